@@ -1,0 +1,121 @@
+"""The tables that `rover.toml` and a simulation's TOML share: one model of each, here.
+
+Units stand in the names. Defaults are Kapvik's (the paper, and the makers' data sheets where it is silent). A
+`…_relative_std` says how well a value is known before any recording: 0 means exactly.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Efficiency = Annotated[float, Field(gt=0, le=1)]
+
+
+class Table(BaseModel):
+    """A TOML table: unknown keys are errors, and nothing changes after reading."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Drivetrain(Table):
+    """Motor, planetary gear and harmonic drive, from current to torque at the wheel (Eq. 11)."""
+
+    torque_constant_Nm_per_A: Positive = 0.0234
+    planetary_ratio: Positive = 14.0
+    planetary_efficiency: Efficiency = 0.70
+    harmonic_ratio: Positive = 100.0
+    harmonic_efficiency: Efficiency = 0.70
+    gain_relative_std: NotNegative = 0.0
+
+    @property
+    def ratio(self) -> float:
+        """Motor turns per wheel turn, ζ_PG ζ_HD."""
+        return self.planetary_ratio * self.harmonic_ratio
+
+    @property
+    def gain_Nm_per_A(self) -> float:
+        """Wheel torque per ampere of motor current, κ ζ_PG ζ_HD η_PG η_HD (Eq. 11)."""
+        return self.torque_constant_Nm_per_A * self.ratio * self.planetary_efficiency * self.harmonic_efficiency
+
+
+class Wheel(Table):
+    """A rigid, smooth wheel."""
+
+    radius_m: Positive = 0.075
+    width_m: Positive = 0.07
+
+
+class Rover(Table):
+    """The body that loads the six wheels."""
+
+    mass_kg: Positive = 30.0
+    wheelbase_m: Positive = 0.65
+    track_m: Positive = 0.55
+
+
+class Soil(Table):
+    """One soil: Mohr–Coulomb strength, Janosi's shear modulus and Wong's pressure–sinkage constants.
+
+    `k_c_kN` is in kN/m^(n+1) and `k_phi_kN` in kN/m^(n+2), as Wong tabulates them.
+    """
+
+    cohesion_Pa: NotNegative
+    friction_angle_deg: Annotated[float, Field(gt=0, lt=60)]
+    shear_modulus_m: Positive
+    sinkage_exponent: Positive
+    k_c_kN: float
+    k_phi_kN: Positive
+    cohesion_relative_std: NotNegative = 0.0
+    friction_angle_relative_std: NotNegative = 0.0
+
+
+class Sensors(Table):
+    """The errors of the recorded inputs, as standard deviations."""
+
+    load_relative_std: NotNegative = 0.0
+    ground_speed_relative_std: NotNegative = 0.0
+    pitch_std_rad: NotNegative = 0.0
+    roll_std_rad: NotNegative = 0.0
+    yaw_rate_std_rad_s: NotNegative = 0.0
+    temperature_std_degC: NotNegative = 0.0
+
+
+SOILS = {
+    "lete-sand": Soil(
+        cohesion_Pa=1220,
+        friction_angle_deg=30.3,
+        shear_modulus_m=0.0116,
+        sinkage_exponent=0.79,
+        k_c_kN=102,
+        k_phi_kN=5301,
+    ),
+    "sandy-loam": Soil(
+        cohesion_Pa=3150,
+        friction_angle_deg=30.0,
+        shear_modulus_m=0.0420,
+        sinkage_exponent=0.66,
+        k_c_kN=6.9,
+        k_phi_kN=752,
+    ),
+    "clayey-soil": Soil(
+        cohesion_Pa=4120,
+        friction_angle_deg=11.8,
+        shear_modulus_m=0.0254,
+        sinkage_exponent=0.50,
+        k_c_kN=13.19,
+        k_phi_kN=692.15,
+    ),
+    "medium-soil": Soil(
+        cohesion_Pa=6410,
+        friction_angle_deg=25.7,
+        shear_modulus_m=0.0238,
+        sinkage_exponent=0.80,
+        k_c_kN=29.76,
+        k_phi_kN=2083,
+    ),
+}
+"""Table 1 of the paper, with Wong's pressure–sinkage constants for the same soils."""

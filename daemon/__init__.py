@@ -1,0 +1,1 @@
+"""The acquisition daemon: drivers in, calibration applied, MQTT and a recording out."""

@@ -1,0 +1,60 @@
+"""What the nodes on the bus are, what they measure, and what they say – decoded, in SI units.
+
+This is the drivers' public vocabulary: everything past it speaks of quantities, never of objects or bytes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class NodeKind(StrEnum):
+    """A node's device profile."""
+
+    MOTOR = "motor"  # CiA 402, EPOS-24/1-like
+    LOAD_CELL = "load-cell"  # CiA 404
+    INCLINOMETER = "inclinometer"  # CiA 410
+    GROUND_SPEED = "ground-speed"
+
+
+class Quantity(StrEnum):
+    """A measured quantity; the value is its column name in recordings and messages, unit included."""
+
+    MOTOR_CURRENT = "motor_current_A"
+    MOTOR_SPEED = "motor_speed_rad_s"
+    LOAD = "load_N"
+    GROUND_SPEED = "ground_speed_m_s"
+    PITCH = "pitch_rad"
+    ROLL = "roll_rad"
+    YAW_RATE = "yaw_rate_rad_s"
+    MOTOR_TEMPERATURE = "motor_temperature_degC"
+    BUS_VOLTAGE = "bus_voltage_V"
+    STATUSWORD = "statusword"
+
+
+@dataclass(frozen=True, slots=True)
+class NodeDescription:
+    """A node that the configuration says is on the bus. `wheel` is 0–5 (wheel k of the paper is k − 1), else None."""
+
+    node_id: int
+    kind: NodeKind
+    wheel: int | None
+    required: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Sync:
+    """A SYNC seen on the bus (our own echo included): the instant that a snapshot is of."""
+
+    time_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One TPDO, decoded to SI units."""
+
+    time_ns: int
+    node_id: int
+    cob_id: int
+    values: tuple[tuple[Quantity, float], ...]
