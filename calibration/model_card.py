@@ -3,20 +3,23 @@
 Four keys in the model's `metadata_props`:
 
 - `regolithd.version`: text, changes with every training.
-- `regolithd.inputs`, `regolithd.outputs`: JSON, a list of `{"name", "unit", "low", "high"}` in the order of the columns.
-  `low` and `high` bound the training set; an input outside them is marked so in what is published.
+- `regolithd.inputs`, `regolithd.outputs`: JSON, a list of `{"name", "unit", "low", "high"}` in the order of the
+  columns. `low` and `high` bound the training set; an input outside them is marked so in what is published.
 - `regolithd.gain_Nm_per_A`: number, the drivetrain's gain (Eq. 11) that the training set was made with. A network that
   takes `motor_current_A` is given the torque divided by this, so that it is not tied to one rover's gears.
 
-The model has one input of shape (N, inputs) and one output of shape (N, outputs), float32, N free. Scaling is inside the
-model: it takes and returns the units that it names.
+The model has one input of shape (N, inputs) and one output of shape (N, outputs), float32, N free. Scaling is inside
+the model: it takes and returns the units that it names.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 INPUTS = {
     "load_N": "N",
