@@ -8,11 +8,22 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Efficiency = Annotated[float, Field(gt=0, le=1)]
+
+
+def _one_or_six(value: object) -> object:
+    """Return six values where one was given: the same for each wheel."""
+    return (value,) * 6 if isinstance(value, int | float) else value
+
+
+SixNotNegative = Annotated[
+    tuple[NotNegative, NotNegative, NotNegative, NotNegative, NotNegative, NotNegative], BeforeValidator(_one_or_six)
+]
+SixPositive = Annotated[tuple[Positive, Positive, Positive, Positive, Positive, Positive], BeforeValidator(_one_or_six)]
 
 
 class Table(BaseModel):
@@ -22,7 +33,12 @@ class Table(BaseModel):
 
 
 class Drivetrain(Table):
-    """Motor, planetary gear and harmonic drive, from current to torque at the wheel (Eq. 11)."""
+    """Motor, planetary gear and harmonic drive, from current to torque at the wheel (Eq. 11).
+
+    The last fields are what a wheels-up spin and a brake measure, one value for each wheel (or one for all): the
+    current that only turns the drivetrain, I = `no_load_current_A` + `viscous_current_A_s_per_rad` |ω_motor|, and a
+    factor on the gain. Eq. 11 has none of them; with the defaults it is Eq. 11.
+    """
 
     torque_constant_Nm_per_A: Positive = 0.0234
     planetary_ratio: Positive = 14.0
@@ -30,6 +46,11 @@ class Drivetrain(Table):
     harmonic_ratio: Positive = 100.0
     harmonic_efficiency: Efficiency = 0.70
     gain_relative_std: NotNegative = 0.0
+    no_load_current_A: SixNotNegative = (0.0,) * 6
+    no_load_current_std_A: SixNotNegative = (0.0,) * 6
+    viscous_current_A_s_per_rad: SixNotNegative = (0.0,) * 6
+    viscous_current_std_A_s_per_rad: SixNotNegative = (0.0,) * 6
+    gain_factor: SixPositive = (1.0,) * 6
 
     @property
     def ratio(self) -> float:

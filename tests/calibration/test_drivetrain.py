@@ -1,0 +1,31 @@
+"""Eq. 11 both ways, and the no-load current that it leaves out."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from calibration.drivetrain import motor_current, no_load_current, wheel_torque
+from calibration.parameters import Drivetrain
+
+FRICTION = Drivetrain(no_load_current_A=(0.03, 0.031, 0.037, 0.04, 0.033, 0.036), viscous_current_A_s_per_rad=2e-5)  # type: ignore[arg-type]
+
+
+def test_without_friction_it_is_equation_11() -> None:
+    """80 mA through the default gears are κ ζ ζ η η I = 0.0234 · 1400 · 0.49 · 0.08 N·m."""
+    torque = wheel_torque(np.full(6, 0.080), np.full(6, 400.0), Drivetrain())
+    np.testing.assert_allclose(torque, 0.0234 * 14 * 100 * 0.7 * 0.7 * 0.080)
+
+
+@given(torque=st.floats(-5, 5), speed=st.floats(-900, 900))
+def test_current_and_torque_invert_each_other(torque: float, speed: float) -> None:
+    """Whatever the torque and speed, the way to current and back changes nothing."""
+    torques, speeds = np.full(6, torque), np.full(6, speed)
+    back = wheel_torque(motor_current(torques, speeds, FRICTION), speeds, FRICTION)
+    np.testing.assert_allclose(back, torques, atol=1e-12)
+
+
+def test_friction_opposes_either_direction_and_rests_at_standstill() -> None:
+    """The no-load current is odd in speed and zero where nothing turns."""
+    speed = np.linspace(10, 400, 6)
+    np.testing.assert_allclose(no_load_current(-speed, FRICTION), -no_load_current(speed, FRICTION))
+    np.testing.assert_array_equal(no_load_current(np.zeros(6), FRICTION), 0)
