@@ -100,7 +100,8 @@ class Snapshot:
     @property
     def valid(self) -> Mask:
         """Where current, speed and load all arrived in this SYNC's window."""
-        return ~np.isnan(self.values[:3]).any(axis=0)
+        needed: Mask = np.isfinite(self.values[: len(NEEDED)])
+        return np.logical_and.reduce(needed, axis=0)
 
 
 @dataclass(frozen=True, slots=True)
