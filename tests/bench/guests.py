@@ -1,0 +1,245 @@
+"""Runs the tests marked `vcan` or `systemd` inside one guest each, and reports them here under their own names.
+
+The marked tests are moved to the end of the run. The first of them boots its guest (`with-vcan`, `with-systemd`), in
+which one nested pytest runs all of them and writes each report as a line of JSON; this pytest reads the lines as they
+come and reports them as if it had run the tests itself. Inside the guest, or where this kernel has the links already,
+the tests simply run.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+HERE = Path(__file__).parent
+INSIDE = "BENCH_GUEST"
+REPORTS = "BENCH_REPORTS"
+SILENCE_s = 300
+"""How long a guest may report nothing before it counts as hung: a boot and the longest test's own time limit."""
+PACKAGES = {
+    "vcan": "user-mode-linux iproute2 kmod hostname can-utils",
+    "systemd": "user-mode-linux iproute2 kmod hostname can-utils systemd python3-venv",
+}
+
+
+def links_are_up() -> bool:
+    """Whether this kernel has both vcan links, and they are up."""
+    flags = [Path("/sys/class/net", link, "flags") for link in ("vcan0", "vcan1")]
+    return all(flag.exists() and int(flag.read_text(), 16) & 1 for flag in flags)
+
+
+def guest_of(item: pytest.Item) -> str | None:
+    """Name the guest that a test needs and is not in already."""
+    if os.environ.get(INSIDE):
+        return None
+    if item.get_closest_marker("systemd"):
+        return "systemd"
+    if item.get_closest_marker("vcan") and not links_are_up():
+        return "vcan"
+    return None
+
+
+def why_not(guest: str) -> str | None:
+    """Say why a guest cannot run on this machine, and the cure."""
+    if shutil.which("linux.uml") and shutil.which("ip") and Path("/usr/lib/uml/modules").is_dir():
+        return None
+    if guest == "vcan" and shutil.which("ip"):
+        tried = subprocess.run(
+            [HERE / "with-vcan", "true"], env={**os.environ, "VCAN_MODE": "native"}, check=False, capture_output=True
+        )
+        if tried.returncode == 0:
+            return None
+    return f"no {guest} here: apt-get install {PACKAGES[guest]}"
+
+
+@dataclass
+class Guest:
+    """One nested pytest inside a guest, and what it has reported so far."""
+
+    name: str
+    folder: Path
+    node_ids: list[str]
+    root: Path
+    process: subprocess.Popen[bytes] | None = None
+    reader: IO[str] | None = None
+    rest: str = ""
+    reports: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+    finished: set[str] = field(default_factory=set)
+
+    def start(self) -> None:
+        """Boot the guest with a nested pytest as its command."""
+        selection = self.folder / "selection"
+        selection.write_text("".join(f"{node_id}\n" for node_id in self.node_ids))
+        lines = self.folder / "reports"
+        lines.touch()
+        self.reader = lines.open()
+        pytest_command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--durations=0", f"@{selection}"]
+        inside = {INSIDE: self.name, REPORTS: str(lines), "BENCH_SHARED": str(self.folder)}
+        with (self.folder / "output").open("wb") as output:
+            self.process = subprocess.Popen(
+                [HERE / f"with-{self.name}", *pytest_command],
+                cwd=self.root,
+                env={**os.environ, **inside},
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+            )
+
+    def runs(self) -> bool:
+        """Whether the guest is up."""
+        return self.process is not None and self.process.poll() is None
+
+    def wait_for(self, node_id: str) -> bool:
+        """Read reports until a test is finished; false if the guest ended, or fell silent, before."""
+        heard = time.monotonic()
+        while node_id not in self.finished:
+            ended = not self.runs()
+            if self.read():
+                heard = time.monotonic()
+            elif ended or time.monotonic() - heard > SILENCE_s:
+                return False
+            else:
+                time.sleep(0.1)
+        return True
+
+    def read(self) -> bool:
+        """Take in the lines that were written since; true if there were any."""
+        assert self.reader is not None
+        *lines, self.rest = (self.rest + self.reader.read()).split("\n")
+        for line in lines:
+            message = json.loads(line)
+            if "finished" in message:
+                self.finished.add(message["finished"])
+            else:
+                self.reports.setdefault(message["nodeid"], []).append(message)
+        return bool(lines)
+
+    def output(self) -> str:
+        """Return the end of what the guest printed."""
+        return (self.folder / "output").read_text(errors="replace")[-8000:]
+
+    def stop(self) -> None:
+        """End the guest, however far it is."""
+        if self.process is None:
+            return
+        self.process.terminate()
+        try:
+            self.process.wait(20)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        if self.reader is not None:
+            self.reader.close()
+
+
+class Guests:
+    """The outer side: moves the marked tests to the end and replays what their guest reports."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.guests: dict[str, Guest] = {}
+        self.missing: dict[str, str] = {}
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """Put the tests of each guest together, behind all others."""
+        items.sort(key=lambda item: {None: 0, "vcan": 1, "systemd": 2}[guest_of(item)])
+        for item in items:
+            if guest_of(item):
+                item.add_marker(pytest.mark.timeout(0), append=False)  # the nested run keeps the time
+
+    def guest_for(self, item: pytest.Item) -> Guest | None:
+        """Return the running guest of a test, booted if it is the first to need it; None if there can be none."""
+        name = guest_of(item)
+        assert name is not None
+        if name in self.missing:
+            return None
+        if name not in self.guests:
+            if reason := why_not(name):
+                self.missing[name] = reason
+                return None
+            folder = self.folder / name
+            folder.mkdir(parents=True)
+            node_ids = [other.nodeid for other in item.session.items if guest_of(other) == name]
+            self.guests[name] = Guest(name, folder, node_ids, item.config.rootpath)
+            self.guests[name].start()
+        return self.guests[name]
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> bool | None:
+        """Report a test that runs in a guest."""
+        if guest_of(item) is None:
+            return None
+        item.ihook.pytest_runtest_logstart(nodeid=item.nodeid, location=item.location)
+        for report in self.outcome(item):
+            item.ihook.pytest_runtest_logreport(report=report)
+        item.ihook.pytest_runtest_logfinish(nodeid=item.nodeid, location=item.location)
+        return True
+
+    def outcome(self, item: pytest.Item) -> Iterator[pytest.TestReport]:
+        """Yield a test's reports: what the guest says, or why there is nothing."""
+        guest = self.guest_for(item)
+        if guest is None:
+            yield absent(item, self.missing[str(guest_of(item))])
+            return
+        complete = guest.wait_for(item.nodeid)
+        for message in guest.reports.get(item.nodeid, []):
+            yield item.config.hook.pytest_report_from_serializable(config=item.config, data=message)
+        if not complete:
+            how = (
+                "ended"
+                if guest.process is None or guest.process.poll() is not None
+                else f"said nothing for {SILENCE_s} s"
+            )
+            guest.stop()
+            text = f"the {guest.name} guest {how} before this test was done; it printed:\n{guest.output()}"
+            yield pytest.TestReport(item.nodeid, item.location, {}, "failed", text, "call")
+
+    def pytest_sessionfinish(self) -> None:
+        """End the guests; nothing of them outlives the run."""
+        for guest in self.guests.values():
+            guest.stop()
+
+
+def absent(item: pytest.Item, reason: str) -> pytest.TestReport:
+    """Report a test that cannot run here: skipped, but failed in continuous integration."""
+    if os.environ.get("CI"):
+        return pytest.TestReport(
+            item.nodeid, item.location, {}, "failed", f"skipped, which CI does not allow: {reason}", "setup"
+        )
+    where = (str(item.path), item.location[1] or 0, f"Skipped: {reason}")
+    return pytest.TestReport(item.nodeid, item.location, {}, "skipped", where, "setup")
+
+
+class Reporter:
+    """The inner side: writes every report as a line, at once and through to the host."""
+
+    def __init__(self, config: pytest.Config, path: Path) -> None:
+        self.config = config
+        self.lines = path.open("a")
+
+    def write(self, message: dict[str, Any]) -> None:
+        """Append one line; the guest's kernel would keep it for itself without the fsync."""
+        self.lines.write(json.dumps(message) + "\n")
+        self.lines.flush()
+        os.fsync(self.lines.fileno())
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Pass on a phase's report."""
+        self.write(self.config.hook.pytest_report_to_serializable(config=self.config, report=report))
+
+    def pytest_runtest_logfinish(self, nodeid: str) -> None:
+        """Say that a test has nothing more to report."""
+        self.write({"finished": nodeid})
