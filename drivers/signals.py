@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from drivers.nmt import NmtState
+
 
 class NodeKind(StrEnum):
     """A node's device profile."""
@@ -58,3 +60,36 @@ class Reading:
     node_id: int
     cob_id: int
     values: tuple[tuple[Quantity, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NodeState:
+    """A node's heartbeat, or its boot-up message (`NmtState.BOOT_UP`)."""
+
+    time_ns: int
+    node_id: int
+    state: NmtState
+
+
+@dataclass(frozen=True, slots=True)
+class Emergency:
+    """An EMCY message (CiA 301, 7.2.7), in words.
+
+    `code` 0x0000 means that the error of before is gone; `register` is object 0x1001; `vendor` are the five bytes that
+    the manufacturer defines.
+    """
+
+    time_ns: int
+    node_id: int
+    code: int
+    register: int
+    vendor: bytes
+    text: str
+
+    @property
+    def cleared(self) -> bool:
+        """Whether this says that an error is gone, rather than that there is one."""
+        return self.code == 0
+
+
+Signal = Sync | Reading | NodeState | Emergency

@@ -1,0 +1,120 @@
+"""Any python-can interface but SocketCAN, read by one thread.
+
+python-can promises a blocking `recv` for every interface and a file descriptor for few, so one thread per bus blocks in
+`recv` and hands what it got to the loop. It is the only thread in the drivers. Times are python-can's: of the adapter
+where it stamps frames, else of the computer, with the resolution of a float (0.2 µs).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+
+import can
+
+from drivers.bus import Bus, BusState
+from drivers.errors import BusDownError, BusFullError, BusOpenError
+from drivers.frame import Frame
+
+_RECV_TIMEOUT_S = 0.05  # how long closing may take
+_SEND_TIMEOUT_S = 0.1
+
+
+class AdapterBus(Bus):
+    """A bus behind python-can."""
+
+    def __init__(self, interface: str, channel: str, *, bitrate: int | None = None) -> None:
+        super().__init__(interface, channel)
+        settings = {} if bitrate is None else {"bitrate": bitrate}
+        try:
+            self._bus = can.Bus(channel=channel, interface=interface, receive_own_messages=True, **settings)
+        except (can.CanError, OSError, ValueError, TypeError) as error:
+            raise BusOpenError(
+                f"cannot open channel {channel!r} of interface {interface!r}: {error}",
+                cure="`python -m can.viewer --help` lists the interfaces; is the adapter plugged in?",
+            ) from error
+        self._loop = asyncio.get_running_loop()
+        self._pending: list[Frame] = []
+        self._arrived = asyncio.Event()
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._read, name=f"can-{interface}-{channel}", daemon=True)
+        self._thread.start()
+
+    async def receive(self) -> list[Frame]:
+        """See `Bus.receive`."""
+        await self._arrived.wait()
+        self._arrived.clear()
+        batch, self._pending = self._pending, []
+        return batch
+
+    async def send(self, frame: Frame) -> None:
+        """See `Bus.send`."""
+        message = can.Message(
+            arbitration_id=frame.can_id,
+            data=frame.data,
+            is_extended_id=frame.extended,
+            is_remote_frame=frame.remote,
+        )
+        try:
+            self._bus.send(message, timeout=_SEND_TIMEOUT_S)
+        except can.CanTimeoutError as error:
+            self.counters.transmit_failures += 1
+            raise BusFullError(f"{self.interface} {self.channel}: {error}") from error
+        except (can.CanError, OSError) as error:
+            self.counters.transmit_failures += 1
+            raise BusDownError(f"{self.interface} {self.channel}: {error}") from error
+        self.counters.sent += 1
+
+    def close(self) -> None:
+        """Stop the thread and give the adapter back."""
+        self._closing.set()
+        self._thread.join(timeout=1.0)
+        self._bus.shutdown()
+
+    def _read(self) -> None:
+        """Run in the thread: block for one frame, drain what else is there, hand it over."""
+        while not self._closing.is_set():
+            try:
+                message = self._bus.recv(_RECV_TIMEOUT_S)
+                batch = []
+                while message is not None:
+                    batch.append(_frame(message))
+                    message = self._bus.recv(0)
+            except (can.CanError, OSError):
+                if not self._closing.is_set():
+                    self._call(self._down)
+                return
+            if batch:
+                self._call(self._deliver, batch)
+
+    def _call(self, function: object, *arguments: object) -> None:
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(function, *arguments)  # type: ignore[arg-type]
+
+    def _deliver(self, batch: list[Frame]) -> None:
+        counters = self.counters
+        counters.batches += 1
+        counters.largest_batch = max(counters.largest_batch, len(batch))
+        echoed = sum(frame.sent for frame in batch)
+        counters.echoed += echoed
+        counters.received += len(batch) - echoed
+        self._pending.extend(batch)
+        self._arrived.set()
+
+    def _down(self) -> None:
+        self.state = BusState.DOWN
+        self.counters.link_down += 1
+        self._arrived.set()
+
+
+def _frame(message: can.Message) -> Frame:
+    return Frame(
+        time_ns=round(message.timestamp * 1e9) or time.time_ns(),
+        can_id=message.arbitration_id,
+        data=bytes(message.data),
+        extended=message.is_extended_id,
+        remote=message.is_remote_frame,
+        error=message.is_error_frame,
+        sent=not message.is_rx,
+    )

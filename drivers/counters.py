@@ -1,0 +1,30 @@
+"""What is counted on the bus: nothing is lost without a number going up."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import asdict, dataclass, field
+
+
+@dataclass(slots=True)
+class BusCounters:
+    """Counts since the bus was opened; its owner alone writes them."""
+
+    received: int = 0  # frames of others
+    echoed: int = 0  # our own frames, seen on the bus
+    sent: int = 0  # handed to the kernel or the adapter
+    batches: int = 0  # wake-ups that brought frames
+    largest_batch: int = 0
+    kernel_drops: int = 0  # received by the kernel, thrown away because nobody read (SO_RXQ_OVFL)
+    transmit_retries: int = 0  # ENOBUFS: the transmit queue was full, tried again
+    transmit_failures: int = 0  # given up: queue full for too long, or link down
+    bus_off: int = 0
+    link_down: int = 0
+    malformed: int = 0  # not a classic CAN frame at all
+    errors: Counter[str] = field(default_factory=Counter)  # error frames by class (linux/can/error.h)
+
+    def as_dict(self) -> dict[str, int]:
+        """Return all counts flat, for messages and logs: error frames as `error_…`."""
+        flat = asdict(self)
+        errors = flat.pop("errors")
+        return flat | {f"error_{name}": count for name, count in errors.items()}

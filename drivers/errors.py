@@ -1,0 +1,107 @@
+"""What can go wrong on the bus, in one tree; whoever catches `DriverError` has caught it all.
+
+    DriverError
+    ├── BusError (OSError)
+    │   ├── BusOpenError (ConnectionError)   no such interface, no permission, no kernel support
+    │   ├── BusDownError (ConnectionError)   link down, bus-off or adapter gone: nothing can be sent
+    │   └── BusFullError (TimeoutError)      the transmit queue stayed full for the whole retry time
+    ├── DictionaryError (ValueError)         an EDS lacks an object, or maps what does not fit a PDO
+    ├── SdoError
+    │   ├── SdoTimeoutError (TimeoutError)   the node did not answer
+    │   ├── SdoAbortError                    the node (or we) aborted the transfer; carries the abort code
+    │   └── SdoProtocolError (ValueError)    the node answered something that CiA 301 does not allow
+    ├── BootError                            a node could not be booted; carries a `BootReason`
+    └── DriveError (RuntimeError)            a drive did not reach the state, or must not be commanded now
+
+For example, reading 0x1018:01 of a node that is switched off raises
+
+    SdoTimeoutError: node 3, object 0x1018:01: no answer within 0.5 s. Is the node powered, and is its node-ID 3?
+
+Every message says the node, the object where there is one, what happened, and the cure where one is known.
+"""
+
+from __future__ import annotations
+
+
+class DriverError(Exception):
+    """Anything that the drivers raise.
+
+    Parameters
+    ----------
+    what
+        What happened, in plain words, without a full stop.
+    node_id, index, subindex
+        Where it happened; told at the start of the message.
+    cure
+        What a person can do about it; told at its end.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        node_id: int | None = None,
+        index: int | None = None,
+        subindex: int = 0,
+        cure: str = "",
+    ) -> None:
+        self.what = what
+        self.node_id = node_id
+        self.index = index
+        self.subindex = subindex
+        self.cure = cure
+        super().__init__(self._message())
+
+    def _message(self) -> str:
+        places = []
+        if self.node_id is not None:
+            places.append(f"node {self.node_id}")
+        if self.index is not None:
+            places.append(f"object 0x{self.index:04X}:{self.subindex:02X}")
+        place = ", ".join(places)
+        message = f"{place}: {self.what}" if place else self.what
+        return f"{message}. {self.cure}" if self.cure else message
+
+
+class BusError(DriverError, OSError):
+    """The bus itself cannot be used."""
+
+
+class BusOpenError(BusError, ConnectionError):
+    """The bus cannot be opened."""
+
+
+class BusDownError(BusError, ConnectionError):
+    """The link is down, the controller is bus-off or the adapter is gone; frames cannot be sent."""
+
+
+class BusFullError(BusError, TimeoutError):
+    """The transmit queue stayed full for the whole retry time; the frame was not sent."""
+
+
+class DictionaryError(DriverError, ValueError):
+    """An object dictionary (EDS) lacks an object, or maps a PDO that cannot be."""
+
+
+class SdoError(DriverError):
+    """An SDO transfer failed."""
+
+
+class SdoTimeoutError(SdoError, TimeoutError):
+    """The node did not answer an SDO request."""
+
+
+class SdoAbortError(SdoError):
+    """An SDO transfer was aborted; `code` is CiA 301's abort code."""
+
+    def __init__(self, code: int, text: str, *, node_id: int | None, index: int, subindex: int) -> None:
+        self.code = code
+        super().__init__(f"aborted with 0x{code:08X}: {text}", node_id=node_id, index=index, subindex=subindex)
+
+
+class SdoProtocolError(SdoError, ValueError):
+    """A node's SDO answer is not what CiA 301 allows at this point of the transfer."""
+
+
+class DriveError(DriverError, RuntimeError):
+    """A drive did not reach the wanted state, or must not be commanded in the state it is in."""
