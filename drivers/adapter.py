@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from typing import Any
 
 import can
 
@@ -26,7 +27,7 @@ class AdapterBus(Bus):
 
     def __init__(self, interface: str, channel: str, *, bitrate: int | None = None) -> None:
         super().__init__(interface, channel)
-        settings = {} if bitrate is None else {"bitrate": bitrate}
+        settings: dict[str, Any] = {} if bitrate is None else {"bitrate": bitrate}
         try:
             self._bus = can.Bus(channel=channel, interface=interface, receive_own_messages=True, **settings)
         except (can.CanError, OSError, ValueError, TypeError) as error:

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
-from drivers.nmt import NmtState
+if TYPE_CHECKING:
+    from drivers.nmt import NmtState
 
 
 class NodeKind(StrEnum):
@@ -37,12 +39,18 @@ class Quantity(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class NodeDescription:
-    """A node that the configuration says is on the bus. `wheel` is 0–5 (wheel k of the paper is k − 1), else None."""
+    """A node that the configuration says is on the bus. `wheel` is 0–5 (wheel k of the paper is k − 1), else None.
+
+    `diagnostics` asks a motor controller for TPDO 2 as well: supply voltage and winding temperature, which not every
+    controller has as objects. `serial` (0x1018:04), where given, must match.
+    """
 
     node_id: int
     kind: NodeKind
     wheel: int | None
     required: bool = True
+    diagnostics: bool = False
+    serial: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
