@@ -1,7 +1,8 @@
 # Two commands: `make demo` shows it running, `make test` proves it. The others are for those who change it.
-PYTHON ?= python3
+# PYTHON=/path/to/python chooses the interpreter (3.11 or newer).
 VENV := .venv
 BIN := $(VENV)/bin
+export PYTHON
 
 .PHONY: demo test check clean
 
@@ -9,7 +10,8 @@ demo: $(VENV)/demo.ready
 	$(BIN)/regolithd demo
 
 test: $(VENV)/dev.ready
-	$(BIN)/pytest
+	.ci/test-packages
+	$(BIN)/python -m pytest
 
 check: $(VENV)/dev.ready
 	$(BIN)/ruff check
@@ -17,11 +19,8 @@ check: $(VENV)/dev.ready
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-$(VENV)/bin/pip:
-	$(PYTHON) -m venv $(VENV)
-
-$(VENV)/%.ready: pyproject.toml $(VENV)/bin/pip
-	$(BIN)/pip install --quiet --editable '.[$*]'
+$(VENV)/%.ready: pyproject.toml
+	.ci/virtual-environment $(VENV) $*
 	touch $@
 
 clean:

@@ -16,7 +16,7 @@ import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -73,8 +73,7 @@ class Guest:
     node_ids: list[str]
     root: Path
     process: subprocess.Popen[bytes] | None = None
-    reader: IO[str] | None = None
-    rest: str = ""
+    offset: int = 0
     reports: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     finished: set[str] = field(default_factory=set)
 
@@ -84,7 +83,6 @@ class Guest:
         selection.write_text("".join(f"{node_id}\n" for node_id in self.node_ids))
         lines = self.folder / "reports"
         lines.touch()
-        self.reader = lines.open()
         pytest_command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--durations=0", f"@{selection}"]
         inside = {INSIDE: self.name, REPORTS: str(lines), "BENCH_SHARED": str(self.folder)}
         with (self.folder / "output").open("wb") as output:
@@ -116,8 +114,10 @@ class Guest:
 
     def read(self) -> bool:
         """Take in the lines that were written since; true if there were any."""
-        assert self.reader is not None
-        *lines, self.rest = (self.rest + self.reader.read()).split("\n")
+        with (self.folder / "reports").open("rb") as file:
+            file.seek(self.offset)
+            *lines, _ = file.read().split(b"\n")  # the last may be half a line still
+        self.offset += sum(len(line) + 1 for line in lines)
         for line in lines:
             message = json.loads(line)
             if "finished" in message:
@@ -140,8 +140,6 @@ class Guest:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
-        if self.reader is not None:
-            self.reader.close()
 
 
 class Guests:
@@ -170,9 +168,10 @@ class Guests:
             if reason := why_not(name):
                 self.missing[name] = reason
                 return None
-            folder = self.folder / name
+            folder = self.folder / f"{name}-{len(list(self.folder.iterdir()))}"
             folder.mkdir(parents=True)
-            node_ids = [other.nodeid for other in item.session.items if guest_of(other) == name]
+            others = item.session.items[item.session.items.index(item) :]
+            node_ids = [other.nodeid for other in others if guest_of(other) == name]
             self.guests[name] = Guest(name, folder, node_ids, item.config.rootpath)
             self.guests[name].start()
         return self.guests[name]
@@ -196,7 +195,10 @@ class Guests:
             return
         complete = guest.wait_for(item.nodeid)
         for message in guest.reports.get(item.nodeid, []):
-            yield item.config.hook.pytest_report_from_serializable(config=item.config, data=message)
+            report = item.config.hook.pytest_report_from_serializable(config=item.config, data=message)
+            if isinstance(report.longrepr, list):  # a skip's place and reason: JSON has no tuples
+                report.longrepr = tuple(report.longrepr)
+            yield report
         if not complete:
             how = (
                 "ended"
@@ -204,6 +206,8 @@ class Guests:
                 else f"said nothing for {SILENCE_s} s"
             )
             guest.stop()
+            if guest.finished:  # it did run: this test took it down, and the others get a new one
+                del self.guests[guest.name]
             text = f"the {guest.name} guest {how} before this test was done; it printed:\n{guest.output()}"
             yield pytest.TestReport(item.nodeid, item.location, {}, "failed", text, "call")
 
