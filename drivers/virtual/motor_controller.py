@@ -1,0 +1,201 @@
+"""A motor controller (CiA 402) in profile velocity mode, EPOS-24/1-like.
+
+Speeds are in rpm at the motor, as the device keeps them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from drivers.virtual.abort import Abort, AbortError
+from drivers.virtual.device import Device
+from drivers.virtual.power_state import HALT, STAYS_IN_QUICK_STOP, PowerState, obey
+
+if TYPE_CHECKING:
+    from drivers.virtual.dictionary import Dictionary, Key
+    from drivers.virtual.emergency import EmergencyProducer
+    from drivers.virtual.plant import Measurement
+
+ABORT_CONNECTION_OPTION, ERROR_CODE, CONTROLWORD, STATUSWORD = 0x6007, 0x603F, 0x6040, 0x6041
+QUICK_STOP_OPTION, DISABLE_OPTION, FAULT_REACTION_OPTION = 0x605A, 0x605C, 0x605E
+MODE, MODE_DISPLAY, DEMAND, ACTUAL, TARGET = 0x6060, 0x6061, 0x606B, 0x606C, 0x60FF
+CURRENT, VOLTAGE, TEMPERATURE = 0x6078, 0x6079, 0x2F00
+CURRENT_AVERAGED, VELOCITY_AVERAGED = 0x2027, 0x2028
+MAX_VELOCITY, ACCELERATION, DECELERATION, QUICK_STOP_DECELERATION = 0x607F, 0x6083, 0x6084, 0x6085
+
+PROFILE_VELOCITY = 3
+COASTING_RPM_PER_S = 50_000.0
+"""How fast the gears' friction stops a motor without current: two gears of 1400 : 1 do not roll on."""
+AVERAGING_S = 0.05  # time constant of 0x2027 and 0x2028
+
+_VOLTAGE_ENABLED, _REMOTE, _TARGET_REACHED, _SPEED_ZERO = 0x0010, 0x0200, 0x0400, 0x1000
+_POWERED = frozenset(
+    {
+        PowerState.SWITCHED_ON,
+        PowerState.OPERATION_ENABLED,
+        PowerState.QUICK_STOP_ACTIVE,
+        PowerState.FAULT_REACTION_ACTIVE,
+    }
+)
+_RAD_S_PER_RPM = math.pi / 30
+
+HEARTBEAT_LOST = 0x8130
+
+
+class MotorController(Device):
+    """State machine, velocity ramp and measurements of one drive."""
+
+    def __init__(self, dictionary: Dictionary, emergency: EmergencyProducer, wheel: int | None) -> None:
+        super().__init__(dictionary, emergency, wheel)
+        self.state = PowerState.NOT_READY_TO_SWITCH_ON
+        self.speed_rpm = 0.0
+        self._controlword = 0
+        self._stop_rpm_per_s = COASTING_RPM_PER_S
+        self._since_measured_s = 0.0
+        self._averages = [0.0, 0.0]
+        self.reset()
+
+    @property
+    def speed_rad_s(self) -> float:
+        """The motor's speed [rad/s]."""
+        return self.speed_rpm * _RAD_S_PER_RPM
+
+    @property
+    def busy(self) -> bool:
+        """Whether it moves, or is about to."""
+        return bool(self.speed_rpm) or self.state in {PowerState.OPERATION_ENABLED, PowerState.FAULT_REACTION_ACTIVE}
+
+    def reset(self) -> None:
+        """Start anew: transitions 0 and 1 are made at once."""
+        self.state = PowerState.SWITCH_ON_DISABLED
+        self.speed_rpm = 0.0
+        self._controlword = 0
+        self._averages = [0.0, 0.0]
+        self._show()
+
+    def check(self, key: Key, value: int) -> None:
+        """Refuse any mode of operation but profile velocity."""
+        if key == (MODE, 0) and value != PROFILE_VELOCITY:
+            raise AbortError(Abort.INVALID_VALUE)
+
+    def written(self, key: Key, value: int) -> None:
+        """Obey the controlword; everything else is read when it is needed."""
+        if key == (CONTROLWORD, 0):
+            before, self._controlword = self._controlword, value
+            was = self.state
+            self.state = obey(was, value, before, quick_stop_option=self.dictionary.get(QUICK_STOP_OPTION))
+            if self.state is not was:
+                self._entered(was)
+        elif key == (MODE, 0):
+            self.dictionary.put(MODE_DISPLAY, 0, value)
+        self._show()
+
+    def fault(self, code: int) -> None:
+        """Make transition 13: react as 0x605E says, then hold in fault (14) until it is reset."""
+        if self.state in {PowerState.FAULT_REACTION_ACTIVE, PowerState.FAULT}:
+            return
+        self.dictionary.put(ERROR_CODE, 0, code)
+        self.emergency.set(code)
+        powered = self.state in _POWERED
+        self.state = PowerState.FAULT_REACTION_ACTIVE
+        option = self.dictionary.get(FAULT_REACTION_OPTION) if powered else 0
+        self._stop_rpm_per_s = self._ramp({1: DECELERATION, 2: QUICK_STOP_DECELERATION}.get(option))
+        self._settle()
+        self._show()
+
+    def connection_lost(self) -> None:
+        """React as 0x6007 says."""
+        option = self.dictionary.get(ABORT_CONNECTION_OPTION)
+        was = self.state
+        if option == 1:
+            self.fault(HEARTBEAT_LOST)
+        elif option == 2:
+            self.state = obey(was, 0x0000, 0, quick_stop_option=0)
+        elif option == 3:
+            self.state = obey(was, 0x0002, 0, quick_stop_option=0)
+        if option in {2, 3} and self.state is not was:
+            self._entered(was)
+            self._show()
+
+    def advance(self, elapsed_s: float) -> None:
+        """Follow the ramp for a while."""
+        goal, slope = self._goal()
+        change = goal - self.speed_rpm
+        step = slope * elapsed_s
+        self.speed_rpm = goal if abs(change) <= step else self.speed_rpm + math.copysign(step, change)
+        self._since_measured_s += elapsed_s
+        self._settle()
+        self._show()
+
+    def measure(self, measurement: Measurement) -> None:
+        """Put current, voltage and temperature into the dictionary."""
+        wheel = self.wheel or 0
+        put = self.dictionary.put
+        current_mA = 1000 * float(measurement.motor_current_A[wheel])
+        weight = 1 - math.exp(-self._since_measured_s / AVERAGING_S)
+        self._since_measured_s = 0.0
+        for place, value in enumerate((current_mA, self.speed_rpm)):
+            self._averages[place] += weight * (value - self._averages[place])
+        put(CURRENT, 0, round(current_mA))
+        put(CURRENT_AVERAGED, 0, round(self._averages[0]))
+        put(VELOCITY_AVERAGED, 0, round(self._averages[1]))
+        put(VOLTAGE, 0, round(1000 * measurement.bus_voltage_V))
+        put(TEMPERATURE, 0, round(10 * float(measurement.motor_temperature_degC[wheel])))
+
+    def _ramp(self, index: int | None) -> float:
+        return COASTING_RPM_PER_S if index is None else float(self.dictionary.get(index))
+
+    def _entered(self, was: PowerState) -> None:
+        """Choose how the motor stops in the state just entered, and clear what a fault reset ends."""
+        get = self.dictionary.get
+        option: int | None = None
+        if self.state is PowerState.QUICK_STOP_ACTIVE:
+            code = get(QUICK_STOP_OPTION)
+            option = {1: DECELERATION, 2: QUICK_STOP_DECELERATION, 5: DECELERATION, 6: QUICK_STOP_DECELERATION}.get(
+                code
+            )
+        elif self.state is PowerState.SWITCHED_ON and get(DISABLE_OPTION) == 1:
+            option = DECELERATION
+        self._stop_rpm_per_s = self._ramp(option)
+        if was is PowerState.FAULT:
+            self.dictionary.put(ERROR_CODE, 0, 0)
+            self.emergency.clear()
+        self._settle()
+
+    def _settle(self) -> None:
+        """Make the transitions that the drive makes by itself once it stands still: 12 and 14."""
+        if self.speed_rpm:
+            return
+        if self.state is PowerState.FAULT_REACTION_ACTIVE:
+            self.state = PowerState.FAULT
+        elif (
+            self.state is PowerState.QUICK_STOP_ACTIVE
+            and self.dictionary.get(QUICK_STOP_OPTION) not in STAYS_IN_QUICK_STOP
+        ):
+            self.state = PowerState.SWITCH_ON_DISABLED
+
+    def _goal(self) -> tuple[float, float]:
+        """Return the speed that the drive goes for, and the ramp's slope [rpm/s]."""
+        if self.state is not PowerState.OPERATION_ENABLED:
+            return 0.0, self._stop_rpm_per_s
+        get = self.dictionary.get
+        limit = get(MAX_VELOCITY)
+        goal = 0 if self._controlword & HALT else min(max(get(TARGET), -limit), limit)
+        faster = abs(goal) > abs(self.speed_rpm) and goal * self.speed_rpm >= 0
+        return float(goal), float(get(ACCELERATION if faster else DECELERATION))
+
+    def _show(self) -> None:
+        """Put state and speed into the dictionary."""
+        goal, _ = self._goal()
+        word = self.state.value | _REMOTE
+        if self.state in _POWERED:
+            word |= _VOLTAGE_ENABLED
+        if self.speed_rpm == goal:
+            word |= _TARGET_REACHED
+        if not self.speed_rpm:
+            word |= _SPEED_ZERO
+        speed = round(self.speed_rpm)
+        self.dictionary.put(STATUSWORD, 0, word)
+        self.dictionary.put(ACTUAL, 0, speed)
+        self.dictionary.put(DEMAND, 0, speed)

@@ -1,0 +1,144 @@
+"""A node's PDOs: what they carry and when they go follows the configuration that the master wrote, and nothing else.
+
+Objects (CiA 301, 7.5.2): 0x1400 + k and 0x1600 + k describe RPDO k + 1, 0x1800 + k and 0x1A00 + k TPDO k + 1.
+`check` refuses what CiA 301 forbids; `transmit_pdos` and `receive_pdos` compile what is configured, once.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from drivers.virtual.abort import Abort, AbortError
+
+if TYPE_CHECKING:
+    from drivers.virtual.dictionary import Dictionary, Key
+
+RPDO, RPDO_MAPPING, TPDO, TPDO_MAPPING = 0x1400, 0x1600, 0x1800, 0x1A00
+DISABLED = 0x8000_0000  # COB-ID bit 31
+_EXTENDED = 0x2000_0000  # COB-ID bit 29: a 29-bit identifier, which these nodes do not have
+_COB_ID = 0x7FF
+LAST_SYNCHRONOUS = 240
+_EVENT_DRIVEN = (254, 255)
+_RESERVED_COB_IDS = (
+    *(range(0x080), range(0x101, 0x181), range(0x581, 0x600)),
+    *(range(0x601, 0x680), range(0x6E0, 0x800)),
+)
+"""Identifiers that no PDO may use (CiA 301, 7.3.3); 0x080 is the SYNC's."""
+
+
+@dataclass(slots=True)
+class Pdo:
+    """One PDO that is enabled and carries something."""
+
+    cob_id: int
+    transmission_type: int
+    keys: tuple[Key, ...]
+    layout: struct.Struct
+    inhibit_ns: int = 0
+    event_ns: int = 0
+    syncs: int = 0  # SYNCs since it was last sent
+    sent: bytes | None = None  # what was sent last
+    sent_ns: int = 0
+    received: bytes | None = None  # an RPDO that waits for the next SYNC
+
+    @property
+    def synchronous(self) -> bool:
+        """Whether a SYNC sends (or applies) it."""
+        return self.transmission_type <= LAST_SYNCHRONOUS
+
+    def content(self, dictionary: Dictionary) -> bytes:
+        """Return what it says now."""
+        values = dictionary.values
+        return self.layout.pack(*[values[key] for key in self.keys])
+
+
+def transmit_pdos(dictionary: Dictionary) -> list[Pdo]:
+    """Return the TPDOs that are enabled."""
+    return _compile(dictionary, TPDO, TPDO_MAPPING)
+
+
+def receive_pdos(dictionary: Dictionary) -> dict[int, Pdo]:
+    """Return the RPDOs that are enabled, by COB-ID."""
+    return {pdo.cob_id: pdo for pdo in _compile(dictionary, RPDO, RPDO_MAPPING)}
+
+
+def concerns_pdos(index: int) -> bool:
+    """Whether an object is part of the PDOs' configuration."""
+    return RPDO <= index < TPDO_MAPPING + 0x200
+
+
+def check(dictionary: Dictionary, key: Key, value: int) -> None:
+    """Abort a write to a PDO's configuration that CiA 301 forbids."""
+    index, sub = key
+    part, number = index & ~0x1FF, index & 0x1FF
+    if part in {RPDO, TPDO}:
+        _check_communication(dictionary, key, value, transmit=part == TPDO)
+    elif part in {RPDO_MAPPING, TPDO_MAPPING}:
+        transmit = part == TPDO_MAPPING
+        if not dictionary.get((TPDO if transmit else RPDO) + number, 1) & DISABLED:
+            raise AbortError(Abort.UNSUPPORTED_ACCESS)
+        if sub == 0:
+            _check_mapping(dictionary, index, value, transmit=transmit)
+        elif dictionary.get(index, 0):
+            raise AbortError(Abort.UNSUPPORTED_ACCESS)
+        elif value:
+            _mapped(dictionary, value, transmit=transmit)
+
+
+def _compile(dictionary: Dictionary, communication: int, mapping: int) -> list[Pdo]:
+    pdos = []
+    for number in range(0x200):
+        if communication + number not in dictionary.indices:
+            break
+        cob_id = dictionary.get(communication + number, 1)
+        count = dictionary.get(mapping + number, 0)
+        if cob_id & DISABLED or not count:
+            continue
+        keys = tuple(_split(dictionary.get(mapping + number, sub))[0] for sub in range(1, count + 1))
+        layout = struct.Struct("<" + "".join(dictionary.entries[key].format for key in keys))
+        pdo = Pdo(cob_id & _COB_ID, dictionary.get(communication + number, 2), keys, layout)
+        if communication == TPDO:
+            pdo.inhibit_ns = dictionary.get(communication + number, 3) * 100_000
+            pdo.event_ns = dictionary.get(communication + number, 5) * 1_000_000
+        pdos.append(pdo)
+    return pdos
+
+
+def _split(mapping: int) -> tuple[Key, int]:
+    """Return what a mapping entry names, and its length in bits."""
+    return (mapping >> 16, mapping >> 8 & 0xFF), mapping & 0xFF
+
+
+def _mapped(dictionary: Dictionary, mapping: int, *, transmit: bool) -> int:
+    """Return a mapping entry's length in bits, or abort where it cannot be mapped."""
+    key, bits = _split(mapping)
+    entry = dictionary.find(key)
+    allowed = entry.readable if transmit else entry.writable
+    if not (entry.mappable and allowed and bits == entry.bits):
+        raise AbortError(Abort.NOT_MAPPABLE)
+    return bits
+
+
+def _check_mapping(dictionary: Dictionary, index: int, count: int, *, transmit: bool) -> None:
+    if count > 8:
+        raise AbortError(Abort.PDO_LENGTH)
+    mappings = [dictionary.get(index, sub) for sub in range(1, count + 1)]
+    if sum(_mapped(dictionary, mapping, transmit=transmit) for mapping in mappings) > 64:
+        raise AbortError(Abort.PDO_LENGTH)
+
+
+def _check_communication(dictionary: Dictionary, key: Key, value: int, *, transmit: bool) -> None:
+    index, sub = key
+    before = dictionary.get(index, 1)
+    enabled = not before & DISABLED
+    if sub == 1 and not value & DISABLED:
+        moved = enabled and (value ^ before) & _COB_ID
+        reserved = any((value & _COB_ID) in cob_ids for cob_ids in _RESERVED_COB_IDS)
+        if moved or reserved or value & _EXTENDED:
+            raise AbortError(Abort.INVALID_VALUE)
+    if sub == 2 and value > LAST_SYNCHRONOUS and value not in _EVENT_DRIVEN:
+        raise AbortError(Abort.INVALID_VALUE)  # reserved, or by remote request, which these nodes do not serve
+    if sub == 3 and transmit and enabled:
+        raise AbortError(Abort.INVALID_VALUE)

@@ -1,0 +1,191 @@
+"""The virtual rover: fourteen nodes and the world they measure, behind one bus.
+
+    async with open_bus("virtual", "demo") as bus:
+        await VirtualRover(plant).run(bus)
+
+One task reads, answers and sends for all nodes. At each SYNC the world is asked once, so that what the nodes report is
+of one instant. The bus is drained before any deadline is looked at: a process that slept does not take its own sleep
+for the master's silence.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import heapq
+import itertools
+import time
+from collections import Counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from drivers.errors import BusError
+from drivers.frame import Frame
+from drivers.signals import NodeDescription, NodeKind
+from drivers.virtual.motor_controller import MotorController
+from drivers.virtual.node import VirtualNode
+from drivers.virtual.plant import WHEELS
+from drivers.virtual.tell import tell
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from drivers.bus import Bus
+    from drivers.virtual.plant import Array, Plant
+
+KAPVIK = (
+    *(NodeDescription(1 + wheel, NodeKind.MOTOR, wheel) for wheel in range(WHEELS)),
+    *(NodeDescription(11 + wheel, NodeKind.LOAD_CELL, wheel) for wheel in range(WHEELS)),
+    NodeDescription(21, NodeKind.INCLINOMETER, None, required=False),
+    NodeDescription(22, NodeKind.GROUND_SPEED, None, required=False),
+)
+"""The nodes that the rover has."""
+
+MOVING_STEP_NS = 20_000_000
+"""How often the drives' ramps are followed where no SYNC does it."""
+IDLE_STEP_NS = 200_000_000
+LONGEST_STEP_S = 1.0
+"""A clock that jumps further than this moves the world no further."""
+
+
+class VirtualRover:
+    """All nodes of a rover.
+
+    Parameters
+    ----------
+    plant
+        The world.
+    nodes
+        Which nodes there are.
+    monotonic_ns, wall_ns
+        The clocks: of deadlines, and of the frames' kernel times.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        nodes: Iterable[NodeDescription] = KAPVIK,
+        *,
+        monotonic_ns: Callable[[], int] = time.monotonic_ns,
+        wall_ns: Callable[[], int] = time.time_ns,
+    ) -> None:
+        self._plant = plant
+        self._monotonic_ns = monotonic_ns
+        self._wall_ns = wall_ns
+        self._at_once: list[Frame] = []
+        self._later: list[tuple[int, int, Frame]] = []
+        self._order = itertools.count()
+        self.nodes = {each.node_id: VirtualNode(each, self._emit) for each in nodes}
+        self._drives = [node.device for node in self.nodes.values() if isinstance(node.device, MotorController)]
+        self._time_s = 0.0
+        self._measured_ns: int | None = None  # by the wall clock
+        self._step_due = 0
+        self._sync_interval_ns = 0
+        self._bus_counts: Counter[str] = Counter()
+
+    # What happens, without any input or output
+
+    def power_on(self, now: int) -> None:
+        """Switch every node on."""
+        for node in self.nodes.values():
+            node.power_on(now)
+
+    def take(self, frame: Frame, now: int) -> None:
+        """Let all nodes see a frame."""
+        if frame.sent or frame.error:
+            return
+        if any(frame.can_id == node.sync_cob_id for node in self.nodes.values()):
+            self._bus_counts["sync"] += 1
+            before = self._measured_ns
+            self._step(frame.time_ns, now)
+            self._sync_interval_ns = frame.time_ns - before if before is not None else 0
+            self._step_due = now + max(IDLE_STEP_NS, 3 * self._sync_interval_ns)
+        for node in self.nodes.values():
+            node.receive(frame, now)
+
+    def tick(self, now: int) -> None:
+        """Do what is due by `now`."""
+        if now >= self._step_due:
+            self._step(self._wall_ns(), now)
+            self._step_due = now + (MOVING_STEP_NS if any(drive.busy for drive in self._drives) else IDLE_STEP_NS)
+        for node in self.nodes.values():
+            due = node.due()
+            if due is not None and now >= due:
+                node.tick(now)
+
+    def due(self) -> int:
+        """Return when `tick` (or `outgoing`) has something to do next."""
+        moments = [due for node in self.nodes.values() if (due := node.due()) is not None]
+        if self._later:
+            moments.append(self._later[0][0])
+        return min([self._step_due, *moments])
+
+    def outgoing(self, now: int) -> list[Frame]:
+        """Return the frames that go out now, and forget them."""
+        frames, self._at_once = self._at_once, []
+        while self._later and self._later[0][0] <= now:
+            frames.append(heapq.heappop(self._later)[2])
+        return frames
+
+    def tell(self, line: str) -> str:
+        """Obey a command (`drivers.virtual.tell`) and return its answer."""
+        return tell(self, line, self._monotonic_ns())
+
+    def counts(self) -> dict[str, dict[str, int]]:
+        """Return what was seen and sent: `bus` for the whole, then each node by its ID."""
+        return {"bus": dict(self._bus_counts)} | {str(node.id): dict(node.counts) for node in self.nodes.values()}
+
+    def _emit(self, due: int, can_id: int, data: bytes) -> None:
+        frame = Frame(0, can_id, data)
+        if due:
+            heapq.heappush(self._later, (due, next(self._order), frame))
+        else:
+            self._at_once.append(frame)
+
+    def _step(self, wall_ns: int, now: int) -> None:
+        """Move the world on to `wall_ns` and let every node measure it."""
+        elapsed_s = 0.0 if self._measured_ns is None else (wall_ns - self._measured_ns) / 1e9
+        elapsed_s = min(max(elapsed_s, 0.0), LONGEST_STEP_S)
+        self._measured_ns = wall_ns
+        self._time_s += elapsed_s
+        for node in self.nodes.values():
+            node.advance(elapsed_s)
+        measurement = self._plant.measure(self._time_s, self._motor_speeds())
+        for node in self.nodes.values():
+            node.measure(measurement, now)
+
+    def _motor_speeds(self) -> Array:
+        speeds = np.zeros(WHEELS)
+        for drive in self._drives:
+            if drive.wheel is not None:
+                speeds[drive.wheel] = drive.speed_rad_s
+        return speeds
+
+    # The bus
+
+    async def run(self, bus: Bus) -> None:
+        """Serve the bus until cancelled."""
+        self.power_on(self._monotonic_ns())
+        while True:
+            for frame in await self._receive(bus):
+                self.take(frame, self._monotonic_ns())
+            self.tick(self._monotonic_ns())
+            await self._send(bus, self.outgoing(self._monotonic_ns()))
+
+    async def _receive(self, bus: Bus) -> list[Frame]:
+        """Return what has arrived, or nothing once something else is due."""
+        for patience_s in ((self.due() - self._monotonic_ns()) / 1e9, 0.0):
+            try:
+                async with asyncio.timeout(max(patience_s, 0.0)):
+                    return await bus.receive()
+            except TimeoutError:
+                continue  # once more, without waiting: frames may have come together with the deadline
+        return []
+
+    async def _send(self, bus: Bus, frames: list[Frame]) -> None:
+        for frame in frames:
+            try:
+                await bus.send(frame)
+                self._bus_counts["sent"] += 1
+            except BusError:
+                self._bus_counts["unsent"] += 1  # the frame is lost, as it would be for a real node
