@@ -17,6 +17,12 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+
+@app.callback()
+def _commands() -> None:
+    """Make each command a word of its own, even while there is only one."""
+
+
 for module in pkgutil.iter_modules(commands.__path__):
     importlib.import_module(f"daemon.commands.{module.name}").register(app)
 

@@ -1,5 +1,8 @@
 """Eq. 11 both ways, and the no-load current that it leaves out."""
 
+import csv
+from pathlib import Path
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -29,3 +32,12 @@ def test_friction_opposes_either_direction_and_rests_at_standstill() -> None:
     speed = np.linspace(10, 400, 6)
     np.testing.assert_allclose(no_load_current(-speed, FRICTION), -no_load_current(speed, FRICTION))
     np.testing.assert_array_equal(no_load_current(np.zeros(6), FRICTION), 0)
+
+
+def test_reference_currents_follow_from_reference_torques(shared_folder: Path) -> None:
+    """The independently computed table's currents are its torques through Eq. 11."""
+    with (shared_folder / "reference" / "rover-wheel.csv").open() as file:
+        rows = [(float(row["torque_Nm"]), float(row["motor_current_A"])) for row in csv.DictReader(file)]
+    torque, current = np.array(rows).T
+    ours = motor_current(np.tile(torque[:, None], 6), np.full(6, 10.0), Drivetrain())
+    np.testing.assert_allclose(ours, np.tile(current[:, None], 6), rtol=1e-6)

@@ -1,0 +1,49 @@
+"""`regolithd train`: the paper's network, trained and frozen to ONNX."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(help="Train the paper's network on its 504 pairs and freeze it to ONNX.")(train)
+
+
+def train(
+    out: Annotated[Path, typer.Option(help="where the network goes")] = Path("calibration/models/terrain.onnx"),
+    config: Annotated[Path | None, typer.Option(help="take [drivetrain] and [wheel] from this TOML")] = None,
+    neurons: Annotated[int, typer.Option(min=1, help="hidden neurons")] = 64,
+    trainings: Annotated[int, typer.Option(min=1, help="how many to train; the one with the lowest MSE is kept")] = 100,
+    epochs: Annotated[int, typer.Option(min=1, help="the most epochs of one training")] = 10_000,
+    seed: Annotated[int, typer.Option(help="of the order of the pairs and of the initial weights")] = 1,
+) -> None:
+    """Train `trainings` networks and keep the best."""
+    import tomllib
+
+    import numpy as np
+    import onnx
+    from rich.progress import track
+
+    from calibration.paper import backpropagation
+    from calibration.paper.freeze import card, freeze
+    from calibration.paper.training_set import training_set
+    from calibration.parameters import Drivetrain, Wheel
+
+    tables = tomllib.loads(config.read_text(encoding="utf-8")) if config else {}
+    drivetrain, wheel = Drivetrain(**tables.get("drivetrain", {})), Wheel(**tables.get("wheel", {}))
+    pairs = training_set(drivetrain, wheel, np.random.default_rng(seed))
+    seeds = np.random.SeedSequence(seed).spawn(trainings)
+    done = [
+        backpropagation.train(pairs, neurons, np.random.default_rng(each), epochs)
+        for each in track(seeds, description=f"training 3:{neurons}:2")
+    ]
+    best = min(done, key=lambda training: training.mse)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    onnx.save(freeze(best.network, pairs), out)
+    mean = float(np.mean([training.mse for training in done]))
+    typer.echo(f"{card(best.network, pairs).version}: MSE {best.mse:.4f} after {best.epochs} epochs")
+    typer.echo(f"mean MSE of {trainings}: {mean:.4f} (the paper: 0.0251). Wrote {out}.")
