@@ -1,0 +1,191 @@
+"""Keeps everything that was acquired, within a bound of disk space: pairs of `TIME.mcap` and `TIME.log`.
+
+What is written is handed to the kernel twice a second, so a killed daemon loses less than the last second. A disk that
+is full or gone stops the recording and nothing else: `trouble` says why, and a new pair is tried every ten seconds.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import IO, TYPE_CHECKING
+
+from daemon.recording.candump import frame_line
+from daemon.recording.content import ESTIMATE, EVENT, SNAPSHOT, estimate_json, snapshot_json
+from daemon.recording.mcap_file import McapFile
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    from daemon.config import Recording
+    from daemon.snapshot import Estimate
+    from drivers.frame import Frame
+
+FLUSH_S = 0.4
+RETRY_S = 10.0
+MEGABYTE = 1_000_000
+
+
+@dataclass(slots=True)
+class _Pair:
+    """The two files being written."""
+
+    mcap: McapFile
+    log: IO[str]
+    mcap_path: Path
+    log_path: Path
+    begun_ns: int
+
+    def flush(self) -> None:
+        self.log.flush()
+        self.mcap.flush()
+
+    def close(self) -> None:
+        try:
+            self.mcap.close()
+        finally:
+            self.log.close()
+
+
+class Recorder:
+    """Owns the recording's files; `run` flushes and rotates them, everything else only appends.
+
+    Parameters
+    ----------
+    settings
+        Where, how much, how long a file.
+    interface
+        The CAN interface's name in the log.
+    metadata
+        What every file says about itself: configuration, network, version.
+    now_ns
+        The clock that names the files.
+    """
+
+    def __init__(
+        self,
+        settings: Recording,
+        interface: str,
+        metadata: Mapping[str, str],
+        now_ns: Callable[[], int] = time.time_ns,
+    ) -> None:
+        self._settings = settings
+        self._interface = interface
+        self._metadata = metadata
+        self._now_ns = now_ns
+        self._pair: _Pair | None = None
+        self._retry_ns = 0
+        self.trouble: str | None = None
+        self.lost = 0  # frames that could not be written
+        self._attempt(self._open)
+
+    @property
+    def paths(self) -> tuple[Path, Path] | None:
+        """Return the MCAP file and the log that are being written."""
+        return (self._pair.mcap_path, self._pair.log_path) if self._pair else None
+
+    def frames(self, batch: Sequence[Frame]) -> None:
+        """Append frames to the log."""
+        pair = self._pair
+        if pair is None:
+            self.lost += len(batch)
+            return
+        lines = "".join([frame_line(frame, self._interface) for frame in batch])
+        self._attempt(lambda: pair.log.write(lines))
+
+    def estimate(self, estimate: Estimate) -> None:
+        """Append a snapshot and what the stages made of it."""
+        if pair := self._pair:
+            time_ns, sequence = estimate.snapshot.time_ns, estimate.snapshot.sequence
+            raw, made = snapshot_json(estimate.snapshot), estimate_json(estimate)
+            self._attempt(lambda: pair.mcap.write(SNAPSHOT, time_ns, raw, sequence))
+            self._attempt(lambda: pair.mcap.write(ESTIMATE, time_ns, made, sequence))
+
+    def event(self, time_ns: int, content: bytes) -> None:
+        """Append an event, as JSON."""
+        if pair := self._pair:
+            self._attempt(lambda: pair.mcap.write(EVENT, time_ns, content))
+
+    async def run(self) -> None:
+        """Flush and rotate until cancelled."""
+        while True:
+            await asyncio.sleep(FLUSH_S)
+            self.flush()
+
+    def flush(self) -> None:
+        """Hand everything to the kernel; begin a new pair when it is time, or when the last one failed."""
+        now = self._now_ns()
+        if self._pair is None:
+            if now >= self._retry_ns:
+                self._attempt(self._open)
+            return
+        self._attempt(self._pair.flush)
+        if self._pair and now - self._pair.begun_ns > self._settings.file_minutes * 60e9:
+            self._attempt(self._turn_over)
+
+    def close(self) -> None:
+        """Write the indexes and close both files."""
+        pair, self._pair = self._pair, None
+        if pair:
+            self._attempt(pair.close)
+
+    def _turn_over(self) -> None:
+        self.close()
+        self._open()
+
+    def _open(self) -> None:
+        folder = self._settings.directory
+        folder.mkdir(parents=True, exist_ok=True)
+        self._make_room()
+        begun = self._now_ns()
+        stem = _unused_stem(folder, begun)
+        log = stem.with_suffix(".log").open("x", encoding="ascii")
+        mcap = McapFile(stem.with_suffix(".mcap").open("xb"), self._metadata)
+        self._pair = _Pair(mcap, log, stem.with_suffix(".mcap"), stem.with_suffix(".log"), begun)
+        self.trouble = None
+
+    def _make_room(self) -> None:
+        """Remove the oldest pairs until all of them together are within the limit."""
+        files = sorted(
+            path
+            for path in self._settings.directory.iterdir()
+            if path.suffix in {".mcap", ".log"} and path.name.startswith("rover-")
+        )
+        total = sum(path.stat().st_size for path in files)
+        for path in files:
+            if total <= self._settings.limit_MB * MEGABYTE:
+                return
+            total -= path.stat().st_size
+            path.unlink()
+
+    def _attempt(self, action: Callable[[], object]) -> None:
+        """Do what touches the disk; its failure ends this pair, and nothing else."""
+        try:
+            action()
+        except OSError as error:
+            self.trouble = f"{self._settings.directory}: {error.strerror or error}"
+            self._retry_ns = self._now_ns() + int(RETRY_S * 1e9)
+            pair, self._pair = self._pair, None
+            if pair:
+                _abandon(pair)
+
+
+def _abandon(pair: _Pair) -> None:
+    for close in (pair.log.close, pair.mcap.close):
+        try:
+            close()
+        except OSError:
+            continue  # the reason is told already
+
+
+def _unused_stem(folder: Path, begun_ns: int) -> Path:
+    moment = datetime.fromtimestamp(begun_ns // 1_000_000_000, UTC)
+    name = f"rover-{moment:%Y%m%dT%H%M%SZ}"
+    stem, number = folder / name, 1
+    while stem.with_suffix(".log").exists() or stem.with_suffix(".mcap").exists():
+        number += 1
+        stem = folder / f"{name}-{number}"
+    return stem
