@@ -1,0 +1,29 @@
+"""`regolithd schema`: write down what is published, from the models that publish it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("schema")(schema)
+
+
+def schema(
+    write: Annotated[Path | None, typer.Option(help="Folder to write JSON Schemas, AsyncAPI and table to.")] = None,
+) -> None:
+    """Print the AsyncAPI document of the MQTT messages, or write it and every JSON Schema to a folder."""
+    from daemon.message_documents import documents
+
+    files = documents()
+    if write is None:
+        typer.echo(files["asyncapi.json"], nl=False)
+        return
+    write.mkdir(parents=True, exist_ok=True)
+    for name, text in files.items():
+        (write / name).write_text(text, encoding="utf-8")
+    typer.echo(f"{len(files)} files written to {write}.")

@@ -1,0 +1,97 @@
+"""From what the pipeline knows to the bytes of a message.
+
+The seven messages of a SYNC are built by hand and written by pydantic's own JSON writer: validating what has just been
+computed would cost ten times as much. A test holds that what is written here is what the models say, to the byte.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic_core import to_json
+
+from daemon.messages import SCHEMA_VERSION, iso_time
+from daemon.snapshot import ROW, WHEELS
+from drivers.signals import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from daemon.snapshot import Array, Estimate
+
+_LIVE = f'{{"schema_version":{SCHEMA_VERSION},"late":false,'.encode()
+_LATE = f'{{"schema_version":{SCHEMA_VERSION},"late":true,'.encode()
+
+_MEASURED_PER_WHEEL = (
+    Quantity.MOTOR_CURRENT,
+    Quantity.MOTOR_SPEED,
+    Quantity.LOAD,
+    Quantity.GROUND_SPEED,
+    Quantity.MOTOR_TEMPERATURE,
+    Quantity.BUS_VOLTAGE,
+)
+_BODY = (Quantity.PITCH, Quantity.ROLL, Quantity.YAW_RATE)
+
+
+def write(fields: dict[str, Any]) -> bytes:
+    """Return the JSON of a message's fields; what is not a number becomes null."""
+    return to_json(fields, inf_nan_mode="null")
+
+
+def as_late(payload: bytes) -> bytes:
+    """Return the same message marked as late."""
+    if payload.startswith(_LATE):
+        return payload
+    if not payload.startswith(_LIVE):
+        raise ValueError(f"not a message of schema version {SCHEMA_VERSION}: {payload[:60]!r}")
+    return _LATE + payload[len(_LIVE) :]
+
+
+def _integers(numbers: Array) -> list[int | None]:
+    return [int(number) if number == number else None for number in numbers.tolist()]  # noqa: PLR0124  # NaN differs
+
+
+def _per_wheel(estimate: Estimate) -> dict[str, Sequence[Any]]:
+    """Return every quantity that each wheel has, as six values, under its message's name."""
+    snapshot = estimate.snapshot
+    outside: list[tuple[str, ...]] = [()] * WHEELS
+    if np.logical_or.reduce(estimate.outside, axis=None):
+        outside = [estimate.outside_inputs(wheel) for wheel in range(WHEELS)]
+    return {
+        "measured": snapshot.valid.tolist(),
+        "valid": estimate.valid.tolist(),
+        **{quantity.value: snapshot.values[ROW[quantity]].tolist() for quantity in _MEASURED_PER_WHEEL},
+        "statusword": _integers(snapshot.statusword),
+        "wheel_torque_Nm": estimate.wheel_torque_Nm.tolist(),
+        "smoothed_torque_Nm": estimate.smoothed_torque_Nm.tolist(),
+        "smoothed_load_N": estimate.smoothed_load_N.tolist(),
+        "slip": estimate.slip.tolist(),
+        "slip_source": [source.value for source in estimate.slip_source],
+        "cohesion_Pa": estimate.cohesion_Pa.tolist(),
+        "friction_angle_rad": estimate.friction_angle_rad.tolist(),
+        "outside_training_range": outside,
+    }
+
+
+def _header(estimate: Estimate, session: str) -> dict[str, Any]:
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "late": False,
+        "session": session,
+        "sequence": estimate.snapshot.sequence,
+        "time": iso_time(estimate.snapshot.time_ns),
+        "model_version": estimate.model_version,
+    }
+
+
+def encode(estimate: Estimate, session: str) -> tuple[bytes, list[bytes]]:
+    """Return the `snapshot` message of an estimate, and its six `wheel/…` messages, wheel 1 first."""
+    header = _header(estimate, session)
+    six = _per_wheel(estimate)
+    body = {quantity.value: float(estimate.snapshot.values[ROW[quantity], 0]) for quantity in _BODY}
+    wheels = [
+        write(header | {"wheel": wheel + 1} | {name: values[wheel] for name, values in six.items()})
+        for wheel in range(WHEELS)
+    ]
+    return write(header | body | six), wheels
