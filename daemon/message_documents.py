@@ -136,14 +136,15 @@ document: [asyncapi.json](asyncapi.json).
 
 {table()}
 
-Every message is one JSON object and begins with `schema_version`, `late`, `session`, `sequence` and `time`. Names end in
-their unit; `null` means that it was not measured or could not be estimated. Lists of six belong to wheels 1 to 6.
+Every message is one JSON object and begins with `schema_version`, `late`, `session`, `sequence` and `time`. Names end
+in their unit; `null` means that it was not measured or could not be estimated. Lists of six belong to wheels 1 to 6.
 
 - `session` is one run of the daemon; `(session, sequence)` is unique on a topic. A message with `late: true` comes from
   the store, after the broker had been away, and may repeat one that was received before: compare the two.
 - `state` is `online` from birth to death. An `offline` ends the `online` of the same `session` and `sequence`, and no
   other. While `state` is `offline`, every retained message tells of the past.
-- `snapshot` is complete and in order; `wheel/…` shows the newest without waiting, and is not kept when the broker is away.
+- `snapshot` is complete and in order; `wheel/…` shows the newest without waiting, and is not kept
+  while the broker is away.
 """
 
 

@@ -23,8 +23,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from daemon.snapshot import SlipSource
-from drivers.network import NodePhase
-from drivers.signals import NodeKind
+from drivers.network import NodePhase  # noqa: TC001  # pydantic reads it at run time
+from drivers.signals import NodeKind  # noqa: TC001  # likewise
 
 SCHEMA_VERSION = 1
 """Rises when a field is removed or changes its meaning; new fields alone do not raise it."""
@@ -35,7 +35,7 @@ Time = Annotated[
     str,
     Field(
         pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{9}Z$",
-        description="UTC, ISO 8601 with nanoseconds: text, because JSON numbers above 2^53 lose digits in many readers.",
+        description="UTC, ISO 8601, nanoseconds: text, because JSON numbers above 2^53 lose digits in many readers.",
         examples=["2013-06-11T14:07:22.018291000Z"],
     ),
 ]
@@ -215,7 +215,8 @@ class EventMessage(Header):
     """Something that happened on the bus, in words; what a journal would show."""
 
     kind: str
-    """`node-booted`, `node-boot-failed`, `node-lost`, `node-returned`, `drive-state`, `motion-stopped`, `bus-state` …"""
+    """`node-booted`, `node-boot-failed`, `node-lost`, `node-returned`, `drive-state-changed`, `motion-stopped`,
+    `bus-state-changed`."""
     node_id: NodeNumber | None
     text: str
 

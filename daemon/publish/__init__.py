@@ -1,0 +1,1 @@
+"""Everything that leaves the rover over MQTT: encoded, kept until acknowledged, delivered in order."""
