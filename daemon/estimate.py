@@ -15,7 +15,7 @@ from daemon.snapshot import WHEELS, Array, Mask
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-SHIPPED_MODEL = Path(__file__).parent.parent / "calibration" / "terrain.onnx"
+SHIPPED_MODEL = Path(__file__).parent.parent / "calibration" / "models" / "terrain.onnx"
 """The network that comes with regolithd."""
 
 
