@@ -22,6 +22,8 @@ Every message says the node, the object where there is one, what happened, and t
 
 from __future__ import annotations
 
+from drivers.boot_reason import CURES, BootReason
+
 
 class DriverError(Exception):
     """Anything that the drivers raise.
@@ -51,6 +53,11 @@ class DriverError(Exception):
         self.subindex = subindex
         self.cure = cure
         super().__init__(self._message())
+
+    def locate(self, node_id: int) -> None:
+        """Add the node where only its driver knows it."""
+        self.node_id = node_id
+        self.args = (self._message(),)
 
     def _message(self) -> str:
         places = []
@@ -101,6 +108,16 @@ class SdoAbortError(SdoError):
 
 class SdoProtocolError(SdoError, ValueError):
     """A node's SDO answer is not what CiA 301 allows at this point of the transfer."""
+
+
+class BootError(DriverError):
+    """A node could not be booted; `reason` says why, and brings its cure along."""
+
+    def __init__(
+        self, reason: BootReason, what: str, *, node_id: int, index: int | None = None, subindex: int = 0
+    ) -> None:
+        self.reason = reason
+        super().__init__(what, node_id=node_id, index=index, subindex=subindex, cure=CURES[reason])
 
 
 class DriveError(DriverError, RuntimeError):

@@ -12,33 +12,13 @@ A consumer matches on the class:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from drivers.boot_reason import BootReason
     from drivers.bus import BusState
     from drivers.cia402 import DriveState
     from drivers.signals import Emergency
-
-
-class BootReason(StrEnum):
-    """Why a node could not be booted. The letter is CiA 302-2's, where it has one for the same thing."""
-
-    NO_BOOT_UP = "no-boot-up"  # E/F: silent after the NMT reset
-    NO_SDO_ANSWER = "no-sdo-answer"  # B: no answer for 0x1000
-    WRONG_DEVICE_TYPE = "wrong-device-type"  # C: 0x1000 is another profile's
-    WRONG_VENDOR = "wrong-vendor"  # D: 0x1018:01
-    WRONG_PRODUCT = "wrong-product"  # M: 0x1018:02
-    WRONG_REVISION = "wrong-revision"  # N: 0x1018:03
-    WRONG_SERIAL = "wrong-serial"  # O: 0x1018:04
-    CONFIGURATION_REFUSED = "configuration-refused"  # J: the node aborted a write
-    CONFIGURATION_NOT_KEPT = "configuration-not-kept"  # J: it took a write, but reads back something else
-    FELL_SILENT = "fell-silent"  # J: it stopped answering in the middle
-    RESTARTED = "restarted"  # it booted up again in the middle
-    MALFORMED_ANSWER = "malformed-answer"  # its SDO answers are not CiA 301's
-    NO_HEARTBEAT = "no-heartbeat"  # K: it was told to produce one
-    NOT_OPERATIONAL = "not-operational"  # it does not enter operational
-    BUS_DOWN = "bus-down"  # nothing can be sent
 
 
 @dataclass(frozen=True, slots=True)

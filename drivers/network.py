@@ -14,83 +14,52 @@ is put back into pre-operational.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from enum import StrEnum
+import asyncio
+import time
+from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+from drivers.bus import Bus, BusState
+from drivers.cia402 import DriveState
+from drivers.configuration import CONSUMER_HEARTBEAT
+from drivers.decode import SDO_ANSWER_COB_ID
+from drivers.drive import Drive
+from drivers.emcy import EMCY_COB_ID, parse
+from drivers.errors import DriveError, DriverError
+from drivers.events import (
+    BusStateChanged,
+    DriveStateChanged,
+    MotionStopped,
+    NetworkEvent,
+    NodeEmergency,
+    NodeLost,
+)
+from drivers.heartbeat import produce_heartbeat
+from drivers.link import Link
+from drivers.nmt import ERROR_CONTROL_COB_ID, NmtCommand, parse_state
+from drivers.pdo import tpdos
+from drivers.signals import NodeKind, NodeState
+from drivers.status import NetworkCounters, NetworkSettings, NodePhase, NodeStatus
+from drivers.supervisor import Supervisor
+from drivers.sync import produce_sync
 
-    from drivers.bus import Bus
-    from drivers.cia402 import DriveState
-    from drivers.events import BootReason, Identity, NetworkEvent
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+
     from drivers.frame import Frame
-    from drivers.nmt import NmtState
     from drivers.signals import NodeDescription
 
+__all__ = ["Network", "NetworkCounters", "NetworkSettings", "NodePhase", "NodeStatus"]
 
-class NodePhase(StrEnum):
-    """Where a node is in its life under this master."""
-
-    BOOTING = "booting"
-    OPERATIONAL = "operational"
-    LOST = "lost"  # was operational, is not heard any more
-    FAILED = "failed"  # could not be booted
-
-
-@dataclass(frozen=True, slots=True)
-class NodeStatus:
-    """What is known of one node at this moment."""
-
-    node: NodeDescription
-    phase: NodePhase
-    nmt_state: NmtState | None = None  # as it last said
-    heard_ns: int | None = None  # time of its last heartbeat or boot-up
-    identity: Identity | None = None
-    reason: BootReason | None = None  # of its last failed boot
-    text: str = ""
-    drive_state: DriveState | None = None  # motor controllers only
-    boots: int = 0  # how often it was booted
-    emergencies: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class NetworkSettings:
-    """What the network is to be. Times in seconds, `gear_ratio` in motor turns per wheel turn."""
-
-    nodes: tuple[NodeDescription, ...]
-    sync_rate_Hz: float = 2.0
-    gear_ratio: float = 1400.0
-    master_id: int = 127
-    master_heartbeat_s: float = 0.1
-    master_lost_after_s: float = 0.5  # then the drives stop by themselves (0x1016, 0x6007)
-    node_heartbeat_s: float = 0.2
-    node_lost_after_s: float = 0.7
-    sdo_timeout_s: float = 0.5
-    boot_up_timeout_s: float = 3.0
-    retry_after_s: float = 5.0  # a node that could not be booted, and stays silent
-
-
-@dataclass(slots=True)
-class SyncCounters:
-    """How the SYNC producer keeps its time; jitter is how late a SYNC was sent against its schedule."""
-
-    produced: int = 0
-    skipped: int = 0  # the loop was late by a whole period: that SYNC was left out, never sent in a burst
-    failed: int = 0  # could not be sent: link down or queue full
-    last_late_ns: int = 0
-    worst_late_ns: int = 0
-    mean_late_ns: float = 0.0
-
-
-@dataclass(slots=True)
-class NetworkCounters:
-    """What the network counts of itself."""
-
-    sync: SyncCounters = field(default_factory=SyncCounters)
-    heartbeats_sent: int = 0
-    sdo_transfers: int = 0
-    sdo_failures: int = 0
+_LEAVE_TIMEOUT_S = 5.0  # a stop that cannot be confirmed must not keep the program from ending
+_BUS_STATES = {
+    BusState.ACTIVE: "the bus works",
+    BusState.WARNING: "many errors on the bus: check terminators (60 Ω between the wires), length and plugs",
+    BusState.PASSIVE: "the controller is error passive: is any other node powered, and is the bit rate right?",
+    BusState.OFF: "bus-off: the controller left the bus. `ip link set can0 type can restart-ms 100` lets it return",
+    BusState.DOWN: "the link is down or the adapter is gone: `ip link set can0 up`, or plug it in",
+}
 
 
 class Network:
@@ -116,22 +85,55 @@ class Network:
     ) -> None:
         self.bus = bus
         self.settings = settings
-        self.counters = NetworkCounters()
+        self._counters = NetworkCounters()
         self._on_frames = on_frames
         self._on_event = on_event
+        self._handlers: dict[int, Callable[[Frame], None]] = {}
+        self._supervisors: dict[int, Supervisor] = {}
+        self._drives: dict[int, Drive] = {}
+        self._bus_state = bus.state
+        self._moving = False
+        self._must_stop: NetworkEvent | None = None
+        self._stop_wanted = asyncio.Event()
+        for node in settings.nodes:
+            self._add(node)
 
     @property
     def status(self) -> Mapping[int, NodeStatus]:
         """What is known of each node, by node-ID."""
-        return {node.node_id: NodeStatus(node, NodePhase.BOOTING) for node in self.settings.nodes}
+        return {node_id: self._status(node_id) for node_id in self._supervisors}
+
+    @property
+    def counters(self) -> NetworkCounters:
+        """What the network counts of itself."""
+        clients = [supervisor.link.sdo for supervisor in self._supervisors.values()]
+        self._counters.sdo_transfers = sum(client.transfers for client in clients)
+        self._counters.sdo_failures = sum(client.failures for client in clients)
+        return self._counters
 
     async def run(self) -> None:
         """Read the bus, boot and supervise the nodes, produce SYNC and heartbeat; until cancelled."""
-        async for batch in self.bus:
-            self._on_frames(batch)
+        settings = self.settings
+        async with asyncio.TaskGroup() as lasting:
+            reader = lasting.create_task(self._read())
+            beat = lasting.create_task(
+                produce_heartbeat(self.bus, settings.master_id, settings.master_heartbeat_s, self._count_heartbeat)
+            )
+            try:
+                async with asyncio.TaskGroup() as tasks:
+                    tasks.create_task(produce_sync(self.bus, settings.sync_rate_Hz, self._counters.sync))
+                    tasks.create_task(self._stop_when_wanted())
+                    for supervisor in self._supervisors.values():
+                        tasks.create_task(supervisor.run())
+            finally:
+                await self._leave()
+                reader.cancel()
+                beat.cancel()
 
     async def settled(self) -> None:
         """Wait until each node is operational or has failed its first boot."""
+        for supervisor in self._supervisors.values():
+            await supervisor.link.news.until(lambda supervisor=supervisor: supervisor.attempts > 0)  # type: ignore[misc]
 
     async def enable(self) -> None:
         """Bring all drives to operation enabled, standing still; a fault is reset first.
@@ -139,9 +141,16 @@ class Network:
         Raises
         ------
         DriveError
-            A drive is not on the bus, or does not get there; the message names it and its state.
+            A drive is not on the bus, or does not get there; the message names it and its state. None stays enabled.
         """
-        raise NotImplementedError
+        for node_id in self._drives:
+            status = self._status(node_id)
+            if status.phase is not NodePhase.OPERATIONAL:
+                raise DriveError(f"the drive is not operational ({status.phase}). {status.text}", node_id=node_id)
+        failures = await _each(drive.enable() for drive in self._drives.values())
+        if failures:
+            await _each(drive.disable() for drive in self._live_drives())
+            raise _drive_error(failures)
 
     async def set_speed(self, wheel_speed_rad_s: Sequence[float]) -> None:
         """Turn the wheels at these speeds [rad/s at the wheel, index k − 1 for wheel k]; one RPDO per drive.
@@ -149,14 +158,165 @@ class Network:
         Raises
         ------
         DriveError
-            A drive is not in operation enabled.
+            A drive is not in operation enabled; nothing has been sent then.
+        BusError
+            The bus does not take it; the drives stop by themselves when the heartbeat does not arrive either.
         """
-        raise NotImplementedError
+        for drive in self._drives.values():
+            if self._supervisors[drive.node_id].phase is not NodePhase.OPERATIONAL:
+                raise DriveError("the drive is not operational", node_id=drive.node_id)
+            if drive.state is not DriveState.ENABLED:
+                raise DriveError(f"the drive is in {drive.state}", node_id=drive.node_id, cure="Enable it first")
+        self._moving = any(wheel_speed_rad_s)
+        for drive in self._drives.values():
+            wheel = drive.link.node.wheel
+            if wheel is not None:
+                await drive.turn(wheel_speed_rad_s[wheel] * self.settings.gear_ratio)
 
     async def quick_stop(self) -> None:
-        """Stop all wheels with the quick-stop ramp, now; a drive that is lost does not keep the others from it."""
-        raise NotImplementedError
+        """Stop all wheels with the quick-stop ramp, now, and wait until they stand.
+
+        Raises
+        ------
+        DriveError
+            A drive that is on the bus does not stop. One that is lost does not keep the others from stopping.
+        """
+        self._moving = False
+        failures = await _each(drive.send_quick_stop() for drive in self._drives.values())
+        failures += await _each(drive.until_stopped() for drive in self._live_drives())
+        if failures:
+            raise _drive_error(failures)
 
     async def disable(self) -> None:
-        """Take the power off the motors; wheels that turn are stopped first."""
-        raise NotImplementedError
+        """Take the power off the motors; wheels that turn are stopped first. Raises as `quick_stop` does."""
+        if self._moving or any(drive.state is DriveState.ENABLED for drive in self._live_drives()):
+            await self.quick_stop()
+        failures = await _each(drive.disable() for drive in self._live_drives())
+        if failures:
+            raise _drive_error(failures)
+
+    def _add(self, node: NodeDescription) -> None:
+        node_id = node.node_id
+        link = Link(self.bus, node, sdo_timeout_s=self.settings.sdo_timeout_s)
+        supervisor = Supervisor(link, self.settings, self._emit)
+        self._supervisors[node_id] = supervisor
+        self._handlers[SDO_ANSWER_COB_ID + node_id] = link.sdo.handle
+        self._handlers[ERROR_CONTROL_COB_ID + node_id] = lambda frame: _take_state(link, frame)
+        self._handlers[EMCY_COB_ID + node_id] = lambda frame: self._take_emergency(supervisor, frame)
+        if node.kind is NodeKind.MOTOR:
+            drive = self._drives[node_id] = Drive(self.bus, link)
+            tpdo = tpdos(node.kind)[0].cob_id(node_id)
+            self._handlers[tpdo] = lambda frame: self._take_statusword(drive, frame)
+
+    def _status(self, node_id: int) -> NodeStatus:
+        status = self._supervisors[node_id].status
+        drive = self._drives.get(node_id)
+        return status if drive is None else replace(status, drive_state=drive.state)
+
+    def _live_drives(self) -> list[Drive]:
+        return [
+            drive
+            for node_id, drive in self._drives.items()
+            if self._supervisors[node_id].phase is NodePhase.OPERATIONAL
+        ]
+
+    async def _read(self) -> None:
+        handlers = self._handlers
+        async for batch in self.bus:
+            if batch:
+                self._on_frames(batch)
+            for frame in batch:
+                handler = handlers.get(frame.can_id)
+                if handler is not None and not (frame.sent or frame.error or frame.extended or frame.remote):
+                    handler(frame)
+            if self.bus.state is not self._bus_state:
+                self._bus_state = self.bus.state
+                self._emit(BusStateChanged(time.time_ns(), self._bus_state, _BUS_STATES[self._bus_state]))
+
+    def _take_emergency(self, supervisor: Supervisor, frame: Frame) -> None:
+        node = supervisor.link.node
+        emergency = parse(frame, node.node_id, node.kind)
+        if emergency is None:
+            return
+        supervisor.count_emergency()
+        said = "error gone" if emergency.cleared else f"error 0x{emergency.code:04X}: {emergency.text}"
+        text = f"node {node.node_id} ({node.kind.value}): {said}"
+        self._emit(NodeEmergency(frame.time_ns, node.node_id, emergency, text))
+
+    def _take_statusword(self, drive: Drive, frame: Frame) -> None:
+        before = drive.reported
+        state = drive.take_statusword(int.from_bytes(frame.data[:2], "little"))
+        if state is not before:
+            text = f"drive {drive.node_id}: {before} → {state}"
+            self._emit(DriveStateChanged(frame.time_ns, drive.node_id, state, text))
+
+    def _count_heartbeat(self, sent: bool) -> None:  # a plain yes or no from its producer
+        self._counters.heartbeats_sent += sent
+        self._counters.heartbeats_failed += not sent
+
+    def _emit(self, event: NetworkEvent) -> None:
+        self._on_event(event)
+        if isinstance(event, NodeLost) and event.node_id in self._drives:
+            self._drives[event.node_id].forget()
+        if self._moving and self._ends_motion(event):
+            self._must_stop = event
+            self._stop_wanted.set()
+
+    def _ends_motion(self, event: NetworkEvent) -> bool:
+        match event:
+            case NodeLost(node_id=node_id):
+                return self._supervisors[node_id].link.node.required
+            case DriveStateChanged(state=state):
+                return state is not DriveState.ENABLED
+            case _:
+                return False
+
+    async def _stop_when_wanted(self) -> None:
+        """Stop all wheels when one is lost: a rover that drags a dead wheel digs itself in."""
+        while True:
+            await self._stop_wanted.wait()
+            self._stop_wanted.clear()
+            event = self._must_stop
+            if event is None or not self._moving:
+                continue
+            outcome = "all others are stopped"
+            try:
+                await self.quick_stop()
+            except DriverError as error:
+                outcome = str(error)
+            node_id = getattr(event, "node_id", 0)
+            self._on_event(MotionStopped(time.time_ns(), node_id, f"motion stopped: {event.text}; {outcome}"))
+
+    async def _leave(self) -> None:
+        """Stop and disable the drives, let them forget their master, and put every node into pre-operational."""
+        with suppress(DriverError, TimeoutError):
+            async with asyncio.timeout(_LEAVE_TIMEOUT_S):
+                try:
+                    await self.disable()
+                finally:
+                    await _each(drive.link.sdo.write(CONSUMER_HEARTBEAT, 1, bytes(4)) for drive in self._live_drives())
+        for supervisor in self._supervisors.values():
+            with suppress(DriverError):
+                await supervisor.link.tell(NmtCommand.ENTER_PRE_OPERATIONAL)
+
+
+def _take_state(link: Link, frame: Frame) -> None:
+    state = parse_state(frame.data)
+    if state is not None:
+        link.take_state(NodeState(frame.time_ns, link.node.node_id, state))
+
+
+async def _each(actions: Iterable[Awaitable[None]]) -> list[DriverError]:
+    """Do all at once and return what went wrong, so that one drive's trouble does not keep the others from acting."""
+    results = await asyncio.gather(*actions, return_exceptions=True)
+    failures = []
+    for result in results:
+        if isinstance(result, DriverError):
+            failures.append(result)
+        elif isinstance(result, BaseException):
+            raise result
+    return failures
+
+
+def _drive_error(failures: Sequence[DriverError]) -> DriveError:
+    return DriveError("; ".join(str(failure) for failure in failures), node_id=failures[0].node_id)

@@ -1,0 +1,44 @@
+"""Why a node could not be booted, and what a person can do about it."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class BootReason(StrEnum):
+    """Why a node could not be booted. The letter is CiA 302-2's, where it has one for the same thing."""
+
+    NO_BOOT_UP = "no-boot-up"  # E/F: silent after the NMT reset
+    NO_SDO_ANSWER = "no-sdo-answer"  # B: no answer for 0x1000
+    WRONG_DEVICE_TYPE = "wrong-device-type"  # C: 0x1000 is another profile's
+    WRONG_VENDOR = "wrong-vendor"  # D: 0x1018:01
+    WRONG_PRODUCT = "wrong-product"  # M: 0x1018:02
+    WRONG_REVISION = "wrong-revision"  # N: 0x1018:03
+    WRONG_SERIAL = "wrong-serial"  # O: 0x1018:04
+    CONFIGURATION_REFUSED = "configuration-refused"  # J: the node aborted a write
+    CONFIGURATION_NOT_KEPT = "configuration-not-kept"  # J: it took a write, but reads back something else
+    FELL_SILENT = "fell-silent"  # J: it stopped answering in the middle
+    RESTARTED = "restarted"  # it booted up again in the middle
+    MALFORMED_ANSWER = "malformed-answer"  # its SDO answers are not CiA 301's
+    NO_HEARTBEAT = "no-heartbeat"  # K: it was told to produce one
+    NOT_OPERATIONAL = "not-operational"  # it does not enter operational
+    BUS_DOWN = "bus-down"  # nothing can be sent
+
+
+CURES = {
+    BootReason.NO_BOOT_UP: "Is it powered and wired, is its node-ID right, and has the bus its two 120 Ω terminators?",
+    BootReason.NO_SDO_ANSWER: "Does another device use this node-ID? If not, the node hangs: power it off and on",
+    BootReason.WRONG_DEVICE_TYPE: "Another kind of device has this node-ID: correct the wiring, or rover.toml",
+    BootReason.WRONG_VENDOR: "Another maker's device has this node-ID: correct the wiring, or put its EDS in place",
+    BootReason.WRONG_PRODUCT: "Another product has this node-ID: correct the wiring, or put its EDS in place",
+    BootReason.WRONG_REVISION: "Its firmware behaves differently: update it, or put the EDS of its revision in place",
+    BootReason.WRONG_SERIAL: "The device was exchanged: put its serial number into rover.toml, and calibrate it",
+    BootReason.CONFIGURATION_REFUSED: "The EDS does not describe this device: compare it with the device's own EDS",
+    BootReason.CONFIGURATION_NOT_KEPT: "The device changes the value by itself: compare its EDS, update its firmware",
+    BootReason.FELL_SILENT: "Its supply or its plug may be loose; it is tried again",
+    BootReason.RESTARTED: "Its supply may be too weak; it is tried again",
+    BootReason.MALFORMED_ANSWER: "Two devices may share this node-ID, or its firmware breaks CiA 301",
+    BootReason.NO_HEARTBEAT: "It takes a heartbeat time and sends none: check its firmware",
+    BootReason.NOT_OPERATIONAL: "It may refuse because of an error of its own: see its emergency messages",
+    BootReason.BUS_DOWN: "Bring the link up: `ip link set can0 up type can bitrate 1000000 restart-ms 100`",
+}

@@ -1,0 +1,38 @@
+"""Waiting for what another task learns, without polling."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+class Watch:
+    """Wakes those who wait for a condition whenever something may have changed it.
+
+    Like `asyncio.Condition`, but `notify` is an ordinary call, so that the bus's reader can make it between two frames.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: list[asyncio.Future[None]] = []
+
+    def notify(self) -> None:
+        """Say that something changed."""
+        waiting, self._waiting = self._waiting, []
+        for future in waiting:
+            if not future.done():
+                future.set_result(None)
+
+    async def until(self, condition: Callable[[], bool], timeout_s: float | None = None) -> bool:
+        """Wait until the condition holds; return False if it does not within the time."""
+        try:
+            async with asyncio.timeout(timeout_s):
+                while not condition():
+                    future = asyncio.get_running_loop().create_future()
+                    self._waiting.append(future)
+                    await future
+        except TimeoutError:
+            return condition()
+        return True
