@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 export PYTHON
 
-.PHONY: demo test check clean
+.PHONY: demo test check sizing clean
 
 demo: $(VENV)/demo.ready
 	$(BIN)/regolithd demo
@@ -18,6 +18,10 @@ check: $(VENV)/dev.ready
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The paper's sizing study, all of it: minutes. Interrupted, it goes on where it was.
+sizing: $(VENV)/dev.ready
+	$(BIN)/regolithd sizing
 
 $(VENV)/%.ready: pyproject.toml
 	.ci/virtual-environment $(VENV) $*
