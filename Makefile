@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 export PYTHON
 
-.PHONY: demo test check sizing clean
+.PHONY: demo test check sizing install uninstall clean
 
 demo: $(VENV)/demo.ready
 	$(BIN)/regolithd demo
@@ -22,6 +22,13 @@ check: $(VENV)/dev.ready
 # The paper's sizing study, all of it: minutes. Interrupted, it goes on where it was.
 sizing: $(VENV)/dev.ready
 	$(BIN)/regolithd sizing
+
+# On a rover or a bench, as root: docs/install.md.
+install:
+	systemd/install
+
+uninstall:
+	systemd/uninstall
 
 $(VENV)/%.ready: pyproject.toml
 	.ci/virtual-environment $(VENV) $*

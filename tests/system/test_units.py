@@ -1,0 +1,77 @@
+"""The units and the broker's example configuration, on this machine: no guest needed."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import aiomqtt
+import pytest
+from broker import Mosquitto, mosquitto_program
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+SYSTEMD = Path(__file__).resolve().parents[2] / "systemd"
+EXPOSURE = re.compile(r"Overall exposure level for \S+: ([\d.]+)")
+
+
+@pytest.mark.parametrize(("unit", "highest"), [("regolithd.service", 2.0), ("regolithd-can@.service", 3.0)])
+def test_a_unit_exposes_little(unit: str, highest: float) -> None:
+    """The service manager's own assessment of a unit's exposure stays below what was promised."""
+    if shutil.which("systemd-analyze") is None:
+        pytest.skip("no systemd here: apt-get install systemd")
+    command = ["systemd-analyze", "security", "--offline=true", "--no-pager", SYSTEMD / unit]
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    said = EXPOSURE.search(done.stdout)
+    assert said, done.stderr
+    assert float(said[1]) <= highest
+
+
+@pytest.fixture
+def guarded(tmp_path: Path) -> Iterator[Mosquitto]:
+    """A broker with the example's access rules, the daemon's account and a listener's."""
+    passwords = tmp_path / "passwords"
+    accounts = tmp_path / "regolith.acl"
+    accounts.write_text((SYSTEMD / "mosquitto/regolith.acl").read_text())
+    accounts.chmod(0o600)
+    if mosquitto_program() is None or shutil.which("mosquitto_passwd") is None:
+        pytest.skip("no broker here: apt-get install mosquitto")
+    for flag, name in (("-c", "regolithd"), (None, "operator")):
+        options = [flag] if flag else []
+        subprocess.run(["mosquitto_passwd", *options, "-b", passwords, name, "secret"], check=True, capture_output=True)
+    ours = {"listener", "persistence", "persistence_location"}  # the fixture has its own port and folder
+    lines = (SYSTEMD / "mosquitto/regolith.conf").read_text().splitlines(keepends=True)
+    settings = "".join(line for line in lines if not line.strip() or line.split()[0] not in ours)
+    for name, path in (("passwd", passwords), ("acl", accounts)):
+        settings = settings.replace(f"/etc/mosquitto/regolith.{name}", str(path))
+    broker = Mosquitto(tmp_path, settings=settings)
+    broker.start()
+    yield broker
+    broker.stop()
+
+
+async def test_only_the_daemon_publishes(guarded: Mosquitto) -> None:
+    """With the example configuration a listener hears the daemon, but cannot speak in its name."""
+    account = {"hostname": guarded.host, "port": guarded.port, "password": "secret"}
+    async with (
+        aiomqtt.Client(username="operator", **account) as operator,
+        aiomqtt.Client(username="regolithd", **account) as daemon,
+    ):
+        await operator.subscribe("regolith/#")
+        await operator.publish("regolith/kapvik/state", "a lie", qos=1)
+        await daemon.publish("regolith/kapvik/state", "the truth", qos=1)
+        async with asyncio.timeout(30):
+            first = await anext(aiter(operator.messages))
+        assert first.payload == b"the truth"
+
+
+async def test_nobody_is_anonymous(guarded: Mosquitto) -> None:
+    """With the example configuration a client without a password is refused."""
+    with pytest.raises(aiomqtt.MqttError):
+        async with aiomqtt.Client(guarded.host, guarded.port):
+            pass
