@@ -55,13 +55,14 @@ class Nodes(Table):
     load_cells: SixNodes = (11, 12, 13, 14, 15, 16)
     inclinometer: NodeId | None = None
     ground_speed: NodeId | None = None
+    motor_diagnostics: bool = False
     heartbeat_ms: Annotated[int, Field(ge=20, le=10_000)] = 200
     heartbeat_timeout_ms: Annotated[int, Field(ge=50, le=30_000)] = 600
 
     def described(self) -> tuple[NodeDescription, ...]:
         """Return every node in the vocabulary of the drivers."""
         wheels = [
-            NodeDescription(node, kind, wheel)
+            NodeDescription(node, kind, wheel, diagnostics=self.motor_diagnostics and kind is NodeKind.MOTOR)
             for kind, nodes in ((NodeKind.MOTOR, self.motors), (NodeKind.LOAD_CELL, self.load_cells))
             for wheel, node in enumerate(nodes)
         ]

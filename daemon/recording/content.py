@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic_core import to_json
 
 from daemon.snapshot import QUANTITIES, WHEELS, Snapshot
 
 if TYPE_CHECKING:
-    from daemon.snapshot import Array, Estimate
+    from daemon.snapshot import Estimate
 
 SNAPSHOT = "snapshot"
 ESTIMATE = "estimate"
 EVENT = "event"
 
 
-def _numbers(array: Array) -> list[float | None]:
-    return [None if value != value else value for value in array.tolist()]  # noqa: PLR0124  # the quickest NaN test
+def _write(content: dict[str, Any]) -> bytes:
+    return to_json(content, inf_nan_mode="null")  # pydantic's writer: all digits, five times as fast as json's
 
 
 def snapshot_json(snapshot: Snapshot) -> bytes:
@@ -28,8 +28,8 @@ def snapshot_json(snapshot: Snapshot) -> bytes:
     content: dict[str, Any] = {"sequence": snapshot.sequence, "time_ns": snapshot.time_ns}
     for row, quantity in enumerate(QUANTITIES):
         if measured[row]:
-            content[quantity] = _numbers(rows[row])
-    return json.dumps(content, separators=(",", ":")).encode()
+            content[quantity] = rows[row].tolist()
+    return _write(content)
 
 
 def snapshot_from_json(content: dict[str, Any]) -> Snapshot:
@@ -45,15 +45,15 @@ def estimate_json(estimate: Estimate) -> bytes:
     content = {
         "sequence": estimate.snapshot.sequence,
         "time_ns": estimate.snapshot.time_ns,
-        "wheel_torque_Nm": _numbers(estimate.wheel_torque_Nm),
-        "smoothed_torque_Nm": _numbers(estimate.smoothed_torque_Nm),
-        "smoothed_load_N": _numbers(estimate.smoothed_load_N),
-        "slip": _numbers(estimate.slip),
+        "wheel_torque_Nm": estimate.wheel_torque_Nm.tolist(),
+        "smoothed_torque_Nm": estimate.smoothed_torque_Nm.tolist(),
+        "smoothed_load_N": estimate.smoothed_load_N.tolist(),
+        "slip": estimate.slip.tolist(),
         "slip_source": estimate.slip_source,
-        "cohesion_Pa": _numbers(estimate.cohesion_Pa),
-        "friction_angle_rad": _numbers(estimate.friction_angle_rad),
+        "cohesion_Pa": estimate.cohesion_Pa.tolist(),
+        "friction_angle_rad": estimate.friction_angle_rad.tolist(),
         "valid": estimate.valid.tolist(),
         "outside": [estimate.outside_inputs(wheel) for wheel in range(WHEELS)],
         "model_version": estimate.model_version,
     }
-    return json.dumps(content, separators=(",", ":")).encode()
+    return _write(content)

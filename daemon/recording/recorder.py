@@ -6,7 +6,6 @@ is full or gone stops the recording and nothing else: `trouble` says why, and a 
 
 from __future__ import annotations
 
-import asyncio
 import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -51,7 +50,7 @@ class _Pair:
 
 
 class Recorder:
-    """Owns the recording's files; `run` flushes and rotates them, everything else only appends.
+    """Owns the recording's files; call `flush` every `FLUSH_S`, everything else only appends.
 
     Parameters
     ----------
@@ -108,12 +107,6 @@ class Recorder:
         """Append an event, as JSON."""
         if pair := self._pair:
             self._attempt(lambda: pair.mcap.write(EVENT, time_ns, content))
-
-    async def run(self) -> None:
-        """Flush and rotate until cancelled."""
-        while True:
-            await asyncio.sleep(FLUSH_S)
-            self.flush()
 
     def flush(self) -> None:
         """Hand everything to the kernel; begin a new pair when it is time, or when the last one failed."""

@@ -1,0 +1,51 @@
+"""`regolithd replay`: feed a log through the same pipeline, and get the same numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path  # noqa: TC003  # typer reads it at run time
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(help="Compute everything anew from a log, and compare it with what was recorded then.")(replay)
+
+
+def replay(
+    logs: Annotated[list[Path], typer.Argument(help="candump logs, in their order", exists=True, dir_okay=False)],
+    config: Annotated[
+        Path | None, typer.Option(help="the rover's configuration; else the one in the recording beside the first log")
+    ] = None,
+    model: Annotated[Path | None, typer.Option(help="estimate with this network instead")] = None,
+) -> None:
+    """Print what came of it; status 1 where a number is not the same as then."""
+    from daemon.replay_report import replay_logs
+    from daemon.start_up import configuration_or_exit, network_or_exit, recorded_configuration
+
+    beside = logs[0].with_suffix(".mcap")
+    configuration = configuration_or_exit(config) if config else recorded_configuration(beside)
+    if model is not None:
+        estimator = configuration.estimator.model_copy(update={"model": model})
+        configuration = configuration.model_copy(update={"estimator": estimator})
+    result = replay_logs(logs, configuration, network_or_exit(configuration))
+    typer.echo(f"frames     {result.frames}")
+    typer.echo(f"snapshots  {result.digest.count}")
+    if result.counters:
+        counters = result.counters
+        typer.echo(
+            f"readings   {counters.accepted} accepted, {counters.missing} missing, {counters.late} late, "
+            f"{counters.duplicate} duplicate, {counters.unexpected} unexpected"
+        )
+    for reason, count in result.undecodable.items():
+        typer.echo(f"undecoded  {count} {reason}")
+    typer.echo(f"digest     {result.digest}")
+    if result.different:
+        typer.echo(f"DIFFERENT from the recording in {len(result.different)} messages:", err=True)
+        for line in result.different[:5]:
+            typer.echo(f"  {line}", err=True)
+        typer.echo("Another configuration or network, or the log before this one is missing?", err=True)
+        raise typer.Exit(1)
+    if result.compared:
+        typer.echo(f"identical  to the last bit with the {result.compared} messages recorded then")

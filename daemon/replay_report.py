@@ -1,0 +1,94 @@
+"""Replays logs and says whether the numbers are those of then."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from daemon.recording.candump import read_log
+from daemon.recording.content import ESTIMATE, SNAPSHOT, estimate_json, snapshot_json
+from daemon.recording.mcap_file import read_messages
+from daemon.replay import Chain, Digest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+    from pathlib import Path
+
+    from daemon.config import Configuration
+    from daemon.estimate import Network
+    from daemon.snapshot import AcquisitionCounters, Estimate
+    from drivers.frame import Frame
+
+BATCH = 256
+"""Frames at a time; the numbers do not depend on it."""
+
+
+@dataclass(slots=True)
+class Replayed:
+    """What came of a replay. `compared` counts the recorded messages, `different` names those that are not the same."""
+
+    frames: int = 0
+    digest: Digest = field(default_factory=Digest)
+    counters: AcquisitionCounters | None = None
+    undecodable: dict[str, int] = field(default_factory=dict)
+    compared: int = 0
+    different: list[str] = field(default_factory=list)
+
+
+def replay_logs(
+    logs: Iterable[Path],
+    configuration: Configuration,
+    network: Network,
+    take: Callable[[Estimate], None] = lambda _estimate: None,
+) -> Replayed:
+    """Feed the logs through the pipeline, in their order; compare with the recordings beside them, where there are any.
+
+    `take` is called with each estimate.
+    """
+    result = Replayed()
+    chain = Chain(configuration, network)
+    recorded: dict[tuple[str, int], dict[str, Any]] = {}
+    for log in logs:
+        recorded |= _recorded(log.with_suffix(".mcap"))
+        for batch in _batches(read_log(log)):
+            result.frames += len(batch)
+            for estimate in chain.feed(batch):
+                result.digest.add(estimate)
+                _compare(estimate, recorded, result)
+                take(estimate)
+    result.counters = chain.acquisition.counters
+    result.undecodable = {str(reason): count for reason, count in chain.decoder.undecodable.items()}
+    result.different += [f"{topic} {sequence} was recorded, and is not in the log" for topic, sequence in recorded]
+    return result
+
+
+def _recorded(mcap: Path) -> dict[tuple[str, int], dict[str, Any]]:
+    if not mcap.is_file():
+        return {}
+    return {
+        (message.topic, message.content["sequence"]): message.content
+        for message in read_messages(mcap)
+        if message.topic in {SNAPSHOT, ESTIMATE}
+    }
+
+
+def _compare(estimate: Estimate, recorded: dict[tuple[str, int], dict[str, Any]], result: Replayed) -> None:
+    for topic, made in ((SNAPSHOT, snapshot_json(estimate.snapshot)), (ESTIMATE, estimate_json(estimate))):
+        then = recorded.pop((topic, estimate.snapshot.sequence), None)
+        if then is None:
+            continue
+        result.compared += 1
+        now = json.loads(made)
+        if names := [name for name in then.keys() | now.keys() if then.get(name) != now.get(name)]:
+            result.different.append(f"{topic} {estimate.snapshot.sequence}: {', '.join(sorted(names))}")
+
+
+def _batches(frames: Iterator[Frame]) -> Iterator[list[Frame]]:
+    batch: list[Frame] = []
+    for frame in frames:
+        batch.append(frame)
+        if len(batch) == BATCH:
+            yield batch
+            batch = []
+    yield batch
