@@ -1,0 +1,101 @@
+"""`regolithd prove`: conceal effects in recordings, let the solver answer, open the envelopes, print the score."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from calibration.prove.batch import Batch, Outcome
+    from calibration.prove.score import Figures
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("prove")(prove)
+
+
+def prove(  # noqa: PLR0917  # each is an option of the command line
+    recordings: Annotated[int, typer.Option(help="How many recordings to make.")] = 200,
+    seed: Annotated[int | None, typer.Option(help="Seed of the batch; left out, one that nobody knows yet.")] = None,
+    out: Annotated[Path, typer.Option(help="The batch's folder; an interrupted batch goes on.")] = Path("build/prove"),
+    jobs: Annotated[int, typer.Option(help="Solvers at a time; 0: as many as there are cores.")] = 0,
+    solver: Annotated[str, typer.Option(help="Another solver, with {recording}, {simulation} and {answer}.")] = "",
+    group: Annotated[list[str] | None, typer.Option(help="nothing, single, pair, outside or constant alone.")] = None,
+    no_peers: Annotated[bool, typer.Option("--no-peers", help="Leave the other tools out.")] = False,
+    keep: Annotated[bool, typer.Option("--keep", help="Keep the recordings.")] = False,
+    duration: Annotated[float, typer.Option(help="Length of each recording in seconds.")] = 1800.0,
+    figures: Annotated[Path | None, typer.Option(help="Write the score here too, as one flat JSON object.")] = None,
+) -> None:
+    """Prove what `regolithd mismatch` finds: effects concealed, truths sealed, answers scored, peers beside it."""
+    from rich.console import Console
+
+    from calibration.prove.batch import PEERS, SOLVER, Batch
+    from calibration.prove.errors import ProofError
+    from calibration.prove.isolation import describe
+
+    console = Console()
+    drawn = secrets.randbits(63) if seed is None else seed
+    batch = Batch(
+        folder=out,
+        seed=drawn,
+        recordings=recordings,
+        jobs=jobs or os.cpu_count() or 1,
+        solver=solver or SOLVER,
+        peers=None if no_peers else PEERS,
+        keep=keep,
+        duration_s=duration,
+        groups=tuple(group or ()),
+    )
+    console.print(f"seed {drawn}; {describe()}.", highlight=False)
+    console.print(f"Each truth is committed to in {out / 'commitments.csv'} before its solver starts.", highlight=False)
+    try:
+        outcomes = _run(batch, console)
+    except ProofError as error:
+        console.print(f"[red]{error}[/]", highlight=False)
+        raise typer.Exit(1) from error
+    _report(outcomes, console, [out / "score.json", *([figures] if figures else [])])
+
+
+def _run(batch: Batch, console: Console) -> list[Outcome]:
+    """Run the batch under a progress bar that shows the running score."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from calibration.prove.batch import run_batch
+    from calibration.prove.score import judge
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    outcomes: list[Outcome] = []
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task("prove", total=len(batch.plans()))
+        right = 0
+        for outcome in run_batch(batch):
+            outcomes.append(outcome)
+            right += judge(outcome).right
+            progress.update(task, advance=1, description=f"prove: {right} of {len(outcomes)} right")
+    return sorted(outcomes, key=lambda outcome: outcome.number)
+
+
+def _report(outcomes: list[Outcome], console: Console, paths: list[Path]) -> Figures:
+    """Print the tables and write the flat figures."""
+    import json
+    import math
+
+    from calibration.prove.score import figures_of
+    from calibration.prove.table import peers_table, score_table
+
+    figures = figures_of(outcomes)
+    console.print(score_table(figures))
+    if any(key.startswith("peer_") for key in figures):
+        console.print(peers_table(figures))
+    known = {key: None if math.isnan(float(value)) else value for key, value in figures.items()}
+    for path in paths:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(known, indent=1) + "\n")
+    return figures
