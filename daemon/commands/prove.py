@@ -21,7 +21,7 @@ def register(app: typer.Typer) -> None:
     app.command("prove")(prove)
 
 
-def prove(  # noqa: PLR0917  # each is an option of the command line
+def prove(  # each is an option of the command line
     recordings: Annotated[int, typer.Option(help="How many recordings to make.")] = 200,
     seed: Annotated[int | None, typer.Option(help="Seed of the batch; left out, one that nobody knows yet.")] = None,
     out: Annotated[Path, typer.Option(help="The batch's folder; an interrupted batch goes on.")] = Path("build/prove"),
