@@ -20,6 +20,7 @@ from drivers.frame import Frame
 
 _RECV_TIMEOUT_S = 0.05  # how long closing may take
 _SEND_TIMEOUT_S = 0.1
+_MOST_AT_ONCE = 1000  # frames handed over together
 
 
 class AdapterBus(Bus):
@@ -36,18 +37,11 @@ class AdapterBus(Bus):
                 cure="`python -m can.viewer --help` lists the interfaces; is the adapter plugged in?",
             ) from error
         self._loop = asyncio.get_running_loop()
-        self._pending: list[Frame] = []
-        self._arrived = asyncio.Event()
+        self._may_read = threading.Event()
+        self._may_read.set()
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._read, name=f"can-{interface}-{channel}", daemon=True)
         self._thread.start()
-
-    async def receive(self) -> list[Frame]:
-        """See `Bus.receive`."""
-        await self._arrived.wait()
-        self._arrived.clear()
-        batch, self._pending = self._pending, []
-        return batch
 
     async def send(self, frame: Frame) -> None:
         """See `Bus.send`."""
@@ -70,43 +64,42 @@ class AdapterBus(Bus):
     def close(self) -> None:
         """Stop the thread and give the adapter back."""
         self._closing.set()
+        self._may_read.set()
         self._thread.join(timeout=1.0)
         self._bus.shutdown()
+
+    def pause_reading(self) -> None:
+        """Leave frames to the adapter's own queue."""
+        self._may_read.clear()
+
+    def resume_reading(self) -> None:
+        """Read on."""
+        self._may_read.set()
 
     def _read(self) -> None:
         """Run in the thread: block for one frame, drain what else is there, hand it over."""
         while not self._closing.is_set():
+            self._may_read.wait()
             try:
                 message = self._bus.recv(_RECV_TIMEOUT_S)
                 batch = []
                 while message is not None:
                     batch.append(_frame(message))
-                    message = self._bus.recv(0)
+                    message = self._bus.recv(0) if len(batch) < _MOST_AT_ONCE else None
             except (can.CanError, OSError):
                 if not self._closing.is_set():
-                    self._call(self._down)
+                    self._call(self.change_state, BusState.DOWN)
                 return
             if batch:
-                self._call(self._deliver, batch)
+                self._call(self._take, batch)
+
+    def _take(self, batch: list[Frame]) -> None:
+        self.counters.errors["adapter"] += sum(frame.error for frame in batch)
+        self.deliver(batch)
 
     def _call(self, function: object, *arguments: object) -> None:
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(function, *arguments)  # type: ignore[arg-type]
-
-    def _deliver(self, batch: list[Frame]) -> None:
-        counters = self.counters
-        counters.batches += 1
-        counters.largest_batch = max(counters.largest_batch, len(batch))
-        echoed = sum(frame.sent for frame in batch)
-        counters.echoed += echoed
-        counters.received += len(batch) - echoed
-        self._pending.extend(batch)
-        self._arrived.set()
-
-    def _down(self) -> None:
-        self.state = BusState.DOWN
-        self.counters.link_down += 1
-        self._arrived.set()
 
 
 def _frame(message: can.Message) -> Frame:

@@ -14,6 +14,7 @@ up again is a state of the bus, never the end of it.
 
 from __future__ import annotations
 
+import asyncio
 from abc import ABC, abstractmethod
 from contextlib import asynccontextmanager
 from enum import StrEnum
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from collections.abc import AsyncIterator
 
     from drivers.frame import Frame
+
+
+_MOST_PENDING = 20_000  # frames: two seconds of a full bus
 
 
 class BusState(StrEnum):
@@ -45,6 +49,9 @@ class Bus(ABC):
         self.channel = channel
         self.counters = BusCounters()
         self.state = BusState.ACTIVE
+        self._pending: list[Frame] = []
+        self._arrived = asyncio.Event()
+        self._paused = False
 
     def __aiter__(self) -> Self:
         return self
@@ -52,9 +59,18 @@ class Bus(ABC):
     async def __anext__(self) -> list[Frame]:
         return await self.receive()
 
-    @abstractmethod
     async def receive(self) -> list[Frame]:
-        """Return what has arrived since the last call, in order; wait if nothing has. Empty: `state` changed."""
+        """Return what has arrived since the last call, in order; wait if nothing has. Empty: `state` changed.
+
+        Cancelling it loses nothing.
+        """
+        await self._arrived.wait()
+        self._arrived.clear()
+        batch, self._pending = self._pending, []
+        if self._paused:
+            self._paused = False
+            self.resume_reading()
+        return batch
 
     @abstractmethod
     async def send(self, frame: Frame) -> None:
@@ -73,6 +89,39 @@ class Bus(ABC):
     @abstractmethod
     def close(self) -> None:
         """Give the bus back; pending frames are lost."""
+
+    # For those who implement a bus
+
+    @abstractmethod
+    def pause_reading(self) -> None:
+        """Leave frames where they are: the consumer is too slow."""
+
+    @abstractmethod
+    def resume_reading(self) -> None:
+        """Read on: the consumer has caught up."""
+
+    def deliver(self, frames: list[Frame]) -> None:
+        """Count frames that were read, and hand them to whoever waits in `receive`."""
+        counters = self.counters
+        counters.batches += 1
+        counters.largest_batch = max(counters.largest_batch, len(frames))
+        echoed = sum([frame.sent for frame in frames])
+        counters.echoed += echoed
+        counters.received += len(frames) - echoed
+        self._pending += frames
+        self._arrived.set()
+        if len(self._pending) > _MOST_PENDING and not self._paused:
+            self._paused = True
+            self.pause_reading()
+
+    def change_state(self, state: BusState) -> None:
+        """Note the controller's or the link's state, count it, and wake whoever waits in `receive`."""
+        if state is self.state:
+            return
+        self.state = state
+        self.counters.bus_off += state is BusState.OFF
+        self.counters.link_down += state is BusState.DOWN
+        self._arrived.set()
 
 
 @asynccontextmanager
