@@ -8,7 +8,8 @@ The shear displacement is taken where Eq. 1 is used, at θ_m, and not at the whe
 
     j_m = r [(θ_C − θ_m) − (1 − i)(sin θ_C − sin θ_m)]
 
-All functions take and return arrays of one shape (or what broadcasts to it); angles in radians, the rest SI.
+All functions take and return arrays of one shape (or what broadcasts to it); angles in radians, the rest SI. A soil is
+one, or many as arrays that broadcast likewise.
 """
 
 from __future__ import annotations
@@ -20,6 +21,9 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from calibration.parameters import Soil, Wheel
+    from calibration.soils import Soils
+
+    AnySoil = Soil | Soils
 
 Array = NDArray[np.float64]
 
@@ -33,7 +37,7 @@ def shear_displacement(contact_angle_rad: Array, slip: Array, wheel: Wheel) -> A
     return wheel.radius_m * (contact_angle_rad - at - (1 - slip) * (np.sin(contact_angle_rad) - np.sin(at)))
 
 
-def peak_stresses(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: Soil) -> tuple[Array, Array]:
+def peak_stresses(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> tuple[Array, Array]:
     """Return normal and shear stress at θ_m [Pa] (pressure–sinkage; Eq. 1).
 
     A wheel that is dragged (j_m < 0) shears the soil the other way: Eq. 1 is continued as an odd function.
@@ -47,7 +51,7 @@ def peak_stresses(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: Soi
     return normal, strength * mobilised
 
 
-def carried_load(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: Soil) -> Array:
+def carried_load(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> Array:
     """Return the load that the contact carries [N] (Eq. 6)."""
     theta, half = contact_angle_rad, contact_angle_rad / 2
     normal, shear = peak_stresses(theta, slip, wheel, soil)
@@ -60,13 +64,13 @@ def carried_load(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: Soil
     return wheel.radius_m * wheel.width_m / theta * bracket
 
 
-def wheel_torque(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: Soil) -> Array:
+def wheel_torque(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> Array:
     """Return the torque at the wheel [N·m] (Eq. 7)."""
     _, shear = peak_stresses(contact_angle_rad, slip, wheel, soil)
     return 0.5 * (shear + soil.cohesion_Pa / 2) * wheel.radius_m**2 * wheel.width_m * contact_angle_rad
 
 
-def contact_angle(load_N: Array, slip: Array, wheel: Wheel, soil: Soil) -> Array:
+def contact_angle(load_N: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> Array:
     """Return the contact angle at which the soil carries the load [rad]: the inverse of Eq. 6.
 
     NaN where the load is not positive, or would bury the wheel to its axle.
@@ -75,16 +79,22 @@ def contact_angle(load_N: Array, slip: Array, wheel: Wheel, soil: Soil) -> Array
     -----
     Load grows nearly as a power of the angle, so a secant in logarithms converges in a few steps.
     """
-    load, slip = np.broadcast_arrays(np.asarray(load_N, np.float64), np.asarray(slip, np.float64))
-    most = carried_load(np.full(load.shape, LARGEST_CONTACT_ANGLE_RAD), slip, wheel, soil)
-    known = (load > 0) & (load <= most) & np.isfinite(slip)
-    wanted, at_slip = np.log(load[known]), slip[known]
+    load = np.asarray(load_N, np.float64)
+    slip = np.asarray(slip, np.float64)
+    most = carried_load(
+        np.full(np.broadcast_shapes(load.shape, slip.shape), LARGEST_CONTACT_ANGLE_RAD), slip, wheel, soil
+    )
+    with np.errstate(invalid="ignore"):
+        known = (load > 0) & (load <= most) & np.isfinite(slip)
+    # What has no answer is solved for a load that has one, and blanked afterwards.
+    slip = np.where(np.isfinite(slip), slip, 0.0)
+    wanted = np.log(np.where(known, load, 1.0))
 
     def excess(log_angle: Array) -> Array:
-        return np.log(carried_load(np.exp(log_angle), at_slip, wheel, soil)) - wanted
+        return np.log(carried_load(np.exp(log_angle), slip, wheel, soil)) - wanted
 
-    before = np.full(wanted.shape, np.log(0.2))
-    now = np.full(wanted.shape, np.log(0.3))
+    before = np.full(known.shape, np.log(0.2))
+    now = np.full(known.shape, np.log(0.3))
     excess_before, excess_now = excess(before), excess(now)
     for _ in range(30):
         moved = now - before
@@ -96,6 +106,4 @@ def contact_angle(load_N: Array, slip: Array, wheel: Wheel, soil: Soil) -> Array
         excess_now = excess(now)
         if not step.size or np.max(np.abs(step)) < 1e-13:
             break
-    angle = np.full(load.shape, np.nan)
-    angle[known] = np.exp(now)
-    return angle
+    return np.where(known, np.exp(now), np.nan)
