@@ -17,6 +17,7 @@ Three in five lie around one class; the others between two of them, anywhere on 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +46,7 @@ class Soils:
     shear_modulus_m: Array
     sinkage_exponent: Array
     k_phi_kN: Array
-    k_c_kN: float = 0.0
+    k_c_kN: ClassVar[float] = 0.0
 
     def per_wheel(self) -> Soils:
         """Return the same soils with a last axis of length one, which broadcasts over the wheels."""
