@@ -9,6 +9,8 @@ from __future__ import annotations
 import struct
 import warnings
 from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import canopen
@@ -17,7 +19,7 @@ from canopen.objectdictionary import ODVariable, datatypes
 from drivers.virtual.abort import Abort, AbortError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
 Key = tuple[int, int]
@@ -59,12 +61,7 @@ class Dictionary:
     """
 
     def __init__(self, path: Path, node_id: int) -> None:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            od = canopen.import_od(str(path), node_id)
-        self.entries: dict[Key, Entry] = {
-            (variable.index, variable.subindex): _entry(variable) for variable in _variables(od)
-        }
+        self.entries = _entries(path, node_id)
         self.indices = {index for index, _ in self.entries}
         self.values: dict[Key, int | bytes] = {}
         self.on_write: Callable[[Key, int], None] = lambda _key, _value: None
@@ -123,6 +120,15 @@ class Dictionary:
         self.on_write(key, value)
         self.values[key] = value
         self.after_write(key, value)
+
+
+@cache
+def _entries(path: Path, node_id: int) -> Mapping[Key, Entry]:
+    """Return what the EDS describes; `$NODEID` in a default is the node's."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        od = canopen.import_od(str(path), node_id)
+    return MappingProxyType({(each.index, each.subindex): _entry(each) for each in _variables(od)})
 
 
 def _variables(od: canopen.ObjectDictionary) -> Iterator[ODVariable]:

@@ -47,6 +47,8 @@ IDLE_STEP_NS = 200_000_000
 LONGEST_STEP_S = 1.0
 """A clock that jumps further than this moves the world no further."""
 
+_ERROR_CONTROL = 0x700
+
 
 class VirtualRover:
     """All nodes of a rover.
@@ -78,9 +80,9 @@ class VirtualRover:
         self.nodes = {each.node_id: VirtualNode(each, self._emit) for each in nodes}
         self._drives = [node.device for node in self.nodes.values() if isinstance(node.device, MotorController)]
         self._time_s = 0.0
-        self._measured_ns: int | None = None  # by the wall clock
+        self._advanced_ns: int | None = None  # by the wall clock, as is `_sync_ns`
         self._step_due = 0
-        self._sync_interval_ns = 0
+        self._sync_ns: int | None = None
         self._bus_counts: Counter[str] = Counter()
 
     # What happens, without any input or output
@@ -96,10 +98,12 @@ class VirtualRover:
             return
         if any(frame.can_id == node.sync_cob_id for node in self.nodes.values()):
             self._bus_counts["sync"] += 1
-            before = self._measured_ns
             self._step(frame.time_ns, now)
-            self._sync_interval_ns = frame.time_ns - before if before is not None else 0
-            self._step_due = now + max(IDLE_STEP_NS, 3 * self._sync_interval_ns)
+            interval_ns = frame.time_ns - self._sync_ns if self._sync_ns is not None else 0
+            self._sync_ns = frame.time_ns
+            self._step_due = now + max(IDLE_STEP_NS, 3 * interval_ns)
+        elif frame.can_id < _ERROR_CONTROL:
+            self._advance(frame.time_ns)  # what a command changes begins now, not when somebody last looked
         for node in self.nodes.values():
             node.receive(frame, now)
 
@@ -144,15 +148,19 @@ class VirtualRover:
 
     def _step(self, wall_ns: int, now: int) -> None:
         """Move the world on to `wall_ns` and let every node measure it."""
-        elapsed_s = 0.0 if self._measured_ns is None else (wall_ns - self._measured_ns) / 1e9
-        elapsed_s = min(max(elapsed_s, 0.0), LONGEST_STEP_S)
-        self._measured_ns = wall_ns
-        self._time_s += elapsed_s
-        for node in self.nodes.values():
-            node.advance(elapsed_s)
+        self._advance(wall_ns)
         measurement = self._plant.measure(self._time_s, self._motor_speeds())
         for node in self.nodes.values():
             node.measure(measurement, now)
+
+    def _advance(self, wall_ns: int) -> None:
+        """Move the devices on to `wall_ns`."""
+        elapsed_s = 0.0 if self._advanced_ns is None else (wall_ns - self._advanced_ns) / 1e9
+        elapsed_s = min(max(elapsed_s, 0.0), LONGEST_STEP_S)
+        self._advanced_ns = wall_ns
+        self._time_s += elapsed_s
+        for node in self.nodes.values():
+            node.advance(elapsed_s)
 
     def _motor_speeds(self) -> Array:
         speeds = np.zeros(WHEELS)

@@ -1,0 +1,160 @@
+"""The virtual drive moves, stops and faults as its object dictionary says."""
+
+from __future__ import annotations
+
+import struct
+
+import pytest
+from virtual_master import MASTER_ID, Drive
+
+
+def test_it_follows_its_ramps() -> None:
+    """Speed rises by 0x6083 and falls by 0x6084, rpm per second, to the target and no further."""
+    drive = Drive()
+    drive.master.write(1, 0x6083, 0, 1000, 4)
+    drive.master.write(1, 0x6084, 0, 2000, 4)
+    drive.enable()
+    drive.say(0x0F, 1500)
+    drive.master.wait(1)
+    assert drive.speed_rpm == pytest.approx(1000, abs=25)
+    assert not drive.statusword & 0x0400
+    drive.master.wait(1)
+    assert drive.speed_rpm == 1500
+    assert drive.statusword & 0x0400  # target reached
+    drive.say(0x0F, 500)
+    drive.master.wait(0.25)
+    assert drive.speed_rpm == pytest.approx(1000, abs=45)
+    drive.say(0x0F, -500)
+    drive.master.wait(2)
+    assert drive.speed_rpm == -500
+
+
+def test_it_turns_only_in_operation_enabled() -> None:
+    """A target alone moves nothing; halt stops without leaving the state; disabling stops."""
+    drive = Drive()
+    drive.say(0x06, 1000)
+    drive.master.wait(1)
+    assert drive.speed_rpm == 0
+    drive.run_at(1000)
+    assert drive.say(0x10F, 1000) == 0x27
+    drive.master.wait(1)
+    assert drive.speed_rpm == 0
+    assert drive.statusword & 0x1000
+    drive.say(0x0F, 1000)
+    drive.master.wait(1)
+    assert drive.speed_rpm == 1000
+    assert drive.say(0x07, 1000) == 0x23
+    drive.master.wait(1)
+    assert drive.speed_rpm == 0
+
+
+def test_the_speed_is_limited() -> None:
+    """No faster than 0x607F."""
+    drive = Drive()
+    drive.master.write(1, 0x607F, 0, 600, 4)
+    drive.enable()
+    drive.say(0x0F, 5000)
+    drive.master.wait(2)
+    assert drive.speed_rpm == 600
+
+
+@pytest.mark.parametrize(
+    ("option", "ramp", "after"),
+    [(1, 1000, 0x40), (2, 4000, 0x40), (5, 1000, 0x07), (6, 4000, 0x07), (0, 50_000, 0x40)],
+)
+def test_quick_stop_brakes_as_its_option_says(option: int, ramp: int, after: int) -> None:
+    """0x605A chooses the ramp, and whether the drive then leaves quick stop active by itself (transition 12)."""
+    drive = Drive()
+    drive.master.write(1, 0x6084, 0, 1000, 4)
+    drive.master.write(1, 0x6085, 0, 4000, 4)
+    drive.master.write(1, 0x605A, 0, option, 2)
+    drive.run_at(3000)
+    assert drive.say(0x02, 3000) == 0x07
+    drive.master.wait(2900 / ramp)
+    assert 0 < drive.speed_rpm <= 3000 or ramp == 50_000
+    drive.master.wait(0.5)
+    assert drive.speed_rpm == 0
+    assert drive.state == after
+
+
+def test_from_a_holding_quick_stop_it_may_go_on() -> None:
+    """Transition 16, with option 6 only."""
+    drive = Drive()
+    drive.master.write(1, 0x605A, 0, 6, 2)
+    drive.run_at(1000)
+    drive.say(0x02)
+    drive.master.wait(1)
+    assert drive.say(0x0F, 1000) == 0x27
+
+
+def test_a_fault_stops_it_tells_why_and_lasts() -> None:
+    """EMCY, 0x603F, 0x1001 and 0x1003 name it; fault reaction while it brakes, then fault; reset clears and says so."""
+    drive = Drive()
+    drive.run_at(3000)
+    master = drive.master
+    master.rover.tell("fault 1 0x2310")
+    frames = master.wait(0.02)
+    assert [f.data for f in frames if f.can_id == 0x81] == [struct.pack("<HB5s", 0x2310, 0x03, b"")]
+    assert drive.state == 0x0F
+    master.wait(1)
+    assert drive.state == 0x08
+    assert drive.speed_rpm == 0
+    assert (master.read(1, 0x603F), master.read(1, 0x1001)) == (0x2310, 0x03)
+    assert (master.read(1, 0x1003), master.read(1, 0x1003, 1)) == (1, 0x2310)
+    before = len(master.seen)
+    assert drive.say(0x80) == 0x40
+    assert [f.data for f in master.seen[before:] if f.can_id == 0x81] == [bytes(8)]
+    assert (master.read(1, 0x603F), master.read(1, 0x1001)) == (0, 0)
+
+
+@pytest.mark.parametrize(("option", "state"), [(0, 0x27), (1, 0x08), (2, 0x40), (3, 0x40)])
+def test_the_masters_silence_stops_it(option: int, state: int) -> None:
+    """Heartbeat consumer (0x1016): EMCY 0x8130, and 0x6007's reaction; only after the master was heard once."""
+    drive = Drive()
+    master = drive.master
+    master.write(1, 0x6007, 0, option, 2)
+    master.write(1, 0x1016, 1, MASTER_ID << 16 | 500, 4)
+    drive.run_at(3000)  # two seconds, in which nobody was heard: monitoring has not begun
+    master.heartbeat()
+    master.wait(0.49)
+    assert drive.speed_rpm == 3000
+    master.heartbeat()
+    frames = master.wait(0.51)
+    assert [f.data[:3] for f in frames if f.can_id == 0x81] == [struct.pack("<HB", 0x8130, 0x11)]
+    master.wait(1)
+    assert drive.state == state
+    assert drive.speed_rpm == (3000 if option == 0 else 0)
+
+
+def test_a_master_that_is_heard_again_does_not_start_it() -> None:
+    """After the loss it takes a fault reset and the whole ladder."""
+    drive = Drive()
+    drive.master.write(1, 0x1016, 1, MASTER_ID << 16 | 100, 4)
+    drive.run_at(1000)
+    drive.master.heartbeat()
+    drive.master.wait(1)
+    drive.master.heartbeat()
+    drive.master.nmt(1)
+    assert drive.say(0x0F, 1000) == 0x08
+    assert drive.say(0x8F) == 0x40
+    drive.enable()
+
+
+def test_stopping_the_node_stops_the_motor() -> None:
+    """NMT stop is a lost connection as well (CiA 402-2, 0x6007)."""
+    drive = Drive()
+    drive.run_at(1000)
+    drive.master.nmt(2)
+    drive.master.wait(1)
+    drive.master.nmt(1)
+    assert drive.speed_rpm == 0
+    assert drive.state == 0x08
+
+
+def test_it_refuses_any_other_mode() -> None:
+    """Only profile velocity (3) is supported; 0x6061 goes on saying so."""
+    drive = Drive()
+    with pytest.raises(Exception, match="0x06090030"):
+        drive.master.write(1, 0x6060, 0, 1, 1)
+    drive.master.write(1, 0x6060, 0, 3, 1)
+    assert drive.master.read(1, 0x6061) == 3
