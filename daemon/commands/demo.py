@@ -1,0 +1,39 @@
+"""`regolithd demo`: see it work, with nothing but this computer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(help="Watch a virtual rover's wheels feel the ground: half a minute, no hardware, no root.")(demo)
+
+
+def demo(
+    out: Annotated[Path, typer.Option(help="where recording and picture go")] = Path("build/demo"),
+    seconds: Annotated[float, typer.Option(min=5, max=600, help="how long to drive")] = 30.0,
+) -> None:
+    """Drive, show, summarise."""
+    import asyncio
+
+    from rich.console import Console
+
+    from daemon.demo.drive import drive
+    from daemon.demo.picture import draw
+    from daemon.demo.screen import screen
+    from daemon.demo.summary import summary
+    from daemon.demo.witness import stretches
+
+    console = Console()
+    out.mkdir(parents=True, exist_ok=True)
+    with screen(console, seconds) as show:
+        driven = asyncio.run(drive(out, seconds, show))
+    console.print(summary(stretches(driven.witness.seen, settle_s=4.0)))
+    picture = out / "drive.png"
+    draw(driven.witness.seen, picture)
+    for what, path in (("recording", driven.recording), ("frames", driven.log), ("picture", picture)):
+        console.print(f"{what:10} {path}", highlight=False)

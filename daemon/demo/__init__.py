@@ -1,0 +1,1 @@
+"""`make demo`: virtual rover, daemon, broker and subscriber in one process, for half a minute, nothing installed."""

@@ -1,0 +1,113 @@
+"""The half minute itself: everything is started, the rover drives over a soil that changes, everything is stopped."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import aiomqtt
+
+from calibration.parameters import SOILS
+from daemon.config import Configuration
+from daemon.demo.broker import embedded_broker
+from daemon.demo.publisher import DemoPublisher
+from daemon.demo.viewer import Viewer
+from daemon.demo.witness import Witness
+from daemon.scenario import Ground, Scenario, Stretch
+from daemon.service import Service
+from daemon.virtual_rover import VirtualWorld
+from drivers.bus import open_bus
+from drivers.virtual import VirtualRover
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+CHANNEL = "demo"
+RATE_HZ = 10.0
+SPEED_M_S = 0.05
+CHANGE_M = 0.75
+FIRST, SECOND = "medium-soil", "lete-sand"
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """What is left of the drive."""
+
+    witness: Witness
+    viewer: Viewer
+    recording: Path
+    log: Path
+
+
+def demo_configuration(folder: Path, port: int) -> Configuration:
+    """Return Kapvik on an in-process bus, its drivetrain calibrated, recording into `folder`."""
+    drivetrain = Scenario().drivetrain
+    return Configuration.model_validate(
+        {
+            "bus": {"interface": "virtual", "channel": CHANNEL},
+            "sync": {"rate_Hz": RATE_HZ},
+            "nodes": {"inclinometer": 21, "ground_speed": 22, "motor_diagnostics": True},
+            "drivetrain": drivetrain.model_dump(),
+            "recording": {"directory": folder, "limit_MB": 50},
+            "mqtt": {"host": "127.0.0.1", "port": port, "spool_directory": folder / "spool"},
+        }
+    )
+
+
+async def drive(folder: Path, seconds: float, show: Callable[[Viewer, float], None]) -> Drive:
+    """Drive for so many seconds; `show` is called a few times a second with what the subscriber knows."""
+    ground = Ground(stretches=(Stretch(soil=SOILS[FIRST], until_m=CHANGE_M), Stretch(soil=SOILS[SECOND])))
+    world = VirtualWorld(Scenario(ground=ground))
+    witness = Witness(world)
+    async with (
+        embedded_broker() as port,
+        open_bus("virtual", CHANNEL) as rover_bus,
+        open_bus("virtual", CHANNEL) as daemon_bus,
+        asyncio.TaskGroup() as tasks,
+    ):
+        configuration = demo_configuration(folder, port)
+        prefix = f"{configuration.mqtt.prefix}/{configuration.rover.name}"
+        viewer = Viewer(prefix)
+        service = Service(configuration, daemon_bus)
+        service.outlets += [DemoPublisher(port, prefix), witness]
+        subscribed = asyncio.Event()
+        lasting = [
+            tasks.create_task(VirtualRover(world).run(rover_bus)),
+            tasks.create_task(_subscribe(viewer, port, subscribed)),
+        ]
+        await subscribed.wait()
+        running = tasks.create_task(service.run())
+        await service.network.settled()
+        await service.network.enable()
+        wheel_speed = SPEED_M_S / configuration.wheel.radius_m
+        await service.network.set_speed((wheel_speed,) * 6)
+        await _watch(viewer, seconds, show)
+        await service.network.quick_stop()
+        paths = service.recorder.paths if service.recorder else None
+        running.cancel()
+        await asyncio.wait([running])
+        for task in lasting:
+            task.cancel()
+    if paths is None:
+        raise OSError("the recording failed: " + (service.recorder.trouble or "" if service.recorder else ""))
+    return Drive(witness, viewer, *paths)
+
+
+async def _subscribe(viewer: Viewer, port: int, subscribed: asyncio.Event) -> None:
+    async with aiomqtt.Client("127.0.0.1", port, identifier="demo-viewer") as client:
+        await client.subscribe(f"{viewer.prefix}/#")
+        subscribed.set()
+        async for message in client.messages:
+            if isinstance(message.payload, bytes):
+                viewer.take(str(message.topic), message.payload)
+
+
+async def _watch(viewer: Viewer, seconds: float, show: Callable[[Viewer, float], None]) -> None:
+    begun = time.monotonic()
+    while (elapsed := time.monotonic() - begun) < seconds:
+        show(viewer, elapsed)
+        await asyncio.sleep(0.25)
+    show(viewer, seconds)

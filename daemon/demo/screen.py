@@ -1,0 +1,54 @@
+"""Where the live table goes: redrawn in place on a terminal, a line now and then elsewhere."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rich.console import Group
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from rich.console import Console, RenderableType
+
+    from daemon.demo.viewer import Viewer
+
+TITLE = "regolithd · a virtual rover on an in-process CAN bus, seen over MQTT"
+PLAIN_EVERY_S = 5.0
+
+
+@contextmanager
+def screen(console: Console, seconds: float) -> Iterator[Callable[[Viewer, float], None]]:
+    """Give a function that shows what the viewer knows at a time."""
+    if not console.is_terminal:
+        yield _plain(console, seconds)
+        return
+    with Live(Text(TITLE, style="bold"), console=console, auto_refresh=False) as live:
+        yield lambda viewer, elapsed: live.update(_frame(viewer, elapsed, seconds), refresh=True)
+
+
+def _frame(viewer: Viewer, elapsed: float, seconds: float) -> RenderableType:
+    progress = Table.grid(padding=(0, 2))
+    bar = ProgressBar(total=seconds, completed=elapsed, width=40)
+    progress.add_row(Text("driving", style="dim"), bar, Text(f"{elapsed:.0f} of {seconds:.0f} s", style="dim"))
+    return Group(Text(TITLE, style="bold"), Text(), progress, Text(), viewer.render(), Text())
+
+
+def _plain(console: Console, seconds: float) -> Callable[[Viewer, float], None]:
+    console.print(TITLE)
+    due = PLAIN_EVERY_S
+
+    def show(viewer: Viewer, elapsed: float) -> None:
+        nonlocal due
+        if elapsed < due:
+            return
+        due += PLAIN_EVERY_S
+        console.print(f"\n{elapsed:.0f} of {seconds:.0f} s")
+        console.print(viewer.render())
+
+    return show

@@ -1,0 +1,120 @@
+"""The live table: what an MQTT subscriber knows, and nothing else."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import deque
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from rich import box
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+PLACES = ("front left", "front right", "middle left", "middle right", "rear left", "rear right")
+HISTORY = 16
+BLOCKS = "▁▂▃▄▅▆▇█"
+SYMBOLS = {"load_N": "W", "slip": "i", "motor_current_A": "I", "wheel_torque_Nm": "T", "wheel_speed_rad_s": "ω"}
+
+
+@dataclass(slots=True)
+class Viewer:
+    """The newest message of each wheel, a little history, and how many there were."""
+
+    prefix: str
+    wheels: dict[int, dict[str, Any]] = field(default_factory=dict)
+    torque: dict[int, deque[float]] = field(default_factory=dict)
+    state: str = "offline"
+    nodes: int = 0
+    messages: int = 0
+    snapshots: int = 0
+    last_event: str = ""
+
+    def take(self, topic: str, payload: bytes) -> None:
+        """Take one message."""
+        self.messages += 1
+        match topic.removeprefix(self.prefix + "/").split("/"):
+            case ["wheel", number]:
+                self._wheel(int(number), json.loads(payload))
+            case ["snapshot"]:
+                self.snapshots += 1
+            case ["state"]:
+                self.state = json.loads(payload)["state"]
+            case ["event"]:
+                self.last_event = json.loads(payload)["text"]
+
+    def _wheel(self, number: int, message: dict[str, Any]) -> None:
+        self.wheels[number] = message
+        torque = message["smoothed_torque_Nm"]
+        if torque is not None:
+            self.torque.setdefault(number, deque(maxlen=HISTORY)).append(torque)
+
+    def render(self) -> RenderableType:
+        """Return the table with a line of state beneath."""
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, expand=False)
+        table.add_column("wheel", no_wrap=True)
+        for name in ("load\nN", "slip\n%", "torque\nN·m"):
+            table.add_column(name, justify="right", no_wrap=True)
+        table.add_column("", no_wrap=True)
+        for name in ("c\nkPa", "φ\n°"):
+            table.add_column(name, justify="right", no_wrap=True)
+        table.add_column("\nestimate", no_wrap=True)
+        top = max([0.1, *(max(values) for values in self.torque.values() if values)])
+        for wheel in range(1, 7):
+            table.add_row(*self._row(wheel, top))
+        return Group(table, self._footer())
+
+    def _row(self, wheel: int, top: float) -> tuple[RenderableType, ...]:
+        name = Text.assemble((f"{wheel} ", "bold"), (PLACES[wheel - 1], "dim"))
+        message = self.wheels.get(wheel)
+        if message is None:
+            return (name, *[Text("–", style="dim")] * 3, "", "–", "–", Text("waiting", style="dim"))
+        history = Text(sparkline(self.torque.get(wheel, ()), top).ljust(HISTORY), style="cyan")
+        angle = message["friction_angle_rad"]
+        good = "bold green" if message["valid"] and not message["outside_training_range"] else "yellow"
+        return (
+            name,
+            _number(message["smoothed_load_N"], 1),
+            _number(message["slip"], 1, 100),
+            _number(message["smoothed_torque_Nm"], 2, style="bold cyan"),
+            history,
+            _number(message["cohesion_Pa"], 2, 1e-3, style=good),
+            _number(math.degrees(angle) if angle is not None else None, 1, style=good),
+            _verdict(message),
+        )
+
+    def _footer(self) -> Text:
+        style = "green" if self.state == "online" else "red"
+        text = Text.assemble(
+            ("● ", style), (f"{self.prefix} {self.state}", style), (f" · {self.messages} messages received", "dim")
+        )
+        if self.last_event:
+            text.append(f" · {self.last_event}", style="dim")
+        text.truncate(100, overflow="ellipsis")
+        return text
+
+
+def sparkline(values: Any, top: float) -> str:  # noqa: ANN401  # any numbers in a row
+    """Return values between 0 and `top` as a row of blocks."""
+    return "".join(BLOCKS[min(len(BLOCKS) - 1, max(0, int(value / top * len(BLOCKS))))] for value in values)
+
+
+def _number(value: float | None, digits: int, factor: float = 1.0, style: str = "") -> Text:
+    if value is None:
+        return Text("–", style="dim")
+    return Text(f"{value * factor:.{digits}f}", style=style)
+
+
+def _verdict(message: dict[str, Any]) -> Text:
+    if not message["measured"]:
+        return Text("not measured", style="red")
+    if not message["valid"]:
+        return Text("standing still" if message["slip_source"] == "none" else "no estimate", style="dim")
+    if outside := message["outside_training_range"]:
+        return Text(f"{', '.join(SYMBOLS.get(name, name) for name in outside)} out of range", style="yellow")
+    return Text("valid", style="green")
