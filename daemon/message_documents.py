@@ -79,7 +79,7 @@ def asyncapi() -> dict[str, Any]:
 
 def _server_binding() -> dict[str, Any]:
     will = {"topic": "regolith/{rover}/state", "qos": 1, "retain": True, "message": "offline, connection-lost"}
-    return {"clientId": "regolithd-{rover}", "cleanSession": True, "keepAlive": 10, "lastWill": will}
+    return {"clientId": "regolithd-regolith-{rover}", "cleanSession": True, "keepAlive": 10, "lastWill": will}
 
 
 def _channel(channel: Channel) -> dict[str, Any]:

@@ -268,7 +268,7 @@ class AcquisitionReport(BaseModel):
 class PublishingReport(BaseModel):
     """What became of the messages that must not be lost."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
     connections: int
     queued: int
@@ -276,6 +276,9 @@ class PublishingReport(BaseModel):
     acknowledged: int
     repeated: int
     dropped: int
+    """Lost: the store was full."""
+    unstored: int
+    """Refused by the disk; they waited in memory alone."""
     torn: int
 
 

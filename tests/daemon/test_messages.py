@@ -6,39 +6,15 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from estimates import estimate
 from pydantic import ValidationError
 
 from daemon.message_documents import documents
 from daemon.messages import CHANNELS, SnapshotMessage, StateMessage, WheelMessage, iso_time
 from daemon.publish.encode import as_late, encode, write
-from daemon.snapshot import Estimate, SlipSource, Snapshot
 
 DOCS = Path(__file__).parents[2] / "docs" / "messages"
 SESSION = "20130611T140312Z-5f1c"
-
-
-def estimate(sequence: int = 500, missing_wheel: int | None = None) -> Estimate:
-    """Return six wheels' numbers, none of which has a short decimal form; one wheel may have measured nothing."""
-    random = np.random.default_rng(sequence)
-    values = random.normal(1.0, 0.3, (10, 6))
-    values[9] = 0x1237
-    derived = random.normal(1.0, 0.3, (6, 6))
-    valid = np.ones(6, bool)
-    outside = np.zeros((3, 6), bool)
-    outside[1, 4] = True
-    if missing_wheel is not None:
-        values[:, missing_wheel] = derived[:, missing_wheel] = np.nan
-        valid[missing_wheel] = False
-    return Estimate(
-        Snapshot(sequence, 1_370_959_642_018_291_000, values),
-        *derived[:4],
-        (SlipSource.CONFIGURED,) * 6,
-        *derived[4:],
-        valid,
-        ("load_N", "slip", "motor_current_A"),
-        outside,
-        "terrain-1",
-    )
 
 
 @pytest.mark.parametrize("missing_wheel", [None, 0, 3])

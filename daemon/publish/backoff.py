@@ -1,0 +1,26 @@
+"""How long to wait before the next attempt: twice as long each time, bounded, and never all rovers at once."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass, field
+
+
+@dataclass(slots=True)
+class Backoff:
+    """Delays between attempts [s]: `first`, doubling up to `longest`, each shortened by chance by up to a half."""
+
+    first: float = 0.5
+    longest: float = 30.0
+    random: random.Random = field(default_factory=random.Random)
+    attempts: int = 0
+
+    def next(self) -> float:
+        """Return how long to wait now."""
+        whole = min(self.longest, self.first * 2.0 ** min(self.attempts, 30))
+        self.attempts += 1
+        return whole * self.random.uniform(0.5, 1.0)
+
+    def reset(self) -> None:
+        """Begin anew: an attempt succeeded."""
+        self.attempts = 0

@@ -1,0 +1,77 @@
+"""Somebody who listens to the broker, and what must hold for what they heard."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import aiomqtt
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Callable
+
+
+@dataclass
+class Subscriber:
+    """Whoever listens: remembers everything, and comes back to the same session at the broker."""
+
+    port: int
+    topic: str = "regolith/#"
+    name: str = "subscriber"
+    messages: list[tuple[str, dict[str, Any], bool]] = field(default_factory=list)
+    ready: asyncio.Event = field(default_factory=asyncio.Event)
+
+    async def run(self) -> None:
+        """Listen until cancelled."""
+        while True:
+            with suppress(aiomqtt.MqttError):
+                async with aiomqtt.Client("127.0.0.1", self.port, identifier=self.name, clean_session=False) as client:
+                    await client.subscribe(self.topic, qos=1)
+                    self.ready.set()
+                    async for message in client.messages:
+                        topic = str(message.topic).removeprefix("regolith/kapvik/")
+                        assert isinstance(message.payload, bytes)
+                        self.messages.append((topic, json.loads(message.payload), message.retain))
+            self.ready.clear()
+            await asyncio.sleep(0.05)
+
+    def of(self, topic: str) -> list[dict[str, Any]]:
+        """Return what came on a topic."""
+        return [message for at, message, _ in self.messages if at == topic]
+
+    def sequences(self, topic: str = "snapshot") -> list[int]:
+        """Return the sequence numbers of what came on a topic, late repetitions left out."""
+        seen = [message["sequence"] for message in self.of(topic)]
+        return list(dict.fromkeys(seen))
+
+
+async def until(condition: Callable[[], object], seconds: float = 30) -> None:
+    """Wait for something to become true, with a deadline that only a broken program misses."""
+    async with asyncio.timeout(seconds):
+        while not condition():  # noqa: ASYNC110  # anything may be waited for
+            await asyncio.sleep(0.02)
+
+
+@asynccontextmanager
+async def listening(subscriber: Subscriber) -> AsyncIterator[Subscriber]:
+    """Let a subscriber listen."""
+    task = asyncio.create_task(subscriber.run())
+    try:
+        await until(subscriber.ready.is_set)
+        yield subscriber
+    finally:
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+
+
+def assert_complete(subscriber: Subscriber, count: int) -> None:
+    """All snapshots came, in order; what came twice is marked the second time."""
+    assert subscriber.sequences() == list(range(count))
+    seen: set[int] = set()
+    for message in subscriber.of("snapshot"):
+        assert message["sequence"] not in seen or message["late"], message["sequence"]
+        seen.add(message["sequence"])
