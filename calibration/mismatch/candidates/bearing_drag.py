@@ -1,0 +1,41 @@
+"""One wheel's drag grows from some time on: a bearing that fails, sand in a seal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, onsets, since
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from calibration.mismatch.scene import Scene
+
+
+class BearingDrag(Candidate):
+    """Drag against one wheel's rotation that was not there before."""
+
+    name = "bearing-drag"
+    covariate = "time"
+    equation = "ΔI = I_b g(t − t_0) sign(ω)"
+    words = "drag on one wheel that was not there before"
+    signature = "one wheel's residual along sign(ω), none before its onset, growing after"
+    experiment = "lift the wheels, spin all six at one speed and compare their currents"
+    source = "seal and bearing failures: from percents of rated current to stalling"
+    requires = ("direction",)
+    coefficients: ClassVar = (Coefficient("drag_current", "{unit}"),)
+    sharing: ClassVar = ("one",)
+    free: ClassVar = {"onset_s": (0.0, float("inf"))}
+
+    def shapes(self, scene: Scene) -> Sequence[Shape]:
+        """At each of many times: at once, within minutes, or on and on."""
+        rises = (0.0, 0.03 * scene.length_s, 0.15 * scene.length_s, float("inf"))
+        return [{"onset_s": t, "rise_s": rise} for t in onsets(scene) for rise in rises]
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:
+        """Return sign(ω) g(t − t_0)."""
+        return (scene.covariates["direction"] * since(scene, float(shape["onset_s"]), float(shape["rise_s"])))[None]
+
+    def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
+        """Anywhere but at the very ends."""
+        return {"onset_s": (0.01 * scene.length_s, 0.97 * scene.length_s)}

@@ -1,0 +1,100 @@
+"""What a candidate is: a term with unit, sign and shape, where it acts, and the drive that shows it alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from calibration.mismatch.scene import Scene
+
+Array = NDArray[np.float64]
+Shape = dict[str, float | str]
+"""Values of the shape parameters (an onset, an order, a Stribeck speed): what enters nonlinearly."""
+Sharing = Literal["all", "one"]
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A factor that is fitted: its name, unit ({unit} is the predicted channel's) and sign (0: either)."""
+
+    name: str
+    unit: str = "{unit}"
+    sign: int = 1
+
+
+class Candidate:
+    """One effect: subclass it, say what it is, and return its columns.
+
+    The effect is Σ coefficient × column, added to the prediction.
+    """
+
+    name: ClassVar[str]
+    covariate: ClassVar[str]
+    equation: ClassVar[str]
+    signature: ClassVar[str]
+    """What it looks like in a recording."""
+    experiment: ClassVar[str]
+    """The drive that excites it alone."""
+    source: ClassVar[str]
+    """Where form and size come from."""
+    requires: ClassVar[tuple[str, ...]] = ()
+    """Covariates without which it cannot be told."""
+    coefficients: ClassVar[tuple[Coefficient, ...]]
+    sharing: ClassVar[tuple[Sharing, ...]] = ("all", "one")
+    """Which wheels may have it: all alike, or one alone."""
+    channel: ClassVar[str | None] = None
+    """Where the fault is, if not in the predicted channel."""
+    free: ClassVar[Mapping[str, tuple[float, float]]] = {}
+    """Shape parameters that are continuous, with their least and greatest value."""
+    words: ClassVar[str]
+    """What it is, in a sentence after 'there is'."""
+
+    def applies(self, scene: Scene) -> bool:
+        """Say whether this recording and simulation can have it at all."""
+        return scene.has(*self.requires)
+
+    def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002  # subclasses look
+        """Return the grid of shapes that is searched."""
+        return [{}]
+
+    def seek(self, scene: Scene, residual: Array) -> Sequence[Shape]:  # noqa: ARG002
+        """Return further shapes that a residual suggests, where a grid would be too fine to search blindly."""
+        return []
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:
+        """Return the columns, shape (coefficient, time, wheel), in the predicted channel's unit per coefficient."""
+        raise NotImplementedError
+
+    def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
+        """Return the free shape parameters' range in this recording."""
+        return self.free
+
+    def parameters(self, shape: Shape, values: Sequence[float]) -> dict[str, float]:
+        """Return what the answer reports: coefficients and free shape parameters by name."""
+        found = {c.name: float(v) for c, v in zip(self.coefficients, values, strict=False)}
+        return {**found, **{name: float(shape[name]) for name in self.free if name in shape}}
+
+    def wheels(self, shape: Shape, wheels: tuple[int, ...], row: Array | None) -> tuple[int, ...]:  # noqa: ARG002
+        """Return the wheels on which it really acts, of those that share it."""
+        return wheels
+
+
+def onsets(scene: Scene, count: int = 24) -> list[float]:
+    """Return times at which something may begin [s]: evenly spread, not within 3 % of either end."""
+    return [float(t) for t in scene.length_s * np.linspace(0.03, 0.95, count)]
+
+
+def since(scene: Scene, onset_s: float, rise_s: float) -> Array:
+    """Return growth from 0 at the onset, shape (time, 1): a step (rise 0), an approach to 1, or a ramp (rise inf)."""
+    after = np.maximum(scene.time_s - onset_s, 0.0)
+    if rise_s == 0:
+        return (scene.time_s >= onset_s).astype(np.float64)
+    if np.isinf(rise_s):
+        return after / max(scene.length_s - onset_s, 1e-9)
+    return -np.expm1(-after / rise_s)

@@ -1,0 +1,60 @@
+"""Drag that grows as the gearbox gets colder: grease stiffens."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from calibration.mismatch.scene import Scene
+
+
+class ColdLubricantFriction(Candidate):
+    """Grease viscosity over temperature: a constant drag or one proportional to speed, times a falling function."""
+
+    name = "cold-lubricant-friction"
+    covariate = "temperature"
+    equation = "ΔI = I_cold g(T) sign(ω) |ω|^p,  g falling with T"
+    words = "drag that grows as the gearbox gets colder"
+    signature = "a residual along sign(ω) that shrinks as the motor warms"
+    experiment = "start cold, warm up on level ground at one speed, then stop, cool down and do it again"
+    source = "Vogel–Fulcher viscosity of low-temperature greases: a factor e in 10 to 40 K; linear in a small range"
+    requires = ("temperature", "direction")
+    coefficients: ClassVar = (Coefficient("cold_drag", "{unit} (s/rad)^p"),)
+    free: ClassVar = {"scale_K": (5.0, 80.0), "no_drag_above_degC": (-60.0, 80.0)}
+
+    def shapes(self, scene: Scene) -> Sequence[Shape]:
+        """Exponentials of several steepnesses, and straight lines that end at several temperatures."""
+        temperature = scene.covariates["temperature"][scene.mask]
+        ends = np.nanquantile(temperature, [0.35, 0.6, 0.85]).tolist()
+        top = float(np.nanmax(temperature))
+        found: list[Shape] = []
+        for power in (0.0, 1.0):
+            found += [{"power": power, "scale_K": scale} for scale in (8.0, 15.0, 30.0, 60.0)]
+            found += [{"power": power, "no_drag_above_degC": end} for end in (*ends, top, top + 20)]
+        return found
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:
+        """Return g(T) sign(ω)|ω|^p; g is 1 at the coldest that was driven."""
+        temperature = np.nan_to_num(scene.covariates["temperature"])
+        coldest = float(np.quantile(temperature[scene.mask], 0.005))
+        if "scale_K" in shape:
+            growth = np.exp(-(temperature - coldest) / float(shape["scale_K"]))
+        else:
+            end = float(shape["no_drag_above_degC"])
+            growth = np.maximum(end - temperature, 0.0) / max(end - coldest, 1.0)
+        drag = scene.covariates["direction"] * growth
+        if float(shape["power"]) and "wheel_speed" in scene.covariates:
+            drag = drag * np.abs(scene.covariates["wheel_speed"])
+        return drag[None]
+
+    def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:
+        """Only the parameter that this shape has."""
+        temperature = scene.covariates["temperature"][scene.mask]
+        ends = (float(np.nanquantile(temperature, 0.2)), float(np.nanmax(temperature)) + 40)
+        return {"scale_K": self.free["scale_K"]} if "scale_K" in shape else {"no_drag_above_degC": ends}

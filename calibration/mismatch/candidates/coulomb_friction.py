@@ -1,0 +1,30 @@
+"""Constant drag against rotation: a motor's no-load current, dry friction of seals and gears."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+
+if TYPE_CHECKING:
+    from calibration.mismatch.scene import Scene
+
+
+class CoulombFriction(Candidate):
+    """A constant against the motion."""
+
+    name = "coulomb-friction"
+    covariate = "direction"
+    equation = "ΔI = I_c sign(ω)"
+    words = "constant drag against rotation (no-load current)"
+    signature = "a residual of constant size that changes sign with the direction of rotation"
+    experiment = "drive the same level stretch forwards and backwards at one speed, then lift the wheels and spin them"
+    source = "Maxon RE 25: no-load current about 37 mA; harmonic drives add their starting torque"
+    requires = ("direction",)
+    coefficients: ClassVar = (Coefficient("coulomb_current", "{unit}"),)
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:  # noqa: ARG002
+        """Return sign(ω)."""
+        return np.asarray(scene.covariates["direction"])[None]

@@ -1,0 +1,30 @@
+"""One current reading is offset, whatever the direction."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+
+if TYPE_CHECKING:
+    from calibration.mismatch.scene import Scene
+
+
+class CurrentSensorBias(Candidate):
+    """A constant on one reading, which does not change sign with rotation."""
+
+    name = "current-sensor-bias"
+    covariate = "none"
+    equation = "ΔI = I_0"
+    words = "an offset of one reading, whatever the direction"
+    signature = "one wheel's residual is constant and keeps its sign when the wheel reverses"
+    experiment = "stand still with the motors unpowered, and drive one stretch both ways"
+    source = "shunt amplifiers: offsets of milliamperes"
+    coefficients: ClassVar = (Coefficient("offset", "{unit}", 0),)
+    sharing: ClassVar = ("one",)
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:  # noqa: ARG002
+        """Return 1."""
+        return np.ones((1, *scene.mask.shape))

@@ -1,0 +1,41 @@
+"""The weight's component along the slope, shared among the wheels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from calibration.mismatch.scene import Scene
+
+
+class GradeResistance(Candidate):
+    """Uphill costs current whichever way the wheels turn: nose up, the soil must push forwards."""
+
+    name = "grade-resistance"
+    covariate = "pitch"
+    equation = "ΔI = k W sin(pitch)"
+    words = "the weight's part along the slope"
+    signature = "a residual along sin(pitch) that does not change sign with the direction of travel"
+    experiment = "drive one slope up and down, forwards and backwards"
+    source = "statics: at most weight × radius / gain"
+    requires = ("pitch",)
+    coefficients: ClassVar = (Coefficient("grade_current", "{unit}"),)
+    sharing: ClassVar = ("all",)
+
+    def shapes(self, scene: Scene) -> Sequence[Shape]:
+        """Shared by what each wheel carries, or evenly."""
+        return [{"shared": "by load"}, {"shared": "evenly"}] if "load" in scene.covariates else [{"shared": "evenly"}]
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:
+        """Return sin(pitch), times each wheel's share of the load relative to the mean."""
+        along = np.sin(np.nan_to_num(scene.covariates["pitch"]))
+        if shape["shared"] == "by load":
+            load = np.nan_to_num(scene.covariates["load"])
+            along = along * load / np.mean(load[scene.mask])
+        return along[None]

@@ -1,0 +1,44 @@
+"""Losses that depend on the torque carried: gears that are less efficient at some loads than at others."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from calibration.mismatch.scene import Scene
+
+
+class LoadDependentEfficiency(Candidate):
+    """An efficiency that is not one number: the loss grows as a power of the torque.
+
+    With power 0 the loss is proportional to torque: the stated efficiency is wrong by more than its stated
+    uncertainty. A loss that does not grow with torque at all is Coulomb friction.
+    """
+
+    name = "load-dependent-efficiency"
+    covariate = "torque"
+    equation = "ΔI = a I_sim |I_sim/Ī|^p"
+    words = "a loss that depends on the torque carried"
+    signature = "a residual along the predicted current, curved against it"
+    experiment = "drive one speed with and without ballast, and up and down slopes, at one temperature"
+    source = "CSF-11 efficiency over load (maker's chart): 0.3 to 0.7 from a tenth of rated torque to rated"
+    requires = ("torque",)
+    coefficients: ClassVar = (Coefficient("relative_loss", "1", 0),)
+
+    def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002
+        """From proportional to strongly curved, and losses at light loads."""
+        return [{"power": p} for p in (0.0, 0.5, 1.0, 2.0)] + [{"light": s} for s in (0.5, 1.0)]
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:
+        """Return the loss as a multiple of the prediction."""
+        size = np.abs(scene.filled)
+        relative = size / max(float(np.mean(size[scene.mask])), 1e-30)
+        if "light" in shape:
+            return (scene.filled * np.exp(-relative / float(shape["light"])))[None]
+        return (scene.filled * relative ** float(shape["power"]))[None]

@@ -1,0 +1,58 @@
+"""Later wheels run in the ruts of earlier ones, on soil already compacted."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from calibration.mismatch.scene import Scene
+
+
+class MultiPassCompaction(Candidate):
+    """Resistance that changes from row to row, by number of passes before."""
+
+    name = "multi-pass-compaction"
+    covariate = "wheel_row"
+    equation = "ΔI = a p(row) I_sim"
+    words = "soil that earlier wheels have compacted for later ones"
+    signature = "a residual along the predicted current that is the same for both wheels of a row and differs by row"
+    experiment = "drive the same virgin lane forwards, then backwards in the same ruts, then a third time"
+    source = "multi-pass tests on sand: most of the compaction in the first pass"
+    requires = ("torque",)
+    coefficients: ClassVar = (Coefficient("relative_change_per_pass", "1", 0),)
+    sharing: ClassVar = ("all",)
+
+    def applies(self, scene: Scene) -> bool:
+        """Only where there are rows."""
+        return super().applies(scene) and scene.row is not None and bool(np.ptp(scene.row) > 0)
+
+    def shapes(self, scene: Scene) -> Sequence[Shape]:
+        """All at the first pass, or evenly; counted from the front, or from whichever end leads."""
+        leads = ("front", "travel") if "direction" in scene.covariates else ("front",)
+        ways = ("current", "stiffness") if "stiffness_factor" in scene.simulation.variants() else ("current",)
+        return [{"kept": kept, "leads": lead, "by": way} for kept in (0.0, 0.5, 1.0) for lead in leads for way in ways]
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:
+        """Return the prediction (or its answer to stiffer soil) times what the passes before have done."""
+        assert scene.row is not None  # noqa: S101  # applies() said so
+        last = np.max(scene.row)
+        passes = np.broadcast_to(scene.row, scene.mask.shape)
+        if shape["leads"] == "travel":
+            passes = np.where(scene.covariates["direction"] >= 0, passes, last - passes)
+        # 1 + k + k² …: what each further pass adds is the fraction k of what the one before did.
+        kept = float(shape["kept"])
+        done = np.where(passes > 0, 1.0, 0.0) + np.where(passes > 1, kept * (passes - 1), 0.0)
+        base = scene.filled if shape["by"] == "current" else scene.secant("stiffness_factor", 0.3)
+        return (base * done)[None]
+
+    def wheels(self, shape: Shape, wheels: tuple[int, ...], row: Array | None) -> tuple[int, ...]:
+        """Counted from the front, the first row is never in a rut."""
+        if shape["leads"] == "travel" or row is None:
+            return wheels
+        return tuple(wheel for wheel, at in zip(wheels, row, strict=True) if at > 0)

@@ -1,0 +1,41 @@
+"""Extra sinkage with slip: a wheel that slips digs itself in (Eq. 8)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from calibration.mismatch.scene import Scene
+
+
+class SlipSinkage(Candidate):
+    """Lyasko's factor on the sinkage, through the soil model where the simulation has one."""
+
+    name = "slip-sinkage"
+    covariate = "slip"
+    equation = "z_SS = z (1 + s ((1 + i)/(1 − i/2) − 1))  (Eqs 8, 9)"
+    words = "extra sinkage with slip"
+    signature = "a residual along the predicted current that grows with slip and vanishes without it"
+    experiment = "pull a sledge of several weights on level ground: slip at constant load and speed"
+    source = "Lyasko (2010), Eq. 8 of the paper: s = 1"
+    requires = ("slip",)
+    coefficients: ClassVar = (Coefficient("strength", "1"),)
+    sharing: ClassVar = ("all",)
+
+    def shapes(self, scene: Scene) -> Sequence[Shape]:
+        """Through the soil model at small and full strength; else in proportion to slip."""
+        through = [{"step": 0.3}, {"step": 1.0}] if "slip_sinkage" in scene.simulation.variants() else []
+        return [*through, {"power": 1.0}]
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:
+        """Return what the soil model says to more sinkage, or prediction × slip."""
+        if "step" in shape:
+            return scene.secant("slip_sinkage", float(shape["step"]))[None]
+        slip = np.maximum(np.nan_to_num(scene.covariates["slip"]), 0.0)
+        return (scene.filled * slip ** float(shape["power"]))[None]

@@ -1,0 +1,48 @@
+"""The soil's strength changes at some time: the rover has driven onto other ground."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, onsets, since
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from calibration.mismatch.scene import Scene
+
+
+class SoilTransition(Candidate):
+    """Cohesion and the tangent of the friction angle change in one proportion, from some time on."""
+
+    name = "soil-transition"
+    covariate = "time"
+    equation = "c, tan φ → (1 + s) c, (1 + s) tan φ  for t > t_0"
+    words = "a change of the soil's strength"
+    signature = "on all wheels at once, a residual along the predicted current that begins at one time and stays"
+    experiment = "drive back over the place where it began: the residual must go where it came"
+    source = "Table 1 of the paper: strengths differ by a factor of five between soils"
+    coefficients: ClassVar = (Coefficient("relative_strength_change", "1", 0),)
+    sharing: ClassVar = ("all",)
+    free: ClassVar = {"onset_s": (0.0, float("inf"))}
+
+    def applies(self, scene: Scene) -> bool:
+        """Only where the simulation has a soil."""
+        return {"cohesion_Pa", "friction_angle_deg"} <= set(scene.simulation.parameters)
+
+    def shapes(self, scene: Scene) -> Sequence[Shape]:
+        """At each of many times, at once."""
+        return [{"onset_s": t, "rise_s": 0.0, "of": "strength"} for t in onsets(scene, 40)]
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:
+        """Return the prediction's answer to stronger soil, after the onset."""
+        values = scene.values
+        cohesion = values["cohesion_Pa"] * scene.tangent("cohesion_Pa")
+        # d tan φ / tan φ = dφ · 2 / sin 2φ; to a few percent the angle itself scales alike.
+        friction = values["friction_angle_deg"] * scene.tangent("friction_angle_deg")
+        of = {"strength": cohesion + friction, "cohesion": cohesion, "friction": friction}[str(shape["of"])]
+        return (of * since(scene, float(shape["onset_s"]), float(shape["rise_s"])))[None]
+
+    def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
+        """Anywhere but at the very ends."""
+        return {"onset_s": (0.02 * scene.length_s, 0.97 * scene.length_s)}

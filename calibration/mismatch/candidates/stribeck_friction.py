@@ -1,0 +1,52 @@
+"""Extra drag near standstill that fades as a lubricating film builds up."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from calibration.mismatch.scene import Scene
+
+
+class StribeckFriction(Candidate):
+    """Boundary friction above the Coulomb level, gone at several times the Stribeck speed."""
+
+    name = "stribeck-friction"
+    covariate = "wheel_speed"
+    equation = "ΔI = I_s sign(ω) exp(−(|ω|/ω_s)^δ)"
+    words = "extra drag near standstill that fades with speed"
+    signature = "a residual along sign(ω) that is largest at the slowest speeds"
+    experiment = "creep: a staircase of very slow constant speeds on level ground, both ways"
+    source = "Armstrong-Hélouvry, Dupont and Canudas de Wit (1994): δ from 1 to 2"
+    requires = ("wheel_speed",)
+    coefficients: ClassVar = (Coefficient("stribeck_current", "{unit}"),)
+    free: ClassVar = {"stribeck_speed_rad_s": (0.0, np.inf)}
+
+    def shapes(self, scene: Scene) -> Sequence[Shape]:
+        """Stribeck speeds between the slowest and the median speed driven."""
+        return [
+            {"stribeck_speed_rad_s": float(speed), "exponent": exponent}
+            for exponent in (1.0, 2.0)
+            for speed in np.geomspace(*self._range(scene), 6)
+        ]
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:
+        """Return sign(ω) exp(−(|ω|/ω_s)^δ)."""
+        speed = scene.covariates["wheel_speed"]
+        ratio = np.abs(speed) / float(shape["stribeck_speed_rad_s"])
+        return (np.sign(speed) * np.exp(-(ratio ** float(shape["exponent"]))))[None]
+
+    def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
+        """Below the slowest speed driven it cannot be told from nothing, above the median not from viscous."""
+        return {"stribeck_speed_rad_s": self._range(scene)}
+
+    def _range(self, scene: Scene) -> tuple[float, float]:
+        speed = np.abs(scene.covariates["wheel_speed"][scene.mask])
+        speed = speed[speed > 0]
+        return 0.5 * float(np.quantile(speed, 0.02)), 0.8 * float(np.quantile(speed, 0.5))

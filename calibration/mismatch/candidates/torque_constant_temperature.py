@@ -1,0 +1,38 @@
+"""Torque constant that falls as the magnets warm: the same torque then needs more current."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from calibration.mismatch.scene import Scene
+
+
+class TorqueConstantTemperature(Candidate):
+    """Remanence falls with temperature; the current rises in proportion to the torque."""
+
+    name = "torque-constant-temperature"
+    covariate = "temperature"
+    equation = "ΔI = α (T − T_0) I_sim"
+    words = "a torque constant that falls as the motor warms"
+    signature = "a residual along the predicted current that grows with temperature, through zero at T_0"
+    experiment = "hold a known load (a slope, or ballast) at one speed while the motor warms, then let it cool and repeat"
+    source = "NdFeB −0.1 %/K, ferrite −0.2 %/K; T_0 20 to 25 °C on data sheets"
+    requires = ("temperature",)
+    coefficients: ClassVar = (Coefficient("temperature_coefficient", "1/K"),)
+
+    def shapes(self, scene: Scene) -> Sequence[Shape]:
+        """Reference temperatures of data sheets, and where the simulation's gain was measured perhaps."""
+        middle = float(np.nanmean(scene.covariates["temperature"][scene.mask]))
+        return [{"reference_degC": t} for t in (25.0, 20.0, 0.0, middle)]
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:
+        """Return (T − T_0) times the prediction."""
+        warmer = np.nan_to_num(scene.covariates["temperature"]) - float(shape["reference_degC"])
+        return (warmer * scene.filled)[None]

@@ -1,0 +1,52 @@
+"""Scrub while the machine turns: wheels slide sideways, and the two sides work against each other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from calibration.mismatch.scene import Scene
+
+
+class TurningResistance(Candidate):
+    """Two parts: drag against each wheel's own rotation, and the moment that outer wheels push and inner ones brake."""
+
+    name = "turning-resistance"
+    covariate = "yaw_rate"
+    equation = "ΔI = a g(|ψ̇|) sign(ω) + m g(|ψ̇|) sign(ψ̇) side,  g rising"
+    words = "scrub while the rover turns"
+    signature = "a residual only while turning: alike on all wheels (drag) or opposite on the two sides (moment)"
+    experiment = "turn on the spot and along arcs of several radii, both ways, on level ground"
+    source = "skid-steer terramechanics: lateral friction saturates within a few degrees of side slip"
+    requires = ("yaw_rate", "direction")
+    coefficients: ClassVar = (Coefficient("drag", "{unit}", 0), Coefficient("moment", "{unit}", 0))
+    sharing: ClassVar = ("all",)
+
+    def shapes(self, scene: Scene) -> Sequence[Shape]:
+        """Proportional or saturating with yaw rate; even, or more at the end rows."""
+        rows = ("alike", "ends") if scene.row is not None and np.ptp(scene.row) > 1 else ("alike",)
+        return [{"half_at": half, "rows": rows_} for half in (0.3, 1.0, 100.0) for rows_ in rows]
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:
+        """Return drag and moment, in multiples of what the typical turn has."""
+        yaw = np.nan_to_num(scene.covariates["yaw_rate"])
+        noise = scene.simulation.sensors.get("yaw_rate_rad_s")
+        # What is within the sensor's error of no turn is no turn: its sign would be noise.
+        yaw = np.where(np.abs(yaw) > 3 * noise.absolute, yaw, 0.0) if noise else yaw
+        turning = np.abs(yaw[yaw != 0])
+        typical = float(np.mean(turning)) if turning.size else 1.0
+        relative = np.abs(yaw) / typical
+        half = float(shape["half_at"])
+        size = relative * (1 + half) / (relative + half)
+        if shape["rows"] == "ends" and scene.row is not None:
+            size = size * np.abs(scene.row - np.mean(scene.row))
+        drag = size * scene.covariates["direction"]
+        if scene.side is None:
+            return drag[None]
+        return np.stack((drag, size * np.sign(yaw) * scene.side))

@@ -1,0 +1,38 @@
+"""Drag that grows with speed: grease, and a motor's iron losses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from calibration.mismatch.scene import Scene
+
+
+class ViscousFriction(Candidate):
+    """Drag proportional to speed, or to a power of it near 1 (grease shears thin)."""
+
+    name = "viscous-friction"
+    covariate = "wheel_speed"
+    equation = "ΔI = b sign(ω) |ω|^p"
+    words = "drag that grows with the wheel's speed"
+    signature = "a residual along sign(ω) that rises with |ω| and vanishes towards standstill"
+    experiment = "drive a staircase of at least four constant speeds on level ground, both ways"
+    source = "grease viscosity; power 0.7 (shear-thinning) to 1.4 (churning)"
+    requires = ("wheel_speed",)
+    coefficients: ClassVar = (Coefficient("viscous_coefficient", "{unit} (s/rad)^p"),)
+    free: ClassVar = {"power": (0.7, 1.4)}
+
+    def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002
+        """Proportional first; then thinner and thicker."""
+        return [{"power": 1.0}, {"power": 0.75}, {"power": 1.35}]
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:
+        """Return sign(ω)|ω|^p."""
+        speed = scene.covariates["wheel_speed"]
+        return (np.sign(speed) * np.abs(speed) ** float(shape["power"]))[None]

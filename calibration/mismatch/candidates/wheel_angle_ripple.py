@@ -1,0 +1,85 @@
+"""Current that is periodic in the wheel's angle: grousers biting, gear teeth, an eccentric wheel."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from calibration.mismatch.scene import Scene
+
+BINS_PER_TURN = 256
+HIGHEST_ORDER = 64
+
+
+class WheelAngleRipple(Candidate):
+    """A sine of the wheel's angle, each wheel at its own phase, at one order: cycles per wheel turn."""
+
+    name = "wheel-angle-ripple"
+    covariate = "wheel_angle"
+    equation = "ΔI = Σ a_k cos(order θ) + b_k sin(order θ), wheel by wheel"
+    words = "a ripple that is periodic in the wheel's angle"
+    signature = "a line in the residual's spectrum over wheel angle that stays put when the speed changes"
+    experiment = "drive straight at several constant speeds, sampled at least 4 times per cycle"
+    source = "grousers: as many cycles per turn as there are; harmonic drive: two per turn of its wave generator"
+    requires = ("wheel_angle",)
+    coefficients: ClassVar = (Coefficient("amplitude", "{unit}", 0),)
+    sharing: ClassVar = ("all", "one")
+    free: ClassVar = {"order": (0.5, HIGHEST_ORDER)}
+
+    def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002
+        """None: orders are sought in the residual, where thousands can be tried at once."""
+        return []
+
+    def seek(self, scene: Scene, residual: Array) -> Sequence[Shape]:
+        """Return the strongest order of each kind: the residual summed over angle bins, and its spectrum."""
+        kinds = ("drag", "torque", "load") if "direction" in scene.covariates else ("torque",)
+        return [{"order": self._strongest(scene, residual * self._base(scene, kind)), "kind": kind} for kind in kinds]
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:
+        """Return cosine and sine for each wheel, shape (2 wheels, time, wheel)."""
+        phase = float(shape["order"]) * scene.covariates["wheel_angle"]
+        base = self._base(scene, str(shape["kind"]))
+        wheels = scene.mask.shape[1]
+        found = np.zeros((2 * wheels, *scene.mask.shape))
+        for k in range(wheels):
+            found[2 * k, :, k] = (base * np.cos(phase))[:, k]
+            found[2 * k + 1, :, k] = (base * np.sin(phase))[:, k]
+        return found
+
+    def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:
+        """Within one line's width of where it was found."""
+        width = np.pi / max(float(np.ptp(scene.covariates["wheel_angle"])), 1.0)
+        order = float(shape["order"])
+        return {"order": (order - width, order + width)}
+
+    def parameters(self, shape: Shape, values: Sequence[float]) -> dict[str, float]:
+        """Return the amplitude (root mean square over the wheels that have it) and the order."""
+        amplitudes = np.hypot(np.asarray(values[0::2]), np.asarray(values[1::2]))
+        amplitude = float(np.sqrt(np.mean(amplitudes**2)))
+        return {"amplitude": amplitude, "order": float(shape["order"])}
+
+    def _base(self, scene: Scene, kind: str) -> Array:
+        """A torque that ripples whichever way the wheel turns, a drag, or a ripple in proportion to the load."""
+        if kind == "drag":
+            return scene.covariates["direction"]
+        return np.ones(scene.mask.shape) if kind == "torque" else scene.filled / scene.mean_size
+
+    def _strongest(self, scene: Scene, weighted: Array) -> float:
+        angle = scene.covariates["wheel_angle"]
+        low = np.min(angle, axis=0)
+        bins = np.rint((angle - low) * BINS_PER_TURN / (2 * np.pi)).astype(np.int64)
+        length = 4 * int(2 ** np.ceil(np.log2(np.max(bins) + 2)))
+        power: Array = np.zeros(length // 2 + 1)
+        for k in range(angle.shape[1]):
+            here = scene.mask[:, k]
+            summed = np.bincount(bins[here, k], weighted[here, k], minlength=length)
+            power += np.abs(np.fft.rfft(summed)) ** 2 / max(float(np.sum(weighted[here, k] ** 2)), 1e-300)
+        order = np.arange(len(power)) * BINS_PER_TURN / length
+        sought = (order >= self.free["order"][0]) & (order <= HIGHEST_ORDER)
+        return float(order[np.argmax(np.where(sought, power, 0.0))])

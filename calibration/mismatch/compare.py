@@ -1,0 +1,263 @@
+"""The whole comparison: a recording and a simulation in, an answer and its evidence out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.mismatch.answer import (
+    Answer,
+    Contribution,
+    Curve,
+    Effect,
+    Evidence,
+    FitImprovement,
+    Parameter,
+    Unexplained,
+    Verdict,
+)
+from calibration.mismatch.corrected import effect_of
+from calibration.mismatch.decide import Decision, contribution, decide, residual_of
+from calibration.mismatch.dictionary import Dictionary
+from calibration.mismatch.fill import NOT_FOR_CURVES, add_candidates, add_curves, add_nuisance
+from calibration.mismatch.held_out import HeldOut, hold_out
+from calibration.mismatch.intervals import parameters_of
+from calibration.mismatch.noise import Noise, blocks_of_time, estimate_noise, folds_of_blocks
+from calibration.mismatch.rivals import rivals
+from calibration.mismatch.scene import Scene, build_scene
+from calibration.mismatch.search import Search, Term
+from calibration.mismatch.sensitivity import sensitivities
+from calibration.mismatch.statements import statement
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from calibration.mismatch.recording import Recording
+    from calibration.mismatch.simulation import Simulation
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What the tool says, and what it has seen."""
+
+    answer: Answer
+    evidence: Evidence
+
+
+def compare(
+    recording: Recording,
+    simulation: Simulation,
+    *,
+    effects: Sequence[Contribution] = (),
+    progress: Callable[[str], None] = lambda _: None,
+) -> Comparison:
+    """Find where a simulation and a recording differ, and what physics was left out.
+
+    `effects` are those that the simulation has already (from an earlier `--corrected`).
+
+    Raises
+    ------
+    MismatchError
+        When there is nothing to compare.
+    """
+    progress("simulating")
+    scene = build_scene(recording, simulation)
+    if effects:
+        scene = replace(scene, prediction=scene.prediction + effect_of(scene, effects))
+    noise = estimate_noise(np.where(scene.mask, scene.measured - scene.filled, 0.0), scene.mask)
+    blocks = blocks_of_time(scene, noise)
+    dictionary = Dictionary(scene, folds_of_blocks(scene, blocks))
+    nuisance = add_nuisance(dictionary)
+    progress("building what could be missing")
+    fitting = add_candidates(dictionary, simulation.candidates())
+    add_curves(dictionary)
+    grid = tuple(dictionary.groups)
+    progress("searching")
+    decision = decide(Search(dictionary, nuisance, noise.weights), fitting)
+    blocks = blocks_of_time(scene, decision.noise)
+    progress("measuring on held-out blocks")
+    sought = [g for g in dictionary.groups if g in grid or g.name == "wheel-angle-ripple"]
+    held = hold_out(decision.search, decision.named, decision.noise, sought)
+    progress("weighing rivals")
+    answer = Answer(
+        _verdict(decision),
+        _effects(decision, held, blocks),
+        tuple(_unexplained(decision, term) for term in decision.unnamed),
+        rivals(decision.search, decision.named),
+        sensitivities(decision.search, decision.whole, simulation.candidates()),
+        FitImprovement(simulation.channel, held.before, held.after, _floor(decision)),
+        (*recording.notes, *_not_looked_for(scene, simulation, [c.name for c in fitting])),
+    )
+    return Comparison(answer, _evidence(decision))
+
+
+def _verdict(decision: Decision) -> Verdict:
+    if decision.unnamed:
+        return "unexplained"
+    return "missing-physics" if decision.named.terms else "consistent"
+
+
+def _floor(decision: Decision) -> float:
+    """Return the noise's root mean square over all values."""
+    counts = decision.search.dictionary.counts.sum(axis=0)
+    return float(np.sqrt(np.sum(decision.noise.deviation**2 * counts) / counts.sum()))
+
+
+def _names(scene: Scene, wheels: Sequence[int]) -> tuple[int, ...]:
+    return tuple(scene.recording.wheels[w] for w in wheels)
+
+
+def _effects(decision: Decision, held: HeldOut, blocks: NDArray[np.int64]) -> tuple[Effect, ...]:
+    search, named = decision.search, decision.named
+    if not named.terms:
+        return ()
+    scene = search.dictionary.scene
+    found = []
+    for index, (term, parameters) in enumerate(zip(named.terms, parameters_of(search, named, blocks), strict=True)):
+        candidate = term.group.candidate
+        assert candidate is not None  # noqa: S101  # named terms are candidates
+        wheels = candidate.wheels(term.group.shape, _names(scene, term.wheels), scene.row)
+        onset = parameters.get("onset_s")
+        errors = (held.without[index], held.with_it[index])
+        told = statement(candidate, wheels, len(scene.recording.wheels), parameters, errors, scene.simulation.wheel_column)
+        found.append(
+            Effect(
+                term.name,
+                candidate.channel or scene.simulation.channel,
+                wheels,
+                candidate.covariate,
+                onset.value if isinstance(onset, Parameter) else None,
+                candidate.equation,
+                told,
+                parameters,
+                *errors,
+            )
+        )
+    return tuple(found)
+
+
+def _unexplained(decision: Decision, term: Term) -> Unexplained:
+    """Say where a curve without a name lives, from when to when, and how much of the residual it is."""
+    search, scene = decision.search, decision.search.dictionary.scene
+    index = decision.whole.terms.index(term)
+    values = contribution(search, decision.whole, index)
+    before = residual_of(search, search.fit(()))
+    on = list(term.wheels)
+    share = float(np.sum(values[:, on] ** 2) / max(float(np.sum(before[:, on] ** 2)), 1e-300))
+    size = np.sum(values[:, on] ** 2, axis=1)
+    grown = np.cumsum(size) / max(float(size.sum()), 1e-300)
+    time_s = scene.time_s[:, 0]
+    first, last = time_s[np.searchsorted(grown, 0.01)], time_s[min(np.searchsorted(grown, 0.99), len(time_s) - 1)]
+    return Unexplained(
+        scene.simulation.channel, _names(scene, term.wheels), term.name, float(first), float(last), min(share, 1.0)
+    )
+
+
+def _not_looked_for(scene: Scene, simulation: Simulation, fitting: Sequence[str]) -> list[str]:
+    missing = [c for c in simulation.candidates() if c.name not in fitting]
+    return [
+        f"{c.name} was not looked for: it needs {', '.join(n for n in c.requires if n not in scene.covariates) or 'another simulation'}."
+        for c in missing
+    ]
+
+
+def _evidence(decision: Decision) -> Evidence:
+    search = decision.search
+    dictionary = search.dictionary
+    scene, noise = dictionary.scene, decision.noise
+    base, whole = search.fit(()), decision.named
+    nan = np.where(scene.mask, 0.0, np.nan)
+    left, after = residual_of(search, base) + nan, residual_of(search, whole) + nan
+    blocks = blocks_of_time(scene, noise)
+    shift = whole.coefficients[: len(search.nuisance.names)] / dictionary.scale[list(search.nuisance.columns)]
+    moved = dict(zip(search.nuisance.names, shift.tolist(), strict=True))
+    values = {name: value + moved.get(name, 0.0) for name, value in scene.values.items()}
+    contributions = tuple(
+        Contribution(
+            term.name,
+            term.group.shape,
+            tuple((whole.coefficients[whole.of_term(i)] / dictionary.scale[list(term.group.columns)]).tolist()),
+            _names(scene, term.wheels),
+        )
+        for i, term in enumerate(whole.terms)
+    )
+    return Evidence(
+        scene.simulation.channel,
+        scene.simulation.unit,
+        scene.time_s[:, 0],
+        scene.recording.wheels,
+        scene.measured,
+        scene.measured - left,
+        scene.measured - after,
+        *_map(scene, noise, left, after, blocks),
+        _curves(decision, left, after),
+        values,
+        contributions,
+        scene,
+    )
+
+
+def _map(scene: Scene, noise: Noise, left: Array, after: Array, blocks: NDArray[np.int64]) -> tuple[Array, Array, Array]:
+    """Return block centres, and block means of the residual along the motion over their standard errors."""
+    along = scene.covariates.get("direction", np.ones(scene.mask.shape))
+    count = int(blocks.max()) + 1
+    centres = np.bincount(blocks, scene.time_s[:, 0], count) / np.bincount(blocks, minlength=count)
+
+    def means(residual: Array) -> Array:
+        signed = np.nan_to_num(residual * along)
+        sums = np.stack([np.bincount(blocks, signed[:, w], count) for w in range(signed.shape[1])], axis=1)
+        counts = np.stack([np.bincount(blocks, scene.mask[:, w], count) for w in range(signed.shape[1])], axis=1)
+        errors = noise.deviation * np.sqrt(noise.memory * np.maximum(counts, 1))
+        return np.where(counts > 0, sums / errors, np.nan)
+
+    return centres, means(left), means(after)
+
+
+def _curves(decision: Decision, left: Array, after: Array) -> tuple[Curve, ...]:
+    """Return the residual against each covariate, those first along which most stood out before."""
+    scene, noise = decision.search.dictionary.scene, decision.noise
+    found = []
+    concerned = sorted({w for term in decision.whole.terms for w in term.wheels}) or list(range(scene.mask.shape[1]))
+    flavours = {"offset": np.ones(scene.mask.shape), "gain": np.sign(scene.filled)}
+    if "direction" in scene.covariates:
+        flavours["drag"] = scene.covariates["direction"]
+    for name, values in scene.covariates.items():
+        if name in NOT_FOR_CURVES - {"direction"}:
+            continue
+        for flavour, factor in flavours.items():
+            curve = _curve(name, flavour, values, factor, (left, after), noise, concerned, scene)
+            if curve is not None:
+                found.append(curve)
+    return tuple(sorted(found, key=lambda c: -float(np.mean((c.before / c.standard_error) ** 2))))
+
+
+def _curve(
+    name: str,
+    flavour: str,
+    values: Array,
+    factor: Array,
+    residuals: tuple[Array, Array],
+    noise: Noise,
+    wheels: list[int],
+    scene: Scene,
+) -> Curve | None:
+    kept = scene.mask & np.isfinite(values)
+    kept[:, [w for w in range(kept.shape[1]) if w not in wheels]] = False
+    chosen = values[kept]
+    if chosen.size < 100:
+        return None
+    edges = np.unique(np.quantile(chosen, np.linspace(0, 1, 25)))
+    if len(edges) < 3:
+        return None
+    place = np.clip(np.searchsorted(edges, chosen, side="right") - 1, 0, len(edges) - 2)
+    counts = np.maximum(np.bincount(place, minlength=len(edges) - 1), 1)
+    at = np.bincount(place, chosen, len(edges) - 1) / counts
+    before, after = (np.bincount(place, (r * factor)[kept], len(edges) - 1) / counts for r in residuals)
+    error = float(np.sqrt(np.mean(noise.deviation[wheels] ** 2) * noise.memory)) / np.sqrt(counts)
+    names = tuple(scene.recording.wheels[w] for w in wheels)
+    return Curve(name, flavour, at, before, after, error, names)

@@ -1,0 +1,138 @@
+"""The corrected simulation: SIM.toml with the effects in it, and a simulation that has such effects.
+
+Drivetrain terms that the daemon has too go into its tables; the others stand in `[[effects]]`, each with its shape,
+its coefficients and its wheels, and are added to the prediction when the file is read again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.mismatch.answer import Contribution
+from calibration.mismatch.errors import SimulationError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from calibration.mismatch.scene import Scene
+    from calibration.mismatch.simulation import Simulation
+
+Array = NDArray[np.float64]
+
+
+def corrected_tables(
+    tables: Mapping[str, Any], simulation: Simulation, values: Mapping[str, float], contributions: Sequence[Contribution]
+) -> dict[str, Any]:
+    """Return SIM.toml's tables with the calibrated parameters and every effect."""
+    corrected = {**tables, **simulation.corrected_tables(values)}
+    rest = [c for c in contributions if not _into_drivetrain(corrected, simulation, c)]
+    before = list(tables.get("effects", []))
+    if before or rest:
+        corrected["effects"] = before + [{k: _toml(v) for k, v in asdict(c).items()} for c in rest]
+    return corrected
+
+
+def _into_drivetrain(tables: dict[str, Any], simulation: Simulation, effect: Contribution) -> bool:
+    """Put Coulomb and viscous friction where the daemon keeps them; say whether that could be done."""
+    drivetrain = tables.get("drivetrain")
+    if simulation.channel != "motor_current_A" or not isinstance(drivetrain, dict):
+        return False
+    six = np.isin(np.arange(1, 7), effect.wheels)
+    (value, *_) = effect.coefficients
+    if effect.name == "coulomb-friction" and value >= 0:
+        drivetrain["no_load_current_A"] = (np.array(_six(drivetrain, "no_load_current_A")) + value * six).tolist()
+        return True
+    if effect.name == "viscous-friction" and value >= 0 and abs(float(effect.shape["power"]) - 1) < 1e-9:
+        # The daemon's viscous term is per motor speed, the effect's per wheel speed.
+        ratio = drivetrain["planetary_ratio"] * drivetrain["harmonic_ratio"]
+        name = "viscous_current_A_s_per_rad"
+        drivetrain[name] = (np.array(_six(drivetrain, name)) + value / ratio * six).tolist()
+        return True
+    return False
+
+
+def _six(drivetrain: Mapping[str, Any], name: str) -> list[float]:
+    before = drivetrain.get(name, 0.0)
+    return [float(v) for v in before] if isinstance(before, list | tuple) else [float(before)] * 6
+
+
+def _toml(value: object) -> object:
+    if isinstance(value, dict):
+        return {k: _toml(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_toml(v) for v in value]
+    return float(value) if isinstance(value, float) else value
+
+
+def stated_effects(tables: Mapping[str, Any]) -> tuple[Contribution, ...]:
+    """Return the effects that SIM.toml has already.
+
+    Raises
+    ------
+    SimulationError
+        When one of them is not as `--corrected` writes it.
+    """
+    found = []
+    for number, effect in enumerate(tables.get("effects", []), 1):
+        try:
+            found.append(
+                Contribution(
+                    str(effect["name"]),
+                    dict(effect["shape"]),
+                    tuple(float(c) for c in effect["coefficients"]),
+                    tuple(int(w) for w in effect["wheels"]),
+                )
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            raise SimulationError(f"effect {number} needs name, shape, coefficients and wheels: {error}") from error
+    return tuple(found)
+
+
+def effect_of(scene: Scene, effects: Sequence[Contribution]) -> Array:
+    """Return what stated effects add to the prediction, shape (time, wheel)."""
+    known = {candidate.name: candidate for candidate in scene.simulation.candidates()}
+    total = np.zeros(scene.mask.shape)
+    for effect in effects:
+        if effect.name not in known:
+            raise SimulationError(f"there is no effect {effect.name!r}; known are {', '.join(sorted(known))}")
+        columns = np.where(scene.mask, known[effect.name].columns(scene, effect.shape), 0.0)
+        on = np.isin(scene.recording.wheels, effect.wheels)
+        total += np.einsum("c,ctw,w->tw", np.array(effect.coefficients), columns, on)
+    return total
+
+
+def to_toml(tables: Mapping[str, Any]) -> str:
+    """Write tables as TOML: what SIM.toml needs, and no more of the language."""
+    lines: list[str] = []
+    for name, table in tables.items():
+        if isinstance(table, dict):
+            lines += [f"[{name}]", *_keys(table), ""]
+            for inner, below in table.items():
+                if isinstance(below, dict):
+                    lines += [f"[{name}.{inner}]", *_keys(below), ""]
+    for effect in tables.get("effects", []):
+        lines += ["[[effects]]", *_keys(effect), ""]
+    return "\n".join(lines)
+
+
+def _keys(table: Mapping[str, Any]) -> list[str]:
+    inline = {"shape"}
+    return [f"{k} = {_value(v)}" for k, v in table.items() if not isinstance(v, dict) or k in inline]
+
+
+def _value(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{k} = {_value(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_value(v) for v in value) + "]"
+    if isinstance(value, float | np.floating):
+        return repr(float(value))
+    return str(value)

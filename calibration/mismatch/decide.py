@@ -1,0 +1,228 @@
+"""Which terms to name, and what to leave without a name.
+
+Named sets of up to three terms are searched: singles, pairs that are best together (not only one after the other), and
+a third on the best pairs. Curves without a name compete: where one covariate's curve explains clearly more than any
+name does, the names have not earned it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.mismatch.fill import add_candidate
+from calibration.mismatch.noise import Noise, estimate_noise
+from calibration.mismatch.refine import refined
+from calibration.mismatch.search import Fit, Search, Term
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from calibration.mismatch.candidates import Candidate
+
+Array = NDArray[np.float64]
+
+NAMED_BY = 12.0
+"""A term must improve the score (its price already paid) by this much: with prices, an error rate near 1 in 200 for the
+whole search, as sign-flipped recordings show (tests)."""
+UNNAMED_BY = 16.0
+"""Likewise for a curve, of which there are more and freer ones."""
+WORTH_A_NAME = 0.02
+"""Of the mean magnitude of the predicted channel: an effect whose root mean square on its wheels is smaller is no finding."""
+SHAPE_MISFIT = 0.12
+"""A name whose form explains all but this share of what a free curve could explain has the right form: nature's
+friction curves are not ours to the last percent."""
+MOST_TERMS = 3
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What was decided, with all that led to it."""
+
+    search: Search
+    noise: Noise
+    named: Fit
+    unnamed: tuple[Term, ...]
+    whole: Fit
+    """Named and unnamed together."""
+
+
+def residual_of(search: Search, fit: Fit) -> Array:
+    """Return measured less fitted, shape (time, wheel), 0 outside the mask."""
+    dictionary = search.dictionary
+    left = dictionary.residual.astype(np.float64)
+    for (column, wheels), value in zip(fit.columns, fit.coefficients, strict=True):
+        for w in wheels:
+            left[w] -= value * dictionary.columns[column, w]
+    restored = np.empty_like(left)
+    restored[:, dictionary.order] = left
+    return np.where(dictionary.scene.mask, restored.T, 0.0)
+
+
+def contribution(search: Search, fit: Fit, index: int) -> Array:
+    """Return what a term adds to the prediction, shape (time, wheel)."""
+    dictionary, term = search.dictionary, fit.terms[index]
+    total = np.zeros(dictionary.residual.shape)
+    for column, value in zip(term.group.columns, fit.coefficients[fit.of_term(index)], strict=True):
+        for w in term.wheels:
+            total[w] += value * dictionary.columns[column, w]
+    restored = np.empty_like(total)
+    restored[:, dictionary.order] = total
+    return restored.T
+
+
+def size_of(search: Search, fit: Fit, index: int) -> float:
+    """Return a term's root mean square on its wheels, as a share of the channel's mean magnitude."""
+    scene = search.dictionary.scene
+    term = fit.terms[index]
+    values = contribution(search, fit, index)[:, list(term.wheels)][scene.mask[:, list(term.wheels)]]
+    return float(np.sqrt(np.mean(values**2))) / scene.mean_size
+
+
+def settle_noise(search: Search) -> Noise:
+    """Estimate the noise from what is left when anything at all that explains something is taken out."""
+    scene = search.dictionary.scene
+    terms: list[Term] = []
+    noise = estimate_noise(residual_of(search, search.fit(())), scene.mask)
+    for _ in range(6):
+        search.weights = noise.weights
+        search.refresh()
+        wheels = len(search.weights)
+        best = max(search.conditional(terms), key=lambda found: found[0] - found[1].price(wheels), default=None)
+        if best is None or best[0] - best[1].price(wheels) < 0.5 * UNNAMED_BY:
+            break
+        terms.append(best[1])
+        noise = estimate_noise(residual_of(search, search.fit(terms)), scene.mask)
+    search.weights = noise.weights
+    search.refresh()
+    return noise
+
+
+def seek_in_residual(search: Search, candidates: Sequence[Candidate], terms: Iterable[Term]) -> None:
+    """Let candidates with too fine a grid look at the residual for their shapes."""
+    scene = search.dictionary.scene
+    residual = residual_of(search, search.fit(terms))
+    for candidate in candidates:
+        if shapes := candidate.seek(scene, residual):
+            add_candidate(search.dictionary, candidate, shapes)
+    search.refresh()
+
+
+def best_per_family(search: Search, given: Sequence[Term], *, named: bool = True) -> list[tuple[float, Term]]:
+    """Return each candidate's best shape and wheels beside `given`, by gain less price, best first."""
+    wheels = len(search.weights)
+    taken = {(t.name, t.wheels) for t in given}
+    best: dict[str, tuple[float, Term]] = {}
+    groups = [group for group in search.dictionary.groups if group.named == named]
+    for gain, term in search.conditional(given, groups):
+        if (term.name, term.wheels) in taken or any(_same_fault(term, t) for t in given):
+            continue
+        score = gain - term.price(wheels)
+        key = term.name if named else f"{term.name} {term.group.flavour} {len(term.wheels)}"
+        if key not in best or score > best[key][0]:
+            best[key] = (score, term)
+    return sorted(best.values(), key=lambda found: -found[0])
+
+
+def _same_fault(one: Term, other: Term) -> bool:
+    """Say whether two terms are one family on overlapping wheels."""
+    return one.group.named and one.name == other.name and bool(set(one.wheels) & set(other.wheels))
+
+
+def acceptable(search: Search, fit: Fit) -> bool:
+    """Say whether every coefficient has its sign and every term is worth a name."""
+    for index, term in enumerate(fit.terms):
+        values = fit.coefficients[fit.of_term(index)]
+        if any(sign * value < 0 for sign, value in zip(term.group.signs, values, strict=True)):
+            return False
+        if term.group.named and size_of(search, fit, index) < WORTH_A_NAME:
+            return False
+    return True
+
+
+def polished(search: Search, terms: Sequence[Term]) -> tuple[Term, ...]:
+    """Return the terms with each one's shape, and grid, at its best beside the others; twice round."""
+    terms = list(terms)
+    for _ in range(2 if len(terms) > 1 else 1):
+        for index, term in enumerate(terms):
+            others = terms[:index] + terms[index + 1 :]
+            family = [g for g in search.dictionary.groups if g.named and g.name == term.name]
+            found = [(g, t) for g, t in search.conditional(others, family) if t.wheels == term.wheels]
+            if found:
+                terms[index] = max(found, key=lambda pair: pair[0])[1]
+            terms[index] = refined(search, others, terms[index])
+    return tuple(terms)
+
+
+def best_named(search: Search) -> list[Fit]:
+    """Return the best named set of each size, from none to three, each polished."""
+    none = search.fit(())
+    singles = _polished_best(search, [(t,) for _, t in best_per_family(search, ())[:5]])
+    if not singles:
+        return [none]
+    seeds = [fit.terms[0] for fit in singles] + [t for s, t in best_per_family(search, ())[5:] if s > 0]
+    pairs = [(seed, t) for seed in seeds for _, t in best_per_family(search, (seed,))[:4]]
+    best_pairs = _polished_best(search, _distinct(search, pairs)[:4])
+    if not best_pairs:
+        return [none, singles[0]]
+    triples = [(*fit.terms, t) for fit in best_pairs[:2] for _, t in best_per_family(search, fit.terms)[:2]]
+    best_triples = _polished_best(search, _distinct(search, triples)[:1])
+    return [none, singles[0], best_pairs[0], *best_triples[:1]]
+
+
+def _distinct(search: Search, sets: Sequence[tuple[Term, ...]]) -> list[tuple[Term, ...]]:
+    """Return sets ordered by score, one for each combination of names and wheels."""
+    fits = sorted((search.fit(terms) for terms in sets), key=search.score, reverse=True)
+    seen: dict[frozenset[tuple[str, tuple[int, ...]]], tuple[Term, ...]] = {}
+    for fit in fits:
+        seen.setdefault(frozenset((t.name, t.wheels) for t in fit.terms), fit.terms)
+    return list(seen.values())
+
+
+def _polished_best(search: Search, sets: Sequence[tuple[Term, ...]]) -> list[Fit]:
+    fits = [search.fit(polished(search, terms)) for terms in sets]
+    return sorted((fit for fit in fits if acceptable(search, fit)), key=search.score, reverse=True)
+
+
+def decide(search: Search, candidates: Sequence[Candidate]) -> Decision:
+    """Choose names, and say what is left without."""
+    noise = settle_noise(search)
+    seek_in_residual(search, candidates, ())
+    named = search.fit(())
+    for fit in best_named(search)[1:]:
+        if search.score(fit) - search.score(named) > NAMED_BY * (len(fit.terms) - len(named.terms)):
+            named = fit
+    named, unnamed = _without_a_name(search, named)
+    whole = search.fit((*named.terms, *unnamed))
+    noise = estimate_noise(residual_of(search, whole), search.dictionary.scene.mask)
+    search.weights = noise.weights
+    search.refresh()
+    return Decision(search, noise, search.fit(named.terms), unnamed, search.fit((*named.terms, *unnamed)))
+
+
+def _without_a_name(search: Search, named: Fit) -> tuple[Fit, tuple[Term, ...]]:
+    """Hold the names against curves that have none."""
+    alone = best_per_family(search, (), named=False)
+    if not alone:
+        return named, ()
+    curve = alone[0][1]
+    by_curve = search.fit((curve,))
+    left = best_per_family(search, named.terms, named=False)
+    remains = left[0][0] if left else 0.0
+    beside = search.fit((*named.terms, left[0][1])) if left else named
+    misfit = (beside.gain - named.gain) / max(beside.gain, 1e-9)
+    if remains < UNNAMED_BY or (named.terms and misfit < SHAPE_MISFIT):
+        return named, ()
+    # Something is left. Do the names add anything once the best single curve is in?
+    kept: tuple[Term, ...] = ()
+    fit = by_curve
+    for term in named.terms:
+        trial = search.fit((*kept, term, curve))
+        if search.score(trial) - search.score(fit) > NAMED_BY and acceptable(search, trial):
+            kept, fit = (*kept, term), trial
+    if search.score(fit) >= search.score(beside):
+        return search.fit(kept), (curve,)
+    return named, (left[0][1],)

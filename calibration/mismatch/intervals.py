@@ -1,0 +1,158 @@
+"""How sure the parameters are: a sandwich over blocks of time, with the priors and the shapes in it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.mismatch.answer import Parameter
+from calibration.mismatch.decide import contribution, residual_of
+from calibration.mismatch.refine import Profile
+
+if TYPE_CHECKING:
+    from calibration.mismatch.search import Fit, Search
+
+Array = NDArray[np.float64]
+
+DRAWS = 4000
+NINE_TENTHS = 2.706
+"""A profile may fall this far within a 90 % interval (χ² with one degree of freedom)."""
+
+
+def parameters_of(search: Search, fit: Fit, blocks: NDArray[np.int64]) -> list[dict[str, Parameter]]:
+    """Return each term's parameters with bounds that hold them nine times in ten."""
+    columns, names = _design(search, fit)
+    spread = _sandwich(search, fit, columns, blocks)
+    generator = np.random.default_rng(0)
+    root = np.linalg.cholesky(spread + 1e-12 * np.trace(spread) / len(spread) * np.eye(len(spread)))
+    moved = generator.standard_normal((DRAWS, len(spread))) @ root.T
+    found = []
+    for index in range(len(fit.terms)):
+        found.append(_of_term(search, fit, index, moved, names))
+    return found
+
+
+def _design(search: Search, fit: Fit) -> tuple[Array, list[tuple[int, str, float]]]:
+    """Return all columns (column, time, wheel), and what those after the coefficients' are: (term, shape, unit)."""
+    dictionary = search.dictionary
+    back = np.argsort(dictionary.order)
+    parts = []
+    for column, wheels in fit.columns:
+        values = np.zeros(dictionary.residual.shape)
+        for w in wheels:
+            values[w] = dictionary.columns[column, w]
+        parts.append(values[:, back].T)
+    names: list[tuple[int, str, float]] = []
+    scene = dictionary.scene
+    for index, term in enumerate(fit.terms):
+        candidate, shape = term.group.candidate, term.group.shape
+        if candidate is None:
+            continue
+        values = fit.coefficients[fit.of_term(index)] / dictionary.scale[list(term.group.columns)]
+        for name in candidate.bounds(scene, shape):
+            if name in shape and name != "onset_s":
+                step = 1e-3 * (abs(float(shape[name])) or 1.0)
+                if candidate.name == "wheel-angle-ripple":
+                    step = 1e-5
+                changed = candidate.columns(scene, {**shape, name: float(shape[name]) + step})
+                before = candidate.columns(scene, shape)
+                slope = np.einsum("c,ctw->tw", values, changed - before) / step
+                on = np.zeros(slope.shape[1])
+                on[list(term.wheels)] = 1
+                slope = np.where(scene.mask, slope, 0.0) * on
+                size = float(np.sqrt(np.mean(slope**2)))
+                if size > 0:
+                    names.append((index, name, size))
+                    parts.append(slope / size)
+    return np.stack(parts) if parts else np.zeros((0, *scene.mask.shape)), names
+
+
+def _sandwich(search: Search, fit: Fit, columns: Array, blocks: NDArray[np.int64]) -> Array:
+    """Return the covariance of all coefficients: what the blocks' scores really did, not what white noise would."""
+    weights = search.weights
+    matrix = np.einsum("atw,w,btw->ab", columns, weights, columns, optimize=True)
+    base = len(search.nuisance.columns)
+    prior = np.zeros(len(matrix))
+    prior[:base] = search.nuisance.precision
+    inverse = np.linalg.pinv(matrix + np.diag(prior), rcond=1e-9, hermitian=True)
+    scores = columns * (residual_of(search, fit) * weights)[None]
+    count = int(blocks.max()) + 1
+    # Wheels are independent of each other, so each block of each wheel is one draw.
+    sums = np.stack([np.add.reduceat(scores, np.flatnonzero(np.diff(blocks, prepend=-1)), axis=1)])[0]
+    rows = sums.transpose(1, 2, 0).reshape(-1, len(matrix))
+    middle = rows.T @ rows * count / max(count - 1, 1) + np.diag(prior)
+    return inverse @ middle @ inverse
+
+
+def _of_term(
+    search: Search, fit: Fit, index: int, moved: Array, names: list[tuple[int, str, float]]
+) -> dict[str, Parameter]:
+    dictionary, term = search.dictionary, fit.terms[index]
+    candidate, shape = term.group.candidate, term.group.shape
+    assert candidate is not None  # noqa: S101  # only named terms come here
+    at = fit.of_term(index)
+    scale = dictionary.scale[list(term.group.columns)]
+    best = fit.coefficients[at] / scale
+    central = candidate.parameters(shape, best.tolist())
+    drawn: dict[str, list[float]] = {name: [] for name in central}
+    free = [(len(fit.columns) + k, name, size) for k, (i, name, size) in enumerate(names) if i == index]
+    for row in moved[:1000]:
+        other = dict(shape)
+        for place, name, size in free:
+            other[name] = float(shape[name]) + row[place] / size
+        for name, value in candidate.parameters(other, ((fit.coefficients[at] + row[at]) / scale).tolist()).items():
+            drawn[name].append(value)
+    units = {c.name: c.unit.format(unit=dictionary.scene.simulation.unit) for c in candidate.coefficients}
+    units |= {name: _unit(name) for name in candidate.free}
+    found = {
+        name: Parameter(value, *(float(q) for q in np.quantile(drawn[name], [0.05, 0.95])), units.get(name, "1"))
+        for name, value in central.items()
+    }
+    if "onset_s" in shape and "onset_s" in candidate.free:
+        found["onset_s"] = Parameter(float(shape["onset_s"]), *_onset_bounds(search, fit, index), "s")
+    found["relative_size"] = _relative_size(search, fit, index, moved)
+    return found
+
+
+def _unit(name: str) -> str:
+    """Return the unit that a shape parameter's name ends in."""
+    endings = {"_rad_s": "rad/s", "_degC": "degC", "_K": "K", "_s": "s"}
+    return next((unit for ending, unit in endings.items() if name.endswith(ending)), "1")
+
+
+def _relative_size(search: Search, fit: Fit, index: int, moved: Array) -> Parameter:
+    """Return the effect's root mean square on its wheels over the channel's mean magnitude."""
+    scene, term = search.dictionary.scene, fit.terms[index]
+    columns = list(term.group.columns)
+    on = list(term.wheels)
+    gram = search.dictionary.gram[:, on].sum(axis=(0, 1))[np.ix_(columns, columns)] / scene.mask[:, on].sum()
+    at = fit.of_term(index)
+    drawn = fit.coefficients[at] + moved[:, at]
+    sizes = np.sqrt(np.maximum(np.einsum("da,ab,db->d", drawn, gram, drawn), 0)) / scene.mean_size
+    value = float(np.sqrt(np.mean(contribution(search, fit, index)[:, on][scene.mask[:, on]] ** 2))) / scene.mean_size
+    low, high = np.quantile(sizes, [0.05, 0.95])
+    return Parameter(value, float(low), float(high), "1")
+
+
+def _onset_bounds(search: Search, fit: Fit, index: int) -> tuple[float, float]:
+    """Return where the gain has fallen by what chance allows, to either side."""
+    term = fit.terms[index]
+    candidate, shape = term.group.candidate, term.group.shape
+    assert candidate is not None  # noqa: S101
+    others = [t for i, t in enumerate(fit.terms) if i != index]
+    profile = Profile(search, others, candidate, term.wheels)
+    at, length = float(shape["onset_s"]), search.dictionary.scene.length_s
+    best = profile(shape)
+    bounds = []
+    for way in (-1, 1):
+        near, far = 0.0, 0.002 * length
+        while far < 0.3 * length and profile({**shape, "onset_s": at + way * far}) > best - NINE_TENTHS:
+            near, far = far, 2 * far
+        for _ in range(6):
+            middle = 0.5 * (near + far)
+            inside = profile({**shape, "onset_s": at + way * middle}) > best - NINE_TENTHS
+            near, far = (middle, far) if inside else (near, middle)
+        bounds.append(float(np.clip(at + way * far, 0, length)))
+    return bounds[0], bounds[1]

@@ -1,0 +1,119 @@
+"""Shape parameters between the grid's points: an onset to the second, a Stribeck speed, an order."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.mismatch.fill import add_candidate
+from calibration.mismatch.search import Search, Term
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from calibration.mismatch.candidates import Candidate, Shape
+
+Array = NDArray[np.float64]
+
+GOLDEN = (np.sqrt(5) - 1) / 2
+
+
+class Profile:
+    """The gain of one candidate as a function of its shape, with other terms in the fit."""
+
+    def __init__(self, search: Search, others: Sequence[Term], candidate: Candidate, wheels: tuple[int, ...]) -> None:
+        self.search, self.candidate, self.wheels = search, candidate, wheels
+        dictionary = search.dictionary
+        fitted = search.fit(others)
+        self._scene = dictionary.scene
+        count = dictionary.columns.shape[2]
+        self._others = np.zeros((len(fitted.columns), len(wheels), count), np.float32)
+        for row, (column, on) in enumerate(fitted.columns):
+            for place, wheel in enumerate(wheels):
+                if wheel in on:
+                    self._others[row, place] = dictionary.columns[column, wheel]
+        self._inverse = fitted.covariance
+        self._weights = np.sqrt(search.weights[list(wheels)])[:, None].astype(np.float32)
+        residual = dictionary.residual[list(wheels)].astype(np.float64)
+        residual -= np.einsum("r,rwt->wt", fitted.coefficients, self._others, optimize=True)
+        self._left = (residual * self._weights).astype(np.float32)
+        self._flat = (self._others * self._weights).reshape(len(self._others), -1)
+
+    def __call__(self, shape: Shape) -> float:
+        """Return the further gain."""
+        dictionary = self.search.dictionary
+        columns = np.asarray(self.candidate.columns(self._scene, shape), np.float64)
+        kept = np.where(self._scene.mask, columns, 0.0)[:, :, list(self.wheels)]
+        fresh = np.swapaxes(kept, 1, 2)[:, :, dictionary.order].astype(np.float32) * self._weights
+        rows = fresh.reshape(len(fresh), -1)
+        cross = (rows @ self._flat.T).astype(np.float64)
+        matrix = (rows @ rows.T).astype(np.float64)
+        own = np.max(np.diag(matrix))
+        matrix -= cross @ self._inverse @ cross.T
+        moment = (rows @ self._left.ravel()).astype(np.float64)
+        values, vectors = np.linalg.eigh(matrix)
+        good = values > 1e-3 * own
+        along = vectors[:, good].T @ moment
+        coefficients = vectors[:, good] @ (along / values[good])
+        signs = [c.sign for c in self.candidate.coefficients[: len(rows)]]
+        if any(s * c < 0 for s, c in zip(signs, coefficients, strict=False)):
+            return 0.0
+        return float(np.sum(along**2 / values[good]))
+
+
+def refined(search: Search, others: Sequence[Term], term: Term) -> Term:
+    """Return the term with its free shape parameters where they gain most; the dictionary gains its columns."""
+    candidate = term.group.candidate
+    if candidate is None or not any(name in term.group.shape for name in candidate.free):
+        return term
+    profile = Profile(search, others, candidate, term.wheels)
+    best, gain = dict(term.group.shape), profile(term.group.shape)
+    scene = search.dictionary.scene
+    for name, (low, high) in candidate.bounds(scene, best).items():
+        if name not in best:
+            continue
+        reach = _reach(candidate, scene.length_s, name, float(best[name]), low, high)
+        value, found = maximise(lambda x, n=name: profile({**best, n: x}), *reach)  # type: ignore[misc]
+        if found > gain:
+            best, gain = {**best, name: value}, found
+    if best == term.group.shape:
+        return term
+    (group,) = add_candidate(search.dictionary, candidate, [best])
+    search.refresh()
+    return Term(group, term.wheels)
+
+
+def _reach(candidate: Candidate, length_s: float, name: str, at: float, low: float, high: float) -> tuple[float, float]:
+    """Return where to look: to the neighbouring points of the grid."""
+    if name == "onset_s":
+        return max(low, at - 0.05 * length_s), min(high, at + 0.05 * length_s)
+    if candidate.name == "wheel-angle-ripple":
+        return low, high
+    spread = 0.35 * max(abs(at), 0.2 * (high - low))
+    return max(low, at - spread), min(high, at + spread)
+
+
+def maximise(function: Callable[[float], float], low: float, high: float, steps: int = 14) -> tuple[float, float]:
+    """Return argument and value of the largest of a coarse scan, then golden sections around it."""
+    points = np.linspace(low, high, 7)
+    values = [function(float(x)) for x in points]
+    top = int(np.argmax(values))
+    a, b = float(points[max(top - 1, 0)]), float(points[min(top + 1, 6)])
+    best, value = float(points[top]), values[top]
+    c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
+    fc, fd = function(c), function(d)
+    for _ in range(steps):
+        if fc > fd:
+            b, d, fd = d, c, fc
+            c = b - GOLDEN * (b - a)
+            fc = function(c)
+        else:
+            a, c, fc = c, d, fd
+            d = a + GOLDEN * (b - a)
+            fd = function(d)
+    for x, f in ((c, fc), (d, fd)):
+        if f > value:
+            best, value = x, f
+    return best, value

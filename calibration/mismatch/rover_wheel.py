@@ -1,0 +1,173 @@
+"""The built-in simulation: six driven wheels on soil, current from load, slip and soil (Eqs 1, 6, 7 and 11)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ValidationError
+
+from calibration.drivetrain import motor_current
+from calibration.mismatch.errors import SimulationError
+from calibration.mismatch.simulation import Prior, SensorError, Simulation
+from calibration.parameters import Drivetrain, Rover, Sensors, Soil, Table, Wheel
+from calibration.wheel_soil import LARGEST_CONTACT_ANGLE_RAD, contact_angle, wheel_torque
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from calibration.mismatch.recording import Recording
+
+Array = NDArray[np.float64]
+
+GRAVITY_M_S2 = 9.81
+SLOWEST_RAD_S = 0.05
+"""Below this speed at the wheel the model says nothing: slip is a quotient of two small numbers there."""
+
+
+class SimulationTable(Table):
+    """SIM.toml's `[simulation]`."""
+
+    model: str = "rover-wheel"
+    slip_without_ground_speed: float = Field(default=0.025, gt=-1, lt=1)
+
+
+class RoverWheelTables(Table):
+    """SIM.toml for `rover-wheel`; effects found earlier are read elsewhere."""
+
+    simulation: SimulationTable
+    drivetrain: Drivetrain = Drivetrain()
+    wheel: Wheel = Wheel()
+    rover: Rover = Rover()
+    soil: Soil
+    sensors: Sensors = Sensors()
+
+
+class RoverWheel(Simulation):
+    """Motor currents of a six-wheel rover; odd wheels left, even right, 1 and 2 in front."""
+
+    channel = "motor_current_A"
+    unit = "A"
+    inputs = ("motor_speed_rad_s",)
+
+    def __init__(self, tables: RoverWheelTables) -> None:
+        self.tables = tables
+        self.parameters = _priors(tables)
+        self.sensors = _sensors(tables.sensors)
+
+    @classmethod
+    def from_tables(cls, tables: Mapping[str, Any]) -> Self:
+        """Read the tables of the contract; every mistake is told at once."""
+        try:
+            return cls(RoverWheelTables(**{name: table for name, table in tables.items() if name != "effects"}))
+        except ValidationError as error:
+            told = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
+            raise SimulationError(f"the simulation's tables are wrong: {told}") from error
+
+    def prepare(self, recording: Recording) -> Recording:
+        """Add `slip`, and the load that each wheel has on level ground where no cell measured it."""
+        speed = self._wheel_speed(recording.channels)
+        turning = np.abs(speed) > SLOWEST_RAD_S
+        rim = np.where(turning, self.tables.wheel.radius_m * speed, np.nan)
+        ground = recording.channel("ground_speed_m_s")
+        slip = np.where(np.isfinite(ground), 1 - ground / rim, self.tables.simulation.slip_without_ground_speed)
+        slip = np.where(turning, slip, np.nan)
+        load = recording.channel("load_N")
+        never = ~np.isfinite(load).any(axis=0)
+        share = self.tables.rover.mass_kg * GRAVITY_M_S2 / recording.shape[1]
+        return recording.with_channels(slip=slip, load_N=np.where(never, share, load))
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the motor currents [A], shape (time, wheel)."""
+        tables = self.tables
+        soil = tables.soil.model_copy(
+            update={
+                "cohesion_Pa": values["cohesion_Pa"],
+                "friction_angle_deg": values["friction_angle_deg"],
+                "k_phi_kN": tables.soil.k_phi_kN * values.get("stiffness_factor", 1.0),
+                "k_c_kN": tables.soil.k_c_kN * values.get("stiffness_factor", 1.0),
+            }
+        )
+        slip = inputs["slip"]
+        speed = self._wheel_speed(inputs)
+        angle = contact_angle(inputs["load_N"], slip, tables.wheel, soil)
+        if sinking := values.get("slip_sinkage", 0.0):
+            angle = slip_sunk(angle, slip, sinking)
+        torque = np.sign(speed) * wheel_torque(angle, slip, tables.wheel, soil) / values["gain_factor"]
+        torque = np.where(np.abs(speed) > SLOWEST_RAD_S, torque, np.nan)
+        if torque.shape[-1] != 6:
+            return torque / tables.drivetrain.gain_Nm_per_A
+        return motor_current(torque, inputs["motor_speed_rad_s"], tables.drivetrain)
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return everything measured that a left-out effect may follow."""
+        named = {
+            "temperature": "motor_temperature_degC",
+            "voltage": "bus_voltage_V",
+            "pitch": "pitch_rad",
+            "roll": "roll_rad",
+            "yaw_rate": "yaw_rate_rad_s",
+            "load": "load_N",
+            "slip": "slip",
+        }
+        found = {name: inputs[column] for name, column in named.items() if column in inputs}
+        return {**found, "wheel_speed": self._wheel_speed(inputs), "time": inputs["t_s"]}
+
+    def side(self, wheels: Sequence[int]) -> Array | None:
+        """Odd wheels are on the left."""
+        return np.array([-1.0 if wheel % 2 else 1.0 for wheel in wheels])
+
+    def row(self, wheels: Sequence[int]) -> Array | None:
+        """1, 2 in front; 3, 4 in the middle; 5, 6 behind."""
+        return np.array([(wheel - 1) // 2 for wheel in wheels], np.float64)
+
+    def variants(self) -> Mapping[str, float]:
+        """Physics that the model has in it, switched off: candidates switch it on."""
+        return {"stiffness_factor": 1.0, "slip_sinkage": 0.0}
+
+    def corrected_tables(self, values: Mapping[str, float]) -> dict[str, Any]:
+        """Return the tables with gain, cohesion and friction angle where the recording moved them."""
+        tables = self.tables.model_dump()
+        factor = values["gain_factor"]
+        drivetrain, soil = tables["drivetrain"], tables["soil"]
+        drivetrain["gain_factor"] = [factor * before for before in drivetrain["gain_factor"]]
+        soil["cohesion_Pa"] = float(values["cohesion_Pa"])
+        soil["friction_angle_deg"] = float(values["friction_angle_deg"])
+        return tables
+
+    def _wheel_speed(self, inputs: Mapping[str, Array]) -> Array:
+        return inputs["motor_speed_rad_s"] / self.tables.drivetrain.ratio
+
+
+def slip_sunk(contact_angle_rad: Array, slip: Array, strength: float) -> Array:
+    """Return the contact angle of a wheel that slip has sunk deeper [rad] (Eqs 8 and 9).
+
+    `strength` 1 is Lyasko's z_SS = z (1 + i)/(1 − 0.5 i); 0 leaves the sinkage as it is.
+    """
+    deeper = 1 + strength * ((1 + slip) / (1 - 0.5 * slip) - 1)
+    cosine = 1 - deeper * (1 - np.cos(contact_angle_rad))
+    return np.minimum(np.arccos(np.clip(cosine, -1, 1)), LARGEST_CONTACT_ANGLE_RAD)
+
+
+def _priors(tables: RoverWheelTables) -> dict[str, Prior]:
+    soil = tables.soil
+    return {
+        "gain_factor": Prior(1.0, tables.drivetrain.gain_relative_std),
+        "cohesion_Pa": Prior(soil.cohesion_Pa, soil.cohesion_relative_std * soil.cohesion_Pa, "Pa"),
+        "friction_angle_deg": Prior(
+            soil.friction_angle_deg, soil.friction_angle_relative_std * soil.friction_angle_deg, "deg"
+        ),
+    }
+
+
+def _sensors(errors: Sensors) -> dict[str, SensorError]:
+    return {
+        "load_N": SensorError(relative=errors.load_relative_std),
+        # Slip is 1 − V/(r ω): the ground speed's relative error is slip's absolute one, within a factor (1 − i).
+        "slip": SensorError(absolute=errors.ground_speed_relative_std),
+        "pitch_rad": SensorError(absolute=errors.pitch_std_rad),
+        "roll_rad": SensorError(absolute=errors.roll_std_rad),
+        "yaw_rate_rad_s": SensorError(absolute=errors.yaw_rate_std_rad_s),
+        "motor_temperature_degC": SensorError(absolute=errors.temperature_std_degC),
+    }

@@ -1,0 +1,185 @@
+"""The search: which set of terms, on which wheels, explains most, each paying for the freedom it had.
+
+A set's gain is what it takes from the weighted sum of squares beyond what the free parameters, held by their priors,
+take already; in units of the long-run noise variance, so that twice a log-likelihood ratio is meant.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from calibration.mismatch.dictionary import Dictionary, Group
+    from calibration.mismatch.fill import Nuisance
+
+Array = NDArray[np.float64]
+
+OUTSIDE_REACH = 1e-3
+"""A column of which less than this share of energy lies outside all others' reach is one of theirs."""
+PER_COEFFICIENT = 2.0
+"""Paid for each coefficient, as in Akaike's criterion: what a coefficient gains by chance is 1 on average."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """A group on some wheels."""
+
+    group: Group
+    wheels: tuple[int, ...]
+    """Indices, not names."""
+
+    @property
+    def name(self) -> str:
+        """The candidate's or the covariate's."""
+        return self.group.name
+
+    def price(self, wheel_count: int) -> float:
+        """What choosing this term costs: its coefficients, its shape, and that it is on these wheels."""
+        paid = PER_COEFFICIENT * len(self.group.columns) + self.group.complexity
+        if len(self.wheels) < wheel_count:
+            paid += 2 * float(np.log(wheel_count))
+            # One wheel alone is the rule for some faults and the exception for what all wheels are built with.
+            paid += 6.0 if "all" in self.group.sharing else 0.0
+        return paid
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Terms fitted together with the free parameters."""
+
+    terms: tuple[Term, ...]
+    columns: tuple[tuple[int, tuple[int, ...]], ...]
+    """(column, wheels) of every coefficient: the free parameters' first."""
+    coefficients: Array
+    covariance: Array
+    """For white noise of the long-run variance."""
+    gain: float
+
+    def of_term(self, index: int) -> slice:
+        """Where the coefficients of a term are."""
+        start = len(self.columns) - sum(len(t.group.columns) for t in self.terms)
+        start += sum(len(t.group.columns) for t in self.terms[:index])
+        return slice(start, start + len(self.terms[index].group.columns))
+
+
+class Search:
+    """Gains of sets of terms, on given folds, with given weights of the wheels."""
+
+    def __init__(
+        self, dictionary: Dictionary, nuisance: Nuisance, weights: Array, folds: Sequence[int] | None = None
+    ) -> None:
+        self.dictionary = dictionary
+        self.nuisance = nuisance
+        self.weights = weights
+        chosen = list(range(len(dictionary.gram))) if folds is None else list(folds)
+        self.folds = chosen
+        self._sum()
+
+    def _sum(self) -> None:
+        w = self.weights
+        self.gram = np.einsum("fwij,w->wij", self.dictionary.gram[self.folds], w)
+        self.moment = self.dictionary.moment[self.folds].sum(axis=0) * w[:, None]
+        self.energy = float(np.sum(self.dictionary.energy[self.folds].sum(axis=0) * w))
+
+    def refresh(self) -> None:
+        """Take in columns that were added to the dictionary since."""
+        self._sum()
+
+    @property
+    def all_wheels(self) -> tuple[int, ...]:
+        """Indices of all wheels."""
+        return tuple(range(len(self.weights)))
+
+    def fit(self, terms: Iterable[Term]) -> Fit:
+        """Fit terms and free parameters together."""
+        terms = tuple(terms)
+        columns = self._columns(terms)
+        matrix, moment = self._normal(columns)
+        base = len(self.nuisance.columns)
+        inverse = np.linalg.pinv(matrix, rcond=1e-10, hermitian=True)
+        solved = inverse @ moment
+        gain = float(moment @ solved)
+        if base:
+            gain -= float(moment[:base] @ np.linalg.solve(matrix[:base, :base], moment[:base]))
+        return Fit(terms, columns, solved, inverse, gain)
+
+    def score(self, fit: Fit) -> float:
+        """Return the gain less the prices."""
+        return fit.gain - sum(term.price(len(self.weights)) for term in fit.terms)
+
+    def conditional(self, given: Iterable[Term], groups: Sequence[Group] | None = None) -> list[tuple[float, Term]]:
+        """Return the further gain of every group, on all wheels and on each alone, when `given` is in the fit already."""
+        columns = self._columns(tuple(given))
+        matrix, moment = self._normal(columns)
+        inverse = np.linalg.pinv(matrix, rcond=1e-10, hermitian=True) if columns else np.zeros((0, 0))
+        index = [c for c, _ in columns]
+        share = np.zeros((len(columns), len(self.weights)))
+        for row, (_, wheels) in enumerate(columns):
+            share[row, list(wheels)] = 1
+        cross = np.stack([share[:, w, None] * self.gram[w][index] for w in self.all_wheels])
+        patterns = [self.all_wheels, *[(w,) for w in self.all_wheels]] if len(self.weights) > 1 else [self.all_wheels]
+        found: list[tuple[float, Term]] = []
+        for pattern in patterns:
+            chosen = list(pattern)
+            reach = cross[chosen].sum(axis=0)
+            solved = inverse @ reach
+            left = self.moment[chosen].sum(axis=0) - reach.T @ (inverse @ moment)
+            block = self.gram[chosen].sum(axis=0)
+            single = np.diag(block) - np.einsum("sp,sp->p", reach, solved)
+            kind = "all" if pattern == self.all_wheels else "one"
+            for group in self.dictionary.groups if groups is None else groups:
+                if kind in group.sharing or len(self.weights) == 1:
+                    gain = _gain(group, left, block, reach, solved, single)
+                    if gain > 0:
+                        found.append((gain, Term(group, pattern)))
+        return found
+
+    def beside(self, given: Iterable[Term], term: Term) -> tuple[Array, Array]:
+        """Return a term's own sums of products, and the part of them that `given` and the free parameters reach."""
+        columns = self._columns((*given, term))
+        size = len(columns) - len(term.group.columns)
+        matrix, _ = self._normal(columns)
+        cross = matrix[:size, size:]
+        inverse = np.linalg.pinv(matrix[:size, :size], rcond=1e-10, hermitian=True) if size else np.zeros((0, 0))
+        return matrix[size:, size:], cross.T @ inverse @ cross
+
+    def _columns(self, terms: tuple[Term, ...]) -> tuple[tuple[int, tuple[int, ...]], ...]:
+        base = [(column, self.all_wheels) for column in self.nuisance.columns]
+        return tuple(base + [(column, term.wheels) for term in terms for column in term.group.columns])
+
+    def _normal(self, columns: Sequence[tuple[int, tuple[int, ...]]]) -> tuple[Array, Array]:
+        index = [c for c, _ in columns]
+        share = np.zeros((len(columns), len(self.weights)))
+        for row, (_, wheels) in enumerate(columns):
+            share[row, list(wheels)] = 1
+        matrix = np.zeros((len(columns), len(columns)))
+        for w in self.all_wheels:
+            matrix += np.outer(share[:, w], share[:, w]) * self.gram[w][np.ix_(index, index)]
+        base = len(self.nuisance.columns)
+        matrix[range(base), range(base)] += self.nuisance.precision
+        moment = np.einsum("cw,wc->c", share, self.moment[:, index])
+        return matrix, moment
+
+
+def _gain(group: Group, left: Array, block: Array, reach: Array, solved: Array, single: Array) -> float:
+    """Return what a group adds: zero where a coefficient has the wrong sign, or nothing of it is new."""
+    if len(group.columns) == 1:
+        (c,) = group.columns
+        if single[c] <= OUTSIDE_REACH * block[c, c] or group.signs[0] * left[c] < 0:
+            return 0.0
+        return float(left[c] ** 2 / single[c])
+    at = list(group.columns)
+    matrix = block[np.ix_(at, at)] - reach[:, at].T @ solved[:, at]
+    values, vectors = np.linalg.eigh(matrix)
+    kept = values > OUTSIDE_REACH * np.max(np.diag(block)[at])
+    along = vectors[:, kept].T @ left[at]
+    coefficients = vectors[:, kept] @ (along / values[kept])
+    if any(sign * value < 0 for sign, value in zip(group.signs, coefficients, strict=True)):
+        return 0.0
+    return float(np.sum(along**2 / values[kept]))

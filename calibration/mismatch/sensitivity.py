@@ -1,0 +1,56 @@
+"""What silence is worth: for every candidate, the smallest effect that this recording would have shown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calibration.mismatch.answer import Sensitivity
+from calibration.mismatch.decide import NAMED_BY, WORTH_A_NAME
+from calibration.mismatch.search import Term
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from calibration.mismatch.candidates import Candidate
+    from calibration.mismatch.search import Fit, Search
+
+NINE_IN_TEN = 1.2816
+"""Quantile of the normal density: 9 times in 10 the gain's root is above its expectation less this."""
+
+
+def sensitivities(search: Search, given: Fit, candidates: Sequence[Candidate]) -> tuple[Sensitivity, ...]:
+    """Return root mean squares on the wheels concerned, in the channel's unit, with the effects found in the fit."""
+    scene = search.dictionary.scene
+    unit = scene.simulation.unit
+    found = []
+    for candidate in candidates:
+        groups = [g for g in search.dictionary.groups if g.name == candidate.name and g.named]
+        if not groups:
+            found.append(Sensitivity(candidate.name, float("inf"), unit))
+            continue
+        # A shape in the middle of the grid stands for the family.
+        group = groups[len(groups) // 2]
+        wheels = search.all_wheels
+        patterns = [wheels] if "all" in candidate.sharing or len(wheels) == 1 else [(w,) for w in wheels]
+        sizes = [_smallest(search, given, Term(group, pattern)) for pattern in patterns]
+        found.append(Sensitivity(candidate.name, float(np.median(sizes)), unit))
+    return tuple(sorted(found, key=lambda s: s.name))
+
+
+def _smallest(search: Search, given: Fit, term: Term) -> float:
+    """Return the effect whose gain passes the threshold nine times in ten."""
+    scene, dictionary = search.dictionary.scene, search.dictionary
+    block, reach = search.beside(given.terms, term)
+    own = np.linalg.eigvalsh(block - reach)
+    total = float(np.trace(block)) / len(block)
+    needed = (np.sqrt(NAMED_BY + term.price(len(search.weights))) + NINE_IN_TEN) ** 2
+    outside = float(np.max(own))
+    if outside <= 1e-9 * total:
+        return float("inf")
+    on = list(term.wheels)
+    at = list(term.group.columns)
+    energy = float(np.trace(dictionary.gram[:, on].sum(axis=(0, 1))[np.ix_(at, at)])) / len(at)
+    rms = np.sqrt(energy / max(int(scene.mask[:, on].sum()), 1))
+    return float(max(np.sqrt(needed / outside) * rms, WORTH_A_NAME * scene.mean_size))

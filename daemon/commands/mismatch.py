@@ -1,0 +1,109 @@
+"""`regolithd mismatch`: what physics does this simulation leave out of this recording?"""
+
+from __future__ import annotations
+
+from pathlib import Path  # noqa: TC003  # typer reads the annotations when it runs
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from calibration.mismatch.answer import Answer
+    from calibration.mismatch.recording import Recording
+
+EXIT_DATA = 65
+"""EX_DATAERR: what was given cannot be compared."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+
+    @app.command()
+    def mismatch(
+        recording: Annotated[Path, typer.Argument(help="CSV(.gz), Parquet, or a recording of the daemon's own (MCAP).")],
+        simulation: Annotated[Path, typer.Option(help="SIM.toml: the simulation's name and parameters.")],
+        json: Annotated[Path | None, typer.Option(help="Write the answer here.")] = None,
+        report: Annotated[Path | None, typer.Option(help="Write a self-contained HTML report here.")] = None,
+        corrected: Annotated[Path | None, typer.Option(help="Write the simulation with the effects in it here.")] = None,
+    ) -> None:
+        """Locate where simulation and recording differ, name the physics left out, and show the fit improve."""
+        from calibration.mismatch.errors import MismatchError
+
+        try:
+            _run(recording, simulation, json, report, corrected)
+        except (MismatchError, OSError) as error:
+            typer.echo(f"regolithd mismatch: {error}", err=True)
+            raise typer.Exit(EXIT_DATA) from error
+
+
+def _run(recording: Path, simulation: Path, json: Path | None, report: Path | None, corrected: Path | None) -> None:
+    from rich.console import Console
+
+    from calibration.mismatch.compare import compare
+    from calibration.mismatch.corrected import corrected_tables, stated_effects, to_toml
+    from calibration.mismatch.simulation import load_simulation
+
+    tables = _tables(simulation)
+    simulated = load_simulation(tables, beside=simulation.resolve().parent)
+    errors = Console(stderr=True)
+    with errors.status("reading") as status:
+        recorded = _read(recording, simulated.wheel_column)
+        found = compare(recorded, simulated, effects=stated_effects(tables), progress=status.update)
+    if json:
+        _write_json(json, found.answer)
+    if corrected:
+        evidence = found.evidence
+        text = to_toml(corrected_tables(tables, simulated, evidence.values, evidence.contributions))
+        corrected.write_text(text, encoding="utf-8")
+    if report:
+        _write_report(report, found, recording.name)
+    _tell(Console(), found.answer)
+
+
+def _tables(path: Path) -> dict[str, Any]:
+    import tomllib
+
+    from calibration.mismatch.errors import SimulationError
+
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise SimulationError(f"{path} is not TOML: {error}") from error
+
+
+def _read(path: Path, unit: str) -> Recording:
+    from calibration.mismatch.recording import read_recording
+
+    return read_recording(path, unit=unit)
+
+
+def _write_json(path: Path, answer: Answer) -> None:
+    import json
+
+    path.write_text(json.dumps(answer.to_json(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def _write_report(path: Path, found: object, title: str) -> None:
+    from calibration.mismatch.report import write_report
+
+    write_report(path, found, title)
+
+
+def _tell(console: Any, answer: Answer) -> None:  # noqa: ANN401  # rich's console
+    console.print(f"[bold]{answer.verdict}[/bold]")
+    for effect in answer.effects:
+        console.print(f"  {effect.name}: {effect.statement}")
+    for rest in answer.unexplained:
+        console.print(
+            f"  unexplained: {100 * rest.share_of_residual:.0f} % of the residual follows {rest.covariate} on wheels "
+            f"{', '.join(map(str, rest.wheels))}, {rest.from_s:.0f} to {rest.to_s:.0f} s"
+        )
+    for pair in answer.indistinguishable:
+        console.print(f"  {' or '.join(pair.effects)}: this recording cannot tell. {pair.experiment}")
+    fit = answer.fit
+    console.print(
+        f"  held-out error of {fit.channel}: {fit.held_out_rmse_before:.5g} before, {fit.held_out_rmse_after:.5g} after, "
+        f"noise floor {fit.noise_floor_rmse:.5g}"
+    )
+    for note in answer.notes:
+        console.print(f"  note: {note}")
