@@ -124,7 +124,9 @@ def _effects(decision: Decision, held: HeldOut, blocks: NDArray[np.int64]) -> tu
         wheels = candidate.wheels(term.group.shape, _names(scene, term.wheels), scene.row)
         onset = parameters.get("onset_s")
         errors = (held.without[index], held.with_it[index])
-        told = statement(candidate, wheels, len(scene.recording.wheels), parameters, errors, scene.simulation.wheel_column)
+        told = statement(
+            candidate, wheels, len(scene.recording.wheels), parameters, errors, scene.simulation.wheel_column
+        )
         found.append(
             Effect(
                 term.name,
@@ -152,18 +154,19 @@ def _unexplained(decision: Decision, term: Term) -> Unexplained:
     size = np.sum(values[:, on] ** 2, axis=1)
     grown = np.cumsum(size) / max(float(size.sum()), 1e-300)
     time_s = scene.time_s[:, 0]
-    first, last = time_s[np.searchsorted(grown, 0.01)], time_s[min(np.searchsorted(grown, 0.99), len(time_s) - 1)]
+    first, last = (time_s[min(int(np.searchsorted(grown, part)), len(time_s) - 1)] for part in (0.01, 0.99))
     return Unexplained(
         scene.simulation.channel, _names(scene, term.wheels), term.name, float(first), float(last), min(share, 1.0)
     )
 
 
 def _not_looked_for(scene: Scene, simulation: Simulation, fitting: Sequence[str]) -> list[str]:
-    missing = [c for c in simulation.candidates() if c.name not in fitting]
-    return [
-        f"{c.name} was not looked for: it needs {', '.join(n for n in c.requires if n not in scene.covariates) or 'another simulation'}."
-        for c in missing
-    ]
+    told = []
+    for candidate in simulation.candidates():
+        if candidate.name not in fitting:
+            lacking = ", ".join(n for n in candidate.requires if n not in scene.covariates)
+            told.append(f"{candidate.name} was not looked for: it needs {lacking or 'another simulation'}.")
+    return told
 
 
 def _evidence(decision: Decision) -> Evidence:
@@ -202,7 +205,9 @@ def _evidence(decision: Decision) -> Evidence:
     )
 
 
-def _map(scene: Scene, noise: Noise, left: Array, after: Array, blocks: NDArray[np.int64]) -> tuple[Array, Array, Array]:
+def _map(
+    scene: Scene, noise: Noise, left: Array, after: Array, blocks: NDArray[np.int64]
+) -> tuple[Array, Array, Array]:
     """Return block centres, and block means of the residual along the motion over their standard errors."""
     along = scene.covariates.get("direction", np.ones(scene.mask.shape))
     count = int(blocks.max()) + 1

@@ -25,7 +25,10 @@ Array = NDArray[np.float64]
 
 
 def corrected_tables(
-    tables: Mapping[str, Any], simulation: Simulation, values: Mapping[str, float], contributions: Sequence[Contribution]
+    tables: Mapping[str, Any],
+    simulation: Simulation,
+    values: Mapping[str, float],
+    contributions: Sequence[Contribution],
 ) -> dict[str, Any]:
     """Return SIM.toml's tables with the calibrated parameters and every effect."""
     corrected = {**tables, **simulation.corrected_tables(values)}

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from calibration.mismatch.fill import add_candidate
 from calibration.mismatch.noise import Noise, estimate_noise
 from calibration.mismatch.refine import refined
-from calibration.mismatch.search import Fit, Search, Term
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from calibration.mismatch.candidates import Candidate
+    from calibration.mismatch.search import Fit, Search, Term
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ whole search, as sign-flipped recordings show (tests)."""
 UNNAMED_BY = 16.0
 """Likewise for a curve, of which there are more and freer ones."""
 WORTH_A_NAME = 0.02
-"""Of the mean magnitude of the predicted channel: an effect whose root mean square on its wheels is smaller is no finding."""
+"""Of the predicted channel's mean magnitude: an effect with a smaller root mean square on its wheels is no finding."""
 SHAPE_MISFIT = 0.12
 """A name whose form explains all but this share of what a free curve could explain has the right form: nature's
 friction curves are not ours to the last percent."""

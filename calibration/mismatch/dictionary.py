@@ -72,7 +72,9 @@ class Dictionary:
         self.scale: Array = np.zeros(0)
         self.gram: Array = np.zeros((count, wheels, 0, 0))
         self.moment: Array = np.zeros((count, wheels, 0))
-        self.energy: Array = np.stack([np.sum(part.astype(np.float64) ** 2, axis=1) for part in self._parts(self.residual)])
+        self.energy: Array = np.stack(
+            [np.sum(part.astype(np.float64) ** 2, axis=1) for part in self._parts(self.residual)]
+        )
         self.counts: Array = np.stack(
             [np.sum(part, axis=1) for part in self._parts(scene.mask.T[:, self.order].astype(np.float64))]
         )

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from calibration.mismatch.candidates import Candidate, Shape
-    from calibration.mismatch.scene import Scene
 
 Array = NDArray[np.float64]
 
@@ -94,8 +93,8 @@ def broken_lines(values: Array, mask: NDArray[np.bool_], knots: int) -> list[Arr
     if not known.any():
         return []
     inside = values[known]
-    ends = np.quantile(inside, [0.005, 0.995])
-    at = np.unique(0.5 * (np.quantile(inside, np.linspace(0.005, 0.995, knots)) + np.linspace(*ends, knots)))
+    low, high = (float(q) for q in np.quantile(inside, [0.005, 0.995]))
+    at = np.unique(0.5 * (np.quantile(inside, np.linspace(0.005, 0.995, knots)) + np.linspace(low, high, knots)))
     if len(at) < 3 or at[-1] - at[0] <= 0:
         return []
     clipped = np.clip(np.where(known, values, at[0]), at[0], at[-1])

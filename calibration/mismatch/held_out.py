@@ -93,5 +93,7 @@ def _squares(train: Search, fit: Fit, fold: int) -> Array:
             continue
         at = [c for c, _ in on]
         values = np.array([v for _, v in on])
-        total[w] += values @ dictionary.gram[fold, w][np.ix_(at, at)] @ values - 2 * values @ dictionary.moment[fold, w, at]
+        total[w] += (
+            values @ dictionary.gram[fold, w][np.ix_(at, at)] @ values - 2 * values @ dictionary.moment[fold, w, at]
+        )
     return total

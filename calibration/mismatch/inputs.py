@@ -25,7 +25,9 @@ Array = NDArray[np.float64]
 
 def expected_inputs(recording: Recording, sensors: Mapping[str, SensorError]) -> Recording:
     """Return the recording with each input that has an error replaced by its conditional expectation."""
-    names = [name for name, error in sensors.items() if name in recording.channels and (error.relative or error.absolute)]
+    names = [
+        name for name, error in sensors.items() if name in recording.channels and (error.relative or error.absolute)
+    ]
     if not names:
         return recording
     values = np.concatenate([recording.channels[name] for name in names], axis=1)

@@ -28,10 +28,7 @@ def parameters_of(search: Search, fit: Fit, blocks: NDArray[np.int64]) -> list[d
     generator = np.random.default_rng(0)
     root = np.linalg.cholesky(spread + 1e-12 * np.trace(spread) / len(spread) * np.eye(len(spread)))
     moved = generator.standard_normal((DRAWS, len(spread))) @ root.T
-    found = []
-    for index in range(len(fit.terms)):
-        found.append(_of_term(search, fit, index, moved, names))
-    return found
+    return [_of_term(search, fit, index, moved, names) for index in range(len(fit.terms))]
 
 
 def _design(search: Search, fit: Fit) -> tuple[Array, list[tuple[int, str, float]]]:
@@ -106,10 +103,10 @@ def _of_term(
             drawn[name].append(value)
     units = {c.name: c.unit.format(unit=dictionary.scene.simulation.unit) for c in candidate.coefficients}
     units |= {name: _unit(name) for name in candidate.free}
-    found = {
-        name: Parameter(value, *(float(q) for q in np.quantile(drawn[name], [0.05, 0.95])), units.get(name, "1"))
-        for name, value in central.items()
-    }
+    found = {}
+    for name, value in central.items():
+        low, high = np.quantile(drawn[name], [0.05, 0.95])
+        found[name] = Parameter(value, float(low), float(high), units.get(name, "1"))
     if "onset_s" in shape and "onset_s" in candidate.free:
         found["onset_s"] = Parameter(float(shape["onset_s"]), *_onset_bounds(search, fit, index), "s")
     found["relative_size"] = _relative_size(search, fit, index, moved)

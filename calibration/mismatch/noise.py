@@ -45,7 +45,9 @@ def estimate_noise(residual: Array, mask: NDArray[np.bool_]) -> Noise:
     clean = np.where(mask, residual, 0.0)
     counts = np.maximum(mask.sum(axis=0), 1)
     deviation = np.sqrt(np.sum(clean**2, axis=0) / counts)
-    deviation = np.where(deviation > 0, deviation, np.median(deviation[deviation > 0]) if np.any(deviation > 0) else 1.0)
+    deviation = np.where(
+        deviation > 0, deviation, np.median(deviation[deviation > 0]) if np.any(deviation > 0) else 1.0
+    )
     size = 2 ** int(np.ceil(np.log2(2 * len(clean))))
     scaled = np.fft.rfft(clean / deviation, size, axis=0)
     known = np.fft.rfft(mask.astype(np.float64), size, axis=0)

@@ -7,7 +7,6 @@ NaN. Order of rows, origin of time and names of wheels carry no meaning: rows ar
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,8 +16,10 @@ from calibration.mismatch.errors import RecordingError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 TIME = "t_s"
 UNIT = "wheel"
@@ -153,16 +154,16 @@ def from_columns(columns: Mapping[str, Array], *, unit: str = UNIT) -> Recording
     return Recording(time_s, run, wheels, channels, tuple(notes))
 
 
-def _places(table: Mapping[str, Array], unit: str) -> tuple[Array, Array, tuple[int, ...], Array]:
+def _places(table: Mapping[str, Array], unit: str) -> tuple[Array, Index, tuple[int, ...], Index]:
     """Return the instants in order (run, time), each row's instant, the wheels, and each row's wheel."""
     # A nanosecond decides whether two rows are of one instant: less is rounding of the text, not time.
     stamps = np.column_stack((table[RUN], np.round(table[TIME], 9)))
     keys, row = np.unique(stamps, axis=0, return_inverse=True)
     names, column = np.unique(table[unit], return_inverse=True)
-    return keys, row.ravel(), tuple(int(name) for name in names), column.ravel()
+    return keys, row.ravel().astype(np.int64), tuple(int(name) for name in names), column.ravel().astype(np.int64)
 
 
-def _arranged(values: Array, row: Array, column: Array, shape: tuple[int, int]) -> Array:
+def _arranged(values: Array, row: Index, column: Index, shape: tuple[int, int]) -> Array:
     """Put values where they belong; rows that claim one place are averaged, so that their order cannot matter."""
     place = row * shape[1] + column
     known = np.isfinite(values)
@@ -182,7 +183,7 @@ def _note_order(table: Mapping[str, Array], unit: str, notes: list[str]) -> None
         notes.append("Rows are not in the order of time; they are sorted.")
 
 
-def _note_duplicates(row: Array, column: Array, shape: tuple[int, int], notes: list[str]) -> None:
+def _note_duplicates(row: Index, column: Index, shape: tuple[int, int], notes: list[str]) -> None:
     taken = np.bincount(row * shape[1] + column, minlength=shape[0] * shape[1])
     if (extra := int(np.sum(taken[taken > 1] - 1))) > 0:
         notes.append(f"{extra} rows repeat an instant and wheel; their mean is taken.")
@@ -190,7 +191,7 @@ def _note_duplicates(row: Array, column: Array, shape: tuple[int, int], notes: l
         notes.append(f"{absent} of {taken.size} instants of single wheels are absent.")
 
 
-def _note_gaps(time_s: Array, run: Array, notes: list[str]) -> None:
+def _note_gaps(time_s: Array, run: Index, notes: list[str]) -> None:
     steps = np.where(np.diff(run) == 0, np.diff(time_s), np.nan)
     usual = np.nanmedian(steps) if np.isfinite(steps).any() else np.nan
     gaps = np.flatnonzero(steps > 5 * usual)

@@ -41,6 +41,10 @@ class Profile:
         self._left = (residual * self._weights).astype(np.float32)
         self._flat = (self._others * self._weights).reshape(len(self._others), -1)
 
+    def along(self, shape: Shape, name: str) -> Callable[[float], float]:
+        """Return the gain as a function of one shape parameter."""
+        return lambda value: self({**shape, name: value})
+
     def __call__(self, shape: Shape) -> float:
         """Return the further gain."""
         dictionary = self.search.dictionary
@@ -75,7 +79,7 @@ def refined(search: Search, others: Sequence[Term], term: Term) -> Term:
         if name not in best:
             continue
         reach = _reach(candidate, scene.length_s, name, float(best[name]), low, high)
-        value, found = maximise(lambda x, n=name: profile({**best, n: x}), *reach)  # type: ignore[misc]
+        value, found = maximise(profile.along(best, name), *reach)
         if found > gain:
             best, gain = {**best, name: value}, found
     if best == term.group.shape:

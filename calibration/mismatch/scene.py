@@ -88,7 +88,7 @@ class Scene:
         return self.secant(name, RELATIVE_STEP * (abs(start) or 1.0))
 
     def input_tangent(self, column: str) -> Array:
-        """Return ∂prediction/∂ln(input), shape (time, wheel): what a reading that is 1 too large by its own size does."""
+        """Return ∂prediction/∂ln(input), shape (time, wheel)."""
         key = ("input " + column, RELATIVE_STEP)
         if key not in self._made:
             inputs = complete_inputs(self.recording)
@@ -121,11 +121,21 @@ def build_scene(recording: Recording, simulation: Simulation, values: Mapping[st
     measured = prepared.channel(simulation.channel)
     mask = np.isfinite(prediction) & np.isfinite(measured)
     if mask.sum() < 100:
-        raise RecordingError(f"only {mask.sum()} values of {simulation.channel} can be compared; at least 100 are needed")
+        raise RecordingError(
+            f"only {mask.sum()} values of {simulation.channel} can be compared; at least 100 are needed"
+        )
     covariates = _covariates(prepared, simulation, inputs, prediction)
     wheels = recording.wheels
     return Scene(
-        prepared, simulation, chosen, measured, prediction, mask, covariates, simulation.side(wheels), simulation.row(wheels)
+        prepared,
+        simulation,
+        chosen,
+        measured,
+        prediction,
+        mask,
+        covariates,
+        simulation.side(wheels),
+        simulation.row(wheels),
     )
 
 
@@ -166,4 +176,6 @@ def _integral(values: Array, recording: Recording) -> Array:
     steps = np.diff(recording.time_s)
     steps = np.where((np.diff(recording.run) == 0) & (steps > 0), steps, 0.0)
     known = np.nan_to_num(values)
-    return np.vstack((np.zeros((1, values.shape[1])), np.cumsum(0.5 * (known[1:] + known[:-1]) * steps[:, None], axis=0)))
+    return np.vstack(
+        (np.zeros((1, values.shape[1])), np.cumsum(0.5 * (known[1:] + known[:-1]) * steps[:, None], axis=0))
+    )

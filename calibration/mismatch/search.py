@@ -40,7 +40,7 @@ class Term:
         return self.group.name
 
     def price(self, wheel_count: int) -> float:
-        """What choosing this term costs: its coefficients, its shape, and that it is on these wheels."""
+        """Return what choosing this term costs: its coefficients, its shape, and that it is on these wheels."""
         paid = PER_COEFFICIENT * len(self.group.columns) + self.group.complexity
         if len(self.wheels) < wheel_count:
             paid += 2 * float(np.log(wheel_count))
@@ -102,7 +102,7 @@ class Search:
         columns = self._columns(terms)
         matrix, moment = self._normal(columns)
         base = len(self.nuisance.columns)
-        inverse = np.linalg.pinv(matrix, rcond=1e-10, hermitian=True)
+        inverse: Array = np.linalg.pinv(matrix, rcond=1e-10, hermitian=True).astype(np.float64)
         solved = inverse @ moment
         gain = float(moment @ solved)
         if base:
@@ -114,7 +114,7 @@ class Search:
         return fit.gain - sum(term.price(len(self.weights)) for term in fit.terms)
 
     def conditional(self, given: Iterable[Term], groups: Sequence[Group] | None = None) -> list[tuple[float, Term]]:
-        """Return the further gain of every group, on all wheels and on each alone, when `given` is in the fit already."""
+        """Return the further gain of every group beside `given`, on all wheels and on each alone."""
         columns = self._columns(tuple(given))
         matrix, moment = self._normal(columns)
         inverse = np.linalg.pinv(matrix, rcond=1e-10, hermitian=True) if columns else np.zeros((0, 0))

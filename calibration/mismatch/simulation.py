@@ -21,7 +21,6 @@ from __future__ import annotations
 import importlib
 import sys
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -31,6 +30,7 @@ from calibration.mismatch.errors import SimulationError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
     from calibration.mismatch.candidates import Candidate
     from calibration.mismatch.recording import Recording
@@ -49,8 +49,7 @@ class Prior:
 
 @dataclass(frozen=True)
 class SensorError:
-    """The standard error of a recorded input: a fraction of the reading plus a constant, independent from reading to
-    reading."""
+    """A recorded input's standard error: a fraction of the reading plus a constant, new with each reading."""
 
     relative: float = 0.0
     absolute: float = 0.0

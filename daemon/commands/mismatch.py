@@ -1,4 +1,4 @@
-"""`regolithd mismatch`: what physics does this simulation leave out of this recording?"""
+"""`regolithd mismatch`: the physics that a simulation leaves out of a recording."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from calibration.mismatch.answer import Answer
+    from calibration.mismatch.compare import Comparison
     from calibration.mismatch.recording import Recording
 
 EXIT_DATA = 65
@@ -20,11 +21,15 @@ def register(app: typer.Typer) -> None:
 
     @app.command()
     def mismatch(
-        recording: Annotated[Path, typer.Argument(help="CSV(.gz), Parquet, or a recording of the daemon's own (MCAP).")],
+        recording: Annotated[
+            Path, typer.Argument(help="CSV(.gz), Parquet, or a recording of the daemon's own (MCAP).")
+        ],
         simulation: Annotated[Path, typer.Option(help="SIM.toml: the simulation's name and parameters.")],
         json: Annotated[Path | None, typer.Option(help="Write the answer here.")] = None,
         report: Annotated[Path | None, typer.Option(help="Write a self-contained HTML report here.")] = None,
-        corrected: Annotated[Path | None, typer.Option(help="Write the simulation with the effects in it here.")] = None,
+        corrected: Annotated[
+            Path | None, typer.Option(help="Write the simulation with the effects in it here.")
+        ] = None,
     ) -> None:
         """Locate where simulation and recording differ, name the physics left out, and show the fit improve."""
         from calibration.mismatch.errors import MismatchError
@@ -83,7 +88,7 @@ def _write_json(path: Path, answer: Answer) -> None:
     path.write_text(json.dumps(answer.to_json(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-def _write_report(path: Path, found: object, title: str) -> None:
+def _write_report(path: Path, found: Comparison, title: str) -> None:
     from calibration.mismatch.report import write_report
 
     write_report(path, found, title)
@@ -102,8 +107,8 @@ def _tell(console: Any, answer: Answer) -> None:  # noqa: ANN401  # rich's conso
         console.print(f"  {' or '.join(pair.effects)}: this recording cannot tell. {pair.experiment}")
     fit = answer.fit
     console.print(
-        f"  held-out error of {fit.channel}: {fit.held_out_rmse_before:.5g} before, {fit.held_out_rmse_after:.5g} after, "
-        f"noise floor {fit.noise_floor_rmse:.5g}"
+        f"  held-out error of {fit.channel}: {fit.held_out_rmse_before:.5g} before, "
+        f"{fit.held_out_rmse_after:.5g} after, noise floor {fit.noise_floor_rmse:.5g}"
     )
     for note in answer.notes:
         console.print(f"  note: {note}")

@@ -33,8 +33,10 @@ class LoadCellDrift(Candidate):
 
     def shapes(self, scene: Scene) -> Sequence[Shape]:
         """Ramps and slow approaches from several times on."""
-        early = [{"onset_s": -1.0, "rise_s": rise} for rise in (float("inf"), 0.5 * scene.length_s, 0.15 * scene.length_s)]
-        later = [{"onset_s": t, "rise_s": rise} for t in onsets(scene, 12) for rise in (float("inf"), 0.0)]
+        early: list[Shape] = [
+            {"onset_s": -1.0, "rise_s": rise} for rise in (float("inf"), 0.5 * scene.length_s, 0.15 * scene.length_s)
+        ]
+        later: list[Shape] = [{"onset_s": t, "rise_s": rise} for t in onsets(scene, 12) for rise in (float("inf"), 0.0)]
         return [*early, *later]
 
     def columns(self, scene: Scene, shape: Shape) -> Array:

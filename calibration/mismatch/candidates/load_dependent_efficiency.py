@@ -33,7 +33,9 @@ class LoadDependentEfficiency(Candidate):
 
     def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002
         """From proportional to strongly curved, and losses at light loads."""
-        return [{"power": p} for p in (0.0, 0.5, 1.0, 2.0)] + [{"light": s} for s in (0.5, 1.0)]
+        curved: list[Shape] = [{"power": p} for p in (0.0, 0.5, 1.0, 2.0)]
+        light: list[Shape] = [{"light": s} for s in (0.5, 1.0)]
+        return [*curved, *light]
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return the loss as a multiple of the prediction."""

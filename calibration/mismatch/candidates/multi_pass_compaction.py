@@ -52,7 +52,7 @@ class MultiPassCompaction(Candidate):
         return (base * done)[None]
 
     def wheels(self, shape: Shape, wheels: tuple[int, ...], row: Array | None) -> tuple[int, ...]:
-        """Counted from the front, the first row is never in a rut."""
+        """Leave out the first row where passes count from the front: it is never in a rut."""
         if shape["leads"] == "travel" or row is None:
             return wheels
         return tuple(wheel for wheel, at in zip(wheels, row, strict=True) if at > 0)

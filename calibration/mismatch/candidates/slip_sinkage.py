@@ -30,7 +30,8 @@ class SlipSinkage(Candidate):
 
     def shapes(self, scene: Scene) -> Sequence[Shape]:
         """Through the soil model at small and full strength; else in proportion to slip."""
-        through = [{"step": 0.3}, {"step": 1.0}] if "slip_sinkage" in scene.simulation.variants() else []
+        has_soil = "slip_sinkage" in scene.simulation.variants()
+        through: list[Shape] = [{"step": 0.3}, {"step": 1.0}] if has_soil else []
         return [*through, {"power": 1.0}]
 
     def columns(self, scene: Scene, shape: Shape) -> Array:

@@ -22,13 +22,15 @@ class TorqueConstantTemperature(Candidate):
     equation = "ΔI = α (T − T_0) I_sim"
     words = "a torque constant that falls as the motor warms"
     signature = "a residual along the predicted current that grows with temperature, through zero at T_0"
-    experiment = "hold a known load (a slope, or ballast) at one speed while the motor warms, then let it cool and repeat"
+    experiment = (
+        "hold a known load (a slope, or ballast) at one speed while the motor warms, then let it cool and repeat"
+    )
     source = "NdFeB −0.1 %/K, ferrite −0.2 %/K; T_0 20 to 25 °C on data sheets"
     requires = ("temperature",)
     coefficients: ClassVar = (Coefficient("temperature_coefficient", "1/K"),)
 
     def shapes(self, scene: Scene) -> Sequence[Shape]:
-        """Reference temperatures of data sheets, and where the simulation's gain was measured perhaps."""
+        """Return the reference temperatures of data sheets, and the recording's mean."""
         middle = float(np.nanmean(scene.covariates["temperature"][scene.mask]))
         return [{"reference_degC": t} for t in (25.0, 20.0, 0.0, middle)]
 

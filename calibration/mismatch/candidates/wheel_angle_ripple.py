@@ -65,7 +65,7 @@ class WheelAngleRipple(Candidate):
         return {"amplitude": amplitude, "order": float(shape["order"])}
 
     def _base(self, scene: Scene, kind: str) -> Array:
-        """A torque that ripples whichever way the wheel turns, a drag, or a ripple in proportion to the load."""
+        """Return a torque that ripples whichever way the wheel turns, a drag, or a ripple in proportion to the load."""
         if kind == "drag":
             return scene.covariates["direction"]
         return np.ones(scene.mask.shape) if kind == "torque" else scene.filled / scene.mean_size
