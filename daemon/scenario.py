@@ -89,7 +89,6 @@ class Motion(Table):
 
     slip: Annotated[float, Field(gt=-0.5, lt=0.9)] = 0.025
     slip_per_grade: NotNegative = 0.3
-    slip_std: NotNegative = 0.002
     centre_of_mass_m: Positive = 0.2
 
 
@@ -104,6 +103,7 @@ class Noise(Table):
     load_relative_std: SixNotNegative = (0.142, 0.119, 0.096, 0.070, 0.067, 0.072)
     terrain_share: Fraction = 0.5
     terrain_length_m: Positive = 0.05
+    slip_std: NotNegative = 0.002  # of the slip itself, with the ground
     current_correlation_s: Positive = 0.2
     drops_per_s: NotNegative = 0.15
     drop_duration_s: Positive = 0.3

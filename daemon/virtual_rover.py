@@ -132,7 +132,7 @@ class VirtualWorld:
     def _motion(self, wheel_speed: Array, pitch_rad: float, wander: float) -> tuple[float, float, Array]:
         """Return speed over ground [m/s], yaw rate [rad/s] and each hub's speed [m/s]."""
         motion, rover, radius = self.scenario.motion, self.scenario.rover, self.scenario.wheel.radius_m
-        slip = motion.slip + motion.slip_per_grade * np.sin(pitch_rad) + motion.slip_std * wander
+        slip = motion.slip + motion.slip_per_grade * np.sin(pitch_rad) + self.scenario.noise.slip_std * wander
         if not np.any(np.abs(wheel_speed) > 0):
             return 0.0, 0.0, np.zeros(WHEELS)
         rim = radius * wheel_speed
