@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from calibration.drivetrain import motor_current
+from calibration.wheel_loads import GRAVITY_M_S2, wheel_loads
 from calibration.wheel_soil import contact_angle, wheel_torque
 from daemon.ground_noise import Drops, Wander
 from daemon.scenario import Scenario
 from drivers.virtual.plant import WHEELS, Array, Measurement
 
-GRAVITY_M_S2 = 9.80665
 STANDSTILL_RAD_S = 0.05
 """Below this wheel speed the wheel–soil model says nothing; the torque is faded out."""
 STALL_CURRENT_A = 1.0  # what a motor draws whose wheel is in to its axle; the EPOS 24/1 limits it there
@@ -85,7 +85,8 @@ class VirtualWorld:
         self._speed_m_s, yaw_rate, hub_speed = self._motion(wheel_speed, pitch, float(terrain[-1]))
         slip = self._slip(wheel_speed, hub_speed)
         load_std = np.array(noise.load_relative_std)
-        load = self._loads(pitch, roll) * (1 + load_std * np.sqrt(noise.terrain_share) * terrain[:-1])
+        level = wheel_loads(np.array(pitch), np.array(roll), scenario.rover, scenario.motion.centre_of_mass_m)
+        load = level * (1 + load_std * np.sqrt(noise.terrain_share) * terrain[:-1])
         torque, numbers = self._torque(np.maximum(load, 0.1), slip, wheel_speed, pitch)
         self._remember(numbers, load, slip, torque)
         steady = self._steady_current(torque, motor_speed_rad_s)
@@ -115,19 +116,6 @@ class VirtualWorld:
             np.array([phase, phase / 2]) + self._wave_phase
         )
         return float(pitch), float(roll)
-
-    def _loads(self, pitch_rad: float, roll_rad: float) -> Array:
-        """Return the six loads [N]: equal shares, moved to the rear and to the side by the slope.
-
-        The share that moves is what balances the weight's moment about the wheels' centre, growing linearly with a
-        wheel's distance from it.
-        """
-        rover, height = self.scenario.rover, self.scenario.motion.centre_of_mass_m
-        weight = rover.mass_kg * GRAVITY_M_S2
-        level = np.cos(pitch_rad) * np.cos(roll_rad) / WHEELS
-        rear = -np.sin(pitch_rad) * height / rover.wheelbase_m * AHEAD / np.sum(AHEAD**2)
-        side = np.sin(roll_rad) * height / rover.track_m * RIGHT / np.sum(RIGHT**2)
-        return weight * (level + rear + side)
 
     def _motion(self, wheel_speed: Array, pitch_rad: float, wander: float) -> tuple[float, float, Array]:
         """Return speed over ground [m/s], yaw rate [rad/s] and each hub's speed [m/s]."""
