@@ -107,7 +107,7 @@ class _Boot:
     async def run(self) -> Identity:
         await self._reset()
         try:
-            identity = await self._identify()
+            identity = await self._identify_restarted()
             await self._configure()
         except SdoTimeoutError as error:
             self._check_restart()
@@ -125,11 +125,25 @@ class _Boot:
             raise self._error(BootReason.NO_BOOT_UP, f"no boot-up message within {timeout_s:g} s of the NMT reset")
         self._boot_ups = link.boot_ups
 
+    async def _identify_restarted(self) -> Identity:
+        """Identify the node; a boot-up meanwhile does no harm, as nothing has been written yet.
+
+        It happens when the node has just got its power: the boot-up that was taken for the reset's was of before.
+        """
+        try:
+            identity = await self._identify()
+        except BootError:
+            if self._link.boot_ups == self._boot_ups:
+                raise
+            self._boot_ups = self._link.boot_ups
+            return await self._identify()
+        self._boot_ups = self._link.boot_ups
+        return identity
+
     async def _identify(self) -> Identity:
         try:
             identity = await read_identity(self._link)
         except SdoTimeoutError as error:
-            self._check_restart()
             raise self._error(BootReason.NO_SDO_ANSWER, error.what, error) from error
         except SdoAbortError as error:
             raise self._error(BootReason.WRONG_DEVICE_TYPE, error.what, error) from error

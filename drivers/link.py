@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from drivers.nmt import NmtCommand, NmtState, command_frame
+from drivers.decode import SDO_ANSWER_COB_ID
+from drivers.nmt import ERROR_CONTROL_COB_ID, NmtCommand, NmtState, command_frame, parse_state
 from drivers.sdo_client import SdoClient
 from drivers.watch import Watch
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from drivers.bus import Bus
-    from drivers.signals import NodeDescription, NodeState
+    from drivers.frame import Frame
+    from drivers.signals import NodeDescription
 
 
 class Link:
@@ -26,15 +30,27 @@ class Link:
         self.boot_ups = 0
         self._bus = bus
 
+    @property
+    def handlers(self) -> dict[int, Callable[[Frame], None]]:
+        """What takes the frames of its SDO server and of its error control, by COB-ID."""
+        node_id = self.node.node_id
+        return {
+            SDO_ANSWER_COB_ID + node_id: self.sdo.handle,
+            ERROR_CONTROL_COB_ID + node_id: self._take_state,
+        }
+
     async def tell(self, command: NmtCommand) -> None:
         """Send an NMT command to the node."""
         await self._bus.send(command_frame(command, self.node.node_id))
 
-    def take_state(self, signal: NodeState) -> None:
-        """Take a heartbeat or boot-up message of the node."""
+    def _take_state(self, frame: Frame) -> None:
+        """Take a heartbeat or boot-up message; one that says no state of CiA 301 is none."""
+        state = parse_state(frame.data)
+        if state is None:
+            return
         self.heard += 1
-        self.heard_ns = signal.time_ns
-        booted = signal.state is NmtState.BOOT_UP
+        self.heard_ns = frame.time_ns
+        booted = state is NmtState.BOOT_UP
         self.boot_ups += booted
-        self.state = NmtState.PRE_OPERATIONAL if booted else signal.state
+        self.state = NmtState.PRE_OPERATIONAL if booted else state
         self.news.notify()

@@ -23,7 +23,6 @@ from typing import TYPE_CHECKING
 from drivers.bus import Bus, BusState
 from drivers.cia402 import DriveState
 from drivers.configuration import CONSUMER_HEARTBEAT
-from drivers.decode import SDO_ANSWER_COB_ID
 from drivers.drive import Drive
 from drivers.emcy import EMCY_COB_ID, parse
 from drivers.errors import DriveError, DriverError
@@ -37,9 +36,9 @@ from drivers.events import (
 )
 from drivers.heartbeat import produce_heartbeat
 from drivers.link import Link
-from drivers.nmt import ERROR_CONTROL_COB_ID, NmtCommand, parse_state
+from drivers.nmt import NmtCommand
 from drivers.pdo import tpdos
-from drivers.signals import NodeKind, NodeState
+from drivers.signals import NodeKind
 from drivers.status import NetworkCounters, NetworkSettings, NodePhase, NodeStatus
 from drivers.supervisor import Supervisor
 from drivers.sync import produce_sync
@@ -200,8 +199,7 @@ class Network:
         link = Link(self.bus, node, sdo_timeout_s=self.settings.sdo_timeout_s)
         supervisor = Supervisor(link, self.settings, self._emit)
         self._supervisors[node_id] = supervisor
-        self._handlers[SDO_ANSWER_COB_ID + node_id] = link.sdo.handle
-        self._handlers[ERROR_CONTROL_COB_ID + node_id] = lambda frame: _take_state(link, frame)
+        self._handlers |= link.handlers
         self._handlers[EMCY_COB_ID + node_id] = lambda frame: self._take_emergency(supervisor, frame)
         if node.kind is NodeKind.MOTOR:
             drive = self._drives[node_id] = Drive(self.bus, link)
@@ -227,7 +225,7 @@ class Network:
                 self._on_frames(batch)
             for frame in batch:
                 handler = handlers.get(frame.can_id)
-                if handler is not None and not (frame.sent or frame.error or frame.extended or frame.remote):
+                if handler is not None and frame.ordinary and not frame.sent:
                     handler(frame)
             if self.bus.state is not self._bus_state:
                 self._bus_state = self.bus.state
@@ -298,12 +296,6 @@ class Network:
         for supervisor in self._supervisors.values():
             with suppress(DriverError):
                 await supervisor.link.tell(NmtCommand.ENTER_PRE_OPERATIONAL)
-
-
-def _take_state(link: Link, frame: Frame) -> None:
-    state = parse_state(frame.data)
-    if state is not None:
-        link.take_state(NodeState(frame.time_ns, link.node.node_id, state))
 
 
 async def _each(actions: Iterable[Awaitable[None]]) -> list[DriverError]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from drivers.nmt import NmtState
@@ -60,9 +60,11 @@ class Sync:
     time_ns: int
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """One TPDO, decoded to SI units."""
+class Reading(NamedTuple):
+    """One TPDO, decoded to SI units. `values` is empty where the node says that its measurement is not valid.
+
+    A named tuple for the reason that `Frame` is one.
+    """
 
     time_ns: int
     node_id: int

@@ -1,0 +1,135 @@
+"""A bus in this process, with the virtual rover on it."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import pytest
+
+from drivers.bus import Bus, open_bus
+from drivers.decode import Decoder
+from drivers.network import Network, NetworkSettings
+from drivers.signals import Reading
+from drivers.virtual.plant import Bench
+from drivers.virtual.rover import KAPVIK, VirtualRover
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Callable, Sequence
+
+    from drivers.events import NetworkEvent
+    from drivers.frame import Frame
+    from drivers.signals import NodeDescription, Signal
+    from drivers.virtual.plant import Plant
+
+_CHANNELS = itertools.count()
+PATIENCE_s = 20.0
+
+
+async def until(condition: Callable[[], object], what: str, patience_s: float = PATIENCE_s) -> None:
+    """Wait for a condition, and say what was waited for where it never holds."""
+    try:
+        async with asyncio.timeout(patience_s):
+            while not condition():  # noqa: ASYNC110  # what is waited for belongs to others, who notify nobody
+                await asyncio.sleep(0.01)
+    except TimeoutError:
+        pytest.fail(f"waited {patience_s:g} s in vain: {what}")
+
+
+def settings(nodes: Sequence[NodeDescription], **changes: object) -> NetworkSettings:
+    """Return settings for a bus in a test: quick where nothing depends on it, patient where a loaded machine does."""
+    quick = {"sync_rate_Hz": 20.0, "boot_up_timeout_s": 1.0, "sdo_timeout_s": 0.5, "retry_after_s": 0.5}
+    slow = {"node_lost_after_s": 1.0, "master_lost_after_s": 2.0}
+    return NetworkSettings(nodes=tuple(nodes), **(quick | slow | changes))
+
+
+@dataclass
+class Rig:
+    """A running network and the virtual rover that it runs."""
+
+    rover: VirtualRover
+    bus: Bus
+    network: Network = field(init=False)
+    running: asyncio.Task[None] = field(init=False)
+    decoder: Decoder = field(init=False)
+    events: list[NetworkEvent] = field(default_factory=list)
+    frames: list[Frame] = field(default_factory=list)
+    signals: list[Signal] = field(default_factory=list)
+
+    def start(self, tasks: asyncio.TaskGroup, wanted: NetworkSettings) -> None:
+        """Run a network, and keep what it says."""
+        self.decoder = Decoder(wanted.nodes)
+        self.network = Network(self.bus, wanted, on_frames=self.take, on_event=self.events.append)
+        self.running = tasks.create_task(self.network.run())
+
+    def take(self, batch: Sequence[Frame]) -> None:
+        """Keep and decode frames."""
+        self.frames.extend(batch)
+        self.signals.extend(filter(None, map(self.decoder.decode, batch)))
+
+    def told(self, kind: type, **fields: object) -> list[NetworkEvent]:
+        """Return the events of a class whose fields are these."""
+        return [
+            event
+            for event in self.events
+            if isinstance(event, kind) and all(getattr(event, name) == value for name, value in fields.items())
+        ]
+
+    def readings(self, node_id: int) -> list[Reading]:
+        """Return what one node has measured so far."""
+        return [signal for signal in self.signals if isinstance(signal, Reading) and signal.node_id == node_id]
+
+    async def until_told(self, kind: type, **fields: object) -> NetworkEvent:
+        """Wait for an event that has not been waited for before, and return it."""
+        await until(lambda: self.told(kind, **fields), f"{kind.__name__} {fields}; told: {self.events}")
+        event = self.told(kind, **fields)[0]
+        self.events.remove(event)
+        return event
+
+    async def until_transfers(self, node_id: int, count: int) -> None:
+        """Wait until so many SDO transfers have begun with a node."""
+        sdo = self.network._supervisors[node_id].link.sdo
+        await until(lambda: sdo.transfers >= count, f"{count} SDO transfers with node {node_id}")
+
+    async def until_attempts(self, node_id: int, count: int) -> None:
+        """Wait until a node has been tried so often."""
+        supervisor = self.network._supervisors[node_id]
+        await until(lambda: supervisor.attempts >= count, f"{count} attempts to boot node {node_id}")
+
+    async def stop(self) -> None:
+        """Stop the network as a daemon does: cancel it, and wait."""
+        self.running.cancel()
+        await asyncio.wait([self.running])
+
+
+@asynccontextmanager
+async def rig(
+    nodes: Sequence[NodeDescription] = KAPVIK,
+    *,
+    plant: Plant | None = None,
+    tell: Sequence[str] = (),
+    known: Sequence[NodeDescription] | None = None,
+    **changes: object,
+) -> AsyncIterator[Rig]:
+    """Run a virtual rover with these nodes, obeying `tell` from the start, and a network that knows `known`."""
+    channel = f"test-{next(_CHANNELS)}"
+    described = nodes if known is None else known
+    async with AsyncExitStack() as stack:
+        rover_bus = await stack.enter_async_context(open_bus("virtual", channel))
+        bus = await stack.enter_async_context(open_bus("virtual", channel))
+        tasks = await stack.enter_async_context(asyncio.TaskGroup())
+        rover = VirtualRover(plant or Bench(), nodes)
+        serving = tasks.create_task(rover.run(rover_bus))
+        await asyncio.sleep(0)  # the nodes have their power now, and obey
+        for line in tell:
+            assert rover.tell(line) == "ok", line
+        running = Rig(rover, bus)
+        running.start(tasks, settings(described, **changes))
+        try:
+            yield running
+        finally:
+            await running.stop()
+            serving.cancel()
