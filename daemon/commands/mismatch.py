@@ -61,7 +61,7 @@ def _run(recording: Path, simulation: Path, json: Path | None, report: Path | No
         text = to_toml(corrected_tables(tables, simulated, evidence.values, evidence.contributions))
         corrected.write_text(text, encoding="utf-8")
     if report:
-        _write_report(report, found, recording.name)
+        _write_report(report, found, recording, simulation)
     _tell(Console(), found.answer)
 
 
@@ -88,10 +88,16 @@ def _write_json(path: Path, answer: Answer) -> None:
     path.write_text(json.dumps(answer.to_json(), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
-def _write_report(path: Path, found: Comparison, title: str) -> None:
-    from calibration.mismatch.report import write_report
+def _write_report(path: Path, found: Comparison, recording: Path, simulation: Path) -> None:
+    from hashlib import sha256
 
-    write_report(path, found, title)
+    from calibration.mismatch.report import Provenance, write_report
+
+    first, second = (sha256(file.read_bytes()).hexdigest() for file in (recording, simulation))
+    command = f"regolithd mismatch {recording.name} --simulation {simulation.name} --report {path.name}"
+    write_report(
+        path, found.answer, found.evidence, Provenance(recording.name, simulation.name, first, second, command)
+    )
 
 
 def _tell(console: Any, answer: Answer) -> None:  # noqa: ANN401  # rich's console

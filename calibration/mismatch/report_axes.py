@@ -1,0 +1,112 @@
+"""The little drawing that the report needs: scales, ticks and marks as inline SVG that follows the page's colours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A rectangle of the drawing [px] and the ranges that it shows; y grows upwards."""
+
+    left: float
+    top: float
+    width: float
+    height: float
+    x: tuple[float, float]
+    y: tuple[float, float]
+
+    def at_x(self, value: float) -> float:
+        """Return where a value is across."""
+        return self.left + self.width * (value - self.x[0]) / ((self.x[1] - self.x[0]) or 1.0)
+
+    def at_y(self, value: float) -> float:
+        """Return where a value is down."""
+        return self.top + self.height * (1 - (value - self.y[0]) / ((self.y[1] - self.y[0]) or 1.0))
+
+
+def ticks(low: float, high: float, about: int = 5) -> list[float]:
+    """Return round numbers between two values, about as many as asked for."""
+    span = high - low
+    if about == 0:
+        return []
+    if not np.isfinite(span) or span <= 0:
+        return [low]
+    raw = span / about
+    scale = 10.0 ** np.floor(np.log10(raw))
+    step = scale * next(m for m in (1, 2, 2.5, 5, 10) if m * scale >= raw * 0.999)
+    first = np.ceil(low / step - 1e-9)
+    return [float(round(k * step, 12)) + 0.0 for k in np.arange(first, np.floor(high / step + 1e-9) + 1)]
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Return a number as people write it: a true minus, no exponent where it can be helped."""
+    if not np.isfinite(value):
+        return "–"
+    text = f"{value:.{digits}g}"
+    if "e" in text and 1e-5 < abs(value) < 1e7:
+        text = np.format_float_positional(float(text), trim="-")
+    return text.replace("-", "−")
+
+
+def text(x: float, y: float, words: str, *, anchor: str = "start", kind: str = "", turn: float = 0.0) -> str:
+    """Return a text element."""
+    turned = f' transform="rotate({turn} {x:.1f} {y:.1f})"' if turn else ""
+    named = f' class="{kind}"' if kind else ""
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}"{named}{turned}>{escape(words)}</text>'
+
+
+def line(points: Sequence[tuple[float, float]], kind: str) -> str:
+    """Return a polyline; broken where a point is not finite."""
+    parts, pen = [], "M"
+    for x, y in points:
+        if np.isfinite(x) and np.isfinite(y):
+            parts.append(f"{pen}{x:.1f} {y:.1f}")
+            pen = "L"
+        else:
+            pen = "M"
+    return f'<path class="{kind}" d="{" ".join(parts)}"/>'
+
+
+def box(panel: Panel, kind: str = "ground") -> str:
+    """Return the panel's ground."""
+    return (
+        f'<rect class="{kind}" x="{panel.left:.1f}" y="{panel.top:.1f}" '
+        f'width="{panel.width:.1f}" height="{panel.height:.1f}"/>'
+    )
+
+
+def axes(panel: Panel, x_label: str, y_label: str, *, x_about: int = 6, y_about: int = 4) -> str:
+    """Return ticks, numbers and labels on the left and below."""
+    bottom = panel.top + panel.height
+    parts = []
+    for value in ticks(*panel.x, x_about):
+        at = panel.at_x(value)
+        parts += [line([(at, bottom), (at, bottom + 4)], "axis"), text(at, bottom + 17, number(value), anchor="middle")]
+    for value in ticks(*panel.y, y_about):
+        at = panel.at_y(value)
+        parts += [line([(panel.left - 4, at), (panel.left, at)], "axis")]
+        parts += [text(panel.left - 7, at + 4, number(value), anchor="end")]
+    parts.append(text(panel.left + panel.width / 2, bottom + 35, x_label, anchor="middle"))
+    if y_label:
+        middle = panel.top + panel.height / 2
+        parts.append(text(panel.left - 44, middle, y_label, anchor="middle", turn=-90))
+    return "".join(parts)
+
+
+def svg(width: float, height: float, parts: Sequence[str], label: str) -> str:
+    """Return the drawing, with words for those who cannot see it."""
+    return (
+        f'<svg viewBox="0 0 {width:.0f} {height:.0f}" role="img" aria-label="{escape(label)}" '
+        f'xmlns="http://www.w3.org/2000/svg">{"".join(parts)}</svg>'
+    )
