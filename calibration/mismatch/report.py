@@ -149,7 +149,8 @@ def _where(answer: Answer, evidence: Evidence) -> str:
         picture = curve_figure(curve, evidence.unit, corrected=bool(answer.effects))
         parts.append(
             f"<figure>{picture}<figcaption><b>{_what_orders(answer)}{escape(spoken(curve.covariate))}.</b> "
-            f"Mean residual{of} in bins that share the data evenly; bars are two standard errors. {_key(answer)}</figcaption></figure>"
+            f"Mean residual{of} "
+            f"in bins that share the data evenly; bars are two standard errors. {_key(answer)}</figcaption></figure>"
         )
     return "\n".join(parts)
 
