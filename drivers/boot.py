@@ -19,7 +19,15 @@ from typing import TYPE_CHECKING
 from drivers.boot_reason import BootReason
 from drivers.configuration import Write, configuration
 from drivers.dictionary import variable
-from drivers.errors import BootError, BusError, DriverError, SdoAbortError, SdoProtocolError, SdoTimeoutError
+from drivers.errors import (
+    BootError,
+    BusError,
+    DriverError,
+    SdoAbortError,
+    SdoInterruptedError,
+    SdoProtocolError,
+    SdoTimeoutError,
+)
 from drivers.events import Identity
 from drivers.nmt import NmtCommand, NmtState
 
@@ -109,8 +117,9 @@ class _Boot:
         try:
             identity = await self._identify_restarted()
             await self._configure()
+        except SdoInterruptedError as error:
+            raise self._error(BootReason.RESTARTED, "booted up again while it was being configured") from error
         except SdoTimeoutError as error:
-            self._check_restart()
             raise self._error(BootReason.FELL_SILENT, error.what, error) from error
         except SdoProtocolError as error:
             raise self._error(BootReason.MALFORMED_ANSWER, error.what, error) from error
@@ -131,14 +140,11 @@ class _Boot:
         It happens when the node has just got its power: the boot-up that was taken for the reset's was of before.
         """
         try:
-            identity = await self._identify()
-        except BootError:
-            if self._link.boot_ups == self._boot_ups:
-                raise
-            self._boot_ups = self._link.boot_ups
             return await self._identify()
-        self._boot_ups = self._link.boot_ups
-        return identity
+        except SdoInterruptedError:
+            return await self._identify()
+        finally:
+            self._boot_ups = self._link.boot_ups
 
     async def _identify(self) -> Identity:
         try:

@@ -8,6 +8,7 @@
     ├── DictionaryError (ValueError)         an EDS lacks an object, or maps what does not fit a PDO
     ├── SdoError
     │   ├── SdoTimeoutError (TimeoutError)   the node did not answer
+    │   ├── SdoInterruptedError (ConnectionResetError)   the node restarted in the middle of the transfer
     │   ├── SdoAbortError                    the node (or we) aborted the transfer; carries the abort code
     │   └── SdoProtocolError (ValueError)    the node answered something that CiA 301 does not allow
     ├── BootError                            a node could not be booted; carries a `BootReason`
@@ -96,6 +97,10 @@ class SdoError(DriverError):
 
 class SdoTimeoutError(SdoError, TimeoutError):
     """The node did not answer an SDO request."""
+
+
+class SdoInterruptedError(SdoError, ConnectionResetError):
+    """The node restarted in the middle of a transfer, and has forgotten it."""
 
 
 class SdoAbortError(SdoError):

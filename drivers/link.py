@@ -51,6 +51,8 @@ class Link:
         self.heard += 1
         self.heard_ns = frame.time_ns
         booted = state is NmtState.BOOT_UP
-        self.boot_ups += booted
+        if booted:
+            self.boot_ups += 1
+            self.sdo.interrupt()
         self.state = NmtState.PRE_OPERATIONAL if booted else state
         self.news.notify()

@@ -6,7 +6,7 @@ import asyncio
 from typing import TYPE_CHECKING
 
 from drivers.decode import SDO_REQUEST_COB_ID
-from drivers.errors import BusError, SdoError, SdoProtocolError, SdoTimeoutError
+from drivers.errors import BusError, SdoError, SdoInterruptedError, SdoProtocolError, SdoTimeoutError
 from drivers.frame import Frame
 from drivers.sdo import ABORT_COMMAND, ABORT_TIMEOUT, Transfer, abort_request, download, upload
 
@@ -23,7 +23,7 @@ class SdoClient:
         self.failures = 0
         self._bus = bus
         self._timeout_s = timeout_s
-        self._answers: asyncio.Queue[bytes] = asyncio.Queue()
+        self._answers: asyncio.Queue[bytes | None] = asyncio.Queue()
         self._one_at_a_time = asyncio.Lock()
 
     def handle(self, frame: Frame) -> None:
@@ -31,12 +31,17 @@ class SdoClient:
         if self._one_at_a_time.locked():
             self._answers.put_nowait(frame.data)
 
+    def interrupt(self) -> None:
+        """Give up the transfer under way: the node has restarted and knows nothing of it."""
+        if self._one_at_a_time.locked():
+            self._answers.put_nowait(None)
+
     async def read(self, index: int, subindex: int = 0) -> bytes:
         """Return an object's bytes.
 
         Raises
         ------
-        SdoTimeoutError, SdoAbortError, SdoProtocolError
+        SdoTimeoutError, SdoInterruptedError, SdoAbortError, SdoProtocolError
             As the error tree says.
         BusError
             The request could not be sent.
@@ -58,6 +63,9 @@ class SdoClient:
                 self._answers.get_nowait()
             try:
                 return await self._converse(transfer)
+            except SdoInterruptedError as error:
+                error.locate(self.node_id)
+                raise  # no failure of the transfer: whoever boots the node knows
             except BusError:
                 self.failures += 1
                 raise
@@ -84,11 +92,17 @@ class SdoClient:
             while True:
                 await self._send(request or b"")
                 async with asyncio.timeout(self._timeout_s):
-                    request = transfer.send(await self._answers.get())
+                    request = transfer.send(await self._answer())
                     while request is None:
-                        request = transfer.send(await self._answers.get())
+                        request = transfer.send(await self._answer())
         except StopIteration as end:
             return end.value
+
+    async def _answer(self) -> bytes:
+        answer = await self._answers.get()
+        if answer is None:
+            raise SdoInterruptedError("the node restarted in the middle of the transfer")
+        return answer
 
     async def _send(self, request: bytes) -> None:
         await self._bus.send(Frame(0, SDO_REQUEST_COB_ID + self.node_id, request))

@@ -47,6 +47,7 @@ class Supervisor:
         self._emit = emit
         self._status = NodeStatus(link.node)
         self._patience_s = settings.retry_after_s
+        self._away = False  # told as lost or failed, and not heard since
 
     @property
     def status(self) -> NodeStatus:
@@ -84,7 +85,9 @@ class Supervisor:
             if text != self._status.text:  # said once, however often it is tried
                 self._emit(NodeBootFailed(time.time_ns(), node_id, error.reason, text, error.cure))
             self._status = replace(self._status, phase=NodePhase.FAILED, reason=error.reason, text=text)
+            self._away = True
         else:
+            self._note_return()
             boots = self._status.boots + 1
             text = f"node {node_id} ({self.link.node.kind.value}) is operational"
             self._status = replace(
@@ -103,7 +106,15 @@ class Supervisor:
         text = f"node {node_id} ({self.link.node.kind.value}) lost: {loss.text}"
         self._status = replace(self._status, phase=NodePhase.LOST, text=text)
         self._emit(NodeLost(time.time_ns(), node_id, text))
+        self._away = True
         return loss.silent
+
+    def _note_return(self) -> None:
+        if self._away:
+            self._away = False
+            node = self.link.node
+            text = f"node {node.node_id} ({node.kind.value}) is heard again"
+            self._emit(NodeReturned(time.time_ns(), node.node_id, text))
 
     async def _until_worth_trying(self) -> None:
         """Wait until the node is heard (where silence was the trouble), boots up by itself, or some time has passed."""
@@ -115,7 +126,6 @@ class Supervisor:
         )
         if returned:
             self._patience_s = self._settings.retry_after_s
-            text = f"node {link.node.node_id} ({link.node.kind.value}) is heard again"
-            self._emit(NodeReturned(time.time_ns(), link.node.node_id, text))
+            self._note_return()
         else:
             self._patience_s = min(2.0 * self._patience_s, self._settings.retry_at_most_s)
