@@ -123,6 +123,8 @@ class Control(Table):
 
     socket: Path = Path("/run/regolithd/control.sock")
     group: str = "regolithd"
+    speed_limit_m_s: Positive = 0.05
+    distance_limit_m: Positive = 1000.0
 
 
 class Configuration(Table):

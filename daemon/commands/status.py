@@ -1,0 +1,72 @@
+"""`regolithd status`: how the running daemon and its nodes are."""
+
+from __future__ import annotations
+
+from pathlib import Path  # noqa: TC003  # typer reads it at run time
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from daemon.control.protocol import Status
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(status)
+
+
+def status(
+    *,
+    config: Annotated[Path | None, typer.Option(help="The rover.toml of the running daemon.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="As the daemon says it.")] = False,
+) -> None:
+    """Show the running daemon's nodes, broker and traverse. The exit status is 0 while every node is operational."""
+    from daemon.control.client import converse
+
+    raise typer.Exit(converse(config, lambda path: _status(path, as_json=json)))
+
+
+async def _status(path: Path, *, as_json: bool) -> int:
+    from rich.console import Console
+
+    from daemon.control.client import conversation
+    from daemon.control.protocol import Status, StatusRequest
+
+    async with conversation(path) as daemon:
+        daemon.ask(StatusRequest())
+        reply = await daemon.reply()
+    if not isinstance(reply, Status):
+        typer.echo(f"The daemon answered something else: {reply}", err=True)
+        return 1
+    if as_json:
+        typer.echo(reply.model_dump_json(indent=2))
+    else:
+        console = Console()
+        console.print(_head(reply), highlight=False)
+        console.print(_table(reply))
+    return int(not reply.nodes or any(node.phase != "operational" for node in reply.nodes))
+
+
+def _head(status: Status) -> str:
+    driven = status.traverse
+    traverse = "none" if driven is None else f"{driven.turned_m:.3f} m turned, {driven.elapsed_s:.1f} s"
+    return (
+        f"[bold]{status.rover}[/] · bus {status.bus} · broker {status.broker} · "
+        f"{status.snapshots} snapshots at {status.rate_Hz:g} Hz · traverse: {traverse}"
+    )
+
+
+def _table(status: Status) -> Table:
+    from rich.table import Table
+
+    table = Table("node", "kind", "wheel", "phase", "drive", "what it says", expand=True)
+    colours = {"operational": "green", "booting": "yellow"}
+    for node in status.nodes:
+        colour = colours.get(node.phase, "red")
+        wheel = "" if node.wheel is None else str(node.wheel)
+        phase = f"[{colour}]{node.phase}[/]"
+        table.add_row(str(node.node_id), node.kind, wheel, phase, node.drive_state or "", node.text)
+    return table

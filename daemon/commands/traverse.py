@@ -1,0 +1,128 @@
+"""`regolithd traverse`: drive so far, at constant wheel speed; and `regolithd stop`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bar
+
+    from daemon.control.client import Conversation
+    from daemon.control.protocol import Ended, Refused
+
+Config = Annotated[Path | None, typer.Option(help="The rover.toml of the running daemon.")]
+INTERRUPTED = 130
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands."""
+    app.command()(traverse)
+    app.command()(stop)
+
+
+def traverse(
+    *,
+    distance: Annotated[float, typer.Option(help="How far the wheels' rims move [m].")],
+    speed: Annotated[float, typer.Option(help="How fast [m/s]; negative: backwards.")] = 0.022,
+    config: Config = None,
+) -> None:
+    """Drive DISTANCE at constant wheel SPEED through the running daemon, then stop clean.
+
+    Ctrl-C, a lost node, or the end of this command in any other way quick-stops the wheels.
+    """
+    from daemon.control.client import converse
+
+    raise typer.Exit(converse(config, lambda path: _traverse(path, distance, speed)))
+
+
+async def _traverse(path: Path, distance_m: float, speed_m_s: float) -> int:
+    import asyncio
+    import signal
+
+    from daemon.control.client import conversation
+    from daemon.control.protocol import Refused, StopRequest, TraverseRequest
+
+    interrupted = False
+
+    def interrupt() -> None:
+        nonlocal interrupted
+        if interrupted:  # once more: be gone at once; the daemon quick-stops then too
+            raise SystemExit(INTERRUPTED)
+        interrupted = True
+        daemon.ask(StopRequest(quick=True))
+
+    async with conversation(path) as daemon:
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGTSTP):
+            asyncio.get_running_loop().add_signal_handler(number, interrupt)
+        daemon.ask(TraverseRequest(distance_m=distance_m, speed_m_s=speed_m_s))
+        end = await _follow(daemon)
+    if isinstance(end, Refused):
+        typer.echo(f"Not driven: {end.text} {end.cure}".rstrip(), err=True)
+        return 1
+    typer.echo(f"{end.ending.value.capitalize()} after {end.elapsed_s:.2f} s, {end.turned_m:.3f} m turned: {end.text}.")
+    if end.ending == "finished":
+        return 0
+    return INTERRUPTED if interrupted else 1
+
+
+async def _follow(daemon: Conversation) -> Ended | Refused:
+    """Show how it goes until it ends."""
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from daemon.control.protocol import Ended, Refused
+
+    columns = (
+        TextColumn("[bold]traverse"),
+        BarColumn(bar_width=None),
+        TextColumn("{task.fields[turned_m]:7.3f} m"),
+        TextColumn("{task.completed:7.1f} of {task.total:.2f} s"),
+        TextColumn("left"),
+        TimeRemainingColumn(elapsed_when_finished=True),
+    )
+    with Progress(*columns, expand=True) as bar:
+        while True:
+            reply = await daemon.reply()
+            if isinstance(reply, Ended | Refused):
+                if isinstance(reply, Ended):
+                    for task in bar.task_ids:
+                        bar.update(task, completed=reply.elapsed_s, turned_m=reply.turned_m)
+                return reply
+            _show(bar, reply)
+
+
+def _show(bar: Bar, reply: object) -> None:
+    from daemon.control.protocol import Accepted, Progress
+
+    if isinstance(reply, Accepted):
+        bar.add_task("traverse", total=reply.duration_s, turned_m=0.0)
+    elif isinstance(reply, Progress):
+        for task in bar.task_ids:
+            bar.update(task, completed=reply.elapsed_s, turned_m=reply.turned_m)
+
+
+def stop(
+    *,
+    quick: Annotated[bool, typer.Option("--quick", help="At once, instead of with the drives' ramp.")] = False,
+    config: Config = None,
+) -> None:
+    """Stop the wheels, whoever commanded them."""
+    from daemon.control.client import converse
+
+    raise typer.Exit(converse(config, lambda path: _stop(path, quick=quick)))
+
+
+async def _stop(path: Path, *, quick: bool) -> int:
+    from daemon.control.client import conversation
+    from daemon.control.protocol import Done, StopRequest
+
+    async with conversation(path) as daemon:
+        daemon.ask(StopRequest(quick=quick))
+        reply = await daemon.reply()
+    if isinstance(reply, Done):
+        typer.echo(reply.text)
+        return 0
+    typer.echo(f"Not stopped: {getattr(reply, 'text', reply)} {getattr(reply, 'cure', '')}".rstrip(), err=True)
+    return 1

@@ -1,0 +1,1 @@
+"""The local control socket: the only way to move the rover."""

@@ -1,0 +1,143 @@
+"""What is said over the control socket: one JSON object a line, in UTF-8, over a UNIX stream socket.
+
+A client asks; the daemon answers with one line, or, while a traverse is driven, with many:
+
+    → {"command": "traverse", "distance_m": 10.0, "speed_m_s": 0.022}
+    ← {"event": "accepted", "duration_s": 454.5454545454545, "wheel_speed_rad_s": 0.29333333333333333}
+    ← {"event": "progress", "elapsed_s": 0.5, "turned_m": 0.011}
+      …
+    ← {"event": "ended", "ending": "finished", "elapsed_s": 454.5454545454545, "turned_m": 10.0, "text": "…"}
+
+    → {"command": "stop", "quick": false}
+    ← {"event": "done", "text": "…"}
+
+    → {"command": "status"}
+    ← {"event": "status", "rover": "kapvik", "nodes": [{"node_id": 1, "phase": "operational", …}, …], …}
+
+    → {"command": "dance"}
+    ← {"event": "refused", "code": "bad-request", "text": "…", "cure": "…"}
+
+A client that commanded a traverse keeps its connection open: when it closes, however, the wheels are quick-stopped. It
+may send `stop` meanwhile. Any other client may stop the traverse too; there is one at a time.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+
+from daemon.traverse import Ending  # noqa: TC001  # pydantic reads it at run time
+
+LINE_LIMIT = 65_536
+
+
+class _Line(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def line(self) -> bytes:
+        """Return it as it is sent."""
+        return self.model_dump_json().encode() + b"\n"
+
+
+class TraverseRequest(_Line):
+    """Drive so far at constant wheel speed."""
+
+    command: Literal["traverse"] = "traverse"
+    distance_m: float
+    speed_m_s: float
+
+
+class StopRequest(_Line):
+    """Stop the traverse that is driven: with the drives' ramp, or at once."""
+
+    command: Literal["stop"] = "stop"
+    quick: bool = False
+
+
+class StatusRequest(_Line):
+    """Say how things are."""
+
+    command: Literal["status"] = "status"
+
+
+class Accepted(_Line):
+    """The traverse begins."""
+
+    event: Literal["accepted"] = "accepted"
+    duration_s: float
+    wheel_speed_rad_s: float
+
+
+class Progress(_Line):
+    """The traverse goes on; `turned_m` is what the wheels' rims have moved."""
+
+    event: Literal["progress"] = "progress"
+    elapsed_s: float
+    turned_m: float
+
+
+class Ended(_Line):
+    """The traverse is over."""
+
+    event: Literal["ended"] = "ended"
+    ending: Ending
+    elapsed_s: float
+    turned_m: float
+    text: str
+
+
+class Done(_Line):
+    """What was asked is done."""
+
+    event: Literal["done"] = "done"
+    text: str
+
+
+class Code(StrEnum):
+    """Why something was refused."""
+
+    BAD_REQUEST = "bad-request"
+    LIMIT = "limit"
+    BUSY = "busy"
+    NOT_READY = "not-ready"
+
+
+class Refused(_Line):
+    """What was asked is not done."""
+
+    event: Literal["refused"] = "refused"
+    code: Code
+    text: str
+    cure: str = ""
+
+
+class NodeLine(_Line):
+    """A node in a status."""
+
+    node_id: int
+    kind: str
+    wheel: int | None
+    phase: str
+    drive_state: str | None
+    text: str
+
+
+class Status(_Line):
+    """How things are."""
+
+    event: Literal["status"] = "status"
+    rover: str
+    bus: str
+    broker: str
+    rate_Hz: float
+    snapshots: int
+    traverse: Progress | None
+    nodes: tuple[NodeLine, ...]
+
+
+Request = Annotated[TraverseRequest | StopRequest | StatusRequest, Field(discriminator="command")]
+Reply = Annotated[Accepted | Progress | Ended | Done | Refused | Status, Field(discriminator="event")]
+REQUEST: TypeAdapter[TraverseRequest | StopRequest | StatusRequest] = TypeAdapter(Request)
+REPLY: TypeAdapter[Accepted | Progress | Ended | Done | Refused | Status] = TypeAdapter(Reply)

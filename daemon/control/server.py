@@ -1,0 +1,312 @@
+"""The daemon's end of the control socket: an outlet of the service that also lets something in.
+
+It alone commands the wheels. One traverse at a time; when the connection that commanded it is closed, when a node is
+lost, when a drive faults or when the daemon stops, the wheels are stopped.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+import struct
+from contextlib import suppress
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from pydantic import ValidationError
+
+from daemon.control.protocol import (
+    LINE_LIMIT,
+    REQUEST,
+    Accepted,
+    Code,
+    Done,
+    Ended,
+    NodeLine,
+    Progress,
+    Refused,
+    Status,
+    StatusRequest,
+    StopRequest,
+    TraverseRequest,
+)
+from daemon.control.socket import ControlSocketError, open_control_socket
+from daemon.traverse import Clock, Outcome, Plan, Traverse, TraverseError, Wheels, plan_traverse
+from drivers.errors import DriverError
+from drivers.events import MotionStopped
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from daemon.config import Configuration
+    from daemon.control.protocol import _Line
+    from daemon.snapshot import Estimate, Snapshot
+    from drivers.events import NetworkEvent
+    from drivers.status import NodeStatus
+
+_log = logging.getLogger(__name__)
+_CREDENTIALS = struct.Struct("3i")  # pid, uid, gid: unix(7), SO_PEERCRED
+RETRY_S = 5.0
+
+
+class Rover(Wheels, Protocol):
+    """What the control socket needs of `drivers.network.Network`."""
+
+    @property
+    def status(self) -> Mapping[int, NodeStatus]:
+        """What is known of each node."""
+
+
+class ControlOutlet:
+    """Takes commands from the socket, and what the bus says from the service.
+
+    Parameters
+    ----------
+    configuration
+        `[control]`, `[wheel]`, `[slip]`, `[drivetrain]` and the rover's name.
+    rover
+        Returns the nodes, or None while the bus is not open.
+    broker
+        Returns how the connection to the broker is, in words.
+    beat
+        Called at least once a second while this task answers.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        rover: Callable[[], Rover | None],
+        *,
+        broker: Callable[[], str] = lambda: "unknown",
+        beat: Callable[[], None] = lambda: None,
+        clock: Clock | None = None,
+    ) -> None:
+        self._configuration = configuration
+        self._rover = rover
+        self._broker = broker
+        self._beat = beat
+        self._clock = clock or Clock()
+        self._tasks: asyncio.TaskGroup | None = None
+        self._traverse: Traverse | None = None
+        self._owner: asyncio.StreamWriter | None = None
+        self._progress: Progress | None = None
+        self._last: Snapshot | None = None
+        self._snapshots = 0
+        self.problem = ""
+
+    def estimate(self, estimate: Estimate) -> None:
+        """Remember how fast the wheels turn."""
+        self._last = estimate.snapshot
+        self._snapshots += 1
+
+    def event(self, event: NetworkEvent) -> None:
+        """End the traverse when the bus has stopped the wheels."""
+        if isinstance(event, MotionStopped) and self._traverse is not None:
+            self._traverse.stop(event.text, quick=True)
+
+    async def run(self) -> None:
+        """Serve until cancelled. Where the socket cannot be made, say why, try again, and let the rest go on."""
+        settings = self._configuration.control
+        while True:
+            try:
+                listener = open_control_socket(settings.socket, settings.group)
+            except ControlSocketError as error:
+                if str(error) != self.problem:
+                    _log.warning("no commands can be taken: %s", error)
+                self.problem = str(error)
+                await self._pause(RETRY_S)
+                continue
+            self.problem = ""
+            try:
+                await self._serve(listener)
+            finally:
+                listener.close()
+                settings.socket.unlink(missing_ok=True)
+
+    async def _pause(self, seconds: float) -> None:
+        for _ in range(int(2 * seconds)):
+            self._beat()
+            await asyncio.sleep(0.5)
+
+    async def _serve(self, listener: socket.socket) -> None:
+        async with asyncio.TaskGroup() as tasks:
+            self._tasks = tasks
+
+            def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+                tasks.create_task(self._talk(reader, writer))
+
+            server = await asyncio.start_unix_server(accept, sock=listener, limit=LINE_LIMIT)
+            try:
+                while True:
+                    self._beat()
+                    await asyncio.sleep(0.5)
+            finally:
+                server.close()
+
+    async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Answer one client until it goes."""
+        try:
+            while line := await reader.readline():
+                _send(writer, await self._answer(line, writer))
+                await writer.drain()
+        except (ConnectionError, ValueError) as error:  # ValueError: a line without end
+            _log.info("a client of the control socket was cut off: %s", error)
+        finally:
+            if self._owner is writer and self._traverse is not None:
+                self._traverse.stop("the client that commanded it is gone", quick=True)
+            writer.close()
+
+    async def _answer(self, line: bytes, writer: asyncio.StreamWriter) -> _Line:
+        try:
+            request = REQUEST.validate_json(line)
+        except ValidationError as error:
+            problems = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
+            return Refused(code=Code.BAD_REQUEST, text=problems, cure="The commands are traverse, stop and status.")
+        match request:
+            case TraverseRequest():
+                return self._begin(request, writer)
+            case StopRequest():
+                return await self._stop(request, writer)
+            case StatusRequest():
+                return self._status()
+
+    def _begin(self, request: TraverseRequest, writer: asyncio.StreamWriter) -> _Line:
+        settings = self._configuration.control
+        try:
+            plan = plan_traverse(
+                request.distance_m,
+                request.speed_m_s,
+                radius_m=self._configuration.wheel.radius_m,
+                speed_limit_m_s=settings.speed_limit_m_s,
+                distance_limit_m=settings.distance_limit_m,
+            )
+        except TraverseError as error:
+            return Refused(code=Code.LIMIT, text=str(error))
+        if self._traverse is not None:
+            return Refused(code=Code.BUSY, text="A traverse is being driven.", cure="`regolithd stop` ends it.")
+        rover = self._rover()
+        if refusal := _not_ready(rover):
+            return refusal
+        assert rover is not None  # noqa: S101  # else it is not ready
+        assert self._tasks is not None  # noqa: S101  # a client is served within it
+        _log.info("traverse of %g m at %g m/s, commanded by %s", plan.distance_m, plan.speed_m_s, _who(writer))
+        self._traverse = Traverse(
+            plan, rover, self._watch, lambda elapsed: self._tell(elapsed, plan, writer), self._clock
+        )
+        self._owner = writer
+        self._tasks.create_task(self._drive(self._traverse, writer))
+        return Accepted(duration_s=plan.duration_s, wheel_speed_rad_s=plan.wheel_speed_rad_s)
+
+    async def _drive(self, traverse: Traverse, writer: asyncio.StreamWriter) -> None:
+        try:
+            outcome = await traverse.run()
+        finally:
+            self._traverse = self._owner = self._progress = None
+        _log.info("traverse %s after %.2f s: %s", outcome.ending.value, outcome.elapsed_s, outcome.text)
+        _send(writer, _ended(outcome, traverse.plan))
+        with suppress(ConnectionError):
+            await writer.drain()
+
+    def _tell(self, elapsed_s: float, plan: Plan, writer: asyncio.StreamWriter) -> None:
+        self._progress = Progress(elapsed_s=elapsed_s, turned_m=elapsed_s * abs(plan.speed_m_s))
+        _send(writer, self._progress)
+
+    def _watch(self) -> Callable[[], bool]:
+        """Return what says whether all wheels stand, by a snapshot whose SYNC came after this call."""
+        begun = self._snapshots
+
+        def standing() -> bool:
+            if self._last is None or self._snapshots < begun + 2:  # the first may have been on its way already
+                return False
+            wheel_speed = self._last.motor_speed_rad_s / self._configuration.drivetrain.ratio
+            # A wheel that says nothing, NaN, may turn.
+            return bool(np.all(np.abs(wheel_speed) < self._configuration.slip.standstill_rad_s))
+
+        return standing
+
+    async def _stop(self, request: StopRequest, writer: asyncio.StreamWriter) -> _Line:
+        who = _who(writer)
+        _log.info("stop commanded by %s", who)
+        if self._traverse is not None:
+            self._traverse.stop(f"stopped by {who}", quick=request.quick)
+            return Done(text="The traverse is being stopped.")
+        rover = self._rover()
+        if rover is None:
+            return Done(text="The bus is not open: nothing is driven by this daemon.")
+        try:
+            await rover.disable()
+        except DriverError as error:
+            return Refused(code=Code.NOT_READY, text=str(error), cure="Cut the motors' power.")
+        return Done(text="No traverse was being driven; the drives are without power.")
+
+    def _status(self) -> Status:
+        rover = self._rover()
+        nodes = rover.status if rover is not None else {}
+        bus = self._configuration.bus
+        return Status(
+            rover=self._configuration.rover.name,
+            bus=f"{bus.interface} {bus.channel}: {'open' if rover is not None else 'not open'}",
+            broker=self._broker(),
+            rate_Hz=self._configuration.sync.rate_Hz,
+            snapshots=self._snapshots,
+            traverse=self._progress,
+            nodes=tuple(_node_line(status) for status in nodes.values()),
+        )
+
+
+def _send(writer: asyncio.StreamWriter, reply: _Line) -> None:
+    if not writer.is_closing():
+        writer.write(reply.line())
+
+
+def _ended(outcome: Outcome, plan: Plan) -> Ended:
+    return Ended(
+        ending=outcome.ending,
+        elapsed_s=outcome.elapsed_s,
+        turned_m=outcome.elapsed_s * abs(plan.speed_m_s),
+        text=outcome.text,
+    )
+
+
+def _not_ready(rover: Rover | None) -> Refused | None:
+    """Return why no traverse can begin now, or None."""
+    if rover is None:
+        return Refused(
+            code=Code.NOT_READY, text="The CAN bus is not open.", cure="`regolithd check` says what is wrong with it."
+        )
+    missing = [
+        f"{status.node.kind.value} {node_id} is {status.phase.value}"
+        for node_id, status in rover.status.items()
+        if status.node.required and status.phase.value != "operational"
+    ]
+    if not missing:
+        return None
+    return Refused(
+        code=Code.NOT_READY,
+        text=f"Not every node is operational: {', '.join(missing)}.",
+        cure="`regolithd status` says why; power them, or mend [nodes].",
+    )
+
+
+def _node_line(status: NodeStatus) -> NodeLine:
+    node = status.node
+    return NodeLine(
+        node_id=node.node_id,
+        kind=node.kind.value,
+        wheel=None if node.wheel is None else node.wheel + 1,
+        phase=status.phase.value,
+        drive_state=None if status.drive_state is None else status.drive_state.value,
+        text=status.text,
+    )
+
+
+def _who(writer: asyncio.StreamWriter) -> str:
+    """Return who is at the other end, as the kernel knows them."""
+    connection = writer.get_extra_info("socket")
+    try:
+        raw = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    except OSError:
+        return "an unknown user"
+    pid, uid, _ = _CREDENTIALS.unpack(raw)
+    return f"user {uid} (process {pid})"

@@ -1,0 +1,68 @@
+"""The file that the control socket is: made so that only its group may open it, from the first moment on."""
+
+from __future__ import annotations
+
+import grp
+import os
+import socket
+import stat
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MODE = 0o660
+
+
+class ControlSocketError(Exception):
+    """The control socket cannot be offered; the message says why, and the cure."""
+
+
+def group_id(group: str) -> int:
+    """Return a group's number."""
+    try:
+        return int(group) if group.isdigit() else grp.getgrnam(group).gr_gid
+    except KeyError:
+        cure = f"Make it (`groupadd --system {group}`), or name another: [control] group."
+        raise ControlSocketError(f"there is no group {group!r}. {cure}") from None
+
+
+def open_control_socket(path: Path, group: str) -> socket.socket:
+    """Return a listening socket at `path`, which only the group's members (and root) may open."""
+    number = group_id(group)
+    _clear(path)
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK | socket.SOCK_CLOEXEC)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        mask = os.umask(0o177)  # nobody but us, until the group is right
+        try:
+            listener.bind(str(path))
+        finally:
+            os.umask(mask)
+        if path.stat().st_gid != number:
+            os.chown(path, -1, number)
+        path.chmod(MODE)
+        listener.listen(8)
+    except OSError as error:
+        listener.close()
+        cure = f"The daemon's user must own the folder and be a member of {group!r}: [control] socket and group."
+        raise ControlSocketError(f"{path}: {error.strerror or error}. {cure}") from error
+    return listener
+
+
+def _clear(path: Path) -> None:
+    """Remove the socket of a daemon that was killed; never that of one that runs, and never another kind of file."""
+    try:
+        if not stat.S_ISSOCK(path.lstat().st_mode):
+            raise ControlSocketError(f"{path}: is not a socket. Choose another path: [control] socket.")
+    except OSError:
+        return  # nothing there, or binding will say why not
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        try:
+            probe.connect(str(path))
+        except ConnectionRefusedError:
+            path.unlink()
+        except OSError as error:
+            raise ControlSocketError(f"{path}: {error.strerror}.") from error
+        else:
+            raise ControlSocketError(f"{path}: another regolithd answers there. Stop that one first.")
