@@ -18,33 +18,37 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import time
 from contextlib import AsyncExitStack
 from dataclasses import asdict
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Protocol
 
-from daemon.estimate import SHIPPED_MODEL
-from daemon.estimate import Network as TerrainNetwork
 from daemon.notify import READY, STOPPING, WATCHDOG, notify, watchdog_period_s
 from daemon.pulse import Pulses
 from daemon.recording.recorder import FLUSH_S, Recorder
 from daemon.replay import Chain
 from drivers.bus import open_bus
+from drivers.errors import BusOpenError
 from drivers.network import Network, NetworkSettings
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from daemon.config import Configuration
+    from daemon.estimate import Network as TerrainNetwork
     from daemon.snapshot import Estimate
     from drivers.bus import Bus
     from drivers.events import NetworkEvent
     from drivers.frame import Frame
 
+_log = logging.getLogger(__name__)
+
 NETWORK, RECORDING = "network", "recording"
 PATIENCE_S = 5.0
 WATCH_S = 0.5
+BUS_RETRY_S = 2.0
 
 
 class Outlet(Protocol):
@@ -71,39 +75,77 @@ class Service:
         From frames to estimates, with its counters.
     recorder
         The recording, or None where it is switched off.
-    network
-        The nodes; commands may come from any task of the group.
     pulses
         Who has answered lately.
+    bus_trouble
+        Why the bus cannot be opened; empty where it is open.
     """
 
-    def __init__(self, configuration: Configuration, bus: Bus) -> None:
+    def __init__(self, configuration: Configuration, terrain: TerrainNetwork) -> None:
         self.configuration = configuration
-        self.terrain = TerrainNetwork(configuration.estimator.model or SHIPPED_MODEL)
-        self.chain = Chain(configuration, self.terrain)
-        self.recorder = _recorder(configuration, self.terrain) if configuration.recording.enabled else None
-        self.network = Network(
-            bus, network_settings(configuration), on_frames=self._take_frames, on_event=self._take_event
-        )
+        self.terrain = terrain
+        self.chain = Chain(configuration, terrain)
+        self.recorder = _recorder(configuration, terrain) if configuration.recording.enabled else None
         self.pulses = Pulses()
+        self.bus_trouble = ""
         self.outlets: list[Outlet] = []
+        self._network: Network | None = None
+        self._opened = asyncio.Event()
+        self._syncs_tried = -1
+
+    @property
+    def network(self) -> Network | None:
+        """The nodes, once the bus is open; commands may come from any task."""
+        return self._network
+
+    async def opened(self) -> Network:
+        """Wait until the bus is open, and return its nodes."""
+        await self._opened.wait()
+        assert self._network is not None  # noqa: S101  # set before the event
+        return self._network
 
     async def run(self) -> None:
-        """Run until cancelled; then stop the drives, close the recording, and let the outlets say goodbye."""
+        """Run until cancelled; then stop the drives, let the outlets say goodbye, and close the recording."""
         try:
-            async with asyncio.TaskGroup() as outlets:
-                tasks = [outlets.create_task(outlet.run()) for outlet in self.outlets]
+            async with asyncio.TaskGroup() as group:
+                tasks = [group.create_task(outlet.run()) for outlet in self.outlets]
                 if self.recorder:
-                    tasks.append(outlets.create_task(self._record(self.recorder)))
-                tasks.append(outlets.create_task(self._watch()))
+                    tasks.append(group.create_task(self._record(self.recorder)))
+                tasks.append(group.create_task(self._watch()))
                 try:
-                    await self.network.run()
+                    await self._run_network()
                 finally:
                     for task in tasks:
                         task.cancel()
         finally:
             if self.recorder:
                 self.recorder.close()
+
+    async def _run_network(self) -> None:
+        async with AsyncExitStack() as opened:
+            bus = await self._open_bus(opened)
+            self._network = Network(
+                bus, network_settings(self.configuration), on_frames=self._take_frames, on_event=self._take_event
+            )
+            self._opened.set()
+            await self._network.run()
+
+    async def _open_bus(self, opened: AsyncExitStack) -> Bus:
+        """Open the bus; while it is not there, say why and try again."""
+        settings = self.configuration.bus
+        while True:
+            try:
+                bus = await opened.enter_async_context(
+                    open_bus(settings.interface, settings.channel, bitrate=settings.bitrate)
+                )
+            except BusOpenError as error:
+                if str(error) != self.bus_trouble:
+                    _log.warning("%s It is tried again every %g s.", error, BUS_RETRY_S)
+                self.bus_trouble = str(error)
+                await asyncio.sleep(BUS_RETRY_S)
+            else:
+                self.bus_trouble = ""
+                return bus
 
     def _take_frames(self, batch: Sequence[Frame]) -> None:
         self.pulses.beat(NETWORK)
@@ -130,25 +172,32 @@ class Service:
 
     async def _watch(self) -> None:
         """Feed the watchdog while every task answers; let it bite when one does not."""
-        self.pulses.expect(NETWORK, PATIENCE_S)
-        notify(f"{READY}\nSTATUS=acquiring at {self.configuration.sync.rate_Hz:g} Hz")
         period_s = watchdog_period_s()
-        produced = -1
+        pause_s = min(WATCH_S, period_s or WATCH_S)
         try:
+            while self._network is None:
+                # systemd shall wait for the bus, however long it takes, and show why.
+                notify(f"EXTEND_TIMEOUT_USEC=10000000\nSTATUS=waiting for the bus. {self.bus_trouble}")
+                await asyncio.sleep(pause_s)
+            self.pulses.expect(NETWORK, PATIENCE_S)
+            notify(f"{READY}\nSTATUS=acquiring at {self.configuration.sync.rate_Hz:g} Hz")
             while True:
-                sync = self.network.counters.sync
-                tried = sync.produced + sync.failed + sync.skipped
-                if tried != produced:  # a dead link brings no frames, but the network goes on trying
-                    produced = tried
-                    self.pulses.beat(NETWORK)
-                silent = self.pulses.silent()
-                if silent:
+                self._feel_network(self._network)
+                if silent := self.pulses.silent():
                     notify(f"STATUS=no answer from {', '.join(silent)}")
                 elif period_s is not None:
                     notify(WATCHDOG)
-                await asyncio.sleep(min(WATCH_S, period_s or WATCH_S))
+                await asyncio.sleep(pause_s)
         finally:
             notify(STOPPING)
+
+    def _feel_network(self, network: Network) -> None:
+        """Take the network for alive while it tries to send SYNCs: a dead link brings no frames."""
+        sync = network.counters.sync
+        tried = sync.produced + sync.failed + sync.skipped
+        if tried != self._syncs_tried:
+            self._syncs_tried = tried
+            self.pulses.beat(NETWORK)
 
 
 def network_settings(configuration: Configuration) -> NetworkSettings:
@@ -183,23 +232,3 @@ def _recorder(configuration: Configuration, terrain: TerrainNetwork) -> Recorder
         "started_ns": str(time.time_ns()),
     }
     return Recorder(configuration.recording, configuration.bus.channel, metadata)
-
-
-async def serve(configuration: Configuration, equip: Callable[[Service], None]) -> None:
-    """Open the bus and run the service until cancelled. `equip` adds the outlets.
-
-    Raises
-    ------
-    BusOpenError
-        The bus cannot be opened.
-    ModelError
-        The network cannot be used.
-    """
-    bus_settings = configuration.bus
-    async with AsyncExitStack() as opened:
-        bus = await opened.enter_async_context(
-            open_bus(bus_settings.interface, bus_settings.channel, bitrate=bus_settings.bitrate)
-        )
-        service = Service(configuration, bus)
-        equip(service)
-        await service.run()

@@ -12,21 +12,27 @@ import aiomqtt
 from calibration.parameters import SOILS
 from daemon.config import Configuration
 from daemon.demo.broker import embedded_broker
-from daemon.demo.publisher import DemoPublisher
 from daemon.demo.viewer import Viewer
 from daemon.demo.witness import Witness
+from daemon.equipment import equip
+from daemon.estimate import SHIPPED_MODEL
+from daemon.estimate import Network as TerrainNetwork
 from daemon.scenario import Ground, Scenario, Stretch
 from daemon.service import Service
 from daemon.virtual_rover import VirtualWorld
 from drivers.bus import open_bus
+from drivers.network import NodePhase
 from drivers.virtual import VirtualRover
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from drivers.network import Network
+
 CHANNEL = "demo"
 RATE_HZ = 10.0
+BOOT_WITHIN_S = 20.0
 SPEED_M_S = 0.05
 CHANGE_M = 0.75
 FIRST, SECOND = "medium-soil", "lete-sand"
@@ -65,14 +71,14 @@ async def drive(folder: Path, seconds: float, show: Callable[[Viewer, float], No
     async with (
         embedded_broker() as port,
         open_bus("virtual", CHANNEL) as rover_bus,
-        open_bus("virtual", CHANNEL) as daemon_bus,
         asyncio.TaskGroup() as tasks,
     ):
         configuration = demo_configuration(folder, port)
         prefix = f"{configuration.mqtt.prefix}/{configuration.rover.name}"
         viewer = Viewer(prefix)
-        service = Service(configuration, daemon_bus)
-        service.outlets += [DemoPublisher(port, prefix), witness]
+        service = Service(configuration, TerrainNetwork(SHIPPED_MODEL))
+        equip(service)
+        service.outlets.append(witness)
         subscribed = asyncio.Event()
         lasting = [
             tasks.create_task(VirtualRover(world).run(rover_bus)),
@@ -80,12 +86,14 @@ async def drive(folder: Path, seconds: float, show: Callable[[Viewer, float], No
         ]
         await subscribed.wait()
         running = tasks.create_task(service.run())
-        await service.network.settled()
-        await service.network.enable()
+        network = await service.opened()
+        async with asyncio.timeout(BOOT_WITHIN_S):
+            await _operational(network)
+        await network.enable()
         wheel_speed = SPEED_M_S / configuration.wheel.radius_m
-        await service.network.set_speed((wheel_speed,) * 6)
+        await network.set_speed((wheel_speed,) * 6)
         await _watch(viewer, seconds, show)
-        await service.network.quick_stop()
+        await network.quick_stop()
         paths = service.recorder.paths if service.recorder else None
         running.cancel()
         await asyncio.wait([running])
@@ -94,6 +102,12 @@ async def drive(folder: Path, seconds: float, show: Callable[[Viewer, float], No
     if paths is None:
         raise OSError("the recording failed: " + (service.recorder.trouble or "" if service.recorder else ""))
     return Drive(witness, viewer, *paths)
+
+
+async def _operational(network: Network) -> None:
+    """Wait for every node: one that was just switched on may be told to reset while it boots, and is tried again."""
+    while any(each.phase is not NodePhase.OPERATIONAL for each in network.status.values()):  # noqa: ASYNC110  # no event
+        await asyncio.sleep(0.05)
 
 
 async def _subscribe(viewer: Viewer, port: int, subscribed: asyncio.Event) -> None:

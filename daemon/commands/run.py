@@ -1,0 +1,54 @@
+"""`regolithd run`: the daemon."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from daemon.config import Configuration
+    from daemon.estimate import Network
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(help="Acquire, estimate, record and publish, until stopped.")(run)
+
+
+def run(
+    config: Annotated[Path, typer.Option(help="the rover's configuration")] = Path("/etc/regolithd/rover.toml"),
+    verbose: Annotated[bool, typer.Option("--verbose", help="say more in the journal")] = False,
+) -> None:
+    """Run until SIGTERM or Ctrl-C; then the drives stop, the recording is closed and `offline` is published."""
+    import asyncio
+    import logging
+
+    from daemon.start_up import configuration_or_exit, network_or_exit
+
+    logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, format="%(levelname)s %(name)s: %(message)s")
+    configuration = configuration_or_exit(config)
+    asyncio.run(_run(configuration, network_or_exit(configuration)))
+
+
+async def _run(configuration: Configuration, terrain: Network) -> None:
+    import asyncio
+    import signal
+
+    from daemon.equipment import equip
+    from daemon.publish.spool import SpoolError
+    from daemon.service import Service
+
+    service = Service(configuration, terrain)
+    try:
+        equip(service)
+    except SpoolError as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(1) from error
+    task = asyncio.create_task(service.run())
+    for number in (signal.SIGTERM, signal.SIGINT):
+        asyncio.get_running_loop().add_signal_handler(number, task.cancel)
+    await asyncio.wait([task])
+    if not task.cancelled():
+        task.result()  # a bug: its traceback goes to the journal, and systemd starts us again
