@@ -1,0 +1,150 @@
+"""The small pure parts: errors, schedule, error frames, PDO layouts, emergencies, configuration."""
+
+from __future__ import annotations
+
+import builtins
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers import errors, pdo
+from drivers.bus import BusState
+from drivers.configuration import configuration
+from drivers.emcy import error_text
+from drivers.error_frame import error_classes, reported_state
+from drivers.errors import BusDownError, DictionaryError, DriverError, SdoTimeoutError
+from drivers.frame import Frame
+from drivers.signals import NodeDescription, NodeKind
+from drivers.sync import Schedule, SyncCounters
+
+
+def test_a_message_says_where_what_and_the_cure() -> None:
+    """In that order, and only what is known."""
+    error = SdoTimeoutError("no answer within 0.5 s", node_id=3, index=0x1018, subindex=1, cure="Is it powered?")
+    assert str(error) == "node 3, object 0x1018:01: no answer within 0.5 s. Is it powered?"
+    assert str(BusDownError("vcan0: cannot send")) == "vcan0: cannot send"
+
+
+def test_the_tree_that_is_drawn_is_the_tree_that_is() -> None:
+    """Each error of the module stands in its docstring, is a `DriverError`, and the standard error drawn beside it."""
+    for name, error in vars(errors).items():
+        if not (isinstance(error, type) and issubclass(error, DriverError)):
+            continue
+        found = re.search(rf"^[ │├└─]*{name}(?: \((\w+)\))?(?:  |$)", errors.__doc__ or "", re.MULTILINE)
+        assert found, f"{name} is not drawn"
+        if found[1]:
+            assert issubclass(error, getattr(builtins, found[1])), found[0]
+
+
+@given(
+    st.floats(0.005, 1.0),
+    st.lists(st.floats(0.0, 3.0), max_size=60),
+)
+def test_a_schedule_neither_drifts_nor_bursts(period: float, delays: list[float]) -> None:
+    """Every due time is start + n·period; late by whole periods, they are left out and counted."""
+    schedule, now, counted = Schedule(100.0, period), 100.0, 0
+    for delay in delays:
+        due, missed = schedule.following(now)
+        counted += 1 + missed
+        assert due == 100.0 + counted * period
+        assert due > now - period - 1e-9
+        now = max(now, due) + delay
+
+
+def test_jitter_is_the_spread_of_the_lateness() -> None:
+    """Mean, worst and standard deviation of three."""
+    counters = SyncCounters()
+    for late in (100, 200, 600):
+        counters.count(late)
+    assert (counters.produced, counters.worst_late_ns, counters.mean_late_ns) == (3, 600, 300.0)
+    assert counters.jitter_ns == pytest.approx(216.02469)
+
+
+@pytest.mark.parametrize(
+    ("can_id", "data", "classes", "state"),
+    [
+        (0x040, bytes(8), ["bus-off"], BusState.OFF),
+        (0x100, bytes(8), ["restarted"], BusState.ACTIVE),
+        (0x004, b"\0\x08\0\0\0\0\x80\0", ["controller"], BusState.WARNING),
+        (0x004, b"\0\x20\0\0\0\0\x90\0", ["controller"], BusState.PASSIVE),
+        (0x004, b"\0\x01\0\0\0\0\0\0", ["controller", "receive-overflow"], None),
+        (0x004, b"\0\x40\0\0\0\0\0\0", ["controller"], BusState.ACTIVE),
+        (0x088, bytes(8), ["protocol", "bus-error"], None),
+        (0x020, bytes(8), ["no-acknowledge"], None),
+        (0x004, b"", ["controller"], None),
+    ],
+)
+def test_an_error_frame_is_counted_and_says_the_state(
+    can_id: int, data: bytes, classes: list[str], state: BusState | None
+) -> None:
+    """By the bits of linux/can/error.h."""
+    frame = Frame(0, can_id, data, error=True)
+    assert error_classes(frame) == classes
+    assert reported_state(frame) is state
+
+
+def test_a_layout_is_checked_against_the_eds() -> None:
+    """What the EDS lacks, what it does not allow, and what does not fit are refused, with the object named."""
+    for entries, what in (
+        (((0x6123, 0),), "no such object"),
+        (((0x1017, 0),), "may not be mapped"),
+        (((0x606C, 0), (0x60FF, 0), (0x6041, 0)), "a frame carries 8"),
+    ):
+        with pytest.raises(DictionaryError, match=what):
+            pdo._compile(NodeKind.MOTOR, pdo.Layout(1, entries), transmit=True)
+
+
+def test_every_mapped_measurement_has_a_meaning() -> None:
+    """Nothing travels that nobody understands."""
+    for kind in NodeKind:
+        for each in pdo.tpdos(kind, diagnostics=True):
+            assert None not in each.meanings
+            assert each.transmission_type == 1
+
+
+def test_a_pdo_is_set_up_in_the_standard_s_order() -> None:
+    """Off, type, count 0, entries, count, on – and what is not used is off."""
+    writes = configuration(
+        NodeDescription(3, NodeKind.MOTOR, 2), heartbeat_s=0.2, master_id=127, master_lost_after_s=0.5
+    )
+    first = [(write.index, write.subindex, write.value) for write in writes if write.index in (0x1800, 0x1A00)]
+    assert first == [
+        (0x1800, 1, 0x80000000),
+        (0x1800, 2, 1),
+        (0x1A00, 0, 0),
+        (0x1A00, 1, 0x60410010),
+        (0x1A00, 2, 0x60780010),
+        (0x1A00, 3, 0x606C0020),
+        (0x1A00, 0, 3),
+        (0x1800, 1, 0x183),
+    ]
+    unused = [write.index for write in writes if write.subindex == 1 and write.keep]
+    assert {0x1801, 0x1802, 0x1803, 0x1401, 0x1402, 0x1403} <= set(unused)
+    assert (0x1016, 1, 127 << 16 | 500) in [(write.index, write.subindex, write.value) for write in writes]
+
+
+def test_a_valid_pdo_keeps_its_identifier_while_it_is_switched_off() -> None:
+    """CiA 301 forbids to change it and bit 31 at once."""
+    off = configuration(
+        NodeDescription(3, NodeKind.LOAD_CELL, 2), heartbeat_s=0.2, master_id=127, master_lost_after_s=0.5
+    )[0]
+    assert off.data(present=0x40000183) == (0xC0000183).to_bytes(4, "little")
+
+
+def test_error_codes_are_words() -> None:
+    """The maker's words for its own device, else CiA 301's, else the class's."""
+    assert "undervoltage" in error_text(0x3220, NodeKind.MOTOR)
+    assert error_text(0x3220) == "voltage inside the device"
+    assert "heartbeat" in error_text(0x8130)
+    assert error_text(0x5001) == "device hardware"
+    assert error_text(0xA000) == "reserved error class"
+    assert error_text(0x0000) == "no error, or an error is reset"
+
+
+@given(st.integers(0, 0xFFFF))
+def test_every_code_has_words(code: int) -> None:
+    """All of them."""
+    assert error_text(code)
+    assert error_text(code, NodeKind.MOTOR)
