@@ -46,7 +46,9 @@ def draw(seen: list[tuple[Estimate, Truth]], path: Path) -> None:
     for axis, (label, estimated, true) in zip(axes, panels, strict=True):
         _panel(axis, seconds, np.stack(estimated), np.stack(true), label)
     axes[0].legend(ncols=3, frameon=False, fontsize=8, loc="upper right")
-    axes[0].set_title("Six wheels over a soil that changes: estimated (lines) and true (pale)", loc="left", fontsize=11)
+    axes[0].set_title(
+        "Six wheels over a soil that changes: estimated (lines), true (broad and pale)", loc="left", fontsize=11
+    )
     axes[-1].set_xlabel("time (s)")
     figure.savefig(path, dpi=130)
     plt.close(figure)

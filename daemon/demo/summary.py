@@ -20,12 +20,13 @@ def summary(stretches: list[Stretch]) -> Table:
         title="Estimated (true), mean over each soil",
         title_justify="left",
         title_style="bold",
+        padding=(0, 2, 0, 0),
     )
-    table.add_column("wheel", justify="right")
-    table.add_column("soil")
-    for name in ("torque N·m", "c kPa", "φ °"):
+    table.add_column("\nwheel", justify="right")
+    table.add_column("\nsoil")
+    for name in ("torque\nN·m", "c\nkPa", "φ\n°"):
         table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("inputs outside training", justify="right")
+    table.add_column("outside\ntraining", justify="right")
     wheel = 0
     for each in stretches:
         table.add_row(

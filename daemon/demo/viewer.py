@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 PLACES = ("front left", "front right", "middle left", "middle right", "rear left", "rear right")
-HISTORY = 16
+HISTORY = 12
 BLOCKS = "▁▂▃▄▅▆▇█"
+MEANING = "outside: load W, slip i or current I is not in the network's training range"
 SYMBOLS = {"load_N": "W", "slip": "i", "motor_current_A": "I", "wheel_torque_Nm": "T", "wheel_speed_rad_s": "ω"}
 
 
@@ -56,7 +57,7 @@ class Viewer:
 
     def render(self) -> RenderableType:
         """Return the table with a line of state beneath."""
-        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, expand=False)
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 2, 0, 0))
         table.add_column("wheel", no_wrap=True)
         for name in ("load\nN", "slip\n%", "torque\nN·m"):
             table.add_column(name, justify="right", no_wrap=True)
@@ -67,7 +68,7 @@ class Viewer:
         top = max([0.1, *(max(values) for values in self.torque.values() if values)])
         for wheel in range(1, 7):
             table.add_row(*self._row(wheel, top))
-        return Group(table, self._footer())
+        return Group(table, Text(MEANING, style="dim"), self._footer())
 
     def _row(self, wheel: int, top: float) -> tuple[RenderableType, ...]:
         name = Text.assemble((f"{wheel} ", "bold"), (PLACES[wheel - 1], "dim"))
@@ -91,11 +92,11 @@ class Viewer:
     def _footer(self) -> Text:
         style = "green" if self.state == "online" else "red"
         text = Text.assemble(
-            ("● ", style), (f"{self.prefix} {self.state}", style), (f" · {self.messages} messages received", "dim")
+            ("● ", style), (f"{self.prefix} {self.state}", style), (f" · {self.messages} messages", "dim")
         )
         if self.last_event:
             text.append(f" · {self.last_event}", style="dim")
-        text.truncate(100, overflow="ellipsis")
+        text.truncate(79, overflow="ellipsis")
         return text
 
 
@@ -116,5 +117,5 @@ def _verdict(message: dict[str, Any]) -> Text:
     if not message["valid"]:
         return Text("standing still" if message["slip_source"] == "none" else "no estimate", style="dim")
     if outside := message["outside_training_range"]:
-        return Text(f"{', '.join(SYMBOLS.get(name, name) for name in outside)} out of range", style="yellow")
+        return Text(f"{', '.join(SYMBOLS.get(name, name) for name in outside)} outside", style="yellow")
     return Text("valid", style="green")

@@ -1,0 +1,40 @@
+"""`regolithd demo` ends by itself and leaves what it promises."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_the_demo_runs_ends_and_leaves_a_recording_a_log_and_a_picture(tmp_path: Path) -> None:
+    """Without a terminal, as in a pipe; the log replays to the same numbers."""
+    command = [sys.executable, "-m", "daemon", "demo", "--seconds", "8", "--out", str(tmp_path / "demo")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=100)
+    assert done.returncode == 0, done.stderr
+    assert "regolith/kapvik online" in done.stdout
+    (mcap,) = (tmp_path / "demo").glob("*.mcap")
+    (log,) = (tmp_path / "demo").glob("*.log")
+    picture = tmp_path / "demo" / "drive.png"
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    for path in (mcap, log, picture):
+        assert path.name in done.stdout
+    wheels = [line.split() for line in done.stdout.splitlines() if "medium-soil" in line]
+    assert [line[0] for line in wheels] == ["1", "2", "3", "4", "5", "6"]
+
+    replay = [sys.executable, "-m", "daemon", "replay", str(log)]
+    again = subprocess.run(replay, cwd=ROOT, capture_output=True, text=True, check=False, timeout=100)
+    assert again.returncode == 0, again.stderr
+    assert "identical  to the last bit" in again.stdout
+
+
+def test_importing_the_daemon_does_not_load_what_only_the_laptop_has() -> None:
+    """The rover starts quickly and needs none of it."""
+    code = (
+        "import sys, json, daemon.service, daemon.equipment, daemon.cli;"
+        "print(json.dumps([name for name in sys.modules if '.' not in name]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    loaded = set(json.loads(done.stdout))
+    assert not loaded & {"jax", "scipy", "matplotlib", "pyarrow", "onnx", "pandas", "amqtt", "numba", "optax"}
