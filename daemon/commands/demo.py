@@ -36,4 +36,4 @@ def demo(
     picture = out / "drive.png"
     draw(driven.witness.seen, picture)
     for what, path in (("recording", driven.recording), ("frames", driven.log), ("picture", picture)):
-        console.print(f"{what:10} {path}", highlight=False)
+        console.print(f"{what:10} {path}", highlight=False, soft_wrap=True)
