@@ -23,8 +23,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from daemon.snapshot import SlipSource
-from drivers.network import NodePhase  # noqa: TC001  # pydantic reads it at run time
 from drivers.signals import NodeKind  # noqa: TC001  # likewise
+from drivers.status import NodePhase  # noqa: TC001  # pydantic reads it at run time
 
 SCHEMA_VERSION = 1
 """Rises when a field is removed or changes its meaning; new fields alone do not raise it."""
@@ -288,9 +288,8 @@ class RecordingReport(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     file: str | None
-    written_MB: float
     free_MB: float | None
-    failed: int
+    trouble: str | None
 
 
 class HealthMessage(Header):

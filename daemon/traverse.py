@@ -140,6 +140,7 @@ class Traverse:
     _interrupted: asyncio.Event = field(default_factory=asyncio.Event)
     _quick: bool = False
     _why: str = ""
+    _began: float | None = None
 
     def stop(self, why: str, *, quick: bool) -> None:
         """Have it end before its time: with the drives' ramp, or at once. A quick stop overrides a clean one."""
@@ -151,33 +152,36 @@ class Traverse:
         """Drive it. However it ends, also by cancellation, the wheels are told to stop."""
         try:
             await self.wheels.enable()
-        except DriverError as error:
-            return Outcome(Ending.FAILED, 0.0, str(error))
-        began = self.clock.now_s()
-        try:
-            trouble = await self._drive(began)
+            self._began = self.clock.now_s()
+            trouble = await self._drive()
         except asyncio.CancelledError:
             await self._stop_at_once()
             raise
-        elapsed = min(self.clock.now_s() - began, self.plan.duration_s)
+        except DriverError as error:
+            trouble = self._why or str(error)
+        if self._began is None:
+            return Outcome(Ending.FAILED, 0.0, trouble)
+        elapsed = min(self.clock.now_s() - self._began, self.plan.duration_s)
         if trouble:
             return await self._end_quickly(elapsed, trouble)
         if self._interrupted.is_set():
             return Outcome(Ending.STOPPED, elapsed, self._why)
         return Outcome(Ending.FINISHED, elapsed, "the traverse is complete")
 
-    async def _drive(self, began: float) -> str:
+    async def _drive(self) -> str:
         """Drive and stop clean; return why this must become a quick stop, or nothing."""
-        try:
+        if not self._interrupted.is_set():  # it may have been while the drives were being enabled
             await self.wheels.set_speed((self.plan.wheel_speed_rad_s,) * 6)
-            while not self._interrupted.is_set() and (left := began + self.plan.duration_s - self.clock.now_s()) > 0:
-                self.report(self.plan.duration_s - left)
-                await self.clock.wait(self._interrupted, min(REPORT_EVERY_S, left))
-            if self._quick:
-                return self._why
-            return await self._stop_clean()
-        except DriverError as error:
-            return self._why or str(error)
+        while not self._interrupted.is_set() and (left := self._left_s()) > 0:
+            self.report(self.plan.duration_s - left)
+            await self.clock.wait(self._interrupted, min(REPORT_EVERY_S, left))
+        if self._quick:
+            return self._why
+        return await self._stop_clean()
+
+    def _left_s(self) -> float:
+        began = self.clock.now_s() if self._began is None else self._began
+        return began + self.plan.duration_s - self.clock.now_s()
 
     async def _stop_clean(self) -> str:
         await self.wheels.set_speed((0.0,) * 6)

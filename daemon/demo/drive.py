@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -59,6 +60,7 @@ def demo_configuration(folder: Path, port: int) -> Configuration:
             "drivetrain": drivetrain.model_dump(),
             "recording": {"directory": folder, "limit_MB": 50},
             "mqtt": {"host": "127.0.0.1", "port": port, "spool_directory": folder / "spool"},
+            "control": {"socket": folder / "control.sock", "group": str(os.getgid())},
         }
     )
 

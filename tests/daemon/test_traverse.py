@@ -177,10 +177,19 @@ async def test_drives_that_cannot_be_enabled_are_told_and_nothing_turns() -> Non
     assert rover.told == ["enable"]
 
 
-@pytest.mark.parametrize("refused", ["speed"])
-async def test_a_drive_that_refuses_ends_in_a_quick_stop(refused: str) -> None:
-    """Whichever command it was."""
-    rover = Rover(refuses={refused: "the drive is in fault"})
+@pytest.mark.parametrize("quick", [True, False])
+async def test_one_that_is_stopped_while_the_drives_are_enabled_never_turns(quick: bool) -> None:
+    """Whoever wanted it may be gone before it has begun."""
+    rover = Rover()
+    driven = traverse(rover, QuickClock())
+    driven.stop("gone", quick=quick)
+    assert (await driven.run()).text == "gone"
+    assert rover.told == ["enable", "quick stop" if quick else ("speed", 0.0), "disable"]
+
+
+async def test_a_drive_that_refuses_ends_in_a_quick_stop() -> None:
+    """In the middle of the traverse."""
+    rover = Rover(refuses={"speed": "the drive is in fault"})
     outcome = await traverse(rover, QuickClock()).run()
     assert outcome.ending is Ending.QUICK_STOPPED
     assert rover.told[-2:] == ["quick stop", "disable"]
