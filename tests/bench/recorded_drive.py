@@ -1,0 +1,53 @@
+"""A daemon that records, with its rover in the same process: made to be killed.
+
+    python tests/bench/recorded_drive.py FOLDER RATE_HZ
+
+Prints a line for each snapshot once it is on its way: its sequence, and its time in ns.
+"""
+
+import asyncio
+import sys
+from pathlib import Path
+
+from daemon.config import Configuration
+from daemon.estimate import SHIPPED_MODEL, Network
+from daemon.service import Service
+from daemon.snapshot import Estimate
+from drivers.bus import open_bus
+from drivers.events import NetworkEvent
+from drivers.virtual import Bench, VirtualRover
+
+
+class Printer:
+    """An outlet to standard output."""
+
+    def estimate(self, estimate: Estimate) -> None:
+        """Say which snapshot was handed to the recording."""
+        print(estimate.snapshot.sequence, estimate.snapshot.time_ns, flush=True)
+
+    def event(self, event: NetworkEvent) -> None:
+        """Say nothing."""
+
+    async def run(self) -> None:
+        """Wait for the end, which is a kill."""
+        await asyncio.Event().wait()
+
+
+async def main(folder: Path, rate_Hz: float) -> None:
+    """Run until killed."""
+    configuration = Configuration.model_validate(
+        {
+            "bus": {"interface": "virtual", "channel": "killed"},
+            "sync": {"rate_Hz": rate_Hz},
+            "recording": {"directory": folder},
+        }
+    )
+    async with open_bus("virtual", "killed") as bus, asyncio.TaskGroup() as tasks:
+        service = Service(configuration, Network(SHIPPED_MODEL))
+        service.outlets.append(Printer())
+        tasks.create_task(VirtualRover(Bench()).run(bus))
+        tasks.create_task(service.run())
+
+
+if __name__ == "__main__":
+    asyncio.run(main(Path(sys.argv[1]), float(sys.argv[2])))
