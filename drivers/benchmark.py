@@ -1,0 +1,212 @@
+"""How dear is a frame? Our reader and decoder beside python-can's asyncio Notifier with canopen's `.raw`, in one run.
+
+    python -m drivers.benchmark [vcan0]          where there is no such link: the decoders alone
+    tests/bench/with-vcan python -m drivers.benchmark
+
+Both get the same motor TPDOs and end at the same three SI values, which is checked.
+
+    decode    from the frame to the values; no bus
+    burst     200 frames wait in the socket, as after a SYNC on a busy bus: take and decode them all
+    single    one frame at a time, wake-up included
+
+Both run in the same process, in turns, so the ratio is what counts. In User Mode Linux a system call is some 200 times
+as dear as natively, and the ratio of the burst with it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import math
+import socket
+import struct
+import sys
+import time
+from contextlib import asynccontextmanager
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING
+
+import can
+import canopen
+
+from drivers.bus import open_bus
+from drivers.decode import Decoder
+from drivers.eds import eds_path
+from drivers.errors import BusOpenError
+from drivers.frame import Frame
+from drivers.kernel_batch import CAN_FRAME
+from drivers.pdo import tpdos
+from drivers.signals import NodeDescription, NodeKind, Reading
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Callable
+    from contextlib import AbstractAsyncContextManager
+
+NODE_ID, COB_ID = 1, 0x181
+FRAMES, ROUNDS = 200, 15
+FIGURES = Path("build/figures/reader_benchmark.json")
+DATA = [struct.pack("<Hhi", 0x0637, number, -number) for number in range(FRAMES)]
+Values = tuple[float, float, float]
+LAST: Values = (0x0637, (FRAMES - 1) * 1e-3, -(FRAMES - 1) * 2.0 * math.pi / 60.0)
+
+
+class Tally:
+    """How many frames have become values, and the last values."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.last: Values = (0.0, 0.0, 0.0)
+        self._wanted = 0
+        self._reached = asyncio.Event()
+
+    def take(self, values: Values) -> None:
+        """Count a frame's values."""
+        self.count += 1
+        self.last = values
+        if self.count == self._wanted:
+            self._reached.set()
+
+    async def more(self, frames: int) -> None:
+        """Wait until so many more have come."""
+        self._wanted = self.count + frames
+        self._reached.clear()
+        await self._reached.wait()
+
+
+def our_decoder() -> Callable[[Frame], Values]:
+    """Return our way from a frame to values."""
+    decode = Decoder([NodeDescription(NODE_ID, NodeKind.MOTOR, 0)]).decode
+
+    def values(frame: Frame) -> Values:
+        signal = decode(frame)
+        if not isinstance(signal, Reading):
+            raise TypeError(f"{frame} is no reading")
+        (_, status), (_, current), (_, speed) = signal.values
+        return status, current, speed
+
+    return values
+
+
+def their_network(take: Callable[[Values], None]) -> canopen.Network:
+    """Return a canopen network that hands the values of each TPDO 1 to `take`."""
+    network = canopen.Network()
+    pdo = network.add_node(NODE_ID, str(eds_path(NodeKind.MOTOR))).tpdo[1]
+    pdo.clear()
+    status, current, speed = (pdo.add_variable(index) for index in (0x6041, 0x6078, 0x606C))
+    pdo.cob_id, pdo.enabled = tpdos(NodeKind.MOTOR)[0].cob_id(NODE_ID), True
+    pdo.subscribe()
+    rpm = 2.0 * math.pi / 60.0
+    pdo.add_callback(lambda _pdo: take((float(status.raw), current.raw * 1e-3, speed.raw * rpm)))
+    return network
+
+
+@asynccontextmanager
+async def ours(channel: str) -> AsyncIterator[Tally]:
+    """Read with `drivers.socketcan`, decode with `drivers.decode`."""
+    tally, values = Tally(), our_decoder()
+
+    async def read() -> None:
+        async for batch in bus:
+            for frame in batch:
+                tally.take(values(frame))
+
+    async with open_bus("socketcan", channel) as bus, asyncio.TaskGroup() as tasks:
+        reading = tasks.create_task(read())
+        yield tally
+        reading.cancel()
+
+
+@asynccontextmanager
+async def theirs(channel: str) -> AsyncIterator[Tally]:
+    """Read with python-can's asyncio Notifier, decode with canopen's variables."""
+    tally = Tally()
+    network = their_network(tally.take)
+    with can.Bus(channel, interface="socketcan", receive_own_messages=True) as bus:
+        notifier = can.Notifier(bus, network.listeners, loop=asyncio.get_running_loop())
+        yield tally
+        notifier.stop(timeout=0.1)
+
+
+async def reading_cost(way: Callable[[str], AbstractAsyncContextManager[Tally]], channel: str) -> tuple[float, float]:
+    """Return what a frame costs in a burst and singly [µs]."""
+    frames = [CAN_FRAME.pack(COB_ID, 8, data) for data in DATA]
+    with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as sender:
+        sender.bind((channel,))
+        async with way(channel) as tally:
+            for frame in frames:
+                sender.send(frame)
+            start = time.perf_counter()
+            await tally.more(FRAMES)
+            burst_s = time.perf_counter() - start
+            singly_s = 0.0
+            for frame in frames:
+                sender.send(frame)
+                start = time.perf_counter()
+                await tally.more(1)
+                singly_s += time.perf_counter() - start
+            check(tally.last)
+    return burst_s / FRAMES * 1e6, singly_s / FRAMES * 1e6
+
+
+def decoding_cost() -> tuple[float, float]:
+    """Return what decoding a frame costs us and them [µs]."""
+    mine, peers = our_decoder(), Tally()
+    network = their_network(peers.take)
+    start = time.perf_counter()
+    for data in DATA:
+        last = mine(Frame(0, COB_ID, data))
+    between = time.perf_counter()
+    for data in DATA:
+        network.notify(COB_ID, bytearray(data), 0.0)
+    end = time.perf_counter()
+    check(last)
+    check(peers.last)
+    return (between - start) / FRAMES * 1e6, (end - between) / FRAMES * 1e6
+
+
+def check(last: Values) -> None:
+    """Refuse a comparison in which one of the two gets it wrong."""
+    if not all(math.isclose(one, two) for one, two in zip(last, LAST, strict=True)):
+        raise AssertionError(f"decoded {last}, sent was {LAST}")
+
+
+async def compare(channel: str | None) -> dict[str, list[tuple[float, float]]]:
+    """Return (ours, theirs) of each round [µs], taken in turns."""
+    rounds: dict[str, list[tuple[float, float]]] = {"decode": [], "burst": [], "single": []}
+    for _ in range(ROUNDS):
+        rounds["decode"].append(decoding_cost())
+        if channel is not None:
+            mine, peers = await reading_cost(ours, channel), await reading_cost(theirs, channel)
+            rounds["burst"].append((mine[0], peers[0]))
+            rounds["single"].append((mine[1], peers[1]))
+    return {name: pairs for name, pairs in rounds.items() if pairs}
+
+
+async def reachable(channel: str) -> str | None:
+    """Return the channel, or None where it cannot be opened, and say why."""
+    try:
+        async with open_bus("socketcan", channel):
+            return channel
+    except BusOpenError as error:
+        sys.stderr.write(f"{error}\nThe decoders alone:\n")
+        return None
+
+
+def main() -> None:
+    """Print the comparison, and write it to `build/figures`."""
+    channel = asyncio.run(reachable(sys.argv[1] if len(sys.argv) > 1 else "vcan0"))
+    figures: dict[str, float] = {}
+    lines = [f"{'µs per frame':<14}{'ours':>10}{'python-can, canopen':>22}{'times':>8}"]
+    for name, pairs in asyncio.run(compare(channel)).items():
+        mine, peers = median(one for one, _ in pairs), median(two for _, two in pairs)
+        ratio = median(two / one for one, two in pairs)
+        figures |= {f"{name}_ours_us": mine, f"{name}_theirs_us": peers, f"{name}_ratio": ratio}
+        lines.append(f"{name:<14}{mine:>10.2f}{peers:>22.2f}{ratio:>8.1f}")
+    sys.stdout.write("\n".join(lines) + "\n")
+    FIGURES.parent.mkdir(parents=True, exist_ok=True)
+    FIGURES.write_text(json.dumps(figures, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
