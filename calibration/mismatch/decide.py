@@ -35,7 +35,10 @@ WORTH_A_NAME = 0.02
 SHAPE_MISFIT = 0.12
 """A name whose form explains all but this share of what a free curve could explain has the right form: nature's
 friction curves are not ours to the last percent."""
-MOST_TERMS = 3
+QUICK_MEMORY = 5.0
+FORCED_TERMS = 4
+SMOOTH = 12
+"""Columns of a curve that cannot follow the noise itself."""
 
 
 @dataclass(frozen=True)
@@ -83,22 +86,43 @@ def size_of(search: Search, fit: Fit, index: int) -> float:
 
 
 def settle_noise(search: Search) -> Noise:
-    """Estimate the noise from what is left when anything at all that explains something is taken out."""
-    scene = search.dictionary.scene
+    """Estimate the noise from what is left when anything at all that explains something is taken out.
+
+    An effect that is not taken out looks like noise that never forgets, and then hides itself. So first the most
+    telling terms are taken out as if the noise forgot quickly, whether they are significant or not: their few
+    coefficients cost the estimate little. Then again, with that noise, only what is significant.
+    """
+    mask = search.dictionary.scene.mask
+    noise = estimate_noise(residual_of(search, search.fit(())), mask)
+    quick = Noise(noise.deviation, min(noise.memory, QUICK_MEMORY))
     terms: list[Term] = []
-    noise = estimate_noise(residual_of(search, search.fit(())), scene.mask)
-    for _ in range(6):
-        search.weights = noise.weights
-        search.refresh()
-        wheels = len(search.weights)
-        best = max(search.conditional(terms), key=lambda found: found[0] - found[1].price(wheels), default=None)
-        if best is None or best[0] - best[1].price(wheels) < 0.5 * UNNAMED_BY:
+    for _ in range(FORCED_TERMS):
+        _weigh(search, quick)
+        terms += [term for _, term in _most_telling(search, terms)]
+    noise = estimate_noise(residual_of(search, search.fit(terms)), mask)
+    terms = []
+    for _ in range(2 * FORCED_TERMS):
+        _weigh(search, noise)
+        found = [term for score, term in _most_telling(search, terms) if score > 0.5 * UNNAMED_BY]
+        if not found:
             break
-        terms.append(best[1])
-        noise = estimate_noise(residual_of(search, search.fit(terms)), scene.mask)
+        terms += found
+    noise = estimate_noise(residual_of(search, search.fit(terms)), mask)
+    _weigh(search, noise)
+    return noise
+
+
+def _weigh(search: Search, noise: Noise) -> None:
     search.weights = noise.weights
     search.refresh()
-    return noise
+
+
+def _most_telling(search: Search, terms: Sequence[Term]) -> list[tuple[float, Term]]:
+    """Return the term with the best score beside these, if there is any; of curves only the smooth ones."""
+    wheels = len(search.weights)
+    smooth = [group for group in search.dictionary.groups if len(group.columns) <= SMOOTH]
+    scored = [(gain - term.price(wheels), term) for gain, term in search.conditional(terms, smooth)]
+    return [max(scored, key=lambda pair: pair[0])] if scored else []
 
 
 def seek_in_residual(search: Search, candidates: Sequence[Candidate], terms: Iterable[Term]) -> None:
@@ -140,7 +164,20 @@ def acceptable(search: Search, fit: Fit) -> bool:
             return False
         if term.group.named and size_of(search, fit, index) < WORTH_A_NAME:
             return False
+        if term.group.evidence is not None and not _seen_here_too(search, fit, index):
+            return False
     return True
+
+
+def _seen_here_too(search: Search, fit: Fit, index: int) -> bool:
+    """Say whether a fault of another channel shows in the predicted one too, and there as large as at home."""
+    term = fit.terms[index]
+    without = search.fit([t for i, t in enumerate(fit.terms) if i != index])
+    assert term.group.evidence is not None  # noqa: S101  # the caller asked
+    scale = search.dictionary.scale[list(term.group.columns)]
+    here = float((fit.coefficients[fit.of_term(index)] / scale)[0])
+    home = float(term.group.evidence[1][list(term.wheels)][0])
+    return fit.gain - without.gain > UNNAMED_BY and 0.4 < here / home < 2.5
 
 
 def polished(search: Search, terms: Sequence[Term]) -> tuple[Term, ...]:
@@ -204,25 +241,30 @@ def decide(search: Search, candidates: Sequence[Candidate]) -> Decision:
 
 
 def _without_a_name(search: Search, named: Fit) -> tuple[Fit, tuple[Term, ...]]:
-    """Hold the names against curves that have none."""
+    """Hold the names against curves that have none.
+
+    A curve wins in two ways: beside the names, where it finds much that they leave; and against them, where one curve
+    says as much as several names of unlike covariates, which then only imitate it.
+    """
     alone = best_per_family(search, (), named=False)
     if not alone:
         return named, ()
     curve = alone[0][1]
     by_curve = search.fit((curve,))
+    imitated = len(named.terms) > 1 and search.score(by_curve) >= search.score(named)
+    imitated &= any(term.group.candidate and term.group.candidate.covariate != curve.name for term in named.terms)
     left = best_per_family(search, named.terms, named=False)
-    remains = left[0][0] if left else 0.0
     beside = search.fit((*named.terms, left[0][1])) if left else named
     misfit = (beside.gain - named.gain) / max(beside.gain, 1e-9)
-    if remains < UNNAMED_BY or (named.terms and misfit < SHAPE_MISFIT):
+    significant = bool(left) and left[0][0] > UNNAMED_BY and (not named.terms or misfit > SHAPE_MISFIT)
+    if not (imitated or significant):
         return named, ()
-    # Something is left. Do the names add anything once the best single curve is in?
     kept: tuple[Term, ...] = ()
     fit = by_curve
     for term in named.terms:
         trial = search.fit((*kept, term, curve))
         if search.score(trial) - search.score(fit) > NAMED_BY and acceptable(search, trial):
             kept, fit = (*kept, term), trial
-    if search.score(fit) >= search.score(beside):
+    if imitated or search.score(fit) >= search.score(beside):
         return search.fit(kept), (curve,)
     return named, (left[0][1],)

@@ -43,6 +43,8 @@ class Group:
     candidate: Candidate | None = None
     shape: Shape = field(default_factory=dict)
     flavour: str = ""
+    evidence: tuple[Array, Array] | None = None
+    """For a fault of another channel: for each wheel, what that channel says for it, and how large it is there."""
 
     @property
     def named(self) -> bool:
@@ -55,10 +57,11 @@ class Dictionary:
 
     Attributes
     ----------
-    columns: shape (column, wheel, time), 0 outside the mask, float32: a few hundred times the recording
+    groups: which columns enter together
+    residual: measured less predicted, shape (wheel, time), in the order of folds
+    order: the instants in the order of folds
     scale: what each column was divided by
-    gram, moment, energy: sums of products per fold and wheel: (fold, wheel, column, column), (fold, wheel, column),
-        (fold, wheel)
+    energy, counts: sum of squares and number of the residual's values, shape (fold, wheel)
     """
 
     def __init__(self, scene: Scene, folds: NDArray[np.int64]) -> None:
@@ -67,17 +70,31 @@ class Dictionary:
         self.order = np.argsort(folds, kind="stable")
         self.cuts = np.searchsorted(folds[self.order], np.arange(folds.max() + 2))
         self.residual: Single = self._arranged((scene.measured - scene.filled)[None])[0]
-        wheels, count = scene.mask.shape[1], len(self.cuts) - 1
-        self.columns: Single = np.zeros((0, wheels, len(folds)), np.float32)
+        self._wheels, self._folds = scene.mask.shape[1], len(self.cuts) - 1
+        self._size = 0
+        self._columns: Single = np.zeros((0, self._wheels, len(folds)), np.float32)
+        self._gram: Array = np.zeros((self._folds, self._wheels, 0, 0))
+        self._moment: Array = np.zeros((self._folds, self._wheels, 0))
         self.scale: Array = np.zeros(0)
-        self.gram: Array = np.zeros((count, wheels, 0, 0))
-        self.moment: Array = np.zeros((count, wheels, 0))
-        self.energy: Array = np.stack(
-            [np.sum(part.astype(np.float64) ** 2, axis=1) for part in self._parts(self.residual)]
-        )
-        self.counts: Array = np.stack(
-            [np.sum(part, axis=1) for part in self._parts(scene.mask.T[:, self.order].astype(np.float64))]
-        )
+        parts = self._parts(self.residual)
+        self.energy: Array = np.stack([np.sum(part.astype(np.float64) ** 2, axis=1) for part in parts])
+        known = self._parts(scene.mask.T[:, self.order].astype(np.float64))
+        self.counts: Array = np.stack([np.sum(part, axis=1) for part in known])
+
+    @property
+    def columns(self) -> Single:
+        """Every column, shape (column, wheel, time), in the order of folds, 0 outside the mask."""
+        return self._columns[: self._size]
+
+    @property
+    def gram(self) -> Array:
+        """Sums of products of columns, shape (fold, wheel, column, column)."""
+        return self._gram[:, :, : self._size, : self._size]
+
+    @property
+    def moment(self) -> Array:
+        """Sums of products of columns and residual, shape (fold, wheel, column)."""
+        return self._moment[:, :, : self._size]
 
     def _arranged(self, values: Array) -> Single:
         """Return (column, time, wheel) as (column, wheel, time) in the order of folds, 0 outside the mask."""
@@ -95,20 +112,29 @@ class Dictionary:
         scale = np.sqrt(np.sum(fresh.astype(np.float64) ** 2, axis=(1, 2)) / max(int(self.scene.mask.sum()), 1))
         scale = np.where(scale > 0, scale, 1.0)
         fresh /= scale[:, None, None].astype(np.float32)
-        old, new = len(self.columns), len(fresh)
-        self.columns = np.concatenate((self.columns, fresh)) if old else fresh
+        old, new = self._size, self._size + len(fresh)
+        self._make_room(new)
+        self._columns[old:new] = fresh
+        self._size = new
         self.scale = np.concatenate((self.scale, scale))
-        gram = np.zeros((*self.gram.shape[:2], old + new, old + new))
-        gram[:, :, :old, :old] = self.gram
-        moment = np.zeros((*self.moment.shape[:2], old + new))
-        moment[:, :, :old] = self.moment
-        for f, (part, added, residual) in enumerate(
-            zip(self._parts(self.columns), self._parts(fresh), self._parts(self.residual), strict=True)
-        ):
-            for w in range(part.shape[1]):
-                cross = (added[:, w] @ part[:, w].T).astype(np.float64)
-                gram[f, w, old:, :] = cross
-                gram[f, w, :, old:] = cross.T
-                moment[f, w, old:] = added[:, w] @ residual[w]
-        self.gram, self.moment = gram, moment
-        return list(range(old, old + new))
+        parts = (self._parts(values) for values in (self.columns, fresh, self.residual))
+        for f, (part, added, residual) in enumerate(zip(*parts, strict=True)):
+            for w in range(self._wheels):
+                cross = added[:, w] @ part[:, w].T
+                self._gram[f, w, old:new, :new] = cross
+                self._gram[f, w, :new, old:new] = cross.T
+                self._moment[f, w, old:new] = added[:, w] @ residual[w]
+        return list(range(old, new))
+
+    def _make_room(self, size: int) -> None:
+        """Let the arrays grow by half as much again, so that growing costs little on the whole."""
+        room = len(self._columns)
+        if size <= room:
+            return
+        more = max(size, room + room // 2)
+        for name, axes in (("_columns", (0,)), ("_gram", (2, 3)), ("_moment", (2,))):
+            before = getattr(self, name)
+            shape = tuple(more if axis in axes else length for axis, length in enumerate(before.shape))
+            grown = np.zeros(shape, before.dtype)
+            grown[tuple(slice(0, length) for length in before.shape)] = before
+            setattr(self, name, grown)

@@ -8,16 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.mismatch.curves import broken_lines
 from calibration.mismatch.dictionary import Dictionary, Group
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from calibration.mismatch.candidates import Candidate, Shape
+    from calibration.mismatch.scene import Scene
 
 Array = NDArray[np.float64]
 
 CURVE_KNOTS = 8
+TIME_KNOTS = 48
+"""Time has no physics of its own that is smooth: spells and beats must show, down to a fortieth of the recording."""
 NOT_FOR_CURVES = frozenset({"direction", "wheel_angle", "wheel_acceleration"})
 
 
@@ -46,7 +50,7 @@ def add_candidate(dictionary: Dictionary, candidate: Candidate, shapes: Sequence
     """Add a candidate in each of these shapes."""
     scene, made, columns = dictionary.scene, [], []
     start = len(dictionary.columns)
-    price = 2 * float(np.log(max(len(candidate.shapes(scene)), 1)))
+    price = 2 * float(np.log(candidate.tried(scene)))
     for shape in shapes:
         found = np.asarray(candidate.columns(scene, shape), np.float64)
         places = tuple(range(start, start + len(found)))
@@ -54,7 +58,8 @@ def add_candidate(dictionary: Dictionary, candidate: Candidate, shapes: Sequence
         columns += list(found)
         signs = tuple(c.sign for c in candidate.coefficients[: len(found)])
         signs += (0,) * (len(found) - len(signs))
-        made.append(Group(candidate.name, places, signs, candidate.sharing, price, candidate, shape))
+        evidence = candidate.evidence(scene, shape)
+        made.append(Group(candidate.name, places, signs, candidate.sharing, price, candidate, shape, "", evidence))
     dictionary.append(columns)
     dictionary.groups += made
     return made
@@ -66,6 +71,16 @@ def add_candidates(dictionary: Dictionary, candidates: Sequence[Candidate]) -> l
     for candidate in fitting:
         add_candidate(dictionary, candidate, candidate.shapes(dictionary.scene))
     return fitting
+
+
+def _opposed(scene: Scene, covariate: str) -> dict[str, Array]:
+    """Return how an effect may differ over the machine: what tilts or turns it acts oppositely on its two sides."""
+    direction = np.nan_to_num(scene.covariates.get("direction", np.ones(scene.mask.shape)))
+    if covariate in {"roll", "yaw_rate"} and scene.side is not None:
+        return {"drag, opposite sides": direction * scene.side}
+    if covariate == "pitch" and scene.row is not None and np.ptp(scene.row) > 0:
+        return {"drag, opposite ends": direction * (scene.row - np.mean(scene.row))}
+    return {}
 
 
 def add_curves(dictionary: Dictionary) -> None:
@@ -81,22 +96,15 @@ def add_curves(dictionary: Dictionary) -> None:
         hats = broken_lines(curve, scene.mask, CURVE_KNOTS)
         if len(hats) < 3:
             continue
-        for flavour, factor in flavours.items():
+        for flavour, factor in {**flavours, **_opposed(scene, name)}.items():
             places = dictionary.append([hat * factor for hat in hats])
             signs = (0,) * len(places)
-            dictionary.groups.append(Group(name, tuple(places), signs, ("all", "one"), 0.0, None, {}, flavour))
-
-
-def broken_lines(values: Array, mask: NDArray[np.bool_], knots: int) -> list[Array]:
-    """Return hat functions that sum to 1, on knots that share the data evenly; 0 where the covariate is unknown."""
-    known = mask & np.isfinite(values)
-    if not known.any():
-        return []
-    inside = values[known]
-    low, high = (float(q) for q in np.quantile(inside, [0.005, 0.995]))
-    at = np.unique(0.5 * (np.quantile(inside, np.linspace(0.005, 0.995, knots)) + np.linspace(low, high, knots)))
-    if len(at) < 3 or at[-1] - at[0] <= 0:
-        return []
-    clipped = np.clip(np.where(known, values, at[0]), at[0], at[-1])
-    hats = [np.interp(clipped, at, row) for row in np.eye(len(at))]
-    return [np.where(known, hat, 0.0) for hat in hats]
+            sharing = ("all",) if "opposite" in flavour else ("all", "one")
+            dictionary.groups.append(Group(name, tuple(places), signs, sharing, 0.0, None, {}, flavour))
+    flavour = "drag" if "drag" in flavours else "offset"
+    hats = broken_lines(scene.covariates["time"], scene.mask, TIME_KNOTS)
+    places = dictionary.append([hat * flavours[flavour] for hat in hats])
+    if places:
+        dictionary.groups.append(
+            Group("time", tuple(places), (0,) * len(places), ("all", "one"), 0.0, None, {}, flavour)
+        )

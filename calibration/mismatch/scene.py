@@ -37,6 +37,7 @@ class Scene:
     mask: where both are known
     covariates: by the contract's names, each of shape (time, wheel)
     side, row: each wheel's place on the machine, or None
+    made: what candidates have computed once for all
     """
 
     recording: Recording
@@ -48,7 +49,7 @@ class Scene:
     covariates: Mapping[str, Array]
     side: Array | None
     row: Array | None
-    _made: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)
+    made: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)
 
     @property
     def time_s(self) -> Array:
@@ -77,10 +78,10 @@ class Scene:
     def secant(self, name: str, step: float) -> Array:
         """Return the prediction's change per unit of a parameter, over a step from where it stands."""
         key = (name, step)
-        if key not in self._made:
+        if key not in self.made:
             start = {**self.simulation.variants(), **self.values}[name]
-            self._made[key] = (self.changed(**{name: start + step}) - self.filled) / step
-        return self._made[key]
+            self.made[key] = (self.changed(**{name: start + step}) - self.filled) / step
+        return self.made[key]
 
     def tangent(self, name: str) -> Array:
         """Return ∂prediction/∂parameter, shape (time, wheel)."""
@@ -90,12 +91,16 @@ class Scene:
     def input_tangent(self, column: str) -> Array:
         """Return ∂prediction/∂ln(input), shape (time, wheel)."""
         key = ("input " + column, RELATIVE_STEP)
-        if key not in self._made:
-            inputs = complete_inputs(self.recording)
-            inputs[column] = inputs[column] * (1 + RELATIVE_STEP)
-            moved = self.simulation.predict(inputs, {**self.simulation.variants(), **self.values})
-            self._made[key] = np.where(self.mask, np.nan_to_num(moved) - self.filled, 0.0) / RELATIVE_STEP
-        return self._made[key]
+        if key not in self.made:
+            moved = self.with_input(column, self.recording.channels[column] * (1 + RELATIVE_STEP))
+            self.made[key] = (moved - self.filled) / RELATIVE_STEP
+        return self.made[key]
+
+    def with_input(self, column: str, values: Array) -> Array:
+        """Return the prediction for another reading of one input, 0 where the simulation says nothing."""
+        inputs = {**complete_inputs(self.recording), column: values}
+        moved = self.simulation.predict(inputs, {**self.simulation.variants(), **self.values})
+        return np.where(self.mask & np.isfinite(moved), moved, 0.0)
 
     @property
     def filled(self) -> Array:

@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 
 OUTSIDE_REACH = 1e-3
 """A column of which less than this share of energy lies outside all others' reach is one of theirs."""
+VISIBLE = 25.0
+"""Gain in its own channel below which a fault is not there."""
+BONUS_SHARE, MOST_BONUS = 0.5, 300.0
 PER_COEFFICIENT = 2.0
 """Paid for each coefficient, as in Akaike's criterion: what a coefficient gains by chance is 1 on average."""
 
@@ -46,7 +49,19 @@ class Term:
             paid += 2 * float(np.log(wheel_count))
             # One wheel alone is the rule for some faults and the exception for what all wheels are built with.
             paid += 6.0 if "all" in self.group.sharing else 0.0
-        return paid
+        return paid - self.bonus
+
+    @property
+    def bonus(self) -> float:
+        """What the fault's own channel pays towards it: one cause for two signs needs no coincidence."""
+        if self.group.evidence is None:
+            return 0.0
+        return min(BONUS_SHARE * float(np.sum(self.group.evidence[0][list(self.wheels)])), MOST_BONUS)
+
+    @property
+    def visible(self) -> bool:
+        """Whether the fault's own channel shows it, where it has one."""
+        return self.group.evidence is None or float(np.sum(self.group.evidence[0][list(self.wheels)])) > VISIBLE
 
 
 @dataclass(frozen=True)
@@ -77,19 +92,18 @@ class Search:
         self.dictionary = dictionary
         self.nuisance = nuisance
         self.weights = weights
-        chosen = list(range(len(dictionary.gram))) if folds is None else list(folds)
-        self.folds = chosen
-        self._sum()
-
-    def _sum(self) -> None:
-        w = self.weights
-        self.gram = np.einsum("fwij,w->wij", self.dictionary.gram[self.folds], w)
-        self.moment = self.dictionary.moment[self.folds].sum(axis=0) * w[:, None]
-        self.energy = float(np.sum(self.dictionary.energy[self.folds].sum(axis=0) * w))
+        self.folds = list(range(len(dictionary.gram))) if folds is None else list(folds)
+        self.refresh()
 
     def refresh(self) -> None:
-        """Take in columns that were added to the dictionary since."""
-        self._sum()
+        """Take in new weights, and columns that were added to the dictionary since."""
+        gram, moment = self.dictionary.gram, self.dictionary.moment
+        self.gram = np.zeros(gram.shape[1:])
+        for fold in self.folds:
+            self.gram += gram[fold]
+        self.gram *= self.weights[:, None, None]
+        self.moment = moment[self.folds].sum(axis=0) * self.weights[:, None]
+        self._whole = self.gram.sum(axis=0)
 
     @property
     def all_wheels(self) -> tuple[int, ...]:
@@ -130,14 +144,15 @@ class Search:
             reach = cross[chosen].sum(axis=0)
             solved = inverse @ reach
             left = self.moment[chosen].sum(axis=0) - reach.T @ (inverse @ moment)
-            block = self.gram[chosen].sum(axis=0)
+            block = self._whole if len(chosen) == len(self.weights) else self.gram[chosen[0]]
             single = np.diag(block) - np.einsum("sp,sp->p", reach, solved)
             kind = "all" if pattern == self.all_wheels else "one"
             for group in self.dictionary.groups if groups is None else groups:
                 if kind in group.sharing or len(self.weights) == 1:
                     gain = _gain(group, left, block, reach, solved, single)
-                    if gain > 0:
-                        found.append((gain, Term(group, pattern)))
+                    term = Term(group, pattern)
+                    if gain > 0 and term.visible:
+                        found.append((gain, term))
         return found
 
     def beside(self, given: Iterable[Term], term: Term) -> tuple[Array, Array]:

@@ -28,13 +28,17 @@ class BearingDrag(Candidate):
     free: ClassVar = {"onset_s": (0.0, float("inf"))}
 
     def shapes(self, scene: Scene) -> Sequence[Shape]:
-        """At each of many times: at once, within minutes, or on and on."""
+        """At each of many times: at once, within minutes, or on and on, slower or faster with time."""
+        at = onsets(scene)
         rises = (0.0, 0.03 * scene.length_s, 0.15 * scene.length_s, float("inf"))
-        return [{"onset_s": t, "rise_s": rise} for t in onsets(scene) for rise in rises]
+        soon: list[Shape] = [{"onset_s": t, "rise_s": rise} for t in at for rise in rises]
+        wear: list[Shape] = [{"onset_s": t, "rise_s": float("inf"), "power": p} for t in at for p in (0.5, 2.0)]
+        return [*soon, *wear]
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return sign(ω) g(t − t_0)."""
-        return (scene.covariates["direction"] * since(scene, float(shape["onset_s"]), float(shape["rise_s"])))[None]
+        grown = since(scene, float(shape["onset_s"]), float(shape["rise_s"])) ** float(shape.get("power", 1.0))
+        return (scene.covariates["direction"] * grown)[None]
 
     def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Anywhere but at the very ends."""

@@ -63,9 +63,17 @@ class Candidate:
         """Return the grid of shapes that is searched."""
         return [{}]
 
+    def tried(self, scene: Scene) -> float:
+        """Return how many different shapes were open to choice: what a choice among them must be paid for."""
+        return max(len(self.shapes(scene)), 1)
+
     def seek(self, scene: Scene, residual: Array) -> Sequence[Shape]:  # noqa: ARG002
         """Return further shapes that a residual suggests, where a grid would be too fine to search blindly."""
         return []
+
+    def evidence(self, scene: Scene, shape: Shape) -> tuple[Array, Array] | None:  # noqa: ARG002
+        """Return what the fault's own channel says, for each wheel: the gain there and the coefficient; or nothing."""
+        return None
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return the columns, shape (coefficient, time, wheel), in the predicted channel's unit per coefficient."""

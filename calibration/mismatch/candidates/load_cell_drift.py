@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, onsets, since
+import numpy as np
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from calibration.mismatch.curves import broken_lines
+from calibration.mismatch.noise import estimate_noise
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from calibration.mismatch.scene import Scene
 
+WANDER_KNOTS = 24
+
 
 class LoadCellDrift(Candidate):
     """A reading that creeps away; the current does not follow it.
 
     Seen twice: in the current, which does not answer to the load that the cell claims, and in the cell itself,
-    against what pitch and roll say it should carry.
+    against what pitch and roll say it should carry. Both are asked for: what the cell does not show is another
+    effect, and a load that the current follows is a load.
     """
 
     name = "load-cell-drift"
@@ -27,18 +34,70 @@ class LoadCellDrift(Candidate):
     signature = "one wheel's load leaves what pitch and roll explain, and its current does not follow"
     experiment = "park on level ground at intervals and compare the six cells' sum with the rover's weight"
     source = "strain-gauge creep and temperature: percents of full scale per hour when faulty"
-    requires = ("load",)
-    coefficients: ClassVar = (Coefficient("relative_drift", "1", 0),)
+    requires = ("load", "pitch", "roll")
+    coefficients: ClassVar = (Coefficient("drift_as_the_cell_shows_it", "1", 1),)
     sharing: ClassVar = ("one",)
+    free: ClassVar = {"relative_offset": (-3.0, 0.85)}
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:
-        """Ramps and slow approaches from several times on."""
-        early: list[Shape] = [
-            {"onset_s": -1.0, "rise_s": rise} for rise in (float("inf"), 0.5 * scene.length_s, 0.15 * scene.length_s)
-        ]
-        later: list[Shape] = [{"onset_s": t, "rise_s": rise} for t in onsets(scene, 12) for rise in (float("inf"), 0.0)]
-        return [*early, *later]
+    def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002
+        """As the cell itself shows it, from several readings that were wrong on the mean already."""
+        return [{"relative_offset": offset} for offset in (-1.6, -0.8, -0.4, -0.2, 0.0, 0.15, 0.3, 0.5)]
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
-        """Return the current that the simulation adds for a reading too large by its own size, taken away again."""
-        return (-scene.input_tangent("load_N") * since(scene, float(shape["onset_s"]), float(shape["rise_s"])))[None]
+        """Return what the simulation says to the load without the drift, less what it said.
+
+        The cell shows how the drift went, but not what it was on the mean: that is the offset, in mean readings.
+        """
+        load = scene.covariates["load"]
+        wrong = np.nanmean(load, axis=0) * (self._drift(scene) + float(shape["relative_offset"]))
+        return (scene.with_input("load_N", np.maximum(load - wrong, 0.1 * load)) - scene.filled)[None]
+
+    def evidence(self, scene: Scene, shape: Shape) -> tuple[Array, Array]:  # noqa: ARG002
+        """Return, for each wheel, what this drift explains of its own cell's reading, and how large it is there."""
+        key = ("drift seen by the cell", 0.0)
+        if key not in scene.made:
+            reading, drift = self._unexplained_load(scene), self._drift(scene)
+            noise = estimate_noise(np.nan_to_num(reading - drift), np.isfinite(reading))
+            seen = np.nansum(np.where(np.isfinite(reading), drift**2, 0.0), axis=0) * noise.weights
+            # A line of many pieces follows noise too: each piece gains 1 by chance.
+            scene.made[key] = np.maximum(seen - WANDER_KNOTS, 0.0)
+        return scene.made[key], np.ones(scene.mask.shape[1])
+
+    def _drift(self, scene: Scene) -> Array:
+        key = ("drift", 0.0)
+        if key not in scene.made:
+            reading = self._unexplained_load(scene)
+            scene.made[key] = np.stack([_wander(scene, reading[:, k]) for k in range(reading.shape[1])], axis=1)
+        return scene.made[key]
+
+    def _unexplained_load(self, scene: Scene) -> Array:
+        """Return the cells' readings less what pitch and roll explain, over the mean reading; NaN where unknown."""
+        key = ("unexplained load", 0.0)
+        if key not in scene.made:
+            load = scene.covariates["load"]
+            scene.made[key] = _without_posture(scene, load / np.nanmean(load, axis=0))
+        return scene.made[key]
+
+
+def _without_posture(scene: Scene, values: Array) -> Array:
+    """Return what a constant, pitch and roll leave of each column, fitted where it is known."""
+    left = np.full(values.shape, np.nan)
+    for k in range(values.shape[1]):
+        pitch, roll = (np.nan_to_num(scene.covariates[name][:, k]) for name in ("pitch", "roll"))
+        regressors = np.column_stack((np.ones(len(pitch)), pitch, roll, pitch**2, roll**2, pitch * roll))
+        known = np.isfinite(values[:, k])
+        if known.sum() > 10:
+            fitted = np.linalg.lstsq(regressors[known], values[known, k], rcond=None)[0]
+            left[known, k] = values[known, k] - regressors[known] @ fitted
+    return left
+
+
+def _wander(scene: Scene, reading: Array) -> Array:
+    """Return a broken line over time through a reading."""
+    known = np.isfinite(reading)
+    hats = broken_lines(scene.time_s[:, 0], known, WANDER_KNOTS)
+    if not hats:
+        return np.zeros(len(reading))
+    columns = np.stack(hats, axis=1)
+    fitted = np.linalg.lstsq(columns[known], reading[known], rcond=None)[0]
+    return columns @ fitted

@@ -29,9 +29,10 @@ class TurningResistance(Candidate):
     sharing: ClassVar = ("all",)
 
     def shapes(self, scene: Scene) -> Sequence[Shape]:
-        """Proportional or saturating with yaw rate; even, or more at the end rows."""
+        """Proportional or saturating with yaw rate, or with yaw rate over speed: even, or more at the end rows."""
         rows = ("alike", "ends") if scene.row is not None and np.ptp(scene.row) > 1 else ("alike",)
-        return [{"half_at": half, "rows": rows_} for half in (0.3, 1.0, 100.0) for rows_ in rows]
+        by = ("rate", "angle") if "wheel_speed" in scene.covariates else ("rate",)
+        return [{"half_at": h, "rows": row, "by": b} for h in (0.3, 1.0, 100.0) for row in rows for b in by]
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return drag and moment, in multiples of what the typical turn has."""
@@ -39,9 +40,13 @@ class TurningResistance(Candidate):
         noise = scene.simulation.sensors.get("yaw_rate_rad_s")
         # What is within the sensor's error of no turn is no turn: its sign would be noise.
         yaw = np.where(np.abs(yaw) > 3 * noise.absolute, yaw, 0.0) if noise else yaw
-        turning = np.abs(yaw[yaw != 0])
-        typical = float(np.mean(turning)) if turning.size else 1.0
-        relative = np.abs(yaw) / typical
+        turned = np.abs(yaw)
+        if shape["by"] == "angle":
+            # Where a wheel points is off from where it goes by yaw rate × lever over the body's speed.
+            body = np.abs(np.nanmean(scene.covariates["wheel_speed"], axis=1, keepdims=True))
+            turned = turned / (body + 0.1 * np.mean(body))
+        typical = float(np.mean(turned[yaw != 0])) if np.any(yaw != 0) else 1.0
+        relative = turned / typical
         half = float(shape["half_at"])
         size = relative * (1 + half) / (relative + half)
         if shape["rows"] == "ends" and scene.row is not None:

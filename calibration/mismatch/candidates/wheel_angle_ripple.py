@@ -30,11 +30,16 @@ class WheelAngleRipple(Candidate):
     requires = ("wheel_angle",)
     coefficients: ClassVar = (Coefficient("amplitude", "{unit}", 0),)
     sharing: ClassVar = ("all", "one")
-    free: ClassVar = {"order": (0.5, HIGHEST_ORDER)}
+    free: ClassVar = {"order": (0.9, HIGHEST_ORDER)}
 
     def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002
         """None: orders are sought in the residual, where thousands can be tried at once."""
         return []
+
+    def tried(self, scene: Scene) -> float:
+        """Return the number of lines that the angle turned can resolve, of each kind."""
+        turns = float(np.ptp(scene.covariates["wheel_angle"])) / (2 * np.pi)
+        return max(3 * HIGHEST_ORDER * turns, 1.0)
 
     def seek(self, scene: Scene, residual: Array) -> Sequence[Shape]:
         """Return the strongest order of each kind: the residual summed over angle bins, and its spectrum."""
