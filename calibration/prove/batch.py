@@ -25,6 +25,8 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from calibration.prove.envelope import Envelope, Truth, file_digest, read_opened
 from calibration.prove.errors import OtherBatchError, SolverError
 from calibration.prove.files import write_trial
@@ -34,6 +36,8 @@ from calibration.prove.isolation import run_alone
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+
+    from calibration.prove.scene import Concealed
 
 SOLVER = f"{shlex.quote(sys.executable)} -m daemon mismatch {{recording}} --simulation {{simulation}} --json {{answer}}"
 PEERS = f"{shlex.quote(sys.executable)} -m calibration.prove.peers {{recording}} {{simulation}} {{answer}}"
@@ -89,7 +93,7 @@ def truth_of(trial: Trial, files: dict[str, str]) -> Truth:
                 "covariate": effect.covariate,
                 "channel": "motor_current_A" if effect.added_load_N is None else "load_N",
                 "onset_s": effect.onset_s,
-                "parameters": effect.parameters(effect.size),
+                "parameters": true_parameters(trial, effect),
             }
             for effect in trial.effects
         ],
@@ -99,6 +103,20 @@ def truth_of(trial: Trial, files: dict[str, str]) -> Truth:
         "true_rmse_A": trial.true_rmse_A,
         "files_sha256": files,
     }
+
+
+def true_parameters(trial: Trial, effect: Concealed) -> dict[str, float]:
+    """Return the true values that an interval can be held against: those that do not hang on the form of a law.
+
+    `relative_size` is the effect's root mean square on its wheels over the mean reading; the others are the effect's
+    own, where its law has the contract's constant (an onset, a constant current, an offset, an order).
+    """
+    moving = trial.drive.moving
+    on = moving & np.isin(np.arange(1, 7), effect.wheels)
+    added = effect.added_current_A(effect.size)
+    size = float(np.sqrt(np.mean(added[on] ** 2)) / np.mean(np.abs(trial.current_A[moving])))
+    onset = {} if effect.onset_s is None else {"onset_s": effect.onset_s}
+    return {"relative_size": size, **onset, **effect.parameters(effect.size)}
 
 
 def solve(batch: Batch, command: str, kind: str, number: int) -> None:

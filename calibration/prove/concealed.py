@@ -32,17 +32,14 @@ def coulomb(rng: Generator, scene: Scene) -> Concealed:
     apart = 1 + rng.uniform(0, 0.1) * rng.normal(size=6)
     effect = _drag("coulomb-friction", "direction", scene.drive.rotation * apart, some_wheels(rng))
     at = [wheel - 1 for wheel in effect.wheels]
-    return replace(effect, parameters=lambda size: {"drag": size * float(np.mean(apart[at]))})
+    return replace(effect, parameters=lambda size: {"coulomb_current": size * float(np.mean(apart[at]))})
 
 
 def viscous(rng: Generator, scene: Scene) -> Concealed:
     """Drag growing with speed, by a power close to one."""
     speed = np.abs(scene.drive.wheel_speed_rad_s)
     power = rng.uniform(0.9, 1.1)
-    effect = _drag("viscous-friction", "wheel_speed", scene.drive.rotation * speed**power, some_wheels(rng))
-    moving = speed[scene.drive.moving]
-    slope = float(np.sum(moving ** (power + 1)) / np.sum(moving**2))
-    return replace(effect, parameters=lambda size: {"drag": size * slope})
+    return _drag("viscous-friction", "wheel_speed", scene.drive.rotation * speed**power, some_wheels(rng))
 
 
 def stribeck(rng: Generator, scene: Scene) -> Concealed:
@@ -82,8 +79,7 @@ def torque_constant(rng: Generator, scene: Scene) -> Concealed:
         return scene.current_A * (1 / np.clip(weakened, 0.4, 2.5) - 1)
 
     name = "torque-constant-temperature"
-    parameters = lambda size: {"coefficient": size}  # noqa: E731  # one value, named where it is made
-    return Concealed(name, name, "temperature", current, largest=0.02, parameters=parameters)
+    return Concealed(name, name, "temperature", current, largest=0.02)
 
 
 def rotor_inertia(rng: Generator, scene: Scene) -> Concealed:
@@ -103,7 +99,7 @@ def ripple(rng: Generator, scene: Scene) -> Concealed:
     angle = order * scene.drive.wheel_angle_rad + phase
     shape = np.abs(scene.drive.rotation) * (np.sin(angle) + overtone * np.sin(2 * angle + rng.uniform(0, 6)))
     effect = _drag("wheel-angle-ripple", "wheel_angle", shape)
-    return replace(effect, parameters=lambda size: {"order": float(order), "amplitude": size})
+    return replace(effect, parameters=lambda _: {"order": float(order)})
 
 
 def grade(rng: Generator, scene: Scene) -> Concealed:

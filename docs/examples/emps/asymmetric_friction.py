@@ -1,0 +1,31 @@
+"""Friction that is not the same in both directions: a ball screw's preload, a cable, a slope of the bench."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from calibration.mismatch.candidates import Candidate, Coefficient, Shape
+
+if TYPE_CHECKING:
+    from calibration.mismatch.scene import Scene
+    from calibration.mismatch.simulation import Array
+
+
+class AsymmetricFriction(Candidate):
+    """A constant force beside friction: forwards it adds, backwards it takes away."""
+
+    name = "asymmetric-friction"
+    covariate = "direction"
+    equation = "F = F_c sign(v) + F_0"
+    words = "friction that differs between the two directions"
+    signature = "a residual of the same sign in both directions"
+    experiment = "move at one speed both ways, then turn the axis end for end and do it again"
+    source = "Janot, Gautier and Brunot (2019): a few newtons on this axis"
+    requires = ("direction",)
+    coefficients: ClassVar = (Coefficient("half_difference", "{unit}", 0),)
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:  # noqa: ARG002  # it has no shape
+        """Return 1 while the axis moves."""
+        return np.abs(np.asarray(scene.covariates["direction"]))[None]

@@ -1,0 +1,59 @@
+"""A servo axis on a ball screw (EMPS): the first simulation anybody writes, force = mass × acceleration."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from asymmetric_friction import AsymmetricFriction
+from scipy.signal import butter, sosfiltfilt
+
+from calibration.mismatch.candidates import library
+from calibration.mismatch.simulation import Prior, Simulation
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from calibration.mismatch.candidates import Candidate
+    from calibration.mismatch.recording import Recording
+    from calibration.mismatch.simulation import Array
+
+FORCE_PER_VOLT = 35.15
+CUTOFF_HZ = 20.0
+EDGE_S = 0.15
+"""What a zero-phase filter spoils at either end."""
+
+
+class ServoAxis(Simulation):
+    """The force at the carriage, from its acceleration alone."""
+
+    channel, unit = "force_N", "N"
+    inputs = ("acceleration_m_s2",)
+    parameters: Mapping[str, Prior] = {"mass_kg": Prior(95.0, 5.0, "kg")}
+
+    def prepare(self, recording: Recording) -> Recording:
+        """Low-pass (20 Hz, zero phase) position and voltage, then differentiate; drop the filter's ends."""
+        step = recording.step_s
+        low = butter(4, CUTOFF_HZ, fs=1 / step, output="sos")
+        position = sosfiltfilt(low, recording.channel("position_m"), axis=0)
+        force = FORCE_PER_VOLT * sosfiltfilt(low, recording.channel("motor_voltage_reference_V"), axis=0)
+        speed = np.gradient(position, step, axis=0)
+        time = recording.time_s[:, None]
+        whole = (time > time[0] + EDGE_S) & (time < time[-1] - EDGE_S)
+        return recording.with_channels(
+            force_N=np.where(whole, force, np.nan),
+            speed_m_s=speed,
+            acceleration_m_s2=np.gradient(speed, step, axis=0),
+        )
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return m a [N]."""
+        return values["mass_kg"] * inputs["acceleration_m_s2"]
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return what the residual may be ordered by."""
+        return {"time": inputs["t_s"], "wheel_speed": inputs["speed_m_s"], "position": inputs["position_m"]}
+
+    def candidates(self) -> Sequence[Candidate]:
+        """Return the whole library, and one of this machine's own."""
+        return (*library(), AsymmetricFriction())
