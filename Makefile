@@ -4,7 +4,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 export PYTHON
 
-.PHONY: demo test check sizing install uninstall clean
+RECORDINGS ?= ../shared/recordings
+
+.PHONY: demo test check sizing prove real scaling install uninstall clean
 
 demo: $(VENV)/demo.ready
 	$(BIN)/regolithd demo
@@ -22,6 +24,18 @@ check: $(VENV)/dev.ready
 # The paper's sizing study, all of it: minutes. Interrupted, it goes on where it was.
 sizing: $(VENV)/dev.ready
 	$(BIN)/regolithd sizing
+
+# The proof of `regolithd mismatch`: 200 recordings with an effect concealed. SEED=… repeats one; interrupted, it goes on.
+prove: $(VENV)/dev.ready
+	$(BIN)/regolithd prove $(if $(SEED),--seed $(SEED)) --figures build/figures/prove.json
+
+# The worked examples on recordings of others, which are not part of this project (docs/examples).
+real: $(VENV)/dev.ready
+	$(BIN)/python docs/examples/run.py $(RECORDINGS) build/figures/real.json build/real
+
+# How time and memory of a comparison grow with rows and candidates.
+scaling: $(VENV)/dev.ready
+	$(BIN)/python -m calibration.prove.scaling build/figures/scaling.json docs/mismatch-scaling.svg
 
 # On a rover or a bench, as root: docs/install.md.
 install:

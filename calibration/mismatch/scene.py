@@ -116,10 +116,11 @@ def build_scene(recording: Recording, simulation: Simulation, values: Mapping[st
     RecordingError
         When the predicted channel or an input is missing, or nothing can be compared.
     """
+    derived = simulation.prepare(recording)
     needed = (simulation.channel, *simulation.inputs)
-    if missing := [name for name in needed if not np.isfinite(recording.channel(name)).any()]:
+    if missing := [name for name in needed if not np.isfinite(derived.channel(name)).any()]:
         raise RecordingError(f"the simulation needs {', '.join(missing)}, which the recording does not have")
-    prepared = expected_inputs(simulation.prepare(recording), simulation.sensors)
+    prepared = expected_inputs(derived, simulation.sensors)
     chosen = dict(values or {name: prior.value for name, prior in simulation.parameters.items()})
     inputs = complete_inputs(prepared)
     prediction = simulation.predict(inputs, {**simulation.variants(), **chosen})

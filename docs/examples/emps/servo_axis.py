@@ -55,5 +55,9 @@ class ServoAxis(Simulation):
         return {"time": inputs["t_s"], "wheel_speed": inputs["speed_m_s"], "position": inputs["position_m"]}
 
     def candidates(self) -> Sequence[Candidate]:
-        """Return the whole library, and one of this machine's own."""
-        return (*library(), AsymmetricFriction())
+        """Return the library without what this machine cannot have, and one effect of its own.
+
+        A slide has no wheel angle, and the voltage is the controller's own command: no sensor reads it with an offset.
+        """
+        foreign = {"wheel-angle-ripple", "current-sensor-bias"}
+        return (*(c for c in library() if c.name not in foreign), AsymmetricFriction())

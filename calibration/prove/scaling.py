@@ -1,0 +1,176 @@
+"""How time and memory of a comparison grow with the recording's rows and with the candidates that are looked for.
+
+    python -m calibration.prove.scaling FIGURES.json PICTURE.svg
+
+Each point is the command line in a process of its own, on a generated recording that conceals one effect: what a user
+would wait for, reading and writing included.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+from calibration.mismatch.candidates import library
+from calibration.mismatch.report_axes import Panel, axes, box, line, number, svg, text
+from calibration.mismatch.rover_wheel import RoverWheel
+from calibration.prove.files import toml_text, write_trial
+from calibration.prove.generator import Plan, make_trial
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from calibration.mismatch.candidates import Candidate
+
+DURATIONS_S = (300.0, 600.0, 1200.0, 1800.0, 3600.0)
+COUNTS = (2, 4, 8, 16)
+FULL = 1800.0
+INK = "svg{--paper:#fff;--ink:#1d2126;--soft:#5c6570;--rule:#d9dde2;--panel:#f5f6f8;--more:#b5482a;--less:#23679b}"
+
+
+class Fewer(RoverWheel):
+    """The rover's simulation with only the first few candidates of the library."""
+
+    count: ClassVar[int] = 16
+
+    def candidates(self) -> Sequence[Candidate]:
+        """Return the first `count`."""
+        return library()[: self.count]
+
+
+class Two(Fewer):
+    """Two candidates."""
+
+    count = 2
+
+
+class Four(Fewer):
+    """Four candidates."""
+
+    count = 4
+
+
+class Eight(Fewer):
+    """Eight candidates."""
+
+    count = 8
+
+
+class Sixteen(Fewer):
+    """All sixteen."""
+
+
+WITH = {2: Two, 4: Four, 8: Eight, 16: Sixteen}
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What one comparison took."""
+
+    rows: int
+    candidates: int
+    wall_s: float
+    cpu_s: float
+    memory_MiB: float
+
+
+def measure(folder: Path, rows: int, candidates: int) -> Cost:
+    """Run one comparison in the folder and return what it took."""
+    command = [
+        sys.executable,
+        "-m",
+        "daemon",
+        "mismatch",
+        "recording.csv.gz",
+        "--simulation",
+        "SIM.toml",
+        "--json",
+        "a.json",
+    ]
+    project = str(Path(__file__).resolve().parents[2])
+    silent = os.open(os.devnull, os.O_WRONLY)
+    started = time.perf_counter()
+    here = Path.cwd()
+    os.chdir(folder)
+    try:
+        child = os.posix_spawn(
+            sys.executable,
+            command,
+            {**os.environ, "PYTHONPATH": project},
+            file_actions=[(os.POSIX_SPAWN_DUP2, silent, 1), (os.POSIX_SPAWN_DUP2, silent, 2)],
+        )
+    finally:
+        os.chdir(here)
+        os.close(silent)
+    _, status, usage = os.wait4(child, 0)
+    if status != 0:
+        raise RuntimeError(f"the comparison of {rows} rows failed with status {os.waitstatus_to_exitcode(status)}")
+    wall = time.perf_counter() - started
+    return Cost(rows, candidates, wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
+
+
+def costs(scratch: Path) -> list[Cost]:
+    """Return the cost of every length with all candidates, and of the full length with fewer."""
+    found = []
+    for duration_s, counts in [(d, COUNTS if d == FULL else COUNTS[-1:]) for d in DURATIONS_S]:
+        trial = make_trial(Plan(1, 3, "single", ("viscous-friction",)), duration_s=duration_s)
+        write_trial(trial, scratch)
+        for count in counts:
+            model = f"calibration.prove.scaling:{WITH[count].__name__}"
+            tables = {**trial.tables, "simulation": {**trial.tables["simulation"], "model": model}}
+            (scratch / "SIM.toml").write_text(toml_text(tables))
+            found.append(measure(scratch, trial.load_N.size, count))
+    return found
+
+
+def picture(found: list[Cost]) -> str:
+    """Draw seconds and MiB over rows, and seconds over candidates."""
+    most = max(cost.candidates for cost in found)
+    by_rows = [(cost.rows / 1000, cost.cpu_s, cost.memory_MiB) for cost in found if cost.candidates == most]
+    full = max(cost.rows for cost in found if cost.candidates < most)
+    by_count = sorted((float(cost.candidates), cost.cpu_s) for cost in found if cost.rows == full)
+    panels = (
+        ("rows (thousands)", "processor time (s)", [(x, y) for x, y, _ in by_rows], 20.0),
+        ("rows (thousands)", "memory (MiB)", [(x, y) for x, _, y in by_rows], 1024.0),
+        (f"candidates, at {full // 1000} 000 rows", "processor time (s)", by_count, 20.0),
+    )
+    parts = [
+        f"<style>{INK} text{{font:12px sans-serif;fill:#5c6570}} .ground{{fill:#f5f6f8}} .axis{{stroke:#d9dde2;fill:none}}"
+    ]
+    parts += [
+        ".after{fill:none;stroke:#23679b;stroke-width:1.6}.zero{stroke:#b5482a;stroke-dasharray:3 3;fill:none}</style>"
+    ]
+    for at, (across, up, points, limit) in enumerate(panels):
+        wide = 1.1 * max(x for x, _ in points)
+        panel = Panel(62 + 280 * at, 24, 200, 150, (0, wide), (0, 1.15 * max(limit, *(y for _, y in points))))
+        parts += [box(panel), axes(panel, across, "", x_about=4), text(panel.left, 15, up)]
+        parts.append(line([(panel.at_x(x), panel.at_y(limit)) for x in (0, wide)], "zero"))
+        parts.append(text(panel.left + 196, panel.at_y(limit) - 4, f"goal {number(limit, 4)}", anchor="end"))
+        parts.append(line([(panel.at_x(x), panel.at_y(y)) for x, y in points], "after"))
+        parts += [
+            f'<circle cx="{panel.at_x(x):.1f}" cy="{panel.at_y(y):.1f}" r="3" fill="#23679b"/>' for x, y in points
+        ]
+    return svg(850, 220, parts, "Time and memory against rows and candidates")
+
+
+def main(figures: Path, drawing: Path) -> None:
+    """Measure, write the flat figures and the picture."""
+    with tempfile.TemporaryDirectory() as scratch:
+        found = costs(Path(scratch))
+    flat = {}
+    for cost in found:
+        key = f"rows_{cost.rows}_candidates_{cost.candidates}"
+        flat |= {f"{key}_wall_s": cost.wall_s, f"{key}_cpu_s": cost.cpu_s, f"{key}_memory_MiB": cost.memory_MiB}
+    for path, content in ((figures, json.dumps(flat, indent=1) + "\n"), (drawing, picture(found) + "\n")):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(content)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))
