@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
 import sys
 import tempfile
 import time
@@ -20,6 +21,7 @@ from typing import TYPE_CHECKING, ClassVar
 from calibration.mismatch.candidates import library
 from calibration.mismatch.report_axes import Panel, axes, box, line, number, svg, text
 from calibration.mismatch.rover_wheel import RoverWheel
+from calibration.prove.errors import ProofError
 from calibration.prove.files import toml_text, write_trial
 from calibration.prove.generator import Plan, make_trial
 
@@ -31,7 +33,9 @@ if TYPE_CHECKING:
 DURATIONS_S = (300.0, 600.0, 1200.0, 1800.0, 3600.0)
 COUNTS = (2, 4, 8, 16)
 FULL = 1800.0
-INK = "svg{--paper:#fff;--ink:#1d2126;--soft:#5c6570;--rule:#d9dde2;--panel:#f5f6f8;--more:#b5482a;--less:#23679b}"
+STYLE = """<style>text{font:12px sans-serif;fill:#5c6570}.ground{fill:#f5f6f8}.axis{stroke:#d9dde2;fill:none}
+.after{fill:none;stroke:#23679b;stroke-width:1.6}.dot{fill:#23679b}.zero{stroke:#b5482a;stroke-dasharray:3 3;fill:none}
+.paper{fill:#fff}</style><rect class="paper" width="850" height="220"/>"""
 
 
 class Fewer(RoverWheel):
@@ -82,35 +86,16 @@ class Cost:
 
 def measure(folder: Path, rows: int, candidates: int) -> Cost:
     """Run one comparison in the folder and return what it took."""
-    command = [
-        sys.executable,
-        "-m",
-        "daemon",
-        "mismatch",
-        "recording.csv.gz",
-        "--simulation",
-        "SIM.toml",
-        "--json",
-        "a.json",
-    ]
-    project = str(Path(__file__).resolve().parents[2])
-    silent = os.open(os.devnull, os.O_WRONLY)
+    command = [sys.executable, "-m", "daemon", "mismatch", "recording.csv.gz", "--simulation", "SIM.toml"]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
     started = time.perf_counter()
-    here = Path.cwd()
-    os.chdir(folder)
-    try:
-        child = os.posix_spawn(
-            sys.executable,
-            command,
-            {**os.environ, "PYTHONPATH": project},
-            file_actions=[(os.POSIX_SPAWN_DUP2, silent, 1), (os.POSIX_SPAWN_DUP2, silent, 2)],
-        )
-    finally:
-        os.chdir(here)
-        os.close(silent)
-    _, status, usage = os.wait4(child, 0)
-    if status != 0:
-        raise RuntimeError(f"the comparison of {rows} rows failed with status {os.waitstatus_to_exitcode(status)}")
+    child = subprocess.Popen(  # noqa: S603  # our own command; waited for below, with what it used
+        [*command, "--json", "answer.json"], cwd=folder, env=environment, stdout=subprocess.DEVNULL
+    )
+    _, status, usage = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)
+    if child.returncode != 0:
+        raise ProofError(f"the comparison of {rows} rows failed with status {child.returncode}")
     wall = time.perf_counter() - started
     return Cost(rows, candidates, wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
 
@@ -140,12 +125,7 @@ def picture(found: list[Cost]) -> str:
         ("rows (thousands)", "memory (MiB)", [(x, y) for x, _, y in by_rows], 1024.0),
         (f"candidates, at {full // 1000} 000 rows", "processor time (s)", by_count, 20.0),
     )
-    parts = [
-        f"<style>{INK} text{{font:12px sans-serif;fill:#5c6570}} .ground{{fill:#f5f6f8}} .axis{{stroke:#d9dde2;fill:none}}"
-    ]
-    parts += [
-        ".after{fill:none;stroke:#23679b;stroke-width:1.6}.zero{stroke:#b5482a;stroke-dasharray:3 3;fill:none}</style>"
-    ]
+    parts = [STYLE]
     for at, (across, up, points, limit) in enumerate(panels):
         wide = 1.1 * max(x for x, _ in points)
         panel = Panel(62 + 280 * at, 24, 200, 150, (0, wide), (0, 1.15 * max(limit, *(y for _, y in points))))
@@ -153,9 +133,8 @@ def picture(found: list[Cost]) -> str:
         parts.append(line([(panel.at_x(x), panel.at_y(limit)) for x in (0, wide)], "zero"))
         parts.append(text(panel.left + 196, panel.at_y(limit) - 4, f"goal {number(limit, 4)}", anchor="end"))
         parts.append(line([(panel.at_x(x), panel.at_y(y)) for x, y in points], "after"))
-        parts += [
-            f'<circle cx="{panel.at_x(x):.1f}" cy="{panel.at_y(y):.1f}" r="3" fill="#23679b"/>' for x, y in points
-        ]
+        for x, y in points:
+            parts.append(f'<circle class="dot" cx="{panel.at_x(x):.1f}" cy="{panel.at_y(y):.1f}" r="3"/>')
     return svg(850, 220, parts, "Time and memory against rows and candidates")
 
 
@@ -163,7 +142,7 @@ def main(figures: Path, drawing: Path) -> None:
     """Measure, write the flat figures and the picture."""
     with tempfile.TemporaryDirectory() as scratch:
         found = costs(Path(scratch))
-    flat = {}
+    flat: dict[str, float] = {}
     for cost in found:
         key = f"rows_{cost.rows}_candidates_{cost.candidates}"
         flat |= {f"{key}_wall_s": cost.wall_s, f"{key}_cpu_s": cost.cpu_s, f"{key}_memory_MiB": cost.memory_MiB}
