@@ -11,7 +11,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from drivers.cia402 import PROFILE_VELOCITY
+from drivers.decode import SYNC_COB_ID
 from drivers.dictionary import object_dictionary, struct_code, variable
+from drivers.emcy import EMCY_COB_ID
 from drivers.pdo import Pdo, rpdos, tpdos
 from drivers.signals import NodeKind
 
@@ -20,10 +22,14 @@ if TYPE_CHECKING:
 
     from drivers.signals import NodeDescription
 
+SYNC_COB_ID_OBJECT = 0x1005
+EMCY_COB_ID_OBJECT = 0x1014
 CONSUMER_HEARTBEAT = 0x1016
 PRODUCER_HEARTBEAT = 0x1017
 PDO_OFF = 1 << 31
 _NO_REMOTE_REQUEST = 1 << 30  # a device may set it by itself
+_SYNC_BITS = 0x400007FF  # identifier, and that the node produces no SYNC itself
+_EMCY_BITS = 0x800007FF  # identifier, and that it is valid
 _PDOS = 512  # of each direction (CiA 301)
 
 # A drive that loses its master, or is told to quick-stop, brakes with the quick-stop ramp and switches itself off.
@@ -65,6 +71,10 @@ def configuration(
 def _writes(node: NodeDescription, heartbeat_s: float, master_id: int, master_lost_after_s: float) -> Iterator[Write]:
     kind = node.kind
     used = (*tpdos(kind, diagnostics=node.diagnostics), *rpdos(kind))
+    if SYNC_COB_ID_OBJECT in object_dictionary(kind):
+        yield Write(SYNC_COB_ID_OBJECT, 0, SYNC_COB_ID, _SYNC_BITS, 4, keep=True)
+    if EMCY_COB_ID_OBJECT in object_dictionary(kind):
+        yield Write(EMCY_COB_ID_OBJECT, 0, EMCY_COB_ID + node.node_id, _EMCY_BITS, 4, keep=True)
     for index in sorted(_listed_pdos(kind) - {pdo.communication_index for pdo in used}):
         yield _switch_off(index)
     for pdo in used:

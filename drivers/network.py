@@ -25,7 +25,7 @@ from drivers.cia402 import DriveState
 from drivers.configuration import CONSUMER_HEARTBEAT
 from drivers.drive import Drive
 from drivers.emcy import EMCY_COB_ID, parse
-from drivers.errors import DriveError, DriverError
+from drivers.errors import DriverError
 from drivers.events import (
     BusStateChanged,
     DriveStateChanged,
@@ -36,6 +36,7 @@ from drivers.events import (
 )
 from drivers.heartbeat import produce_heartbeat
 from drivers.link import Link
+from drivers.motion import Motion, each
 from drivers.nmt import NmtCommand
 from drivers.pdo import tpdos
 from drivers.signals import NodeKind
@@ -44,7 +45,7 @@ from drivers.supervisor import Supervisor
 from drivers.sync import produce_sync
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from drivers.frame import Frame
     from drivers.signals import NodeDescription
@@ -91,11 +92,11 @@ class Network:
         self._supervisors: dict[int, Supervisor] = {}
         self._drives: dict[int, Drive] = {}
         self._bus_state = bus.state
-        self._moving = False
         self._must_stop: NetworkEvent | None = None
         self._stop_wanted = asyncio.Event()
         for node in settings.nodes:
             self._add(node)
+        self._motion = Motion(self._drives, self._status, gear_ratio=settings.gear_ratio)
 
     @property
     def status(self) -> Mapping[int, NodeStatus]:
@@ -142,14 +143,7 @@ class Network:
         DriveError
             A drive is not on the bus, or does not get there; the message names it and its state. None stays enabled.
         """
-        for node_id in self._drives:
-            status = self._status(node_id)
-            if status.phase is not NodePhase.OPERATIONAL:
-                raise DriveError(f"the drive is not operational ({status.phase}). {status.text}", node_id=node_id)
-        failures = await _each(drive.enable() for drive in self._drives.values())
-        if failures:
-            await _each(drive.disable() for drive in self._live_drives())
-            raise _drive_error(failures)
+        await self._motion.enable()
 
     async def set_speed(self, wheel_speed_rad_s: Sequence[float]) -> None:
         """Turn the wheels at these speeds [rad/s at the wheel, index k − 1 for wheel k]; one RPDO per drive.
@@ -157,42 +151,25 @@ class Network:
         Raises
         ------
         DriveError
-            A drive is not in operation enabled; nothing has been sent then.
+            A drive is not in operation enabled, or the wheels were stopped since; nothing has been sent then.
         BusError
-            The bus does not take it; the drives stop by themselves when the heartbeat does not arrive either.
+            The bus does not take it; all are stopped, or stop by themselves when no heartbeat arrives either.
         """
-        for drive in self._drives.values():
-            if self._supervisors[drive.node_id].phase is not NodePhase.OPERATIONAL:
-                raise DriveError("the drive is not operational", node_id=drive.node_id)
-            if drive.state is not DriveState.ENABLED:
-                raise DriveError(f"the drive is in {drive.state}", node_id=drive.node_id, cure="Enable it first")
-        self._moving = any(wheel_speed_rad_s)
-        for drive in self._drives.values():
-            wheel = drive.link.node.wheel
-            if wheel is not None:
-                await drive.turn(wheel_speed_rad_s[wheel] * self.settings.gear_ratio)
+        await self._motion.set_speed(wheel_speed_rad_s)
 
     async def quick_stop(self) -> None:
-        """Stop all wheels with the quick-stop ramp, now, and wait until they stand.
+        """Stop all wheels with the quick-stop ramp, now, and wait until they stand; then they are locked.
 
         Raises
         ------
         DriveError
             A drive that is on the bus does not stop. One that is lost does not keep the others from stopping.
         """
-        self._moving = False
-        failures = await _each(drive.send_quick_stop() for drive in self._drives.values())
-        failures += await _each(drive.until_stopped() for drive in self._live_drives())
-        if failures:
-            raise _drive_error(failures)
+        await self._motion.quick_stop()
 
     async def disable(self) -> None:
         """Take the power off the motors; wheels that turn are stopped first. Raises as `quick_stop` does."""
-        if self._moving or any(drive.state is DriveState.ENABLED for drive in self._live_drives()):
-            await self.quick_stop()
-        failures = await _each(drive.disable() for drive in self._live_drives())
-        if failures:
-            raise _drive_error(failures)
+        await self._motion.disable()
 
     def _add(self, node: NodeDescription) -> None:
         node_id = node.node_id
@@ -210,13 +187,6 @@ class Network:
         status = self._supervisors[node_id].status
         drive = self._drives.get(node_id)
         return status if drive is None else replace(status, drive_state=drive.state)
-
-    def _live_drives(self) -> list[Drive]:
-        return [
-            drive
-            for node_id, drive in self._drives.items()
-            if self._supervisors[node_id].phase is NodePhase.OPERATIONAL
-        ]
 
     async def _read(self) -> None:
         handlers = self._handlers
@@ -256,7 +226,7 @@ class Network:
         self._on_event(event)
         if isinstance(event, NodeLost) and event.node_id in self._drives:
             self._drives[event.node_id].forget()
-        if self._moving and self._ends_motion(event):
+        if self._motion.moving and self._ends_motion(event):
             self._must_stop = event
             self._stop_wanted.set()
 
@@ -275,11 +245,11 @@ class Network:
             await self._stop_wanted.wait()
             self._stop_wanted.clear()
             event = self._must_stop
-            if event is None or not self._moving:
+            if event is None or not self._motion.moving:
                 continue
             outcome = "all others are stopped"
             try:
-                await self.quick_stop()
+                await self._motion.quick_stop(event.text)
             except DriverError as error:
                 outcome = str(error)
             node_id = getattr(event, "node_id", 0)
@@ -292,23 +262,7 @@ class Network:
                 try:
                     await self.disable()
                 finally:
-                    await _each(drive.link.sdo.write(CONSUMER_HEARTBEAT, 1, bytes(4)) for drive in self._live_drives())
+                    await each(drive.link.sdo.write(CONSUMER_HEARTBEAT, 1, bytes(4)) for drive in self._motion.live())
         for supervisor in self._supervisors.values():
             with suppress(DriverError):
                 await supervisor.link.tell(NmtCommand.ENTER_PRE_OPERATIONAL)
-
-
-async def _each(actions: Iterable[Awaitable[None]]) -> list[DriverError]:
-    """Do all at once and return what went wrong, so that one drive's trouble does not keep the others from acting."""
-    results = await asyncio.gather(*actions, return_exceptions=True)
-    failures = []
-    for result in results:
-        if isinstance(result, DriverError):
-            failures.append(result)
-        elif isinstance(result, BaseException):
-            raise result
-    return failures
-
-
-def _drive_error(failures: Sequence[DriverError]) -> DriveError:
-    return DriveError("; ".join(str(failure) for failure in failures), node_id=failures[0].node_id)

@@ -64,6 +64,8 @@ async def test_wheels_turn_at_the_speed_that_is_asked_and_stop() -> None:
             lambda: all(values(r.readings(node), Quantity.MOTOR_SPEED)[-1] == 0.0 for node in range(1, 7)),
             "all wheels standing",
         )
+        with pytest.raises(DriveError, match="a quick stop was commanded"):
+            await r.network.set_speed(CREEP_rad_s)
         await r.network.disable()
         assert not any(r.told(MotionStopped))
 
@@ -73,7 +75,7 @@ async def test_nothing_turns_before_it_is_enabled() -> None:
     async with rig(MOTORS) as r:
         await r.network.settled()
         await until(lambda: len(r.frames), "frames")
-        with pytest.raises(DriveError, match=r"node 1: the drive is in .*Enable it first"):
+        with pytest.raises(DriveError, match=r"the wheels are locked: they have not been enabled yet\. Enable them"):
             await r.network.set_speed(CREEP_rad_s)
         assert not [frame for frame in r.frames if frame.can_id & 0x780 == 0x200]
 

@@ -129,7 +129,7 @@ def test_a_valid_pdo_keeps_its_identifier_while_it_is_switched_off() -> None:
     """CiA 301 forbids to change it and bit 31 at once."""
     off = configuration(
         NodeDescription(3, NodeKind.LOAD_CELL, 2), heartbeat_s=0.2, master_id=127, master_lost_after_s=0.5
-    )[0]
+    )[2]
     assert off.data(present=0x40000183) == (0xC0000183).to_bytes(4, "little")
 
 
