@@ -1,0 +1,69 @@
+"""Iagnemma's least squares for [c, tan φ], with sinkage and shear modulus given: the classical method.
+
+Peak stresses follow from torque and load, and Eq. 1 ties them:
+
+    τ_m = (c + σ_m tan φ)(1 − e^(−j/K)),   τ_m = S − c/2 (Eq. 12),   σ_m = a + b c (Eq. 6, linear in σ_m)
+
+In the original both stresses end at zero and the equation is linear in both unknowns. With the paper's shear stress,
+which ends at c, it is linear in c for a given tan φ: so c is solved for, and tan φ is searched. Everything measured
+over a window goes into one fit, with the torque's error the same everywhere. The answer is kept within what a soil
+can be, in favour of the method.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from calibration.paper import equations
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from calibration.parameters import Wheel
+
+Array = NDArray[np.float64]
+
+MOST_COHESION_PA = 12_000.0
+LEAST_ANGLE_DEG, MOST_ANGLE_DEG = 5.0, 45.0
+
+
+def least_squares(
+    load_N: Array,
+    torque_Nm: Array,
+    contact_angle_rad: Array,
+    displacement_m: Array,
+    shear_modulus_m: Array,
+    wheel: Wheel,
+) -> tuple[Array, Array]:
+    """Return cohesion [Pa] and tan φ, shape (N,), of N windows of shape (N, samples); K has shape (N, 1)."""
+    size = (wheel.radius_m, wheel.width_m)
+    zero, one = np.zeros_like(load_N), np.ones_like(load_N)
+    mobilised = -np.expm1(-displacement_m / shear_modulus_m)
+    shear = equations.peak_shear_from_torque(torque_Nm, contact_angle_rad, zero, *size)
+    by_normal = equations.load(contact_angle_rad, one, zero, zero, *size)
+    by_cohesion = equations.load(contact_angle_rad, zero, -one / 2, one, *size)
+    normal = (load_N - equations.load(contact_angle_rad, zero, shear, zero, *size)) / by_normal
+    normal_by_cohesion = -by_cohesion / by_normal
+
+    def solve(tangent: Array) -> tuple[Array, Array]:
+        """Return c and the squared error, shape (N, tangents), for tan φ of that shape."""
+        t, m = tangent[..., None], mobilised[:, None]
+        constant = shear[:, None] - m * normal[:, None] * t
+        each = m + 0.5 + m * normal_by_cohesion[:, None] * t
+        cohesion = np.clip((constant * each).sum(axis=-1) / (each**2).sum(axis=-1), 0, MOST_COHESION_PA)
+        return cohesion, ((constant - each * cohesion[..., None]) ** 2).sum(axis=-1)
+
+    coarse = np.radians(np.linspace(LEAST_ANGLE_DEG, MOST_ANGLE_DEG, 81))
+    angle = _best(np.broadcast_to(coarse, (len(load_N), len(coarse))), solve)
+    fine = np.clip(angle[:, None] + (coarse[1] - coarse[0]) * np.linspace(-1, 1, 81), coarse[0], coarse[-1])
+    tangent = np.tan(_best(fine, solve))
+    return solve(tangent[:, None])[0][:, 0], tangent
+
+
+def _best(angles: Array, solve: Callable[[Array], tuple[Array, Array]]) -> Array:
+    """Return the angle with the least error in each row."""
+    _, error = solve(np.tan(angles))
+    return angles[np.arange(len(angles)), error.argmin(axis=1)]

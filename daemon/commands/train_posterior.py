@@ -1,0 +1,43 @@
+"""`regolithd train-posterior`: the network that says how sure it is, trained on simulated rovers and frozen to ONNX."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(name="train-posterior", help="Train the posterior on simulated rovers and freeze it to ONNX.")(
+        train_posterior
+    )
+
+
+def train_posterior(
+    out: Annotated[Path, typer.Option(help="where the network goes")] = Path("calibration/models/posterior.onnx"),
+    rovers: Annotated[int, typer.Option(min=1000, help="how many windows to simulate")] = 400_000,
+    steps: Annotated[int, typer.Option(min=50, help="how many steps of Adam")] = 12_000,
+    seed: Annotated[int, typer.Option(help="of rovers and initial weights")] = 1,
+) -> None:
+    """Simulate, fit, freeze: about a quarter of an hour on two cores."""
+    import numpy as np
+    import onnx
+    from rich.progress import Progress
+
+    from calibration.parameters import Wheel
+    from calibration.posterior_training import fit, freeze, simulate
+
+    with Progress() as progress:
+        simulating = progress.add_task("simulating rovers", total=rovers)
+        examples = simulate(rovers, np.random.default_rng(seed), lambda done: progress.advance(simulating, done))
+        fitting = progress.add_task("fitting", total=steps)
+
+        def show(loss: float) -> None:
+            progress.update(fitting, advance=50, description=f"fitting, loss {loss:.3f}")
+
+        parameters, by = fit(examples, seed, steps, progress=show)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    onnx.save(freeze(parameters, by, Wheel().radius_m), out)
+    typer.echo(f"Wrote {out}.")

@@ -1,0 +1,86 @@
+"""The window, the mixture that is read out of the network, and the ONNX graph against what was trained."""
+
+import numpy as np
+import onnxruntime
+import pytest
+
+from calibration.mixture import PARAMETERS, unpack
+from calibration.parameters import Drivetrain, Wheel
+from calibration.posterior import Buffer
+from calibration.posterior_training import apply, fit, freeze, simulate
+from calibration.rovers import TABLE_4_CURRENT, draw_rovers, drive, table_4_noise
+from calibration.window import reduce_windows
+
+
+def raw_mixture(rows: int = 3, components: int = 4) -> np.ndarray:
+    """Return some raw output of a network."""
+    return np.random.default_rng(0).normal(0, 0.5, (rows, components * PARAMETERS))
+
+
+def test_quantiles_means_and_ranks_are_those_of_the_samples() -> None:
+    """What is read out by formula is what 200 000 joint samples have."""
+    mixture = unpack(raw_mixture(), np.array([8.0, 0.4, 0.3]), np.array([0.5, 0.1, 0.2]))
+    samples = mixture.sample(200_000, np.random.default_rng(1))
+    levels = np.array([0.05, 0.5, 0.95])
+    np.testing.assert_allclose(mixture.means(), samples.mean(axis=1), rtol=0.02)
+    quantiles = mixture.quantiles(levels)
+    np.testing.assert_allclose(
+        quantiles, np.moveaxis(np.quantile(samples, levels, axis=1), 0, -1), rtol=0.02, atol=0.01
+    )
+    np.testing.assert_allclose(mixture.ranks(quantiles[:, :, 1]), 0.5, atol=1e-3)
+
+
+def test_an_absent_wheel_changes_nothing_but_the_count() -> None:
+    """A wheel that was not measured has mask 0 and no features; the others keep theirs."""
+    rng = np.random.default_rng(0)
+    load, slip, torque = rng.uniform(40, 60, (1, 20, 6)), np.full((1, 20, 6), 0.03), rng.normal(0.3, 0.1, (1, 20, 6))
+    whole = reduce_windows(load, slip, torque, np.full((1, 3), 0.01), 0.075)
+    torque[:, :, 2] = np.nan
+    part = reduce_windows(load, slip, torque, np.full((1, 3), 0.01), 0.075)
+    assert part.mask.tolist() == [[1, 1, 0, 1, 1, 1]]
+    np.testing.assert_array_equal(part.wheels[:, 2], 0)
+    np.testing.assert_allclose(np.delete(part.wheels, 2, axis=1), np.delete(whole.wheels, 2, axis=1))
+
+
+def test_median_ignores_a_momentary_drop() -> None:
+    """One instant of no torque moves the mean coefficient, and not the median."""
+    load, slip, torque = np.full((1, 9, 6), 50.0), np.full((1, 9, 6), 0.03), np.full((1, 9, 6), 0.3)
+    torque[0, 4] = 0.0
+    features = reduce_windows(load, slip, torque, np.full((1, 3), 0.01), 0.075).wheels[0, 0]
+    assert features[2] == pytest.approx(0.08 * 8 / 9)
+    assert features[3] == pytest.approx(0.08)
+
+
+def test_the_buffer_averages_half_seconds_and_begins_anew_after_a_gap() -> None:
+    """100 Hz for a second closes two half seconds; a minute's silence empties the window."""
+    buffer = Buffer(10.0)
+    ones = np.ones(6)
+    for k in range(101):
+        buffer.add(10**12 + k * 10**7, ones * (k % 2), ones, np.where(np.arange(6) == 1, np.nan, 2.0))
+    window = buffer.window()
+    assert window.shape == (3, 2, 6)
+    np.testing.assert_allclose(window[0], 0.5)
+    assert np.isnan(window[2, :, 1]).all()
+    buffer.add(2 * 10**12, ones, ones, ones)
+    assert buffer.window().shape[1] == 0
+
+
+def test_simulated_currents_are_as_noisy_as_the_table_says() -> None:
+    """The relative standard deviation of 2000 currents of a rover is that of Table 4, drops included."""
+    rng = np.random.default_rng(0)
+    rovers = draw_rovers(4, rng, np.full((4, 3), 1e-6), no_load_A=0.2)
+    current = drive(rovers, table_4_noise(4), 2000, rng, Drivetrain(), Wheel()).current_A
+    np.testing.assert_allclose((current.std(axis=1) / current.mean(axis=1)).mean(axis=0), TABLE_4_CURRENT, rtol=0.08)
+
+
+def test_the_onnx_graph_is_the_trained_network() -> None:
+    """After a brief training, ONNX gives the same mixture parameters as the layers that were trained."""
+    examples = simulate(400, np.random.default_rng(0))
+    parameters, by = fit(examples, 0, 400, batch=16)
+    model = freeze(parameters, by, 0.075)
+    session = onnxruntime.InferenceSession(model.SerializeToString())
+    windows = examples.windows
+    inputs = {"wheels": windows.wheels, "mask": windows.mask, "known": windows.known}
+    (raw,) = session.run(None, {name: value.astype(np.float32) for name, value in inputs.items()})
+    scaled = ((windows.wheels - by.wheels[0]) / by.wheels[1], windows.mask, (windows.known - by.known[0]) / by.known[1])
+    np.testing.assert_allclose(raw, apply(parameters, *scaled), atol=1e-3)
