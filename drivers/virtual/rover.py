@@ -44,8 +44,8 @@ KAPVIK = (
 MOVING_STEP_NS = 20_000_000
 """How often the drives' ramps are followed where no SYNC does it."""
 IDLE_STEP_NS = 200_000_000
-LONGEST_STEP_S = 1.0
-"""A clock that jumps further than this moves the world no further."""
+LONGEST_STEP_S = 5.0
+"""A clock that jumps further than this, either way, moves the world no further."""
 
 _ERROR_CONTROL = 0x700
 
@@ -156,6 +156,8 @@ class VirtualRover:
     def _advance(self, wall_ns: int) -> None:
         """Move the devices on to `wall_ns`."""
         elapsed_s = 0.0 if self._advanced_ns is None else (wall_ns - self._advanced_ns) / 1e9
+        if self._advanced_ns is not None and -LONGEST_STEP_S < elapsed_s <= 0:
+            return  # the frame came while the clock was being read
         elapsed_s = min(max(elapsed_s, 0.0), LONGEST_STEP_S)
         self._advanced_ns = wall_ns
         self._time_s += elapsed_s
