@@ -110,10 +110,10 @@ class AcquisitionCounters:
 
     snapshots: int = 0
     accepted: int = 0  # readings that went into a snapshot
-    late: int = 0  # readings that came before the first SYNC, or after their snapshot had been closed
+    late: int = 0  # readings that came before the first SYNC, after their snapshot had been closed, or in doubt
     duplicate: int = 0  # a second reading of the same PDO in one window; the first is kept
     unexpected: int = 0  # readings from nodes that the configuration does not know
-    missing: int = 0  # PDOs that were expected in a window and did not come
+    missing: int = 0  # PDOs that were expected in a window and did not come, or not in time
 
 
 class SlipSource(StrEnum):

@@ -74,12 +74,42 @@ def test_an_answer_that_comes_after_the_next_sync_is_never_taken_for_a_fresh_one
     window(taken, 2, nodes=range(1, 6))
     taken.accept(Sync(3 * PERIOD_NS))
     taken.accept(reading(6, 3 * PERIOD_NS + MS, current=2.6))  # of SYNC 2
-    for node in range(1, 7):
-        assert taken.accept(reading(node, 3 * PERIOD_NS + 9 * MS, current=3 + node / 10)) is None
-    third = taken.accept(Sync(4 * PERIOD_NS))
+    closed = [taken.accept(reading(node, 3 * PERIOD_NS + 9 * MS, current=3 + node / 10)) for node in range(1, 7)]
+    assert closed[:-1] == [None] * 5
+    third = closed[-1]
     assert third is not None
     assert third.motor_current_A[5] == pytest.approx(3.6)
     assert taken.counters.late == 1
+
+
+def test_answers_that_came_in_a_burst_across_a_sync_are_told_apart() -> None:
+    """Node 6 was held up for two SYNCs; its answers come around the third, and only the third's own counts."""
+    taken = acquisition()
+    for k in range(2):
+        window(taken, k)
+    for k in (2, 3):
+        window(taken, k, nodes=range(1, 6))
+    taken.accept(reading(6, 3 * PERIOD_NS + 9 * MS, current=2.6))  # of SYNC 2, and those of 3 and 4 follow
+    fourth = taken.accept(Sync(4 * PERIOD_NS))
+    assert fourth is not None
+    assert np.isnan(fourth.motor_current_A[5])
+    for node in range(1, 6):
+        taken.accept(reading(node, 4 * PERIOD_NS + MS))
+    taken.accept(reading(6, 4 * PERIOD_NS + 2 * MS, current=3.6))
+    closed = taken.accept(reading(6, 4 * PERIOD_NS + 3 * MS, current=4.6))
+    assert closed is not None
+    assert closed.motor_current_A[5] == pytest.approx(4.6)
+
+
+def test_a_single_answer_after_a_missing_one_is_in_doubt_for_three_windows() -> None:
+    """It may be the missing one; after three windows with one answer each, that one is taken for lost."""
+    taken = acquisition()
+    for k in range(2):
+        window(taken, k)
+    window(taken, 2, nodes=range(1, 6))
+    closed = [snapshot for k in range(3, 8) for snapshot in window(taken, k)]
+    known = {snapshot.sequence: bool(np.isfinite(snapshot.motor_current_A[5])) for snapshot in closed}
+    assert known == {2: False, 3: False, 4: False, 5: False, 6: True, 7: True}
 
 
 def test_an_answer_outside_the_synchronous_window_is_late() -> None:

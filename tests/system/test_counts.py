@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from daemon.acquire import SYNCHRONOUS_WINDOW
+from daemon.acquire import MEMORY, SYNCHRONOUS_WINDOW
 from daemon.config import Configuration
 from daemon.recording.candump import read_log
 from daemon.service import Service
@@ -171,6 +171,7 @@ async def test_no_snapshot_is_lost_and_none_is_stale(tmp_path: Path) -> None:
         "snapshots": len(snapshots),
         "pdos": (sum(counts.get("tpdo", 0) for counts in rover.values()), acquired),
         "loads late on the bus": len(late),
+        "loads not in a snapshot": len(way_ms) - sum(int(np.isfinite(s.load_N).sum()) for s in snapshots),
         "answer_ms": np.quantile(list(way_ms.values()), [0.5, 0.99, 1.0]).round(2).tolist(),
         "worst SYNC jitter_ms": round(sync.worst_late_ns / 1e6, 1),
         "daemon": bus.as_dict(),
@@ -191,9 +192,11 @@ async def test_no_snapshot_is_lost_and_none_is_stale(tmp_path: Path) -> None:
     assert sync.produced - len(snapshots) in {0, 1}, report
     assert len(snapshots) >= 0.9 * RATE_HZ * SECONDS, report
 
-    # Nothing lost: every load that was on the bus in its window is in its snapshot.
+    # Nothing lost: every load that was on the bus in its window is in its snapshot, but where a late one before it had
+    # cast doubt on which SYNC it answers.
+    doubtful = {(sync + later, wheel) for sync, wheel in late for later in range(max(MEMORY, RATE_HZ // 2) + 1)}
     measured = {(s.sequence, wheel) for s in snapshots for wheel in range(6) if np.isfinite(s.load_N[wheel])}
-    assert way_ms.keys() - late - measured <= {(len(snapshots), wheel) for wheel in range(6)}, report
+    assert way_ms.keys() - doubtful - measured <= {(len(snapshots), wheel) for wheel in range(6)}, report
     assert len(late) < 0.2 * len(way_ms), f"this computer is too busy to tell anything: {report}"
 
     # Nothing stale: a load and a current tell the time of their own snapshot, and their own wheel's number.
