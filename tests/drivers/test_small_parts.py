@@ -17,7 +17,7 @@ from drivers.error_frame import error_classes, reported_state
 from drivers.errors import BusDownError, DictionaryError, DriverError, SdoTimeoutError
 from drivers.frame import Frame
 from drivers.signals import NodeDescription, NodeKind
-from drivers.sync import Schedule, SyncCounters
+from drivers.sync import SyncCounters
 
 
 def test_a_message_says_where_what_and_the_cure() -> None:
@@ -36,21 +36,6 @@ def test_the_tree_that_is_drawn_is_the_tree_that_is() -> None:
         assert found, f"{name} is not drawn"
         if found[1]:
             assert issubclass(error, getattr(builtins, found[1])), found[0]
-
-
-@given(
-    st.floats(0.005, 1.0),
-    st.lists(st.floats(0.0, 3.0), max_size=60),
-)
-def test_a_schedule_neither_drifts_nor_bursts(period: float, delays: list[float]) -> None:
-    """Every due time is start + n·period; late by whole periods, they are left out and counted."""
-    schedule, now, counted = Schedule(100.0, period), 100.0, 0
-    for delay in delays:
-        due, missed = schedule.following(now)
-        counted += 1 + missed
-        assert due == 100.0 + counted * period
-        assert due > now - period - 1e-9
-        now = max(now, due) + delay
 
 
 def test_jitter_is_the_spread_of_the_lateness() -> None:

@@ -1,0 +1,55 @@
+"""The SYNC's clock: it neither drifts nor bursts, whoever keeps it."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.timer import KernelTimer, LoopTimer, Schedule, Timer, periodic
+
+START_NS = 100_000_000_000
+PERIOD_NS = 5_000_000
+
+
+@given(st.integers(5_000_000, 1_000_000_000), st.lists(st.integers(0, 3_000_000_000), max_size=60))
+def test_a_schedule_neither_drifts_nor_bursts(period_ns: int, delays_ns: list[int]) -> None:
+    """Every due time is start + n·period; late by whole periods, they are left out and counted."""
+    schedule, now, counted = Schedule(START_NS, period_ns), START_NS, 0
+    for delay in delays_ns:
+        due, missed = schedule.following(now)
+        counted += 1 + missed
+        assert due == START_NS + counted * period_ns
+        assert due > now - period_ns
+        now = max(now, due) + delay
+
+
+@pytest.mark.parametrize("kind", [LoopTimer, KernelTimer])
+async def test_no_tick_is_early_and_those_missed_are_counted(kind: type[Timer]) -> None:
+    """Ticks and missed ones add up to the time that has passed; after a stall there is one tick, not a burst."""
+    before_ns = time.monotonic_ns()
+    timer = kind(PERIOD_NS)
+    counted = 0
+    for number in range(40):
+        if number in (10, 20):
+            time.sleep(0.042)  # noqa: ASYNC251  # the loop hangs, on purpose
+        tick = await timer.tick()
+        now_ns = time.monotonic_ns()
+        counted += 1 + tick.missed
+        assert tick.late_ns >= 0
+        assert now_ns >= before_ns + counted * PERIOD_NS
+        if number in (10, 20):
+            assert tick.missed >= 7
+    if isinstance(timer, KernelTimer):
+        timer.close()
+
+
+async def test_a_timer_gives_its_descriptor_back() -> None:
+    """A hundred timers leave nothing open."""
+    for _ in range(100):
+        with periodic(PERIOD_NS):
+            pass
+    with periodic(PERIOD_NS) as timer:
+        assert (await timer.tick()).late_ns >= 0
