@@ -67,7 +67,7 @@ def running() -> Running:
 
 
 def test_a_node_without_power_is_silent_and_comes_back_new(running: Running) -> None:
-    """Off: not a frame. On: boot-up, pre-operational, unconfigured."""
+    """Off, it sends no frame; on again, it boots up, pre-operational and unconfigured."""
     running.tell("off 11")
     assert running.load(11) is None
     assert running.heartbeats(11) == []

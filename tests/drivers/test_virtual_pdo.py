@@ -126,7 +126,7 @@ def test_a_synchronous_rpdo_waits_for_the_sync() -> None:
 
 @pytest.mark.parametrize(("length", "code", "obeyed"), [(5, 0x8210, False), (7, 0x8220, True)])
 def test_an_rpdo_of_the_wrong_length_is_reported(length: int, code: int, *, obeyed: bool) -> None:
-    """Too short: EMCY 0x8210, and nothing done. Too long: 0x8220, and what is mapped is done."""
+    """Too short brings EMCY 0x8210 and does nothing; too long brings 0x8220, and what is mapped is done."""
     drive = Drive()
     frames = drive.master.send(0x201, struct.pack("<Hi", 0x06, 0).ljust(8, b"\0")[:length])
     assert [struct.unpack_from("<H", f.data)[0] for f in frames if f.can_id == 0x81] == [code]
