@@ -88,7 +88,7 @@ class Link:
             keepalive=settings.keepalive_s,
             timeout=ACKNOWLEDGE_WITHIN_S,
             max_inflight_messages=WINDOW,
-            tls_context=ssl.create_default_context(cafile=settings.ca_file) if settings.tls else None,
+            tls_context=tls_context(settings),
             logger=_quiet,
         )
         client.pending_calls_threshold = 2 * WINDOW
@@ -165,6 +165,11 @@ class Link:
         with suppress(MqttError, TimeoutError):
             async with asyncio.timeout(FAREWELL_WITHIN_S):
                 await self._publish(client, "state", self._words.death(reason), retain=True)
+
+
+def tls_context(settings: Mqtt) -> ssl.SSLContext | None:
+    """Return what `[mqtt] tls` and `ca_file` ask for; without a file, the system's authorities count."""
+    return ssl.create_default_context(cafile=settings.ca_file) if settings.tls else None
 
 
 def _first(group: BaseExceptionGroup[MqttError]) -> MqttError:

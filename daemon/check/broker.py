@@ -1,0 +1,44 @@
+"""The broker: whether it can be reached, and lets us in."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from typing import TYPE_CHECKING
+
+from aiomqtt import Client, MqttError
+
+from daemon.check.finding import Finding, good, wrong
+from daemon.publish.link import tls_context
+from daemon.publish.reasons import reason_of
+
+if TYPE_CHECKING:
+    from daemon.config import Configuration
+
+TIMEOUT_S = 5.0
+
+
+async def check_broker(configuration: Configuration) -> list[Finding]:
+    """Connect and leave again; nothing is published, and a running daemon is not disturbed."""
+    mqtt = configuration.mqtt
+    began = time.monotonic()
+    try:
+        password = mqtt.password_file.read_text().strip() if mqtt.password_file else None
+        client = Client(
+            mqtt.host,
+            mqtt.port,
+            username=mqtt.username,
+            password=password,
+            identifier=f"regolithd-check-{time.time_ns():x}",
+            timeout=TIMEOUT_S,
+            tls_context=tls_context(mqtt),
+        )
+        async with asyncio.timeout(2 * TIMEOUT_S), client:
+            took = time.monotonic() - began
+    except (MqttError, OSError) as error:  # OSError: the password file, the certificate, no answer
+        place, _, rest = reason_of(error, mqtt).partition(": ")
+        text, _, cure = rest.partition(". ")
+        return [wrong("broker", f"{place.removeprefix('MQTT broker ')}: {text}", cure)]
+    secured = "TLS" if mqtt.tls else "no TLS"
+    who = mqtt.username or "nobody in particular"
+    return [good("broker", f"{mqtt.host}:{mqtt.port} lets in {who}, {secured}, after {1e3 * took:.0f} ms")]

@@ -1,0 +1,125 @@
+"""The bus and its nodes: whether there is a link, up and at the right bit rate, and who answers."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from daemon.check.finding import Finding, good, unknown, warning, wrong
+from drivers.bus import open_bus
+from drivers.errors import BusError
+from drivers.probe import probe
+
+if TYPE_CHECKING:
+    from daemon.config import Bus, Configuration
+    from daemon.control.protocol import Status
+    from drivers.probe import Probe
+
+CAN_LINK = "280"  # ARPHRD_CAN, if_arp.h
+_LINKS = Path("/sys/class/net")
+_UP = 0x1  # IFF_UP
+
+
+async def check_bus(configuration: Configuration, running: Status | None) -> list[Finding]:
+    """Look at the link; then ask every node, or the running daemon, who already has."""
+    bus = configuration.bus
+    if bus.interface == "virtual":
+        return [unknown("bus", "in this process alone ([bus] interface): there is nobody to ask")]
+    link = check_link(bus, await _details(bus.channel)) if bus.interface == "socketcan" else []
+    if any(finding.verdict == "wrong" for finding in link):
+        return [*link, unknown("nodes", "they cannot be asked without the bus")]
+    if running is not None:
+        return [*link, *nodes_of_daemon(running)]
+    try:
+        async with open_bus(bus.interface, bus.channel, bitrate=bus.bitrate) as opened:
+            found = await probe(opened, configuration.nodes.described())
+    except BusError as error:
+        return [*link, wrong("bus", error.what, error.cure), unknown("nodes", "they cannot be asked without the bus")]
+    return [*(link or [good("bus", f"{bus.interface} {bus.channel} is open")]), *judge_nodes(found)]
+
+
+def check_link(bus: Bus, details: dict[str, Any]) -> list[Finding]:
+    """Look at the kernel's CAN link."""
+    folder = _LINKS / bus.channel
+    up = f"`sudo ip link set {bus.channel} up type can bitrate {bus.bitrate}`, or regolithd-can@{bus.channel}.service."
+    if not folder.exists():
+        there = [each.name for each in sorted(_LINKS.glob("*")) if _text(each / "type") == CAN_LINK]
+        others = f"there are {', '.join(there)}" if there else "there is no CAN link at all"
+        cure = "Is the adapter plugged in and its module loaded? Else mend [bus] channel."
+        return [wrong("bus", f"there is no link {bus.channel!r}; {others}", cure)]
+    if _text(folder / "type") != CAN_LINK:
+        return [wrong("bus", f"{bus.channel!r} is no CAN link", "Mend [bus] channel.")]
+    if not int(_text(folder / "flags") or "0", 16) & _UP:
+        return [wrong("bus", f"{bus.channel} is down", up)]
+    return [judge_link(bus, details)]
+
+
+def judge_link(bus: Bus, details: dict[str, Any]) -> Finding:
+    """Return what iproute2 says of a link that is up: bit rate, error state."""
+    kind = details.get("linkinfo", {})
+    data = kind.get("info_data", {})
+    bitrate = data.get("bittiming", {}).get("bitrate")
+    state = str(data.get("state", "")).lower()
+    if bitrate is not None and bitrate != bus.bitrate:
+        text = f"{bus.channel} runs at {bitrate} bit/s, [bus] bitrate says {bus.bitrate}"
+        cure = f"`sudo ip link set {bus.channel} down`, then up with the right one; or mend [bus] bitrate."
+        return wrong("bus", text, cure)
+    if state in {"bus-off", "error-passive", "error-warning"}:
+        cure = "Cable, termination (120 Ω at both ends), bit rate; nobody else on the bus?"
+        return (wrong if state == "bus-off" else warning)("bus", f"{bus.channel} is in state {state}", cure)
+    speed = f"{bitrate} bit/s" if bitrate else f"a {kind.get('info_kind', 'CAN')} link, which has no bit rate"
+    return good("bus", f"{bus.channel} is up: {speed}{', ' + state if state else ''}")
+
+
+async def _details(channel: str) -> dict[str, Any]:
+    """Return what `ip -details` knows; nothing where it is not installed."""
+    try:
+        process = await asyncio.create_subprocess_exec(
+            "ip", "-details", "-json", "link", "show", channel, stdout=-1, stderr=-1
+        )
+        out, _ = await process.communicate()
+        found = json.loads(out)
+    except (OSError, ValueError):
+        return {}
+    return found[0] if isinstance(found, list) and found and isinstance(found[0], dict) else {}
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text().strip()
+    except OSError:
+        return ""
+
+
+def judge_nodes(found: list[Probe]) -> list[Finding]:
+    """Return a line for each node that is not as it should be, and one for all that are."""
+    lines = [
+        (wrong if each.node.required else warning)(
+            f"node {each.node.node_id}", f"{each.node.kind.value}: {each.problem}", each.cure
+        )
+        for each in found
+        if each.problem
+    ]
+    well = Counter(each.node.kind.value for each in found if not each.problem)
+    if well:
+        kinds = ", ".join(f"{count} {kind}" for kind, count in well.items())
+        lines.insert(0, good("nodes", f"{well.total()} of {len(found)} answer and are who they should be: {kinds}"))
+    return lines
+
+
+def nodes_of_daemon(status: Status) -> list[Finding]:
+    """Return the same, as the running daemon says it: the bus is its own."""
+    lines = [
+        wrong(f"node {node.node_id}", f"{node.kind}: {node.text or node.phase}", "`regolithd status` shows it live.")
+        for node in status.nodes
+        if node.phase != "operational"
+    ]
+    count = len(status.nodes) - len(lines)
+    if count:
+        lines.insert(0, good("nodes", f"{count} of {len(status.nodes)} are operational, says the running daemon"))
+    if not status.nodes:
+        lines.append(wrong("nodes", f"the running daemon has none: bus {status.bus}", "See its journal."))
+    return lines

@@ -1,0 +1,48 @@
+"""The control socket: whether its group exists, you may command, and a daemon is running."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from typing import TYPE_CHECKING
+
+from daemon.check.finding import Finding, good, unknown, warning, wrong
+from daemon.control.client import EX_NOPERM, ControlError, conversation
+from daemon.control.protocol import Status, StatusRequest
+from daemon.control.socket import ControlSocketError, group_id
+
+if TYPE_CHECKING:
+    from daemon.config import Configuration
+
+
+async def running_daemon(configuration: Configuration) -> Status | ControlError | None:
+    """Return what the running daemon says of itself, why it may not be asked, or None where none is running."""
+    try:
+        async with asyncio.timeout(5), conversation(configuration.control.socket) as daemon:
+            daemon.ask(StatusRequest())
+            reply = await daemon.reply()
+    except ControlError as error:
+        return error if error.exit_status == EX_NOPERM else None
+    except (TimeoutError, ValueError):
+        return None
+    return reply if isinstance(reply, Status) else None
+
+
+def check_control(configuration: Configuration, running: Status | ControlError | None) -> list[Finding]:
+    """Return whether the rover can be commanded, and by you."""
+    control = configuration.control
+    try:
+        number = group_id(control.group)
+    except ControlSocketError as error:
+        what, _, cure = str(error).partition(". ")
+        return [wrong("control", what, cure)]
+    if isinstance(running, ControlError):
+        what, _, cure = str(running).partition(". ")
+        return [warning("control", what, cure)]
+    member = os.geteuid() == 0 or number in {*os.getgroups(), os.getegid()}
+    if not member:
+        cure = f"`sudo usermod -aG {control.group} $USER`, and log in anew."
+        return [warning("control", f"you are not in the group {control.group!r} and may not command the rover", cure)]
+    if running is None:
+        return [unknown("control", f"you may command; no daemon is running at {control.socket}")]
+    return [good("control", f"you may command; a daemon answers at {control.socket}")]

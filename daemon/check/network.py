@@ -1,0 +1,35 @@
+"""The terrain network: whether it loads, fits and runs."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+from daemon.check.finding import Finding, good, warning, wrong
+from daemon.estimate import SHIPPED_MODEL, ModelError, Network
+
+if TYPE_CHECKING:
+    from calibration.model_card import ModelCard
+    from daemon.config import Configuration
+
+
+async def check_network(configuration: Configuration) -> list[Finding]:
+    """Load it, run it once, and compare it with the rover."""
+    path = configuration.estimator.model or SHIPPED_MODEL
+    try:
+        network = await asyncio.to_thread(Network, path)  # it reads a file and runs the network
+    except ModelError as error:
+        return [wrong("model", str(error), "")]
+    return [judge_card(network.card, configuration)]
+
+
+def judge_card(card: ModelCard, configuration: Configuration) -> Finding:
+    """Return whether the network suits this rover."""
+    inputs = ", ".join(f"{each.name} {each.low:.4g} to {each.high:.4g} {each.unit}" for each in card.inputs)
+    share = configuration.rover.mass_kg * 9.81 / 6
+    for each in card.inputs:
+        if each.name == "load_N" and not each.low <= share <= each.high:
+            trained = f"{each.low:.3g} to {each.high:.3g} N"
+            text = f"{card.version}: a sixth of the rover weighs {share:.0f} N, it was trained for {trained}"
+            return warning("model", text, "Every estimate will be marked as outside: train one for this rover.")
+    return good("model", f"{card.version}; {inputs}")

@@ -1,0 +1,108 @@
+"""`regolithd check`: everything that is wrong with configuration, bus, nodes, broker, model, disks and clock."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from daemon.check.finding import Finding
+    from daemon.config import Configuration
+    from daemon.config_reader import ConfigurationError
+
+_STYLES = {"good": "green", "warning": "yellow", "wrong": "bold red", "not checked": "dim"}
+_MARKS = {"good": "✓", "warning": "!", "wrong": "✗", "not checked": "–"}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command()(check)
+
+
+def check(
+    *,
+    config: Annotated[Path, typer.Option(help="The configuration.")] = Path("/etc/regolithd/rover.toml"),
+    syntax: Annotated[bool, typer.Option("--syntax", help="The file alone: touch nothing else.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+) -> None:
+    """Say what is wrong and how to mend it. Nothing is changed or moved; a running daemon is not disturbed.
+
+    The exit status is 78 where the configuration cannot be used, 1 where anything else is wrong, and 0 otherwise.
+    """
+    from daemon.config_reader import EXIT_STATUS, ConfigurationError, read_configuration
+
+    try:
+        configuration = read_configuration(config)
+    except ConfigurationError as error:
+        _tell_problems(error, as_json=json)
+        raise typer.Exit(EXIT_STATUS) from error
+    if syntax:
+        typer.echo(f"{config}: good")
+        return
+    findings = _look(configuration, quiet=json)
+    _tell(findings, config, as_json=json)
+    raise typer.Exit(int(any(finding.verdict == "wrong" for finding in findings)))
+
+
+def _look(configuration: Configuration, *, quiet: bool) -> list[Finding]:
+    import asyncio
+
+    from rich.console import Console
+
+    from daemon.check.everything import check_everything
+
+    with Console(stderr=True, quiet=quiet).status("Looking at bus, nodes, model, broker, disks and clock …"):
+        return asyncio.run(check_everything(configuration))
+
+
+def _tell_problems(error: ConfigurationError, *, as_json: bool) -> None:
+    from json import dumps
+
+    if as_json:
+        typer.echo(dumps([{"subject": "configuration", "verdict": "wrong", "text": str(p)} for p in error.problems]))
+        return
+    for problem in error.problems:
+        typer.echo(str(problem), err=True)
+    count = len(error.problems)
+    typer.echo(f"{count} problem{'s' if count != 1 else ''}: nothing else was looked at.", err=True)
+
+
+def _tell(findings: list[Finding], config: Path, *, as_json: bool) -> None:
+    from dataclasses import asdict
+    from json import dumps
+
+    from rich.console import Console
+
+    if as_json:
+        typer.echo(dumps([asdict(finding) for finding in findings], indent=2))
+        return
+    console = Console()
+    console.print(_table(findings, config))
+    wrong = sum(finding.verdict == "wrong" for finding in findings)
+    warnings = sum(finding.verdict == "warning" for finding in findings)
+    if wrong:
+        console.print(f"[bold red]{wrong} wrong[/], {warnings} to think about.", highlight=False)
+    elif warnings:
+        console.print(f"[yellow]Nothing wrong, {warnings} to think about.[/]")
+    else:
+        console.print("[green]Nothing wrong.[/]")
+
+
+def _table(findings: list[Finding], config: Path) -> Table:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table("", "what", "found, and how to mend it", box=box.SIMPLE_HEAD, expand=True)
+    table.add_row(Text(_MARKS["good"], style="green"), "configuration", str(config))
+    for finding in findings:
+        style = _STYLES[finding.verdict]
+        text = Text(finding.text, style="" if finding.verdict == "good" else style)
+        if finding.cure:
+            text.append(f"\n→ {finding.cure}", style="default not bold")
+        table.add_row(Text(_MARKS[finding.verdict], style=style), finding.subject, text)
+    return table
