@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
+from contextlib import suppress
 from typing import Any
 
 import can
@@ -20,6 +21,7 @@ from drivers.frame import Frame
 
 _RECV_TIMEOUT_S = 0.05  # how long closing may take
 _SEND_TIMEOUT_S = 0.1
+_REOPEN_S = 1.0
 _MOST_AT_ONCE = 1000  # frames handed over together
 
 
@@ -28,14 +30,8 @@ class AdapterBus(Bus):
 
     def __init__(self, interface: str, channel: str, *, bitrate: int | None = None) -> None:
         super().__init__(interface, channel)
-        settings: dict[str, Any] = {} if bitrate is None else {"bitrate": bitrate}
-        try:
-            self._bus = can.Bus(channel=channel, interface=interface, receive_own_messages=True, **settings)
-        except (can.CanError, OSError, ValueError, TypeError) as error:
-            raise BusOpenError(
-                f"cannot open channel {channel!r} of interface {interface!r}: {error}",
-                cure="`python -m can.viewer --help` lists the interfaces; is the adapter plugged in?",
-            ) from error
+        self._settings: dict[str, Any] = {} if bitrate is None else {"bitrate": bitrate}
+        self._bus = self._open()
         self._loop = asyncio.get_running_loop()
         self._may_read = threading.Event()
         self._may_read.set()
@@ -66,7 +62,8 @@ class AdapterBus(Bus):
         self._closing.set()
         self._may_read.set()
         self._thread.join(timeout=1.0)
-        self._bus.shutdown()
+        with suppress(can.CanError, OSError):
+            self._bus.shutdown()
 
     def pause_reading(self) -> None:
         """Leave frames to the adapter's own queue."""
@@ -76,25 +73,53 @@ class AdapterBus(Bus):
         """Read on."""
         self._may_read.set()
 
+    def _open(self) -> can.BusABC:
+        try:
+            return can.Bus(channel=self.channel, interface=self.interface, receive_own_messages=True, **self._settings)
+        except (can.CanError, OSError, ValueError, TypeError) as error:
+            raise BusOpenError(
+                f"cannot open channel {self.channel!r} of interface {self.interface!r}: {error}",
+                cure="Is the adapter plugged in? These interfaces there are: "
+                + ", ".join(sorted(can.VALID_INTERFACES)),
+            ) from error
+
     def _read(self) -> None:
-        """Run in the thread: block for one frame, drain what else is there, hand it over."""
+        """Run in the thread: read until closed; an adapter that vanishes is waited for."""
         while not self._closing.is_set():
             self._may_read.wait()
             try:
-                message = self._bus.recv(_RECV_TIMEOUT_S)
-                batch = []
-                while message is not None:
-                    batch.append(_frame(message))
-                    message = self._bus.recv(0) if len(batch) < _MOST_AT_ONCE else None
+                batch = self._read_batch()
             except (can.CanError, OSError):
-                if not self._closing.is_set():
-                    self._call(self.change_state, BusState.DOWN)
-                return
-            if batch:
-                self._call(self._take, batch)
+                self._reopen()
+            else:
+                if batch:
+                    self._call(self._take, batch)
+
+    def _read_batch(self) -> list[Frame]:
+        """Block for one frame, then drain what else is there."""
+        message = self._bus.recv(_RECV_TIMEOUT_S)
+        batch = []
+        while message is not None:
+            batch.append(_frame(message))
+            message = self._bus.recv(0) if len(batch) < _MOST_AT_ONCE else None
+        return batch
+
+    def _reopen(self) -> None:
+        self._call(self.change_state, BusState.DOWN)
+        with suppress(can.CanError, OSError):
+            self._bus.shutdown()
+        while not self._closing.wait(_REOPEN_S):
+            try:
+                self._bus = self._open()
+            except BusOpenError:
+                continue
+            self._call(self.change_state, BusState.ACTIVE)
+            return
 
     def _take(self, batch: list[Frame]) -> None:
-        self.counters.errors["adapter"] += sum(frame.error for frame in batch)
+        for frame in batch:
+            if frame.error:
+                self.counters.errors["adapter"] += 1  # python-can does not say which
         self.deliver(batch)
 
     def _call(self, function: object, *arguments: object) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field, fields
 
 
 @dataclass(slots=True)
@@ -25,6 +25,5 @@ class BusCounters:
 
     def as_dict(self) -> dict[str, int]:
         """Return all counts flat, for messages and logs: error frames as `error_…`."""
-        flat = asdict(self)
-        errors = flat.pop("errors")
-        return flat | {f"error_{name}": count for name, count in errors.items()}
+        flat = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "errors"}
+        return flat | {f"error_{name}": count for name, count in self.errors.items()}

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from drivers import errors, pdo
 from drivers.bus import BusState
 from drivers.configuration import configuration
+from drivers.counters import BusCounters
 from drivers.emcy import error_text
 from drivers.error_frame import error_classes, reported_state
 from drivers.errors import BusDownError, DictionaryError, DriverError, SdoTimeoutError
@@ -45,6 +46,15 @@ def test_jitter_is_the_spread_of_the_lateness() -> None:
         counters.count(late)
     assert (counters.produced, counters.worst_late_ns, counters.mean_late_ns) == (3, 600, 300.0)
     assert counters.jitter_ns == pytest.approx(216.02469)
+
+
+def test_counters_are_flat_numbers() -> None:
+    """As messages want them; error frames by class beside the rest."""
+    counters = BusCounters(received=3, kernel_drops=2)
+    counters.errors.update(["bus-off", "bus-off"])
+    flat = counters.as_dict()
+    assert (flat["received"], flat["kernel_drops"], flat["error_bus-off"]) == (3, 2, 2)
+    assert "errors" not in flat
 
 
 @pytest.mark.parametrize(
