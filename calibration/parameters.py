@@ -10,6 +10,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
+Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Efficiency = Annotated[float, Field(gt=0, le=1)]
@@ -23,6 +24,7 @@ def _one_or_six(value: object) -> object:
 SixNotNegative = Annotated[
     tuple[NotNegative, NotNegative, NotNegative, NotNegative, NotNegative, NotNegative], BeforeValidator(_one_or_six)
 ]
+SixNumbers = Annotated[tuple[Number, Number, Number, Number, Number, Number], BeforeValidator(_one_or_six)]
 SixPositive = Annotated[tuple[Positive, Positive, Positive, Positive, Positive, Positive], BeforeValidator(_one_or_six)]
 
 
@@ -51,6 +53,7 @@ class Drivetrain(Table):
     viscous_current_A_s_per_rad: SixNotNegative = (0.0,) * 6
     viscous_current_std_A_s_per_rad: SixNotNegative = (0.0,) * 6
     gain_factor: SixPositive = (1.0,) * 6
+    gain_factor_std: SixNotNegative = (0.0,) * 6
 
     @property
     def ratio(self) -> float:
@@ -63,10 +66,20 @@ class Drivetrain(Table):
         return self.torque_constant_Nm_per_A * self.ratio * self.planetary_efficiency * self.harmonic_efficiency
 
 
+class LoadCells(Table):
+    """What the bench found of the load cells: load = `span` × (reading − `zero_N`), six values or one for all."""
+
+    zero_N: SixNumbers = (0.0,) * 6
+    zero_std_N: SixNotNegative = (0.0,) * 6
+    span: SixPositive = (1.0,) * 6
+    span_std: SixNotNegative = (0.0,) * 6
+
+
 class Wheel(Table):
     """A rigid, smooth wheel."""
 
     radius_m: Positive = 0.075
+    radius_std_m: NotNegative = 0.0
     width_m: Positive = 0.07
 
 

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from calibration.parameters import Drivetrain, Positive, Rover, Table, Wheel
+from calibration.parameters import Drivetrain, LoadCells, Positive, Rover, Table, Wheel
 from drivers.signals import NodeDescription, NodeKind
 
 NodeId = Annotated[int, Field(ge=1, le=126, strict=True)]
@@ -135,6 +135,7 @@ class Configuration(Table):
     sync: SyncTiming = SyncTiming()
     nodes: Nodes = Nodes()
     wheel: Wheel = Wheel()
+    load_cells: LoadCells = LoadCells()
     drivetrain: Drivetrain = Drivetrain()
     slip: Slip = Slip()
     smoothing: Smoothing = Smoothing()

@@ -26,6 +26,8 @@ class Pipeline:
 
     def __init__(self, configuration: Configuration, network: Network) -> None:
         self._drivetrain = configuration.drivetrain
+        self._load_zero_N = np.array(configuration.load_cells.zero_N)
+        self._load_span = np.array(configuration.load_cells.span)
         self._radius_m = configuration.wheel.radius_m
         self._slip = configuration.slip
         self._network = network
@@ -42,7 +44,8 @@ class Pipeline:
         torque = wheel_torque(snapshot.motor_current_A, snapshot.motor_speed_rad_s, self._drivetrain)
         turning = np.abs(direction) == 1
         measured = wheel_slip(speed, snapshot.ground_speed_m_s, self._radius_m, turning)
-        raw = np.stack([np.where(turning, torque * direction, np.nan), snapshot.load_N, measured])
+        load = self._load_span * (snapshot.load_N - self._load_zero_N)
+        raw = np.stack([np.where(turning, torque * direction, np.nan), load, measured])
         driving, load, slip = self._smoother.step(snapshot.time_ns, raw)
         slip, source = choose_slip(slip, self._slip.constant, turning)
         terrain = self._network.estimate(self._inputs(driving, load, slip, np.abs(speed)))

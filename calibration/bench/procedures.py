@@ -49,6 +49,10 @@ class LoadCell:
     span: float
     span_std: float
 
+    def line(self, known_N: Array) -> Array:
+        """Return the reading that a load gives [N]."""
+        return self.zero_N + known_N / self.span
+
 
 @dataclass(frozen=True, slots=True)
 class NoLoad:
@@ -59,6 +63,10 @@ class NoLoad:
     viscous_A_s_per_rad: float
     viscous_std_A_s_per_rad: float
 
+    def line(self, motor_speed_rad_s: Array) -> Array:
+        """Return the current that a speed takes [A]."""
+        return np.sign(motor_speed_rad_s) * self.coulomb_A + self.viscous_A_s_per_rad * motor_speed_rad_s
+
 
 @dataclass(frozen=True, slots=True)
 class Gain:
@@ -68,6 +76,11 @@ class Gain:
     factor_std: float
     no_load_A: float
     no_load_std_A: float
+    slope_A_per_Nm: float
+
+    def line(self, torque_Nm: Array) -> Array:
+        """Return the current that a torque takes [A]."""
+        return self.no_load_A + self.slope_A_per_Nm * torque_Nm
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +126,7 @@ def brake(brake_torque_Nm: Array, motor_current_A: Array, gain_Nm_per_A: float) 
     if line.slope <= 0:
         raise BenchError("the current does not grow with the brake's torque")
     factor = 1 / (line.slope * gain_Nm_per_A)
-    return Gain(factor, factor * line.slope_std / line.slope, line.offset, line.offset_std)
+    return Gain(factor, factor * line.slope_std / line.slope, line.offset, line.offset_std, line.slope)
 
 
 def radius(
