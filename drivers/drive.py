@@ -28,6 +28,7 @@ ERROR_CODE = 0x603F
 _RPM_PER_RAD_S = 60.0 / (2.0 * math.pi)
 _ENABLE_TIMEOUT_S = 3.0
 _STOP_TIMEOUT_S = 3.0
+_HEED_S = 0.2  # a drive that is still enabled this long after the quick stop has not got it
 _POLL_S = 0.02
 _STOPPED = (DriveState.SWITCH_ON_DISABLED, DriveState.READY, DriveState.SWITCHED_ON, DriveState.FAULT)
 
@@ -100,16 +101,19 @@ class Drive:
         await self._command(Controlword.QUICK_STOP, 0)
 
     async def until_stopped(self) -> None:
-        """Wait until the drive has stopped after a quick stop.
+        """Wait until the drive has stopped after a quick stop; one that does not heed the PDO is told by SDO as well.
 
         Raises
         ------
         DriveError
             It has not, in time.
         """
-        deadline = asyncio.get_running_loop().time() + _STOP_TIMEOUT_S
+        begun = asyncio.get_running_loop().time()
         while await self.ask() not in _STOPPED and not (self.state is DriveState.QUICK_STOP and self._standing()):
-            if asyncio.get_running_loop().time() > deadline:
+            waited_s = asyncio.get_running_loop().time() - begun
+            if self.state is DriveState.ENABLED and waited_s > _HEED_S:
+                await self._write_controlword(Controlword.QUICK_STOP)
+            if waited_s > _STOP_TIMEOUT_S:
                 raise self._error(f"does not stop: it is in {self.state}", "Cut the motors' supply")
             await asyncio.sleep(_POLL_S)
 
