@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING
 
 from drivers.boot_reason import BootReason
 from drivers.configuration import Write, configuration
-from drivers.dictionary import variable
+from drivers.dictionary import object_dictionary
 from drivers.errors import (
     BootError,
     BusError,
+    DictionaryError,
     DriverError,
     SdoAbortError,
     SdoInterruptedError,
@@ -61,6 +62,14 @@ async def boot(link: Link, settings: BootSettings) -> Identity:
     """
     try:
         return await _Boot(link, settings).run()
+    except DictionaryError as error:
+        raise BootError(
+            BootReason.UNUSABLE_EDS,
+            error.what,
+            node_id=link.node.node_id,
+            index=error.index,
+            subindex=error.subindex,
+        ) from error
     except BusError as error:
         raise BootError(BootReason.BUS_DOWN, error.what, node_id=link.node.node_id) from error
 
@@ -80,28 +89,24 @@ async def read_identity(link: Link) -> Identity:
 
 def compare_identity(node: NodeDescription, found: Identity) -> tuple[BootReason, str] | None:
     """Return in what a node is not the one that its EDS and description say, or None."""
-    expected = Identity(
-        device_type=_expected(node, DEVICE_TYPE),
-        vendor=_expected(node, IDENTITY, 1),
-        product=_expected(node, IDENTITY, 2),
-        revision=_expected(node, IDENTITY, 3),
-        serial=found.serial if node.serial is None else node.serial,
-    )
+    all_bits = 0xFFFFFFFF
     checks = (
-        (BootReason.WRONG_DEVICE_TYPE, "device type", found.device_type, expected.device_type),
-        (BootReason.WRONG_VENDOR, "vendor", found.vendor, expected.vendor),
-        (BootReason.WRONG_PRODUCT, "product code", found.product, expected.product),
-        (BootReason.WRONG_REVISION, "major revision", found.revision & _MAJOR, expected.revision & _MAJOR),
-        (BootReason.WRONG_SERIAL, "serial number", found.serial, expected.serial),
+        (BootReason.WRONG_DEVICE_TYPE, "device type", found.device_type, _expected(node, DEVICE_TYPE), all_bits),
+        (BootReason.WRONG_VENDOR, "vendor", found.vendor, _expected(node, IDENTITY, 1), all_bits),
+        (BootReason.WRONG_PRODUCT, "product code", found.product, _expected(node, IDENTITY, 2), all_bits),
+        (BootReason.WRONG_REVISION, "major revision", found.revision, _expected(node, IDENTITY, 3), _MAJOR),
+        (BootReason.WRONG_SERIAL, "serial number", found.serial, node.serial, all_bits),
     )
-    for reason, name, value, wanted in checks:
-        if value != wanted:
-            return reason, f"its {name} is 0x{value:08X}, expected 0x{wanted:08X} ({node.kind.value})"
+    for reason, name, value, wanted, mask in checks:
+        if wanted is not None and (value ^ wanted) & mask:
+            return reason, f"its {name} is 0x{value & mask:08X}, expected 0x{wanted & mask:08X} ({node.kind.value})"
     return None
 
 
-def _expected(node: NodeDescription, index: int, subindex: int = 0) -> int:
-    return variable(node.kind, index, subindex).default or 0
+def _expected(node: NodeDescription, index: int, subindex: int = 0) -> int | None:
+    """Return what the EDS says, or None where it says nothing."""
+    entry = object_dictionary(node.kind).get_variable(index, subindex)
+    return None if entry is None else entry.default
 
 
 class _Boot:
@@ -176,12 +181,14 @@ class _Boot:
     async def _write(self, write: Write) -> None:
         sdo = self._link.sdo
         index, subindex = write.index, write.subindex
-        present = await sdo.read_number(index, subindex) if write.keep else 0
-        if not (write.keep and present & write.mask == write.value):
+        look_first = write.keep or write.read_only
+        present = await sdo.read_number(index, subindex) if look_first else 0
+        if not write.read_only and not (look_first and present & write.mask == write.value & write.mask):
             await sdo.write(index, subindex, write.data(present))
             present = await sdo.read_number(index, subindex, signed=write.signed)
         if present & write.mask != write.value & write.mask:
-            what = f"wrote 0x{write.value:X}, reads back 0x{present & write.mask:X}"
+            done = "must be" if write.read_only else "was set to"
+            what = f"{done} 0x{write.value:X}, and reads 0x{present & write.mask:X}"
             raise BootError(
                 BootReason.CONFIGURATION_NOT_KEPT,
                 what,

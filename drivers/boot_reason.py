@@ -22,6 +22,7 @@ class BootReason(StrEnum):
     MALFORMED_ANSWER = "malformed-answer"  # its SDO answers are not CiA 301's
     NO_HEARTBEAT = "no-heartbeat"  # K: it was told to produce one
     NOT_OPERATIONAL = "not-operational"  # it does not enter operational
+    UNUSABLE_EDS = "unusable-eds"  # the EDS lacks an object that the driver needs
     BUS_DOWN = "bus-down"  # nothing can be sent
 
 
@@ -40,5 +41,6 @@ CURES = {
     BootReason.MALFORMED_ANSWER: "Two devices may share this node-ID, or its firmware breaks CiA 301",
     BootReason.NO_HEARTBEAT: "It takes a heartbeat time and sends none: check its firmware",
     BootReason.NOT_OPERATIONAL: "It may refuse because of an error of its own: see its emergency messages",
+    BootReason.UNUSABLE_EDS: "Put the device's own EDS in place; it must list what the driver configures",
     BootReason.BUS_DOWN: "Bring the link up: `ip link set can0 up type can bitrate 1000000 restart-ms 100`",
 }

@@ -7,7 +7,7 @@ default.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from drivers.cia402 import PROFILE_VELOCITY
@@ -32,19 +32,29 @@ _SYNC_BITS = 0x400007FF  # identifier, and that the node produces no SYNC itself
 _EMCY_BITS = 0x800007FF  # identifier, and that it is valid
 _PDOS = 512  # of each direction (CiA 301)
 
-# A drive that loses its master, or is told to quick-stop, brakes with the quick-stop ramp and switches itself off.
-_DRIVE_SETTINGS = (
-    (0x6060, PROFILE_VELOCITY),  # modes of operation
-    (0x6007, 3),  # abort connection option code: quick stop
-    (0x605A, 2),  # quick stop option code: quick-stop ramp, then switch-on disabled
-)
+# What else a kind of node must be told, or must be: (index, subindex, value). What its EDS lacks is left out; what it
+# says cannot be written is only compared, because a wrong unit would be a wrong measurement that looks right.
+_SETTINGS: dict[NodeKind, tuple[tuple[int, int, int], ...]] = {
+    NodeKind.MOTOR: (
+        (0x6060, 0, PROFILE_VELOCITY),  # modes of operation
+        (0x6007, 0, 3),  # on the master's loss: quick stop
+        (0x605A, 0, 2),  # quick stop: brake with the quick-stop ramp, then switch-on disabled
+    ),
+    NodeKind.LOAD_CELL: (
+        (0x6112, 1, 1),  # operating mode: on
+        (0x6131, 1, 0x00210000),  # unit of the process value (CiA 303-2): newton
+        (0x6132, 1, 2),  # decimal digits: 0.01 N
+    ),
+    NodeKind.INCLINOMETER: ((0x6000, 0, 10),),  # resolution: 0.01°
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Write:
     """One object to be written and read back; of what is read back, `mask` must equal `value`.
 
-    `keep` leaves the bits outside `mask` as the node has them: the value is read first.
+    `keep` reads the value first: what is right already is not written, and bits outside `mask` stay as the node has
+    them. `read_only` is compared, and never written.
     """
 
     index: int
@@ -54,6 +64,7 @@ class Write:
     size: int  # bytes
     signed: bool = False
     keep: bool = False
+    read_only: bool = False
 
     def data(self, present: int = 0) -> bytes:
         """Return the bytes to write, where the node has `present`."""
@@ -79,9 +90,11 @@ def _writes(node: NodeDescription, heartbeat_s: float, master_id: int, master_lo
         yield _switch_off(index)
     for pdo in used:
         yield from _pdo(kind, pdo, node.node_id)
+    for index, subindex, value in _SETTINGS.get(kind, ()):
+        entry = object_dictionary(kind).get_variable(index, subindex)
+        if entry is not None:
+            yield replace(_write(kind, index, subindex, value), read_only=not entry.writable)
     if kind is NodeKind.MOTOR:
-        for index, value in _DRIVE_SETTINGS:
-            yield _write(kind, index, 0, value)
         consumer = master_id << 16 | round(master_lost_after_s * 1000)
         yield _write(kind, CONSUMER_HEARTBEAT, 1, consumer)
     yield _write(kind, PRODUCER_HEARTBEAT, 0, round(heartbeat_s * 1000))

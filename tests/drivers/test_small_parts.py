@@ -17,8 +17,10 @@ from drivers.emcy import error_text
 from drivers.error_frame import error_classes, reported_state
 from drivers.errors import BusDownError, DictionaryError, DriverError, SdoTimeoutError
 from drivers.frame import Frame
+from drivers.load import bus_load, frame_bits
 from drivers.signals import NodeDescription, NodeKind
 from drivers.sync import SyncCounters
+from drivers.virtual.rover import KAPVIK
 
 
 def test_a_message_says_where_what_and_the_cure() -> None:
@@ -118,6 +120,26 @@ def test_a_pdo_is_set_up_in_the_standard_s_order() -> None:
     unused = [write.index for write in writes if write.subindex == 1 and write.keep]
     assert {0x1801, 0x1802, 0x1803, 0x1401, 0x1402, 0x1403} <= set(unused)
     assert (0x1016, 1, 127 << 16 | 500) in [(write.index, write.subindex, write.value) for write in writes]
+
+
+def test_units_are_set_or_compared() -> None:
+    """A sensor that measures in another unit is refused, not misread."""
+    of = {
+        kind: configuration(NodeDescription(9, kind, 0), heartbeat_s=0.2, master_id=127, master_lost_after_s=0.5)
+        for kind in NodeKind
+    }
+    resolution = next(write for write in of[NodeKind.INCLINOMETER] if write.index == 0x6000)
+    assert (resolution.value, resolution.read_only) == (10, False)
+    digits = next(write for write in of[NodeKind.LOAD_CELL] if write.index == 0x6132)
+    assert (digits.value, digits.read_only) == (2, True)
+
+
+def test_the_load_of_the_bus_is_known_beforehand() -> None:
+    """Worst-case bits by the published formula; Kapvik's fourteen nodes at 100 Hz take a fifth of 1 Mbit/s."""
+    assert [frame_bits(size) for size in (0, 1, 8)] == [55, 65, 135]
+    share = bus_load(KAPVIK, sync_rate_Hz=100.0, bitrate=1_000_000)
+    assert share == pytest.approx((55 + 6 * 135 + 6 * 105 + 115 + 105) * 100e-6 + 65 * 80e-6)
+    assert bus_load(KAPVIK, sync_rate_Hz=200.0, bitrate=125_000) > 1.0
 
 
 def test_a_valid_pdo_keeps_its_identifier_while_it_is_switched_off() -> None:
