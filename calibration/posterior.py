@@ -118,6 +118,8 @@ class Estimator:
         options.inter_op_num_threads = 1
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         self._session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        # One trained without classes of soil takes the numbers before them, and is told of none.
+        self._known = {each.name: each.shape for each in self._session.get_inputs()}["known"][1]
         metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
         try:
             targets = json.loads(metadata["regolithd.targets"])
@@ -132,7 +134,7 @@ class Estimator:
 
     def mixtures(self, windows: Windows) -> Mixture:
         """Return the posterior of each window."""
-        inputs = {"wheels": windows.wheels, "mask": windows.mask, "known": windows.known}
+        inputs = {"wheels": windows.wheels, "mask": windows.mask, "known": windows.known[:, : self._known]}
         (raw,) = self._session.run(None, {name: value.astype(np.float32) for name, value in inputs.items()})
         return unpack(raw, self._centre, self._unit)
 

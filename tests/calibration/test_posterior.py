@@ -6,10 +6,10 @@ import pytest
 
 from calibration.mixture import PARAMETERS, unpack
 from calibration.parameters import Drivetrain, Wheel
-from calibration.posterior import Buffer
-from calibration.posterior_training import apply, fit, freeze, simulate
+from calibration.posterior import Buffer, Estimator
+from calibration.posterior_training import apply, freeze, initial, scaling, simulate
 from calibration.rovers import TABLE_4_CURRENT, draw_rovers, drive, table_4_noise
-from calibration.window import reduce_windows
+from calibration.window import KNOWN_HIGH, Knowledge, reduce_windows
 
 
 def raw_mixture(rows: int = 3, components: int = 4) -> np.ndarray:
@@ -74,9 +74,9 @@ def test_simulated_currents_are_as_noisy_as_the_table_says() -> None:
 
 
 def test_the_onnx_graph_is_the_trained_network() -> None:
-    """After a brief training, ONNX gives the same mixture parameters as the layers that were trained."""
+    """ONNX, with the scaling inside, gives the same mixture parameters as the layers that are trained."""
     examples = simulate(400, np.random.default_rng(0))
-    parameters, by = fit(examples, 0, 400, batch=16)
+    parameters, by = initial(np.random.default_rng(0)), scaling(examples)
     model = freeze(parameters, by, 0.075)
     session = onnxruntime.InferenceSession(model.SerializeToString())
     windows = examples.windows
@@ -84,3 +84,45 @@ def test_the_onnx_graph_is_the_trained_network() -> None:
     (raw,) = session.run(None, {name: value.astype(np.float32) for name, value in inputs.items()})
     scaled = ((windows.wheels - by.wheels[0]) / by.wheels[1], windows.mask, (windows.known - by.known[0]) / by.known[1])
     np.testing.assert_allclose(raw, apply(parameters, *scaled), atol=1e-3)
+
+
+@pytest.fixture(scope="module")
+def estimator() -> Estimator:
+    """Return the posterior that ships."""
+    return Estimator()
+
+
+def window(instants: int) -> np.ndarray:
+    """Return a window of sandy loam under six wheels: 49 N, slip 0.025, 0.3 N·m."""
+    values = np.broadcast_to(np.array([49.0, 0.025, 0.2976])[:, None, None], (3, instants, 6)).copy()
+    values[2] *= np.random.default_rng(0).normal(1, 0.35, (instants, 6))
+    return values
+
+
+def test_more_data_narrow_the_posterior_and_less_knowledge_widens_it(estimator: Estimator) -> None:
+    """Ten seconds of six wheels say more than an instant of one, and a drivetrain badly known takes it away again."""
+    one = window(1)
+    one[:, :, 1:] = np.nan
+    beliefs = [
+        estimator.believe(one, Knowledge()),
+        estimator.believe(window(20), Knowledge()),
+        estimator.believe(window(20), Knowledge(*KNOWN_HIGH.tolist())),
+    ]
+    single, full, vague = (b.cohesion_Pa.high_90 - b.cohesion_Pa.low_90 for b in beliefs if b is not None)
+    assert full < single
+    assert full < vague
+
+
+def test_the_posterior_knows_sandy_loam_from_lete_sand(estimator: Estimator) -> None:
+    """At the same load and slip, half the torque means less cohesion."""
+    strong, weak = window(20), window(20)
+    weak[2] /= 2
+    beliefs = [estimator.believe(each, Knowledge()) for each in (strong, weak)]
+    means = [belief.cohesion_Pa.mean for belief in beliefs if belief is not None]
+    assert means[1] < 0.7 * means[0]
+
+
+def test_no_measurement_is_no_belief(estimator: Estimator) -> None:
+    """An empty window, or one of NaN, has nothing to say."""
+    assert estimator.believe(np.empty((3, 0, 6)), Knowledge()) is None
+    assert estimator.believe(np.full((3, 5, 6), np.nan), Knowledge()) is None

@@ -1,0 +1,33 @@
+"""Training the posterior learns something, from the command to the file that the rover loads."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from calibration.evaluation.estimators import Case, answers
+from calibration.posterior import Estimator
+
+
+@pytest.mark.timeout(600)
+def test_a_brief_training_already_beats_the_prior(tmp_path: Path) -> None:
+    """After 600 steps on 10 000 rovers, ten seconds of six wheels say more than the prior."""
+    out = tmp_path / "posterior.onnx"
+    command = [
+        sys.executable,
+        "-m",
+        "daemon",
+        "train-posterior",
+        "--rovers",
+        "10000",
+        "--steps",
+        "600",
+        "--out",
+        str(out),
+    ]
+    subprocess.run(command, check=True, cwd=Path(__file__).parents[2])
+    found = answers(1000, Case(), 5, Estimator(out))
+    error = np.sqrt(np.mean((found.methods["posterior"][:, 0] - found.truth[:, 0]) ** 2))
+    assert error < 0.9 * found.truth[:, 0].std()
