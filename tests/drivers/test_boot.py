@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from rig import rig
 
 from drivers.boot_reason import CURES, BootReason
+from drivers.errors import DictionaryError
 from drivers.events import NodeBooted, NodeBootFailed
 from drivers.network import NodePhase
 from drivers.signals import NodeDescription, NodeKind
@@ -75,6 +78,30 @@ async def test_a_missing_node_is_told_once_and_the_others_boot() -> None:
         await r.until_told(NodeBooted, node_id=11)
         await r.until_attempts(4, 3)
         assert [event.reason for event in r.told(NodeBootFailed)] == [BootReason.NO_BOOT_UP]
+
+
+async def test_a_sensor_in_another_unit_is_refused_not_misread() -> None:
+    """A load cell whose process value has three decimal digits would be read ten times too large."""
+    async with rig([LOAD_CELL], tell=["off 11"]) as r:
+        objects = r.rover.nodes[11].dictionary
+        objects.entries = {**objects.entries, (0x6132, 1): replace(objects.entries[0x6132, 1], default=3)}
+        r.rover.tell("on 11")
+        failed = await r.until_told(NodeBootFailed, reason=BootReason.CONFIGURATION_NOT_KEPT)
+        assert "object 0x6132:01: must be 0x2, and reads 0x3" in failed.text
+
+
+async def test_an_eds_that_lacks_an_object_is_a_reason_and_no_crash(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The daemon goes on with the others."""
+
+    def lacking(*_: object, **__: object) -> None:
+        raise DictionaryError("the EDS of motor nodes has no such object", index=0x1017)
+
+    monkeypatch.setattr("drivers.boot.configuration", lacking)
+    async with rig([MOTOR]) as r:
+        failed = await r.until_told(NodeBootFailed)
+        assert failed.reason is BootReason.UNUSABLE_EDS
+        assert "0x1017" in failed.text
+        assert not r.running.done()
 
 
 def test_every_reason_has_a_cure() -> None:
