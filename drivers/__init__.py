@@ -4,7 +4,7 @@ Nothing here knows what soil is, or where the values go afterwards. From the wir
 
 | file | reads beside | is |
 |---|---|---|
-| `frame`, `bus`, `socketcan`, `kernel_batch`, `adapter`, `error_frame`, `counters` | linux/can.rst, linux/can/error.h | frames in and out |
+| `frame`, `bus`, `socketcan`, `kernel_batch`, `adapter`, `error_frame`… | linux/can.rst | frames, in and out |
 | `nmt`, `heartbeat`, `sync`, `timer`, `emcy`, `sdo`, `sdo_client`, `pdo` | CiA 301 | one service each |
 | `dictionary`, `eds/` | CiA 306 | what a node has |
 | `cia402`, `drive`, `motion` | CiA 402-2 | the motor controllers: the state machine, one drive, all of them |
