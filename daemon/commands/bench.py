@@ -10,6 +10,7 @@ import typer
 
 if TYPE_CHECKING:
     from daemon.scenario import Scenario
+    from drivers.virtual import VirtualRover
 
 _CONTROL = Path(tempfile.gettempdir()) / "regolithd-bench.sock"
 
@@ -27,6 +28,7 @@ def bench(
     channel: Annotated[str, typer.Option(help="Such as vcan0 or can0.")] = "vcan0",
     interface: Annotated[str, typer.Option(help="Any interface of python-can.")] = "socketcan",
     scenario: Annotated[Path | None, typer.Option(help="TOML: soils along the way, noise, friction, seed.")] = None,
+    config: Annotated[Path | None, typer.Option(help="A rover.toml whose [nodes] are to be on the bus.")] = None,
     soil: Annotated[list[str] | None, typer.Option(help="A soil, or several 5 m each; instead of the file's.")] = None,
     seed: Annotated[int | None, typer.Option(help="Same seed, same ground and noise.")] = None,
     even: Annotated[bool, typer.Option("--even", help="No noise at all.")] = False,
@@ -40,12 +42,16 @@ def bench(
     import asyncio
     import json
 
+    from daemon.start_up import configuration_or_exit
+    from daemon.virtual_rover import VirtualWorld
     from drivers.errors import BusError
+    from drivers.virtual import KAPVIK, VirtualRover
     from drivers.virtual.control import ControlError
 
     settings = _scenario(scenario, soil or [], seed, even=even)
+    nodes = KAPVIK if config is None else configuration_or_exit(config).nodes.described()
     try:
-        counts = asyncio.run(_run(interface, channel, settings, control, seconds))
+        counts = asyncio.run(_run(interface, channel, VirtualRover(VirtualWorld(settings), nodes), control, seconds))
     except (BusError, ControlError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error
@@ -95,17 +101,14 @@ def _scenario(path: Path | None, soils: list[str], seed: int | None, *, even: bo
 
 
 async def _run(
-    interface: str, channel: str, scenario: Scenario, control: Path, seconds: float
+    interface: str, channel: str, rover: VirtualRover, control: Path, seconds: float
 ) -> dict[str, dict[str, int]]:
     import asyncio
     import signal
 
-    from daemon.virtual_rover import VirtualWorld
     from drivers.bus import open_bus
-    from drivers.virtual import VirtualRover
     from drivers.virtual.control import control_socket
 
-    rover = VirtualRover(VirtualWorld(scenario))
     ended = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, ended.set)

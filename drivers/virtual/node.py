@@ -346,6 +346,8 @@ class VirtualNode:
             raise AbortError(Abort.HARDWARE)
         if index == emcy.HISTORY and value:
             raise AbortError(Abort.INVALID_VALUE)
+        if index == emcy.COB_ID_OBJECT and not pdo.usable(value):
+            raise AbortError(Abort.INVALID_VALUE)
         if index == _SYNC_OBJECT and (value & 0x6000_0000 or not value & 0x7FF):
             raise AbortError(Abort.INVALID_VALUE)  # these nodes neither produce a SYNC nor hear a 29-bit one
         if pdo.concerns_pdos(index):

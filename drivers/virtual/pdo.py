@@ -22,10 +22,10 @@ _COB_ID = 0x7FF
 LAST_SYNCHRONOUS = 240
 _EVENT_DRIVEN = (254, 255)
 _RESERVED_COB_IDS = (
-    *(range(0x080), range(0x101, 0x181), range(0x581, 0x600)),
+    *(range(0x081), range(0x101, 0x181), range(0x581, 0x600)),
     *(range(0x601, 0x680), range(0x6E0, 0x800)),
 )
-"""Identifiers that no PDO may use (CiA 301, 7.3.3); 0x080 is the SYNC's."""
+"""Identifiers that no PDO may use (CiA 301, 7.3.3), and the SYNC's."""
 
 
 @dataclass(slots=True)
@@ -67,6 +67,12 @@ def receive_pdos(dictionary: Dictionary) -> dict[int, Pdo]:
 def concerns_pdos(index: int) -> bool:
     """Whether an object is part of the PDOs' configuration."""
     return RPDO <= index < TPDO_MAPPING + 0x200
+
+
+def usable(cob_id: int) -> bool:
+    """Whether a PDO or an EMCY may have this COB-ID (bit 31, enabling it or not, apart)."""
+    reserved = any((cob_id & _COB_ID) in cob_ids for cob_ids in _RESERVED_COB_IDS)
+    return not reserved and not cob_id & _EXTENDED
 
 
 def check(dictionary: Dictionary, key: Key, value: int) -> None:
@@ -135,8 +141,7 @@ def _check_communication(dictionary: Dictionary, key: Key, value: int, *, transm
     enabled = not before & DISABLED
     if sub == 1 and not value & DISABLED:
         moved = enabled and (value ^ before) & _COB_ID
-        reserved = any((value & _COB_ID) in cob_ids for cob_ids in _RESERVED_COB_IDS)
-        if moved or reserved or value & _EXTENDED:
+        if moved or not usable(value):
             raise AbortError(Abort.INVALID_VALUE)
     if sub == 2 and value > LAST_SYNCHRONOUS and value not in _EVENT_DRIVEN:
         raise AbortError(Abort.INVALID_VALUE)  # reserved, or by remote request, which these nodes do not serve

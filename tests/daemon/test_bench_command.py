@@ -98,6 +98,17 @@ def test_a_wrong_scenario_is_told(options: list[str], said: str) -> None:
     assert said in ended.stderr
 
 
+def test_it_may_have_other_nodes(tmp_path: Path) -> None:
+    """Those of a rover.toml."""
+    config = tmp_path / "rover.toml"
+    config.write_text("[nodes]\nmotors = [31, 32, 33, 34, 35, 36]\n")
+    line = command("bench", "--interface", "virtual", "--config", str(config), "--seconds", "0.2")
+    line += ["--control", str(tmp_path / "bench.sock")]
+    ended = subprocess.run(line, capture_output=True, text=True, env=ENVIRONMENT, check=False, timeout=60)
+    assert ended.stdout.startswith("ready: 12 nodes")
+    assert json.loads(ended.stdout.splitlines()[-1])["31"] == {"boot_up": 1}
+
+
 def test_it_ends_by_itself(tmp_path: Path) -> None:
     """With `--seconds`, on the soils that it was given."""
     options = ["--soil", "lete-sand", "--soil", "clayey-soil", "--seed", "5", "--even", "--seconds", "0.2"]

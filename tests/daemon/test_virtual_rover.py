@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import fields
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,12 +15,10 @@ from calibration.drivetrain import wheel_torque
 from calibration.parameters import SOILS
 from calibration.wheel_soil import contact_angle
 from calibration.wheel_soil import wheel_torque as soil_torque
-from daemon.scenario import Noise, Scenario, read_scenario
+from daemon.scenario import Ground, Hidden, Motion, Noise, Scenario, read_scenario
 from daemon.virtual_rover import VirtualWorld
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from drivers.virtual import Measurement
 
 FIELD_SPEED = np.full(6, 0.022 / 0.075 * 1400)  # rad/s at the motors: 2.2 cm/s at the rim
@@ -176,6 +176,16 @@ def test_a_scenario_is_a_file(tmp_path: Path) -> None:
     scenario = read_scenario(path)
     assert scenario.seed == 9
     assert [stretch.name for stretch in scenario.ground.stretches] == ["lete-sand", "medium-soil"]
+
+
+def test_the_annotated_scenario_is_the_default_one() -> None:
+    """`docs/virtual-rover.toml` says what a missing line means, all of it."""
+    path = Path(__file__).resolve().parent.parent.parent / "docs" / "virtual-rover.toml"
+    assert read_scenario(path) == Scenario()
+    told = set(re.findall(r"^#? ?(\w+) =", path.read_text(), re.MULTILINE))
+    tables = [Scenario, Ground, Motion, Noise, Hidden]
+    inner = {name for table in tables for name in table.model_fields} - set(Scenario.model_fields) - {"stretches"}
+    assert inner <= told
 
 
 @pytest.mark.parametrize(

@@ -61,6 +61,7 @@ REFUSED = [
     ("too low a value", 0x6083, 0, 0, 4, 0x06090032),
     ("an error history that is not being cleared", 0x1003, 0, 3, 1, 0x06090030),
     ("a SYNC producer", 0x1005, 0, 0x4000_0080, 4, 0x06090030),
+    ("an EMCY on the NMT's identifier", 0x1014, 0, 0x000, 4, 0x06090030),
     ("a reserved transmission type", 0x1800, 2, 245, 1, 0x06090030),
     ("a PDO on an SDO's identifier", 0x1800, 1, 0x601, 4, 0x06090030),
     ("a PDO of 29 bits", 0x1800, 1, 0x2000_0181, 4, 0x06090030),
