@@ -82,10 +82,11 @@ class Slip(Table):
 
 
 class Smoothing(Table):
-    """`[smoothing]`: the filter that removes momentary current drops (docs/decisions: its choice and its delay)."""
+    """`[smoothing]`: the filter that removes momentary current drops (docs/decisions/010-smoothing.md)."""
 
-    window_s: Annotated[float, Field(ge=0, le=60)] = 2.5
-    time_constant_s: Annotated[float, Field(ge=0, le=60)] = 1.0
+    window_s: Annotated[float, Field(ge=0, le=60)] = 3.5
+    threshold: Annotated[float, Field(ge=0, le=10)] = 2.5
+    time_constant_s: Annotated[float, Field(ge=0, le=60)] = 1.5
 
 
 class Estimator(Table):

@@ -33,7 +33,7 @@ class Pipeline:
         self._network = network
         smoothing = configuration.smoothing
         rate = configuration.sync.rate_Hz
-        self._smoother = Smoother(3, rate, smoothing.window_s, smoothing.time_constant_s)
+        self._smoother = Smoother(rate, smoothing.window_s, smoothing.threshold, smoothing.time_constant_s)
         self._direction = np.zeros(WHEELS)
 
     def step(self, snapshot: Snapshot) -> Estimate:
@@ -45,15 +45,15 @@ class Pipeline:
         turning = np.abs(direction) == 1
         measured = wheel_slip(speed, snapshot.ground_speed_m_s, self._radius_m, turning)
         load = self._load_span * (snapshot.load_N - self._load_zero_N)
-        raw = np.stack([np.where(turning, torque * direction, np.nan), load, measured])
-        driving, load, slip = self._smoother.step(snapshot.time_ns, raw)
-        slip, source = choose_slip(slip, self._slip.constant, turning)
-        terrain = self._network.estimate(self._inputs(driving, load, slip, np.abs(speed)))
+        driving = np.where(turning, torque * direction, np.nan)
+        smoothed = self._smoother.step(snapshot.time_ns, driving, load, measured)
+        slip, source = choose_slip(smoothed.slip, self._slip.constant, turning)
+        terrain = self._network.estimate(self._inputs(smoothed.torque, smoothed.load, slip, np.abs(speed)))
         return Estimate(
             snapshot=snapshot,
             wheel_torque_Nm=torque,
-            smoothed_torque_Nm=driving * direction,
-            smoothed_load_N=load,
+            smoothed_torque_Nm=smoothed.torque * direction,
+            smoothed_load_N=smoothed.load,
             slip=slip,
             slip_source=source,
             cohesion_Pa=terrain.cohesion_Pa,

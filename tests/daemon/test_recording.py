@@ -25,6 +25,9 @@ FRAMES = st.builds(
     time_ns=st.integers(0, 4_000_000_000_000_000).map(lambda us: us * 1000),
     can_id=st.integers(0, 0x7FF),
     data=st.binary(max_size=8),
+    extended=st.just(False),
+    remote=st.just(False),
+    error=st.just(False),
     sent=st.booleans(),
 )
 
