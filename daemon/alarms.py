@@ -12,6 +12,7 @@ from drivers.status import NodePhase
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from drivers.signals import Quantity
     from drivers.status import NodeStatus
 
 _BUS_SEVERITY = {
@@ -46,6 +47,7 @@ class Facts:
     recording_trouble: str = ""
     control_trouble: str = ""
     clock_jump_s: float = 0.0
+    stuck: tuple[tuple[Quantity, int], ...] = ()
 
 
 def current_alarms(facts: Facts) -> dict[str, Alarm]:
@@ -56,7 +58,16 @@ def current_alarms(facts: Facts) -> dict[str, Alarm]:
 
 def known_names(node_ids: Iterable[int]) -> tuple[str, ...]:
     """Return every name that an alarm can have."""
-    return ("bus", "kernel", "store", "recording", "control", "clock", *(f"node-{number}" for number in node_ids))
+    return (
+        "bus",
+        "kernel",
+        "store",
+        "recording",
+        "control",
+        "clock",
+        "sensor",
+        *(f"node-{number}" for number in node_ids),
+    )
 
 
 def _node_alarms(nodes: Iterable[NodeStatus]) -> Iterable[Alarm]:
@@ -91,6 +102,11 @@ def _own_alarms(facts: Facts) -> Iterable[Alarm]:
         yield Alarm("recording", Severity.ERROR, facts.recording_trouble, "Make room, or mend [recording] directory.")
     if facts.control_trouble:
         yield Alarm("control", Severity.WARNING, facts.control_trouble, "Until then the rover cannot be commanded.")
+    if facts.stuck:
+        which = ", ".join(f"{quantity.value} of wheel {wheel}" for quantity, wheel in facts.stuck)
+        text = f"{which}: the same to the last digit for seconds, while other wheels' readings change"
+        cure = "Do not trust it: switch the node off and on, look at its plug, exchange it."
+        yield Alarm("sensor", Severity.ERROR, text, cure)
     if facts.clock_jump_s:
         text = f"the clock jumped by {facts.clock_jump_s:+.3f} s: times before and after do not fit together"
         yield Alarm(

@@ -24,6 +24,7 @@ from daemon.messages import (
     SyncReport,
     iso_time,
 )
+from daemon.stuck import StuckWatch
 from drivers.bus import BusState
 from drivers.emcy import register_bits
 from drivers.events import NodeEmergency
@@ -71,9 +72,11 @@ class MqttOutlet:
         self._offset_ns = time.time_ns() - time.monotonic_ns()
         self._jump_s = 0.0
         self._jump_until_ns = 0
+        self._stuck = StuckWatch()
 
     def estimate(self, estimate: Estimate) -> None:
         """Publish one SYNC."""
+        self._stuck.step(estimate.snapshot)
         self.publisher.estimate(estimate)
 
     def event(self, event: NetworkEvent) -> None:
@@ -147,6 +150,7 @@ class MqttOutlet:
             recording_trouble=(recorder.trouble or "") if recorder is not None else "",
             control_trouble=self._control_trouble(),
             clock_jump_s=self._jump_s,
+            stuck=self._stuck.stuck,
         )
 
     def _health(self) -> dict[str, Any]:

@@ -265,12 +265,20 @@ async def silent(rig: Rig) -> None:
 
 
 async def frozen(rig: Rig) -> None:
-    """The same value again and again is published as it is; the others' vary."""
+    """The same value again and again while the rover drives: it is published as it is, and an alarm says so."""
+    network = await rig.service.opened()
+    await network.enable()
+    await network.set_speed((0.29,) * 6)
     rig.tell(f"frozen {LOAD_CELL}")
-    await rig.until_snapshots(10, lambda snapshot: all(snapshot["measured"]), "all wheels measured")
+    alarm = await rig.until_heard("alarm/sensor", active=True)
+    assert f"load_N of wheel {WHEEL}:" in alarm["text"]
+    await rig.until_snapshots(8, lambda snapshot: all(snapshot["measured"]), "all wheels measured")
     latest = rig.since("snapshot")[-8:]
     assert len({snapshot["load_N"][WHEEL - 1] for snapshot in latest}) == 1
     assert all(len({snapshot["load_N"][wheel] for snapshot in latest}) > 1 for wheel in (0, 1, 3, 4, 5))
+    rig.tell(f"clear {LOAD_CELL}")
+    await rig.until_heard("alarm/sensor", active=False)
+    await network.disable()
 
 
 async def deaf(rig: Rig) -> None:
