@@ -26,7 +26,7 @@ from calibration.mismatch.fill import NOT_FOR_CURVES, add_candidates, add_curves
 from calibration.mismatch.held_out import HeldOut, hold_out
 from calibration.mismatch.intervals import parameters_of
 from calibration.mismatch.noise import Noise, blocks_of_time, estimate_noise, folds_of_blocks
-from calibration.mismatch.rivals import rivals
+from calibration.mismatch.rivals import confusions
 from calibration.mismatch.scene import Scene, build_scene
 from calibration.mismatch.search import Search, Term
 from calibration.mismatch.sensitivity import sensitivities
@@ -88,10 +88,10 @@ def compare(
         _verdict(decision),
         _effects(decision, held, blocks),
         tuple(_unexplained(decision, term) for term in decision.unnamed),
-        rivals(decision.search, decision.named),
+        confusions(decision.search, decision.named, decision.whole),
         sensitivities(decision.search, decision.whole, simulation.candidates()),
         FitImprovement(simulation.channel, held.before, held.after, _floor(decision)),
-        (*recording.notes, *_not_looked_for(scene, simulation, [c.name for c in fitting])),
+        (*recording.notes, *_about_the_mask(scene), *_not_looked_for(scene, simulation, [c.name for c in fitting])),
     )
     return Comparison(answer, _evidence(decision))
 
@@ -109,7 +109,8 @@ def _floor(decision: Decision) -> float:
 
 
 def _names(scene: Scene, wheels: Sequence[int]) -> tuple[int, ...]:
-    return tuple(scene.recording.wheels[w] for w in wheels)
+    """Return the names of those wheels of which something is known."""
+    return tuple(scene.recording.wheels[w] for w in wheels if scene.mask[:, w].any())
 
 
 def _effects(decision: Decision, held: HeldOut, blocks: NDArray[np.int64]) -> tuple[Effect, ...]:
@@ -121,7 +122,8 @@ def _effects(decision: Decision, held: HeldOut, blocks: NDArray[np.int64]) -> tu
     for index, (term, parameters) in enumerate(zip(named.terms, parameters_of(search, named, blocks), strict=True)):
         candidate = term.group.candidate
         assert candidate is not None  # noqa: S101  # named terms are candidates
-        wheels = candidate.wheels(term.group.shape, _names(scene, term.wheels), scene.row)
+        names = _names(scene, term.wheels)
+        wheels = candidate.wheels(term.group.shape, names, scene.simulation.row(names))
         onset = parameters.get("onset_s")
         errors = (held.without[index], held.with_it[index])
         told = statement(
@@ -158,6 +160,21 @@ def _unexplained(decision: Decision, term: Term) -> Unexplained:
     return Unexplained(
         scene.simulation.channel, _names(scene, term.wheels), term.name, float(first), float(last), min(share, 1.0)
     )
+
+
+def _about_the_mask(scene: Scene) -> list[str]:
+    """Say what was left out of the comparison, and why."""
+    told = []
+    kind = scene.simulation.wheel_column
+    silent = [name for k, name in enumerate(scene.recording.wheels) if not scene.mask[:, k].any()]
+    if silent:
+        told.append(
+            f"There is nothing to compare at {kind} {', '.join(map(str, silent))}: it never turns, or is not measured."
+        )
+    spikes = int(np.sum(np.isfinite(scene.prediction) & np.isfinite(scene.measured) & ~scene.mask))
+    if spikes:
+        told.append(f"{spikes} readings of {scene.simulation.channel} are far outside all others; they are left out.")
+    return told
 
 
 def _not_looked_for(scene: Scene, simulation: Simulation, fitting: Sequence[str]) -> list[str]:

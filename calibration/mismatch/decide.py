@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.mismatch.fill import add_candidate
-from calibration.mismatch.noise import Noise, estimate_noise
+from calibration.mismatch.noise import Noise, blocks_of_time, estimate_noise
+from calibration.mismatch.null import naming_threshold
 from calibration.mismatch.refine import refined
 
 if TYPE_CHECKING:
@@ -25,9 +26,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-NAMED_BY = 12.0
-"""A term must improve the score (its price already paid) by this much: with prices, an error rate near 1 in 200 for the
-whole search, as sign-flipped recordings show (tests)."""
+FURTHER_SHARE = 0.01
+"""A further term must gain this share of what the others gained: no form is nature's to the last percent."""
 UNNAMED_BY = 16.0
 """Likewise for a curve, of which there are more and freer ones."""
 WORTH_A_NAME = 0.02
@@ -224,13 +224,22 @@ def _polished_best(search: Search, sets: Sequence[tuple[Term, ...]]) -> list[Fit
     return sorted((fit for fit in fits if acceptable(search, fit)), key=search.score, reverse=True)
 
 
+def enough(search: Search, more: Fit, less: Fit) -> bool:
+    """Say whether a larger set has earned its further names."""
+    needed = max(search.threshold, FURTHER_SHARE * less.gain) * (len(more.terms) - len(less.terms))
+    return search.score(more) - search.score(less) > needed
+
+
 def decide(search: Search, candidates: Sequence[Candidate]) -> Decision:
     """Choose names, and say what is left without."""
     noise = settle_noise(search)
+    none = search.fit(())
+    blocks = blocks_of_time(search.dictionary.scene, noise)
+    search.threshold = naming_threshold(search, residual_of(search, none), blocks)
     seek_in_residual(search, candidates, ())
-    named = search.fit(())
+    named = none
     for fit in best_named(search)[1:]:
-        if search.score(fit) - search.score(named) > NAMED_BY * (len(fit.terms) - len(named.terms)):
+        if enough(search, fit, named):
             named = fit
     named, unnamed = _without_a_name(search, named)
     whole = search.fit((*named.terms, *unnamed))
@@ -263,7 +272,7 @@ def _without_a_name(search: Search, named: Fit) -> tuple[Fit, tuple[Term, ...]]:
     fit = by_curve
     for term in named.terms:
         trial = search.fit((*kept, term, curve))
-        if search.score(trial) - search.score(fit) > NAMED_BY and acceptable(search, trial):
+        if search.score(trial) - search.score(fit) > search.threshold and acceptable(search, trial):
             kept, fit = (*kept, term), trial
     if imitated or search.score(fit) >= search.score(beside):
         return search.fit(kept), (curve,)

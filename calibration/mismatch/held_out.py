@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.mismatch.decide import NAMED_BY, best_per_family
+from calibration.mismatch.decide import best_per_family, enough
 from calibration.mismatch.search import Fit, Search, Term
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ def hold_out(search: Search, named: Fit, noise: Noise, groups: Sequence[Group]) 
     for fold in range(count):
         others = [f for f in range(count) if f != fold] or [fold]
         train = Search(dictionary, search.nuisance, noise.weights, others)
+        train.threshold = search.threshold
         dictionary.groups = list(groups)
         chosen = _chosen(train)
         dictionary.groups = kept
@@ -76,10 +77,10 @@ def _chosen(train: Search) -> tuple[Term, ...]:
         trials = [(*terms, t) for _, t in found[:3]]
         if len(terms) == 1:
             trials += [(a, b) for _, a in best_per_family(train, ())[:6] for _, b in best_per_family(train, (a,))[:2]]
-        best = max(trials, key=lambda trial: train.score(train.fit(trial)))
-        if train.score(train.fit(best)) - train.score(train.fit(terms)) < NAMED_BY:
+        best = max((train.fit(trial) for trial in trials), key=train.score)
+        if not enough(train, best, train.fit(terms)):
             break
-        terms = best
+        terms = best.terms
     return terms
 
 

@@ -24,6 +24,7 @@ Index = NDArray[np.int64]
 TIME = "t_s"
 UNIT = "wheel"
 RUN = "run"
+MOST_CLOCK_JUMPS = 3
 
 
 @dataclass(frozen=True)
@@ -131,13 +132,13 @@ def from_columns(columns: Mapping[str, Array], *, unit: str = UNIT) -> Recording
     rows = len(table[TIME])
     table.setdefault(unit, np.ones(rows))
     table.setdefault(RUN, np.zeros(rows))
+    table[RUN] = _split_where_the_clock_jumps_back(table, unit, notes)
     known = np.isfinite(table[TIME]) & np.isfinite(table[unit]) & np.isfinite(table[RUN])
     if not known.all():
         notes.append(f"{np.sum(~known)} rows have no time or no {unit}; they are left out.")
         table = {name: values[known] for name, values in table.items()}
     if not len(table[TIME]):
         raise RecordingError("the recording has no rows")
-    _note_order(table, unit, notes)
     keys, row, wheels, column = _places(table, unit)
     shape = (len(keys), len(wheels))
     if shape[0] < 2:
@@ -172,15 +173,24 @@ def _arranged(values: Array, row: Index, column: Index, shape: tuple[int, int]) 
     return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0).reshape(shape)
 
 
-def _note_order(table: Mapping[str, Array], unit: str, notes: list[str]) -> None:
-    of_first = (table[unit] == table[unit][0]) & (table[RUN] == table[RUN][0])
-    steps = np.diff(table[TIME][of_first])
-    backwards = int(np.sum(steps < 0))
-    if backwards == 1:
-        at = float(table[TIME][of_first][:-1][steps < 0][0])
-        notes.append(f"The clock jumps back at {at:.1f} s; rows are taken in the order of their time.")
-    elif backwards:
+def _split_where_the_clock_jumps_back(table: Mapping[str, Array], unit: str, notes: list[str]) -> Array:
+    """Return each row's run: a clock that jumps back once or twice begins a new one; more is no clock but disorder."""
+    run = table[RUN].copy()
+    jumps, at = 0, 0.0
+    shift = np.zeros(len(run))
+    for name in np.unique(table[unit][np.isfinite(table[unit])]):
+        here = np.flatnonzero(table[unit] == name)
+        back = (np.diff(table[TIME][here]) < 0) & (np.diff(run[here]) == 0)
+        if np.any(back):
+            jumps, at = max(jumps, int(back.sum())), float(table[TIME][here][:-1][back][0])
+            shift[here[1:]] = np.cumsum(back)
+    if jumps == 0:
+        return run
+    if jumps > MOST_CLOCK_JUMPS:
         notes.append("Rows are not in the order of time; they are sorted.")
+        return run
+    notes.append(f"The clock jumps back {jumps} time(s), first at {at:.1f} s; what follows is taken as another run.")
+    return run * (MOST_CLOCK_JUMPS + 1) + shift
 
 
 def _note_duplicates(row: Index, column: Index, shape: tuple[int, int], notes: list[str]) -> None:

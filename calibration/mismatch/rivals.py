@@ -7,6 +7,7 @@ variance 4 μ, where μ is the energy of the rival's own term outside the named 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import erf, sqrt
 from typing import TYPE_CHECKING
 
@@ -14,13 +15,19 @@ import numpy as np
 
 from calibration.mismatch.answer import Indistinguishable
 from calibration.mismatch.decide import acceptable, best_per_family, polished
+from calibration.mismatch.search import Term
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from calibration.mismatch.search import Fit, Search, Term
+    from calibration.mismatch.search import Fit, Search
 
 ONE_IN_TWENTY = 0.05
+CANNOT_LEAD = 10.8
+"""Energy apart, below which the wrong one of two leads more than one time in twenty: (2 × 1.645)²."""
+WORTH_WORRYING = 0.15
+"""Of the mean magnitude of the predicted channel: the size at which two effects should be told apart."""
+FEW = 2
 
 DRIVES = {
     "direction": "drive the same stretch forwards and backwards at one speed",
@@ -39,6 +46,14 @@ DRIVES = {
 """For each covariate, the drive that moves it and nothing else."""
 
 
+def confusions(search: Search, named: Fit, whole: Fit) -> tuple[Indistinguishable, ...]:
+    """Return what could stand for what was named, and what could not be told apart were it there."""
+    found = rivals(search, named)
+    told = {name for one in found for name in one.effects}
+    others = tuple(one for one in collinear(search, whole) if not told & set(one.effects))
+    return (*found, *others)
+
+
 def rivals(search: Search, named: Fit) -> tuple[Indistinguishable, ...]:
     """Return, for each named effect that has them, the set of effects that explain the recording as well."""
     found = []
@@ -54,9 +69,92 @@ def rivals(search: Search, named: Fit) -> tuple[Indistinguishable, ...]:
             if acceptable(search, fit) and _survives(search, named, fit, others, term):
                 names.append(rival.name)
                 covariates.append(_covariate(rival))
+        names += _parameters_like(search, others, [term])
         if len(names) > 1:
             found.append(Indistinguishable(tuple(names), experiment_for(covariates)))
     return tuple(found)
+
+
+def collinear(search: Search, given: Fit) -> tuple[Indistinguishable, ...]:
+    """Return sets of effects of which one could stand for another, were it there at a size worth worrying about.
+
+    What the simulation's free parameters can imitate belongs to a set as well: constant speed on flat ground makes
+    Coulomb friction, viscous friction and cohesion one.
+    """
+    terms = _representatives(search)
+    size = WORTH_WORRYING * search.dictionary.scene.mean_size
+    like = {
+        one: {two for two in terms if two != one and _imitates(search, given, terms[one], terms[two], size)}
+        for one in terms
+    }
+    found, seen = [], set()
+    for name in terms:
+        # Sets of effects of which each can stand for each.
+        members = {name}
+        for other in sorted(like[name]):
+            if all(other in like[m] and m in like[other] for m in members):
+                members.add(other)
+        if frozenset(members) in seen:
+            continue
+        seen.add(frozenset(members))
+        in_order = sorted(members)
+        parameters = _parameters_like(search, given.terms, [terms[m][0] for m in in_order])
+        if len(members) + len(parameters) > 1:
+            experiment = experiment_for([_covariate(terms[m][0]) for m in in_order])
+            found.append(Indistinguishable((*in_order, *parameters), experiment))
+    return tuple(found)
+
+
+def _parameters_like(search: Search, given: Sequence[Term], members: Sequence[Term]) -> list[str]:
+    """Return the free parameters that could stand for every member, were they as wrong as that takes."""
+    nuisance, size = search.nuisance, WORTH_WORRYING * search.dictionary.scene.mean_size
+    aliases = search.dictionary.scene.simulation.parameter_effects
+    found = []
+    for place, name in enumerate(nuisance.names):
+        if name not in aliases:
+            continue
+        free = nuisance.precision.copy()
+        free[place] = 0.0
+        search.nuisance = replace(nuisance, precision=free)
+        apart = [_energy_apart(search, given, member, size) for member in members]
+        search.nuisance = nuisance
+        if len(members) == 1 and max(apart) < CANNOT_LEAD:
+            # One effect alone is taken for a parameter only where the parameter's own doubt hides it.
+            known = nuisance.precision.copy()
+            known[place] = 1e12
+            search.nuisance = replace(nuisance, precision=known)
+            if _energy_apart(search, given, members[0], size) < 2 * CANNOT_LEAD:
+                apart.append(np.inf)
+            search.nuisance = nuisance
+            if _energy_apart(search, given, members[0], size) > CANNOT_LEAD:
+                apart.append(np.inf)
+        if max(apart) < CANNOT_LEAD:
+            found.append(aliases[name])
+    return found
+
+
+def _energy_apart(search: Search, given: Sequence[Term], term: Term, size: float) -> float:
+    """Return the energy of a term of this size outside the reach of all that is in the fit."""
+    block, reach = search.beside(given, term)
+    counts = search.weights @ search.dictionary.counts.sum(axis=0)
+    return float((block - reach)[0, 0] * size**2 * counts / max(float(block[0, 0]), 1e-300))
+
+
+def _representatives(search: Search) -> dict[str, list[Term]]:
+    """Return every shape of each candidate that all wheels may share."""
+    found: dict[str, list[Term]] = {}
+    for group in search.dictionary.groups:
+        if group.named and ("all" in group.sharing or len(search.weights) == 1) and len(group.columns) <= FEW:
+            found.setdefault(group.name, []).append(Term(group, search.all_wheels))
+    return found
+
+
+def _imitates(search: Search, given: Fit, one: list[Term], two: list[Term], size: float) -> bool:
+    """Say whether some shape of `two` would pass for the middle shape of `one`, at this size, one time in twenty."""
+    term = one[len(one) // 2]
+    if _energy_apart(search, given.terms, term, size) < 2 * CANNOT_LEAD:
+        return False
+    return any(_energy_apart(search, (*given.terms, other), term, size) < CANNOT_LEAD for other in two)
 
 
 def experiment_for(covariates: Sequence[str]) -> str:

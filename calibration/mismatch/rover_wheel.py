@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,11 @@ class RoverWheel(Simulation):
     channel = "motor_current_A"
     unit = "A"
     inputs = ("motor_speed_rad_s",)
+    parameter_effects: ClassVar = {
+        "gain_factor": "drivetrain-gain",
+        "cohesion_Pa": "soil-cohesion",
+        "friction_angle_deg": "soil-friction-angle",
+    }
 
     def __init__(self, tables: RoverWheelTables) -> None:
         self.tables = tables

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+ALWAYS = frozenset({"wheel_speed", "direction", "wheel_acceleration", "wheel_angle", "time", "torque"})
+"""Covariates that mean something even where they are constant."""
+SPIKE = 15.0
+"""A residual this many times the usual one is a fault of the recording, not of the simulation."""
 RELATIVE_STEP = 0.01
 """Of a parameter or an input, for a tangent: small against what matters, large against rounding."""
 
@@ -126,6 +130,7 @@ def build_scene(recording: Recording, simulation: Simulation, values: Mapping[st
     prediction = simulation.predict(inputs, {**simulation.variants(), **chosen})
     measured = prepared.channel(simulation.channel)
     mask = np.isfinite(prediction) & np.isfinite(measured)
+    mask &= ~_spikes(np.where(mask, measured - prediction, np.nan))
     if mask.sum() < 100:
         raise RecordingError(
             f"only {mask.sum()} values of {simulation.channel} can be compared; at least 100 are needed"
@@ -145,6 +150,15 @@ def build_scene(recording: Recording, simulation: Simulation, values: Mapping[st
     )
 
 
+def _spikes(residual: Array) -> NDArray[np.bool_]:
+    """Return where single readings lie far outside of what all others do."""
+    if not np.isfinite(residual).any():
+        return np.zeros(residual.shape, np.bool_)
+    middle = float(np.nanmedian(residual))
+    usual = 1.4826 * float(np.nanmedian(np.abs(residual - middle)))
+    return (np.abs(residual - middle) > SPIKE * usual) & (usual > 0)
+
+
 def _covariates(
     recording: Recording, simulation: Simulation, inputs: Mapping[str, Array], prediction: Array
 ) -> dict[str, Array]:
@@ -157,7 +171,13 @@ def _covariates(
         found["direction"] = np.sign(speed)
         found["wheel_acceleration"] = _derivative(speed, recording)
         found["wheel_angle"] = _integral(speed, recording)
-    return {name: values for name, values in found.items() if np.isfinite(values).any()}
+    return {name: values for name, values in found.items() if name in ALWAYS or _varies(values)}
+
+
+def _varies(values: Array) -> bool:
+    """Say whether a covariate was measured at all, and is not one number."""
+    known = values[np.isfinite(values)]
+    return bool(known.size) and float(np.ptp(known)) > 1e-12 * float(np.max(np.abs(known)))
 
 
 def _elapsed(recording: Recording) -> Array:

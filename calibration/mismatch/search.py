@@ -46,7 +46,7 @@ class Term:
         """Return what choosing this term costs: its coefficients, its shape, and that it is on these wheels."""
         paid = PER_COEFFICIENT * len(self.group.columns) + self.group.complexity
         if len(self.wheels) < wheel_count:
-            paid += 2 * float(np.log(wheel_count))
+            paid += 2 * float(np.log(2 * wheel_count))
             # One wheel alone is the rule for some faults and the exception for what all wheels are built with.
             paid += 6.0 if "all" in self.group.sharing else 0.0
         return paid - self.bonus
@@ -83,6 +83,11 @@ class Fit:
         return slice(start, start + len(self.terms[index].group.columns))
 
 
+def shared(group: Group, kind: str) -> bool:
+    """Say whether wheels of this kind may share a group; what may be on one or on all may be on a side or a row."""
+    return kind in group.sharing or (kind == "some" and group.named and len(group.sharing) > 1)
+
+
 class Search:
     """Gains of sets of terms, on given folds, with given weights of the wheels."""
 
@@ -92,6 +97,8 @@ class Search:
         self.dictionary = dictionary
         self.nuisance = nuisance
         self.weights = weights
+        self.threshold = 10.0
+        """The score that a name must earn; `null.naming_threshold` sets it."""
         self.folds = list(range(len(dictionary.gram))) if folds is None else list(folds)
         self.refresh()
 
@@ -104,6 +111,16 @@ class Search:
         self.gram *= self.weights[:, None, None]
         self.moment = moment[self.folds].sum(axis=0) * self.weights[:, None]
         self._whole = self.gram.sum(axis=0)
+
+    @property
+    def patterns(self) -> dict[tuple[int, ...], str]:
+        """Wheels that may share an effect: all, each alone, a side, a row; and which of these it is."""
+        scene = self.dictionary.scene
+        found = {self.all_wheels: "all"}
+        for place in (scene.side, scene.row):
+            for value in np.unique(place) if place is not None else ():
+                found.setdefault(tuple(int(w) for w in np.flatnonzero(place == value)), "some")
+        return {**{(w,): "one" for w in self.all_wheels}, **found}
 
     @property
     def all_wheels(self) -> tuple[int, ...]:
@@ -137,18 +154,16 @@ class Search:
         for row, (_, wheels) in enumerate(columns):
             share[row, list(wheels)] = 1
         cross = np.stack([share[:, w, None] * self.gram[w][index] for w in self.all_wheels])
-        patterns = [self.all_wheels, *[(w,) for w in self.all_wheels]] if len(self.weights) > 1 else [self.all_wheels]
         found: list[tuple[float, Term]] = []
-        for pattern in patterns:
+        for pattern, kind in self.patterns.items():
             chosen = list(pattern)
             reach = cross[chosen].sum(axis=0)
             solved = inverse @ reach
             left = self.moment[chosen].sum(axis=0) - reach.T @ (inverse @ moment)
-            block = self._whole if len(chosen) == len(self.weights) else self.gram[chosen[0]]
+            block = self._whole if kind == "all" else self.gram[chosen].sum(axis=0)
             single = np.diag(block) - np.einsum("sp,sp->p", reach, solved)
-            kind = "all" if pattern == self.all_wheels else "one"
             for group in self.dictionary.groups if groups is None else groups:
-                if kind in group.sharing or len(self.weights) == 1:
+                if shared(group, kind) or len(self.weights) == 1:
                     gain = _gain(group, left, block, reach, solved, single)
                     term = Term(group, pattern)
                     if gain > 0 and term.visible:

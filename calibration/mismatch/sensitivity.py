@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calibration.mismatch.answer import Sensitivity
-from calibration.mismatch.decide import NAMED_BY, WORTH_A_NAME
+from calibration.mismatch.decide import WORTH_A_NAME
 from calibration.mismatch.search import Term
 
 if TYPE_CHECKING:
@@ -45,7 +45,8 @@ def _smallest(search: Search, given: Fit, term: Term) -> float:
     block, reach = search.beside(given.terms, term)
     own = np.linalg.eigvalsh(block - reach)
     total = float(np.trace(block)) / len(block)
-    needed = (np.sqrt(NAMED_BY + term.price(len(search.weights))) + NINE_IN_TEN) ** 2
+    price = term.price(len(search.weights)) + term.bonus
+    needed = (np.sqrt(search.threshold + price) + NINE_IN_TEN) ** 2
     outside = float(np.max(own))
     if outside <= 1e-9 * total:
         return float("inf")

@@ -67,6 +67,8 @@ class Simulation:
     """Columns without which nothing can be predicted."""
     parameters: Mapping[str, Prior] = {}
     """What the simulation knows, and how well."""
+    parameter_effects: ClassVar[Mapping[str, str]] = {}
+    """Names of parameters as effects, for saying what a wrong parameter could be mistaken for."""
     sensors: Mapping[str, SensorError] = {}
     """The errors of the recorded inputs, by column."""
 

@@ -77,9 +77,16 @@ def _tables(path: Path) -> dict[str, Any]:
 
 
 def _read(path: Path, unit: str) -> Recording:
-    from calibration.mismatch.recording import read_recording
+    from calibration.mismatch.recording import from_columns, read_recording
 
-    return read_recording(path, unit=unit)
+    if path.suffix != ".mcap":
+        return read_recording(path, unit=unit)
+    import numpy as np
+
+    from daemon.export import HEADER, recorded_snapshots, rows
+
+    table = np.array(list(rows(recorded_snapshots([path]))), np.float64).reshape(-1, len(HEADER))
+    return from_columns(dict(zip(HEADER, table.T, strict=True)), unit=unit)
 
 
 def _write_json(path: Path, answer: Answer) -> None:

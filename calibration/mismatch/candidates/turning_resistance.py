@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
     from calibration.mismatch.scene import Scene
 
+HALVES = {"rate": (0.3, 1.0, 100.0), "angle": (0.3, 1.0, 3.0)}
+"""Where scrub has reached half of what it can, in multiples of the typical turn's."""
+
 
 class TurningResistance(Candidate):
     """Two parts: drag against each wheel's own rotation, and the moment that outer wheels push and inner ones brake."""
@@ -32,7 +35,8 @@ class TurningResistance(Candidate):
         """Proportional or saturating with yaw rate, or with yaw rate over speed: even, or more at the end rows."""
         rows = ("alike", "ends") if scene.row is not None and np.ptp(scene.row) > 1 else ("alike",)
         by = ("rate", "angle") if "wheel_speed" in scene.covariates else ("rate",)
-        return [{"half_at": h, "rows": row, "by": b} for h in (0.3, 1.0, 100.0) for row in rows for b in by]
+        # An angle cannot grow without end, a rate may.
+        return [{"half_at": h, "rows": row, "by": b} for b in by for h in HALVES[b] for row in rows]
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return drag and moment, in multiples of what the typical turn has."""
