@@ -67,6 +67,7 @@ _EPOS_CODES = {
     0x6100: "internal software error",
     0x6320: "software parameter out of range",
     0x7320: "position sensor error: encoder cable or supply",
+    0x8111: "CAN overrun",
     0x81FD: "CAN bus-off",
     0x81FE: "CAN receive queue overrun",
     0x81FF: "CAN transmit queue overrun",

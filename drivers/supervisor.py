@@ -82,10 +82,11 @@ class Supervisor:
             identity = await boot(self.link, self._boot_settings)
         except BootError as error:
             text = str(error)
-            if text != self._status.text:  # said once, however often it is tried
-                self._emit(NodeBootFailed(time.time_ns(), node_id, error.reason, text, error.cure))
+            said_before = text == self._status.text
             self._status = replace(self._status, phase=NodePhase.FAILED, reason=error.reason, text=text)
             self._away = True
+            if not said_before:  # once, however often it is tried
+                self._emit(NodeBootFailed(time.time_ns(), node_id, error.reason, text, error.cure))
         else:
             self._note_return()
             boots = self._status.boots + 1

@@ -32,7 +32,11 @@ class Watch:
                 while not condition():
                     future = asyncio.get_running_loop().create_future()
                     self._waiting.append(future)
-                    await future
+                    try:
+                        await future
+                    finally:
+                        if future in self._waiting:  # given up: a node that stays silent must not leave one each time
+                            self._waiting.remove(future)
         except TimeoutError:
             return condition()
         return True

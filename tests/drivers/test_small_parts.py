@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import builtins
 import re
 
@@ -21,6 +22,7 @@ from drivers.load import bus_load, frame_bits
 from drivers.signals import NodeDescription, NodeKind
 from drivers.sync import SyncCounters
 from drivers.virtual.rover import KAPVIK
+from drivers.watch import Watch
 
 
 def test_a_message_says_where_what_and_the_cure() -> None:
@@ -39,6 +41,22 @@ def test_the_tree_that_is_drawn_is_the_tree_that_is() -> None:
         assert found, f"{name} is not drawn"
         if found[1]:
             assert issubclass(error, getattr(builtins, found[1])), found[0]
+
+
+async def test_a_wait_that_is_given_up_leaves_nothing_behind() -> None:
+    """Months of waiting for a silent node fill no list; a wait that is fulfilled ends."""
+    watch, seen = Watch(), []
+    for _ in range(50):
+        assert not await watch.until(lambda: bool(seen), 0.001)
+    assert watch._waiting == []
+    waiting = asyncio.ensure_future(watch.until(lambda: bool(seen), 20.0))
+    await asyncio.sleep(0)
+    watch.notify()  # not yet true
+    await asyncio.sleep(0)
+    seen.append(1)
+    watch.notify()
+    assert await waiting
+    assert watch._waiting == []
 
 
 def test_jitter_is_the_spread_of_the_lateness() -> None:
