@@ -6,6 +6,8 @@ import json
 import os
 import socket
 import stat
+import subprocess
+import tempfile
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
@@ -74,7 +76,7 @@ class Rover:
 async def serving(folder: Path, rover: Rover | None, **control: Any) -> AsyncIterator[tuple[ControlOutlet, Path]]:
     """Serve a rover whose wheels stand still."""
     path = folder / "control.sock"
-    configuration = Configuration(control=Control(socket=path, group=GROUP, **control))
+    configuration = Configuration(control=Control.model_validate({"socket": path, "group": GROUP} | control))
     outlet = ControlOutlet(configuration, lambda: rover)
     task = asyncio.create_task(outlet.run())
 
@@ -156,6 +158,27 @@ async def test_only_the_group_may_open_it(tmp_path: Path) -> None:
         assert stat.S_IMODE(found.st_mode) == 0o660
         assert found.st_gid == os.getgid()
     assert not path.exists()
+
+
+_CONNECT = "import socket, sys; socket.socket(socket.AF_UNIX).connect(sys.argv[1])"
+NOBODY = 65534
+
+
+@pytest.mark.parametrize(("group", "error"), [(NOBODY, ""), (NOBODY - 1, "PermissionError")])
+async def test_the_kernel_lets_the_groups_members_in_and_nobody_else(group: int, error: str) -> None:
+    """Another user, once in the group and once not; nothing but the group decides."""
+    if os.geteuid() != 0:
+        group, error = os.getegid(), ""  # only root can become somebody else: at least we get in
+    with tempfile.TemporaryDirectory(dir="/tmp") as folder:  # every user may pass through
+        os.chmod(folder, 0o755)  # noqa: PTH101  # at once: nothing else runs yet
+        control = {"group": str(NOBODY)} if os.geteuid() == 0 else {}
+        who = {"user": NOBODY, "group": group, "extra_groups": []} if os.geteuid() == 0 else {}
+        async with serving(Path(folder), Rover(), **control) as (_, path):
+            command = ["python3", "-c", _CONNECT, path]
+            done = await asyncio.to_thread(
+                lambda: subprocess.run(command, capture_output=True, text=True, check=False, **who)
+            )
+    assert done.stderr.strip().splitlines()[-1:] == ([] if not error else [f"{error}: [Errno 13] Permission denied"])
 
 
 async def test_a_traverse_is_driven_and_its_end_is_told(tmp_path: Path) -> None:
