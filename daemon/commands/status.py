@@ -60,13 +60,16 @@ def _head(status: Status) -> str:
 
 
 def _table(status: Status) -> Table:
+    from rich import box
     from rich.table import Table
 
-    table = Table("node", "kind", "wheel", "phase", "drive", "what it says", expand=True)
+    table = Table("node", "kind", "wheel", "phase", "drive", "what is wrong", box=box.SIMPLE_HEAD, expand=True)
     colours = {"operational": "green", "booting": "yellow"}
     for node in status.nodes:
         colour = colours.get(node.phase, "red")
         wheel = "" if node.wheel is None else str(node.wheel)
         phase = f"[{colour}]{node.phase}[/]"
-        table.add_row(str(node.node_id), node.kind, wheel, phase, node.drive_state or "", node.text)
+        table.add_row(
+            str(node.node_id), node.kind, wheel, phase, node.drive_state or "", "" if colour == "green" else node.text
+        )
     return table

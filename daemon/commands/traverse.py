@@ -62,7 +62,7 @@ async def _traverse(path: Path, distance_m: float, speed_m_s: float) -> int:
     if isinstance(end, Refused):
         typer.echo(f"Not driven: {end.text} {end.cure}".rstrip(), err=True)
         return 1
-    typer.echo(f"{end.ending.value.capitalize()} after {end.elapsed_s:.2f} s, {end.turned_m:.3f} m turned: {end.text}.")
+    typer.echo(f"{end.ending.value.capitalize()} after {end.elapsed_s:.3f} s, {end.turned_m:.3f} m turned: {end.text}.")
     if end.ending == "finished":
         return 0
     return INTERRUPTED if interrupted else 1
@@ -78,9 +78,9 @@ async def _follow(daemon: Conversation) -> Ended | Refused:
         TextColumn("[bold]traverse"),
         BarColumn(bar_width=None),
         TextColumn("{task.fields[turned_m]:7.3f} m"),
-        TextColumn("{task.completed:7.1f} of {task.total:.2f} s"),
+        TextColumn("{task.completed:6.1f} of {task.total:.1f} s"),
         TextColumn("left"),
-        TimeRemainingColumn(elapsed_when_finished=True),
+        TimeRemainingColumn(),
     )
     with Progress(*columns, expand=True) as bar:
         while True:

@@ -99,6 +99,7 @@ class Publisher:
         self._connections = 0
         self._sequences: Counter[str] = Counter()
         self._problem = ""
+        self._said: set[str] = set()
         self._up_since: float | None = None
 
     @property
@@ -226,6 +227,10 @@ class Publisher:
         _log.log(level, "%s The daemon goes on, keeps what must not be lost, and tries again.", reason)
         self._problem = reason
 
+    def _say_once(self, trouble: str) -> None:
+        _log.log(logging.DEBUG if trouble in self._said else logging.WARNING, "%s", trouble)
+        self._said.add(trouble)
+
     async def _keep_on_disk(self) -> None:
         """Bring to the disk what has waited for a second; a broker that keeps up spares the disk."""
         first = -1
@@ -237,7 +242,7 @@ class Publisher:
                 try:
                     await asyncio.to_thread(self._spool.begin_sync())
                 except OSError as error:
-                    _log.warning("the store could not be brought to the disk: %s", error)
+                    self._say_once(f"the store could not be brought to the disk: {error}")
             await asyncio.sleep(SYNC_EVERY_S)
 
 

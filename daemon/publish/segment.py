@@ -13,6 +13,7 @@ import errno
 import os
 import struct
 import zlib
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -137,6 +138,7 @@ class Segment:
             self._file = None
 
     def remove(self) -> None:
-        """Delete the file."""
+        """Delete the file; where it cannot be, the next process finds it, and what is in it is acknowledged."""
         self.close()
-        self.path.unlink(missing_ok=True)
+        with suppress(OSError):
+            self.path.unlink()

@@ -12,7 +12,8 @@ their records are acknowledged. `acknowledged` holds the first index that is not
 While the broker keeps up, nothing is synced: files are deleted before the kernel gets to writing them, so an SD card is
 spared. When messages wait, `sync` is called once a second; a power cut then costs a second at most.
 
-Full: the oldest file is deleted, and `dropped` counts what was in it. Disk full: a message waits in memory alone.
+Full: the oldest file is deleted, and `dropped` counts what was in it. Disk full, failing or read-only: a message waits
+in memory alone, and `unstored` counts it. Nothing that a disk does raises an error here once the store is open.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ import struct
 import time
 import zlib
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice, pairwise
 from typing import TYPE_CHECKING
@@ -171,7 +173,7 @@ class Spool:
         if self._recent and self._recent[0].index <= index:
             return list(islice(self._recent, index - self._recent[0].index, None))
         for segment in self._segments:
-            if index < segment.end and (left := [record for record in segment.read() if record.index >= index]):
+            if index < segment.end and (left := _readable(segment, index)):
                 return left
         return list(self._recent)
 
@@ -185,7 +187,8 @@ class Spool:
     def _move(self, first: int) -> None:
         self._first = first
         number = first.to_bytes(8, "little")
-        os.pwrite(self._cursor_file, number + zlib.crc32(number).to_bytes(4, "little"), 0)
+        with suppress(OSError):  # then the next process sends some again, marked late
+            os.pwrite(self._cursor_file, number + zlib.crc32(number).to_bytes(4, "little"), 0)
         if self._segments and self._segments[0].end <= first:
             self._forget_acknowledged()
 
@@ -217,3 +220,11 @@ class Spool:
             os.close(self._cursor_file)
             os.close(self._lock)
             self._lock = -1
+
+
+def _readable(segment: Segment, index: int) -> list[Record]:
+    """Return what can be read from `index` on; what a failing disk keeps is counted when the next is acknowledged."""
+    try:
+        return [record for record in segment.read() if record.index >= index]
+    except OSError:
+        return []

@@ -159,6 +159,42 @@ def test_a_full_disk_keeps_messages_in_memory_and_says_so(tmp_path: Path, monkey
     assert everything(Spool(tmp_path, 1_000_000)) == [0, 1, 2, 3, 4, 8, 9, 10, 11]
 
 
+@pytest.mark.parametrize("call", ["write", "pwrite", "ftruncate", "unlink", "open"])
+def test_a_failing_disk_raises_nothing_once_the_store_is_open(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str
+) -> None:
+    """A card that turned read-only on the way: acquisition and publishing go on."""
+    spool = Spool(tmp_path, 20_000, segment_bytes=2000)
+    fill(spool, 30)
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(30, "Read-only file system")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, call, fail)
+        fill(spool, 100)
+        spool.acknowledge(60, 60)
+        fill(spool, 400)
+        assert everything(spool)[-1] == 529
+    spool.acknowledge(500, 440)
+    fill(spool, 3)
+    assert everything(spool) == list(range(500, 533))
+
+
+def test_files_that_cannot_be_read_are_skipped_and_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is still in memory goes on its way."""
+    spool = Spool(tmp_path, 1_000_000, segment_bytes=2000)
+    fill(spool, RECENT + 100)
+
+    def fail(*_: object) -> bytes:
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(Path, "read_bytes", fail)
+    assert everything(spool) == list(range(100, RECENT + 100))
+    spool.acknowledge(RECENT + 100, RECENT)
+    assert spool.counters.dropped == 100
+
+
 def test_a_second_process_is_refused(tmp_path: Path) -> None:
     """Two would acknowledge each other's messages."""
     spool = Spool(tmp_path, 1_000_000)

@@ -133,7 +133,7 @@ def test_a_traverse_takes_its_time_and_stops_clean(stack: Stack, wheels: Wheels)
     until(wheels.turn, lambda: f"the wheels turn: {stack.said('traverse')}")
     assert process.wait(60) == 0, stack.said("traverse")
     assert time.monotonic() - began >= 4.0
-    assert "Finished after 4.00 s, 0.200 m turned" in stack.said("traverse")
+    assert "Finished after 4.000 s, 0.200 m turned" in stack.said("traverse")
     until(wheels.stand, "the wheels stand")
     assert wheels.emergencies == []
 
