@@ -95,6 +95,15 @@ class Estimator(Table):
     model: Path | None = None
 
 
+class Posterior(Table):
+    """`[posterior]`: intervals of the soil under the rover; needs a calibrated drivetrain."""
+
+    enabled: bool = True
+    model: Path | None = None
+    window_s: Annotated[float, Field(ge=0.5, le=20)] = 10.0
+    soil: Literal["lete-sand", "sandy-loam", "clayey-soil", "medium-soil"] | None = None
+
+
 class Recording(Table):
     """`[recording]`: where everything that was acquired is kept, and how much of it."""
 
@@ -141,6 +150,7 @@ class Configuration(Table):
     slip: Slip = Slip()
     smoothing: Smoothing = Smoothing()
     estimator: Estimator = Estimator()
+    posterior: Posterior = Posterior()
     recording: Recording = Recording()
     mqtt: Mqtt = Mqtt()
     control: Control = Control()

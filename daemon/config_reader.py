@@ -185,11 +185,12 @@ def _shared_node_ids(nodes: Nodes) -> Iterator[tuple[str, str, str, str]]:
 
 
 def _with_absolute_paths(configuration: Configuration, folder: Path) -> Configuration:
-    model = configuration.estimator.model
-    if model is None or model.is_absolute():
-        return configuration
-    estimator = configuration.estimator.model_copy(update={"model": folder / model})
-    return configuration.model_copy(update={"estimator": estimator})
+    changed: dict[str, BaseModel] = {}
+    for name in ("estimator", "posterior"):
+        table = getattr(configuration, name)
+        if table.model is not None:
+            changed[name] = table.model_copy(update={"model": folder / table.model})
+    return configuration.model_copy(update=changed)
 
 
 def line_of(text: str, location: list[str]) -> int | None:

@@ -145,6 +145,35 @@ class WheelMessage(Header):
     outside_training_range: tuple[str, ...]
 
 
+class IntervalReport(BaseModel):
+    """One quantity's posterior: its mean, its median, and the bounds of the 50 % and 90 % intervals."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    mean: float
+    low_90: float
+    low_50: float
+    median: float
+    high_50: float
+    high_90: float
+
+
+class BeliefMessage(Header):
+    """How sure the rover can be of its ground: intervals from the last seconds of all wheels that turned.
+
+    Under the prior of the soils that the posterior was trained on. Wide where the data say little.
+    """
+
+    cohesion_Pa: IntervalReport
+    friction_angle_rad: IntervalReport
+    drawbar_margin: IntervalReport
+    """Thrust that is left over the resistance, as a share of the load."""
+    wheels: Annotated[int, Field(ge=1, le=6)]
+    """How many wheels it rests on."""
+    instants: Annotated[int, Field(ge=1)]
+    """How many half seconds it rests on."""
+
+
 class Presence(StrEnum):
     """Whether the daemon is there."""
 
@@ -338,6 +367,7 @@ CHANNELS = (
     Channel("state", "state", StateMessage, QoS.AT_LEAST_ONCE, True, False, "at each connection, and at its end"),
     Channel("snapshot", "snapshot", SnapshotMessage, QoS.AT_LEAST_ONCE, False, True, "at each SYNC, in order"),
     Channel("wheel", "wheel/{wheel}", WheelMessage, QoS.AT_MOST_ONCE, False, False, "at each SYNC, live alone"),
+    Channel("belief", "belief", BeliefMessage, QoS.AT_LEAST_ONCE, False, True, "twice a second while wheels turn"),
     Channel("node", "node/{node_id}", NodeMessage, QoS.AT_LEAST_ONCE, True, True, "when something about it changes"),
     Channel("emcy", "emcy", EmergencyMessage, QoS.AT_LEAST_ONCE, False, True, "when a node sends one"),
     Channel("event", "event", EventMessage, QoS.AT_LEAST_ONCE, False, True, "when it happens"),

@@ -1,4 +1,4 @@
-"""torque ▸ smooth ▸ slip ▸ estimate: from one snapshot to one estimate.
+"""torque ▸ smooth ▸ slip ▸ estimate ▸ believe: from one snapshot to one estimate.
 
 The stages are the modules of those names; this one only joins them. Everything depends on the snapshots that came
 before and on nothing else, so a replay gives the same numbers to the last bit.
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calibration.drivetrain import wheel_torque
+from daemon.believe import belief_stage
 from daemon.slip import choose_slip, wheel_slip
 from daemon.smooth import Smoother
 from daemon.snapshot import WHEELS, Estimate
@@ -35,6 +36,7 @@ class Pipeline:
         rate = configuration.sync.rate_Hz
         self._smoother = Smoother(rate, smoothing.window_s, smoothing.threshold, smoothing.time_constant_s)
         self._direction = np.zeros(WHEELS)
+        self._belief = belief_stage(configuration)
 
     def step(self, snapshot: Snapshot) -> Estimate:
         """Return what the stages make of the next snapshot."""
@@ -48,6 +50,8 @@ class Pipeline:
         driving = np.where(turning, torque * direction, np.nan)
         smoothed = self._smoother.step(snapshot.time_ns, driving, load, measured)
         slip, source = choose_slip(smoothed.slip, self._slip.constant, turning)
+        raw_slip, sources = choose_slip(measured, self._slip.constant, turning)
+        belief = self._belief.step(snapshot.time_ns, load, raw_slip, driving, sources) if self._belief else None
         terrain = self._network.estimate(self._inputs(smoothed.torque, smoothed.load, slip, np.abs(speed)))
         return Estimate(
             snapshot=snapshot,
@@ -62,6 +66,7 @@ class Pipeline:
             input_names=self._network.input_names,
             outside=terrain.outside,
             model_version=self._network.card.version,
+            belief=belief,
         )
 
     def _forget_reversed(self, direction: Array) -> None:

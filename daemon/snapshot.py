@@ -8,11 +8,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.signals import Quantity
+
+if TYPE_CHECKING:
+    from calibration.posterior import Belief
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -148,6 +152,8 @@ class Estimate:
         Shape (inputs, 6): where an input lies outside the range that the network was trained on.
     model_version
         The network's version.
+    belief
+        What the last seconds of all wheels say about the ground, as intervals; where a half second has just ended.
     """
 
     snapshot: Snapshot
@@ -162,6 +168,7 @@ class Estimate:
     input_names: tuple[str, ...]
     outside: Mask
     model_version: str
+    belief: Belief | None = None
 
     def outside_inputs(self, wheel: int) -> tuple[str, ...]:
         """Return the names of the inputs of one wheel (0–5) that lie outside the training range."""

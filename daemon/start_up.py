@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, NoReturn
 
 import typer
 
+from calibration.posterior import PosteriorError
+from daemon.believe import belief_stage
 from daemon.config import Configuration
 from daemon.config_reader import EXIT_STATUS, ConfigurationError, read_configuration
 from daemon.estimate import SHIPPED_MODEL, ModelError, Network
@@ -25,10 +27,11 @@ def configuration_or_exit(path: Path | None) -> Configuration:
 
 
 def network_or_exit(configuration: Configuration) -> Network:
-    """Return the terrain network that the configuration names; end with what does not fit."""
+    """Return the terrain network that the configuration names; end with what does not fit, the posterior's included."""
     try:
+        belief_stage(configuration)  # not kept: the pipeline makes its own, but what does not fit shall show now
         return Network(configuration.estimator.model or SHIPPED_MODEL)
-    except ModelError as error:
+    except (ModelError, PosteriorError) as error:
         _end([str(error)])
 
 

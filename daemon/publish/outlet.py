@@ -14,6 +14,7 @@ from daemon.alarms import Alarm, Facts, current_alarms, known_names
 from daemon.messages import (
     AcquisitionReport,
     AlarmMessage,
+    BeliefMessage,
     EmergencyMessage,
     EventMessage,
     HealthMessage,
@@ -78,6 +79,8 @@ class MqttOutlet:
         """Publish one SYNC."""
         self._stuck.step(estimate.snapshot)
         self.publisher.estimate(estimate)
+        if estimate.belief is not None:
+            self.publisher.say("belief", BeliefMessage, time_ns=estimate.snapshot.time_ns, **asdict(estimate.belief))
 
     def event(self, event: NetworkEvent) -> None:
         """Publish what happened, and soon after, when its consequences have been drawn, how the nodes are."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,7 +43,7 @@ def snapshot_from_json(content: dict[str, Any]) -> Snapshot:
 
 def estimate_json(estimate: Estimate) -> bytes:
     """Return what the stages made of a snapshot as JSON, six numbers or null for each name."""
-    content = {
+    content: dict[str, Any] = {
         "sequence": estimate.snapshot.sequence,
         "time_ns": estimate.snapshot.time_ns,
         "wheel_torque_Nm": estimate.wheel_torque_Nm.tolist(),
@@ -56,4 +57,6 @@ def estimate_json(estimate: Estimate) -> bytes:
         "outside": [estimate.outside_inputs(wheel) for wheel in range(WHEELS)],
         "model_version": estimate.model_version,
     }
+    if estimate.belief is not None:
+        content["belief"] = asdict(estimate.belief)
     return _write(content)

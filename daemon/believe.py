@@ -1,0 +1,78 @@
+"""The last stage: how sure the rover can be of the ground under it, from the last seconds of all six wheels.
+
+The terrain network before it is the paper's: a point for each wheel and instant, mostly its training prior. This one
+(`calibration.posterior`) gives intervals, twice a second. It says nothing while the drivetrain has not been calibrated:
+an unknown no-load current would be taken for soil.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from calibration.posterior import SHIPPED_POSTERIOR, Belief, Buffer, Estimator, PosteriorError
+from calibration.window import Knowledge
+from daemon.snapshot import SlipSource
+
+if TYPE_CHECKING:
+    from daemon.config import Configuration
+    from daemon.snapshot import Array
+
+SLIP_STD_MEASURED = 0.005
+SLIP_STD_GUESSED = 0.03
+RADIUS_WITHIN = 0.02
+"""Relative: a wheel that differs by more from the one that the posterior was trained for needs its own."""
+
+
+class BeliefStage:
+    """Collects half-second means and asks the posterior; no clock but the snapshots'."""
+
+    def __init__(self, estimator: Estimator, configuration: Configuration) -> None:
+        settings, drivetrain = configuration.posterior, configuration.drivetrain
+        self._estimator = estimator
+        self._buffer = Buffer(settings.window_s)
+        self._gain_std = drivetrain.gain_relative_std
+        self._no_load_std_A = float(np.mean(drivetrain.no_load_current_std_A))
+        self._soil = settings.soil
+
+    def step(
+        self, time_ns: int, load_N: Array, slip: Array, driving_torque_Nm: Array, sources: tuple[SlipSource, ...]
+    ) -> Belief | None:
+        """Return a belief when a half second has closed; arrays of shape (6,), unsmoothed, NaN where a wheel stands."""
+        if not self._buffer.add(time_ns, load_N, slip, driving_torque_Nm):
+            return None
+        window = self._buffer.window()
+        if not window.size:
+            return None
+        guessed = SlipSource.CONFIGURED in sources
+        knowledge = Knowledge(
+            gain_relative_std=self._gain_std,
+            no_load_current_std_A=self._no_load_std_A,
+            slip_std=SLIP_STD_GUESSED if guessed else SLIP_STD_MEASURED,
+            soil=self._soil,
+        )
+        return self._estimator.believe(window, knowledge)
+
+
+def belief_stage(configuration: Configuration) -> BeliefStage | None:
+    """Return the stage, or None where it is switched off or the drivetrain's no-load current is not known.
+
+    Raises
+    ------
+    PosteriorError
+        The posterior network cannot be used, or was trained for another wheel.
+    """
+    settings, drivetrain = configuration.posterior, configuration.drivetrain
+    if not settings.enabled or not any(drivetrain.no_load_current_A):
+        return None
+    path = settings.model or Path(SHIPPED_POSTERIOR)
+    estimator = Estimator(path)
+    radius_m = configuration.wheel.radius_m
+    if abs(radius_m / estimator.radius_m - 1) > RADIUS_WITHIN:
+        raise PosteriorError(
+            f"{path}: trained for wheels of {estimator.radius_m} m radius, not {radius_m} m. "
+            "Train one for this rover (`regolithd train-posterior`), or set [posterior] enabled = false."
+        )
+    return BeliefStage(estimator, configuration)

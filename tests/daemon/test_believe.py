@@ -1,0 +1,62 @@
+"""Intervals twice a second – once the drivetrain is known, and for the wheel that the posterior was trained for."""
+
+from collections.abc import Callable
+
+import pytest
+
+from calibration.posterior import PosteriorError
+from daemon.believe import belief_stage
+from daemon.config import Configuration
+from daemon.estimate import Network
+from daemon.replay import Chain
+from daemon.snapshot import Estimate
+
+CALIBRATED = {"no_load_current_A": 0.037, "no_load_current_std_A": 0.001, "gain_relative_std": 0.03}
+
+
+def changed(configuration: Configuration, **tables: dict[str, object]) -> Configuration:
+    """Return a configuration with some tables changed."""
+    return Configuration.model_validate(configuration.model_dump() | tables)
+
+
+def estimates(configuration: Configuration, drive: Callable, rate_Hz: float, snapshots: int) -> list[Estimate]:
+    """Return what the chain makes of a straight drive."""
+    network = Network(configuration.estimator.model)  # type: ignore[arg-type]
+    return Chain(configuration, network).feed(drive(rate_Hz=rate_Hz).frames(snapshots))
+
+
+@pytest.mark.parametrize("rate_Hz", [2.0, 20.0])
+def test_a_calibrated_rover_believes_twice_a_second(
+    configuration: Configuration, drive: Callable, rate_Hz: float
+) -> None:
+    """At any rate, and its intervals are in order and around something."""
+    settings = changed(configuration, drivetrain=CALIBRATED, sync={"rate_Hz": rate_Hz})
+    made = estimates(settings, drive, rate_Hz, int(15 * rate_Hz))
+    beliefs = [estimate.belief for estimate in made if estimate.belief is not None]
+    assert 27 <= len(beliefs) <= 30
+    last = beliefs[-1]
+    assert (last.wheels, last.instants) == (6, 20)
+    for interval in (last.cohesion_Pa, last.friction_angle_rad, last.drawbar_margin):
+        assert interval.low_90 < interval.low_50 < interval.median < interval.high_50 < interval.high_90
+    assert last.cohesion_Pa.low_90 > 0
+    width = [belief.cohesion_Pa.high_90 - belief.cohesion_Pa.low_90 for belief in (beliefs[0], last)]
+    assert width[1] < width[0]  # ten seconds say more than half a one
+
+
+def test_a_rover_that_does_not_know_its_friction_believes_nothing(
+    configuration: Configuration, drive: Callable
+) -> None:
+    """It would take the drivetrain for soil."""
+    assert belief_stage(configuration) is None
+    assert all(estimate.belief is None for estimate in estimates(configuration, drive, 2.0, 20))
+
+
+def test_it_can_be_switched_off(configuration: Configuration) -> None:
+    """Though everything is known."""
+    assert belief_stage(changed(configuration, drivetrain=CALIBRATED, posterior={"enabled": False})) is None
+
+
+def test_a_posterior_for_another_wheel_is_refused(configuration: Configuration) -> None:
+    """With the cure."""
+    with pytest.raises(PosteriorError, match=r"trained for wheels of 0\.075 m radius, not 0\.1 m\. Train one"):
+        belief_stage(changed(configuration, drivetrain=CALIBRATED, wheel={"radius_m": 0.1}))
