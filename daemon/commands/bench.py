@@ -28,7 +28,7 @@ def bench(
     channel: Annotated[str, typer.Option(help="Such as vcan0 or can0.")] = "vcan0",
     interface: Annotated[str, typer.Option(help="Any interface of python-can.")] = "socketcan",
     scenario: Annotated[Path | None, typer.Option(help="TOML: soils along the way, noise, friction, seed.")] = None,
-    config: Annotated[Path | None, typer.Option(help="A rover.toml whose [nodes] are to be on the bus.")] = None,
+    config: Annotated[Path | None, typer.Option(help="A rover.toml: the nodes that it names are on the bus.")] = None,
     soil: Annotated[list[str] | None, typer.Option(help="A soil, or several 5 m each; instead of the file's.")] = None,
     seed: Annotated[int | None, typer.Option(help="Same seed, same ground and noise.")] = None,
     even: Annotated[bool, typer.Option("--even", help="No noise at all.")] = False,

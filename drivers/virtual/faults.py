@@ -1,7 +1,4 @@
-"""What can be made wrong with a node, by command.
-
-One line, one command; `N` is a node-ID. `help` prints this table.
-"""
+"""What can be wrong with a node; `drivers.virtual.tell` makes it so by command."""
 
 from __future__ import annotations
 

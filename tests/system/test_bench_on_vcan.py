@@ -1,0 +1,80 @@
+"""`regolithd bench` on a real SocketCAN link, as another team's daemon would use it: two commands, two processes."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from drivers.bus import open_bus
+from drivers.events import NodeBooted, NodeLost
+from drivers.network import Network, NetworkSettings, NodePhase
+from drivers.virtual import KAPVIK
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from drivers.events import NetworkEvent
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+CHANNEL = "vcan1"
+
+
+async def regolithd(*words: str) -> asyncio.subprocess.Process:
+    """Start a command."""
+    return await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "daemon", *words),
+        stdout=asyncio.subprocess.PIPE,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+    )
+
+
+async def until(condition: Callable[[], object], what: str) -> None:
+    """Wait for something, with patience for a busy machine."""
+    end = time.monotonic() + 90
+    while not condition():
+        assert time.monotonic() < end, f"waited in vain: {what}"
+        await asyncio.sleep(0.05)
+
+
+@pytest.mark.vcan
+async def test_a_node_is_switched_off_and_on_from_outside(tmp_path: Path) -> None:
+    """Booted, lost, booted again, over the kernel's bus; at the end the bench says what each node did."""
+    control = ["--control", str(tmp_path / "bench.sock")]
+    bench = await regolithd("bench", "--channel", CHANNEL, *control)
+    assert bench.stdout is not None
+    async with asyncio.timeout(60):
+        assert (await bench.stdout.readline()).startswith(b"ready: 14 nodes on socketcan vcan1")
+    events: list[NetworkEvent] = []
+    try:
+        async with open_bus("socketcan", CHANNEL) as bus:
+            network = Network(bus, NetworkSettings(KAPVIK, sync_rate_Hz=5.0), on_event=events.append)
+            running = asyncio.ensure_future(network.run())
+            await until(
+                lambda: {s.phase for s in network.status.values()} == {NodePhase.OPERATIONAL}, "all operational"
+            )
+            for word, told in (("off", NodeLost), ("on", NodeBooted)):
+                events.clear()
+                teller = await regolithd("bench-tell", *control, word, "3")
+                assert (await teller.communicate())[0] == b"ok\n"
+                await until(lambda told=told: [e for e in events if isinstance(e, told) and e.node_id == 3], word)
+            running.cancel()
+            await asyncio.wait([running])
+        bench.send_signal(signal.SIGTERM)
+        async with asyncio.timeout(60):
+            output, _ = await bench.communicate()
+        assert bench.returncode == 0
+    finally:
+        if bench.returncode is None:
+            bench.kill()
+            await bench.wait()
+    counts = json.loads(output.splitlines()[-1])
+    assert counts["3"]["boot_up"] > counts["2"]["boot_up"]
+    assert counts["bus"]["sync"] == network.counters.sync.produced
