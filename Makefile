@@ -6,7 +6,7 @@ export PYTHON
 
 RECORDINGS ?= ../shared/recordings
 
-.PHONY: demo test check sizing prove real scaling install uninstall clean
+.PHONY: demo test check sizing reproduce evaluate pictures prove real scaling install uninstall clean
 
 demo: $(VENV)/demo.ready
 	$(BIN)/regolithd demo
@@ -24,6 +24,18 @@ check: $(VENV)/dev.ready
 # The paper's sizing study, all of it: minutes. Interrupted, it goes on where it was.
 sizing: $(VENV)/dev.ready
 	$(BIN)/regolithd sizing
+
+# The paper's figures beside ours: docs/reproduction.md. Tells of the sizing study where that has been run.
+reproduce: $(VENV)/dev.ready
+	$(BIN)/regolithd reproduce
+
+# Posterior, paper's network, least squares and alarm on rovers that none of them has seen.
+evaluate: $(VENV)/dev.ready
+	$(BIN)/regolithd evaluate
+
+# docs/*.svg, from what `make sizing`, `make reproduce` and `make evaluate` found.
+pictures: reproduce
+	$(BIN)/regolithd pictures
 
 # The proof of `regolithd mismatch`: 200 recordings with an effect concealed. SEED=… repeats one; interrupted, it goes on.
 prove: $(VENV)/dev.ready

@@ -155,7 +155,7 @@ def scaling(examples: Examples) -> Scaling:
 
 
 def fit(
-    examples: Examples, seed: int, steps: int, batch: int = 2048, progress: Callable[[float], None] = lambda _: None
+    examples: Examples, seed: int, steps: int, batch: int = 512, progress: Callable[[float], None] = lambda _: None
 ) -> tuple[Parameters, Scaling]:
     """Return the weights after `steps` of Adam with a cosine decay; `progress` is told the loss every 50 steps."""
     by = scaling(examples)

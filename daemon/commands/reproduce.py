@@ -1,0 +1,66 @@
+"""`regolithd reproduce`: the paper's figures, computed again, on one page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command(help="Compute the paper's figures again and write the page that compares them.")(reproduce)
+
+
+def reproduce(
+    docs: Annotated[Path, typer.Option(help="where page and pictures go")] = Path("docs"),
+    figures: Annotated[Path, typer.Option(help="the figures, one flat JSON object")] = Path(
+        "build/figures/reproduce.json"
+    ),
+    sizing: Annotated[Path, typer.Option(help="what `regolithd sizing` found")] = Path("build/figures/sizing.json"),
+    trainings: Annotated[int, typer.Option(min=2, help="networks of the paper's size")] = 20,
+) -> None:
+    """Train, drive the synthetic traverse, compare."""
+    import json
+
+    import numpy as np
+    from rich.progress import Progress
+
+    from calibration.parameters import Drivetrain, Wheel
+    from calibration.reproduction import again, page, pictures, published
+    from calibration.reproduction.scalings import scalings
+
+    sized = json.loads(sizing.read_text(encoding="utf-8")) if sizing.is_file() else None
+    with Progress() as progress:
+        task = progress.add_task("training", total=trainings + 6 * max(2, trainings // 4))
+
+        def tick() -> None:
+            progress.advance(task)
+
+        pairs, done = again.trained(Drivetrain(), Wheel(), trainings, tick=tick)
+        withheld = again.withheld(max(2, trainings // 4), tick)
+    network = min(done, key=lambda training: training.mse).network
+    traverses = [again.traverse(network, ground, np.random.default_rng(7)) for ground in published.COHESION_PA]
+    record = again.record_500(done)
+    clean = again.current_sweep(network, np.array([published.SET_500["motor_current_A"]]))[0]
+    results = page.Results(
+        trainings=trainings,
+        loads=again.load_ranges(pairs),
+        scalings=scalings(pairs, network(pairs.inputs)),
+        record=record,
+        withheld=withheld,
+        traverses=traverses,
+        clean=(float(clean[0]), float(clean[1])),
+        sizing=sized,
+    )
+    docs.mkdir(parents=True, exist_ok=True)
+    (docs / "reproduction.md").write_text(page.page(results), encoding="utf-8")
+    pictures.training_set(pairs, docs / "training-set.svg")
+    pictures.traverse(traverses, docs / "traverse.svg")
+    if sized:
+        pictures.sizing(sized, docs / "sizing.svg")
+    figures.parent.mkdir(parents=True, exist_ok=True)
+    figures.write_text(json.dumps(page.figures(results), indent=1) + "\n", encoding="utf-8")
+    typer.echo(f"record 500: c {record.cohesion_Pa:.0f} Pa (paper 3352), φ {record.angle_deg:.1f}° (28.6)")
+    typer.echo(f"Wrote {docs / 'reproduction.md'}.")
