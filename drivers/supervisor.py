@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from drivers.link import Link
 
 _SILENT = (BootReason.NO_BOOT_UP, BootReason.NO_SDO_ANSWER, BootReason.FELL_SILENT, BootReason.BUS_DOWN)
-_PAUSE_S = 0.1  # before a node that restarts by itself is tried again
+_PAUSE_S = 0.1  # before a node that is heard again is booted: it may be restarting in a row
 
 
 class Supervisor:
@@ -70,10 +70,9 @@ class Supervisor:
                 silent = await self._watch()
             else:
                 silent = self._status.reason is not BootReason.RESTARTED
-            if silent:
-                await self._until_worth_trying()
-            else:
-                await asyncio.sleep(_PAUSE_S)
+            if silent and not await self._heard_again():
+                continue  # tried once more in silence: still lost, or failed, until it says something
+            await asyncio.sleep(_PAUSE_S)
             self._status = replace(self._status, phase=NodePhase.BOOTING)
 
     async def _boot(self) -> bool:
@@ -117,8 +116,8 @@ class Supervisor:
             text = f"node {node.node_id} ({node.kind.value}) is heard again"
             self._emit(NodeReturned(time.time_ns(), node.node_id, text))
 
-    async def _until_worth_trying(self) -> None:
-        """Wait until the node is heard (where silence was the trouble), boots up by itself, or some time has passed."""
+    async def _heard_again(self) -> bool:
+        """Wait until the node is heard (where silence was the trouble) or boots up; False: some time has passed."""
         link = self.link
         heard, boot_ups = link.heard, link.boot_ups
         any_sign = self.phase is NodePhase.LOST or self._status.reason in _SILENT
@@ -130,3 +129,4 @@ class Supervisor:
             self._note_return()
         else:
             self._patience_s = min(2.0 * self._patience_s, self._settings.retry_at_most_s)
+        return returned
