@@ -6,6 +6,7 @@ often, and at whatever instants, the grid is read.
 
 from __future__ import annotations
 
+import bisect
 import math
 from typing import TYPE_CHECKING
 
@@ -82,5 +83,5 @@ class Drops:
         while starts[-1] <= time_s:
             starts.append(max(ends[-1], 0.0) + random.exponential(self._pause_s))
             ends.append(starts[-1] + random.exponential(self._duration_s))
-        place = int(np.searchsorted(starts, time_s, side="right")) - 1
+        place = bisect.bisect_right(starts, time_s) - 1
         return float(time_s < ends[place])
