@@ -25,14 +25,15 @@ def demo(
     from daemon.demo.drive import drive
     from daemon.demo.picture import draw
     from daemon.demo.screen import screen
-    from daemon.demo.summary import summary
-    from daemon.demo.witness import stretches
+    from daemon.demo.summary import ground_summary, summary
+    from daemon.demo.witness import grounds, stretches
 
     console = Console()
     out.mkdir(parents=True, exist_ok=True)
     with screen(console, seconds) as show:
         driven = asyncio.run(drive(out, seconds, show))
     console.print(summary(stretches(driven.witness.seen, settle_s=4.0)))
+    console.print(ground_summary(grounds(driven.witness.seen)))
     picture = out / "drive.png"
     draw(driven.witness.seen, picture)
     for what, path in (("recording", driven.recording), ("frames", driven.log), ("picture", picture)):

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import os
+import tempfile
 import time
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import aiomqtt
@@ -26,8 +29,7 @@ from drivers.network import NodePhase
 from drivers.virtual import VirtualRover
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
+    from collections.abc import AsyncIterator, Callable
 
     from drivers.network import Network
 
@@ -36,6 +38,9 @@ RATE_HZ = 10.0
 BOOT_WITHIN_S = 20.0
 SPEED_M_S = 0.05
 CHANGE_M = 0.75
+WINDOW_S = 8.0
+KNOWN_TO = {"gain_relative_std": 0.03, "no_load_current_std_A": 0.001}
+"""As well as a wheels-up spin and a brake tell."""
 FIRST, SECOND = "medium-soil", "lete-sand"
 
 
@@ -49,18 +54,19 @@ class Drive:
     log: Path
 
 
-def demo_configuration(folder: Path, port: int) -> Configuration:
-    """Return Kapvik on an in-process bus, its drivetrain calibrated, recording into `folder`."""
+def demo_configuration(folder: Path, passing: Path, port: int) -> Configuration:
+    """Return Kapvik on an in-process bus, its drivetrain calibrated, recording into `folder`; `passing` is removed."""
     drivetrain = Scenario().drivetrain
     return Configuration.model_validate(
         {
             "bus": {"interface": "virtual", "channel": CHANNEL},
             "sync": {"rate_Hz": RATE_HZ},
             "nodes": {"inclinometer": 21, "ground_speed": 22, "motor_diagnostics": True},
-            "drivetrain": drivetrain.model_dump(),
+            "drivetrain": drivetrain.model_dump() | KNOWN_TO,
+            "posterior": {"window_s": WINDOW_S},
             "recording": {"directory": folder, "limit_MB": 50},
-            "mqtt": {"host": "127.0.0.1", "port": port, "spool_directory": folder / "spool"},
-            "control": {"socket": folder / "control.sock", "group": str(os.getgid())},
+            "mqtt": {"host": "127.0.0.1", "port": port, "spool_directory": passing / "spool"},
+            "control": {"socket": passing / "control.sock", "group": str(os.getgid())},
         }
     )
 
@@ -71,11 +77,12 @@ async def drive(folder: Path, seconds: float, show: Callable[[Viewer, float], No
     world = VirtualWorld(Scenario(ground=ground))
     witness = Witness(world)
     async with (
+        _temporary_folder() as passing,
         embedded_broker() as port,
         open_bus("virtual", CHANNEL) as rover_bus,
         asyncio.TaskGroup() as tasks,
     ):
-        configuration = demo_configuration(folder, port)
+        configuration = demo_configuration(folder, passing, port)
         prefix = f"{configuration.mqtt.prefix}/{configuration.rover.name}"
         viewer = Viewer(prefix)
         service = Service(configuration, TerrainNetwork(SHIPPED_MODEL))
@@ -104,6 +111,12 @@ async def drive(folder: Path, seconds: float, show: Callable[[Viewer, float], No
     if paths is None:
         raise OSError("the recording failed: " + (service.recorder.trouble or "" if service.recorder else ""))
     return Drive(witness, viewer, *paths)
+
+
+@asynccontextmanager
+async def _temporary_folder() -> AsyncIterator[Path]:
+    with tempfile.TemporaryDirectory(prefix="regolithd-") as name:
+        yield Path(name)
 
 
 async def _operational(network: Network) -> None:

@@ -9,7 +9,7 @@ from rich import box
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from daemon.demo.witness import Stretch
+    from daemon.demo.witness import Ground, Stretch
 
 
 def summary(stretches: list[Stretch]) -> Table:
@@ -17,7 +17,7 @@ def summary(stretches: list[Stretch]) -> Table:
     table = Table(
         box=box.SIMPLE_HEAD,
         pad_edge=False,
-        title="Estimated (true), mean over each soil",
+        title="By each wheel alone, the paper's network: mean over each soil (true)",
         title_justify="left",
         title_style="bold",
         padding=(0, 2, 0, 0),
@@ -38,4 +38,29 @@ def summary(stretches: list[Stretch]) -> Table:
             f"{100 * each.outside:.0f} %",
         )
         wheel = each.wheel
+    return table
+
+
+def ground_summary(grounds: list[Ground]) -> Table:
+    """Return the table of what the posterior said where all six wheels were on one soil: 90 % intervals, and true."""
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        title="By all six wheels together: median, 90 % interval (true)",
+        title_justify="left",
+        title_style="bold",
+        padding=(0, 2, 0, 0),
+    )
+    table.add_column("\nsoil")
+    table.add_column("c\nkPa", justify="right", no_wrap=True)
+    table.add_column("φ\n°", justify="right", no_wrap=True)
+    for each in grounds:
+        cohesion, angle = each.belief.cohesion_Pa, each.belief.friction_angle_rad
+        table.add_row(
+            each.soil,
+            f"{cohesion.median / 1000:.1f}, {cohesion.low_90 / 1000:.1f} … {cohesion.high_90 / 1000:.1f} "
+            f"({each.true_cohesion_Pa / 1000:.2f})",
+            f"{math.degrees(angle.median):.0f}, {math.degrees(angle.low_90):.0f} … {math.degrees(angle.high_90):.0f} "
+            f"({math.degrees(each.true_friction_angle_rad):.1f})",
+        )
     return table

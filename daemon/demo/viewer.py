@@ -13,6 +13,9 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from calibration.window import INTERVAL_S
+from daemon.demo.interval import SCALES, interval_line
+
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
@@ -34,7 +37,8 @@ class Viewer:
     nodes: int = 0
     messages: int = 0
     snapshots: int = 0
-    last_event: str = ""
+    belief: dict[str, Any] | None = None
+    alarms: dict[str, str] = field(default_factory=dict)
 
     def take(self, topic: str, payload: bytes) -> None:
         """Take one message."""
@@ -46,14 +50,21 @@ class Viewer:
                 self.snapshots += 1
             case ["state"]:
                 self.state = json.loads(payload)["state"]
-            case ["event"]:
-                self.last_event = json.loads(payload)["text"]
+            case ["belief"]:
+                self.belief = json.loads(payload)
+            case ["alarm", name]:
+                self._alarm(name, json.loads(payload))
 
     def _wheel(self, number: int, message: dict[str, Any]) -> None:
         self.wheels[number] = message
         torque = message["smoothed_torque_Nm"]
         if torque is not None:
             self.torque.setdefault(number, deque(maxlen=HISTORY)).append(torque)
+
+    def _alarm(self, name: str, message: dict[str, Any]) -> None:
+        self.alarms.pop(name, None)
+        if message["active"]:
+            self.alarms[name] = message["text"]
 
     def render(self) -> RenderableType:
         """Return the table with a line of state beneath."""
@@ -68,7 +79,17 @@ class Viewer:
         top = max([0.1, *(max(values) for values in self.torque.values() if values)])
         for wheel in range(1, 7):
             table.add_row(*self._row(wheel, top))
-        return Group(table, Text(MEANING, style="dim"), self._footer())
+        return Group(table, Text(MEANING, style="dim"), Text(), *self._belief(), Text(), self._footer())
+
+    def _belief(self) -> list[Text]:
+        """Return what the six wheels say together."""
+        if self.belief is None:
+            return [Text("the ground under all six wheels: nothing to go by yet", style="dim"), *[Text()] * len(SCALES)]
+        seconds = self.belief["instants"] * INTERVAL_S
+        title = Text.assemble(
+            ("the ground, by all six wheels over the last ", "dim"), f"{seconds:g} s", (" (90 % sure)", "dim")
+        )
+        return [title, *(interval_line(scale, self.belief[scale.key]) for scale in SCALES)]
 
     def _row(self, wheel: int, top: float) -> tuple[RenderableType, ...]:
         name = Text.assemble((f"{wheel} ", "bold"), (PLACES[wheel - 1], "dim"))
@@ -94,8 +115,10 @@ class Viewer:
         text = Text.assemble(
             ("● ", style), (f"{self.prefix} {self.state}", style), (f" · {self.messages} messages", "dim")
         )
-        if self.last_event:
-            text.append(f" · {self.last_event}", style="dim")
+        if self.alarms:
+            text.append(f" · {next(iter(self.alarms.values()))}", style="bold red")
+        else:
+            text.append(" · no alarm", style="dim")
         text.truncate(79, overflow="ellipsis")
         return text
 

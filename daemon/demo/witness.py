@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from calibration.posterior import Belief
     from daemon.snapshot import Array, Estimate
     from daemon.virtual_rover import Truth, VirtualWorld
     from drivers.events import NetworkEvent
@@ -84,3 +85,24 @@ def _stretch(wheel: int, soil: str, pairs: list[tuple[Estimate, Truth]]) -> Stre
         true_friction_angle_rad=mean([truth.friction_angle_rad for truth in truths]),
         outside=float(np.mean([estimate.outside[:, wheel].any() for estimate in estimates])),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """What all wheels together came to believe while all were on one soil: the last of it."""
+
+    soil: str
+    belief: Belief
+    true_cohesion_Pa: float
+    true_friction_angle_rad: float
+
+
+def grounds(seen: list[tuple[Estimate, Truth]]) -> list[Ground]:
+    """Return the last belief on each soil that was under all six wheels, in the order driven."""
+    last: dict[str, Ground] = {}
+    for estimate, truth in seen:
+        if estimate.belief is not None and len(set(truth.soils)) == 1:
+            soil = truth.soils[0]
+            angle = float(truth.friction_angle_rad[0])
+            last[soil] = Ground(soil, estimate.belief, float(truth.cohesion_Pa[0]), angle)
+    return list(last.values())

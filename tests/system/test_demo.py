@@ -21,7 +21,7 @@ def test_the_demo_runs_ends_and_leaves_a_recording_a_log_and_a_picture(tmp_path:
     for path in (mcap, log, picture):
         assert path.name in done.stdout
     wheels = [line.split() for line in done.stdout.splitlines() if "medium-soil" in line]
-    assert [line[0] for line in wheels] == ["1", "2", "3", "4", "5", "6"]
+    assert [line[0] for line in wheels] == ["1", "2", "3", "4", "5", "6", "medium-soil"]
 
     replay = [sys.executable, "-m", "daemon", "replay", str(log)]
     again = subprocess.run(replay, cwd=ROOT, capture_output=True, text=True, check=False, timeout=100)
