@@ -85,8 +85,8 @@ def size_of(search: Search, fit: Fit, index: int) -> float:
     return float(np.sqrt(np.mean(values**2))) / scene.mean_size
 
 
-def settle_noise(search: Search) -> Noise:
-    """Estimate the noise from what is left when anything at all that explains something is taken out.
+def settle_noise(search: Search) -> tuple[Noise, Array]:
+    """Estimate the noise from what is left when anything at all that explains something is taken out; return both.
 
     An effect that is not taken out looks like noise that never forgets, and then hides itself. So first the most
     telling terms are taken out as if the noise forgot quickly, whether they are significant or not: their few
@@ -107,9 +107,10 @@ def settle_noise(search: Search) -> Noise:
         if not found:
             break
         terms += found
-    noise = estimate_noise(residual_of(search, search.fit(terms)), mask)
+    left = residual_of(search, search.fit(terms))
+    noise = estimate_noise(left, mask)
     _weigh(search, noise)
-    return noise
+    return noise, left
 
 
 def _weigh(search: Search, noise: Noise) -> None:
@@ -232,10 +233,9 @@ def enough(search: Search, more: Fit, less: Fit) -> bool:
 
 def decide(search: Search, candidates: Sequence[Candidate]) -> Decision:
     """Choose names, and say what is left without."""
-    noise = settle_noise(search)
+    noise, left = settle_noise(search)
     none = search.fit(())
-    blocks = blocks_of_time(search.dictionary.scene, noise)
-    search.threshold = naming_threshold(search, residual_of(search, none), blocks)
+    search.threshold = naming_threshold(search, left, blocks_of_time(search.dictionary.scene, noise))
     seek_in_residual(search, candidates, ())
     named = none
     for fit in best_named(search)[1:]:

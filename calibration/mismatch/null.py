@@ -36,7 +36,7 @@ def naming_threshold(search: Search, residual: Array, blocks: NDArray[np.int64])
 def largest_by_chance(search: Search, given: Sequence[Term], residual: Array, blocks: NDArray[np.int64]) -> Array:
     """Return the largest score of single-column candidates in each draw, shape (draw,).
 
-    `residual` [time, wheel] is what `given` and the free parameters leave.
+    `residual` [time, wheel] has no structure left, or as little as possible: what stays in it looks like chance.
     """
     groups = [g for g in search.dictionary.groups if g.named and len(g.columns) == 1]
     if not groups:

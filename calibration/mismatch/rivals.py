@@ -28,6 +28,8 @@ CANNOT_LEAD = 10.8
 WORTH_WORRYING = 0.15
 """Of the mean magnitude of the predicted channel: the size at which two effects should be told apart."""
 FEW = 2
+SLACK = 4.0
+"""A lead that the choice among shapes, and forms that are not nature's, give for nothing."""
 
 DRIVES = {
     "direction": "drive the same stretch forwards and backwards at one speed",
@@ -170,7 +172,7 @@ def _covariate(term: Term) -> str:
 
 def _survives(search: Search, named: Fit, rival: Fit, others: Sequence[Term], term: Term) -> bool:
     """Say whether the rival, were it true, would trail by this much at least one time in twenty."""
-    lead = named.gain - rival.gain
+    lead = max(search.score(named) - search.score(rival) - SLACK, 0.0)
     own = rival.terms[-1]
     block, reach = search.beside((*others, term), own)
     values = rival.coefficients[rival.of_term(len(rival.terms) - 1)]
