@@ -5,12 +5,13 @@ from __future__ import annotations
 import asyncio
 import builtins
 import re
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers import errors, pdo
+from drivers import errors, pdo, reference
 from drivers.bus import BusState
 from drivers.configuration import configuration
 from drivers.counters import BusCounters
@@ -183,3 +184,9 @@ def test_every_code_has_words(code: int) -> None:
     """All of them."""
     assert error_text(code)
     assert error_text(code, NodeKind.MOTOR)
+
+
+def test_the_document_of_the_bus_is_what_the_code_does() -> None:
+    """`docs/bus.md` is written by `python -m drivers.reference`; write it anew where this fails."""
+    written = Path(__file__).parents[2] / "docs" / "bus.md"
+    assert written.read_text() == reference.document()
