@@ -14,12 +14,17 @@ from typing import TYPE_CHECKING
 import pytest
 from broker import Mosquitto, mosquitto_program, unused_port
 from guests import REPORTS, Guests, Reporter
+from hypothesis import HealthCheck, settings
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Iterator
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARED_IS_ABSENT = "recordings of others are not part of this repository: put the folder `shared` beside the checkout"
+
+# No example has a time limit of its own: on a busy machine that would be a test of the machine.
+settings.register_profile("regolithd", settings.default, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("regolithd")
 
 
 def pytest_configure(config: pytest.Config) -> None:
