@@ -36,7 +36,7 @@ def _frame(viewer: Viewer, elapsed: float, seconds: float) -> RenderableType:
     progress = Table.grid(padding=(0, 2))
     bar = ProgressBar(total=seconds, completed=elapsed, width=40)
     progress.add_row(Text("driving", style="dim"), bar, Text(f"{elapsed:.0f} of {seconds:.0f} s", style="dim"))
-    return Group(Text(TITLE, style="bold"), Text(), progress, Text(), viewer.render(), Text())
+    return Group(Text(TITLE, style="bold"), Text(), progress, viewer.render())
 
 
 def _plain(console: Console, seconds: float) -> Callable[[Viewer, float], None]:
