@@ -17,6 +17,7 @@ from calibration.mismatch.fill import add_candidate
 from calibration.mismatch.noise import Noise, blocks_of_time, estimate_noise
 from calibration.mismatch.null import naming_threshold
 from calibration.mismatch.refine import refined
+from calibration.mismatch.transfer import that_transfer
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -241,7 +242,7 @@ def decide(search: Search, candidates: Sequence[Candidate]) -> Decision:
     for fit in best_named(search)[1:]:
         if enough(search, fit, named):
             named = fit
-    named, unnamed = _without_a_name(search, named)
+    named, unnamed = _without_a_name(search, that_transfer(search, named, NAMED_BY))
     whole = search.fit((*named.terms, *unnamed))
     noise = estimate_noise(residual_of(search, whole), search.dictionary.scene.mask)
     search.weights = noise.weights

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from calibration.mismatch.decide import best_per_family, enough
 from calibration.mismatch.search import Fit, Search, Term
+from calibration.mismatch.transfer import squares
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,7 +44,7 @@ def hold_out(search: Search, named: Fit, noise: Noise, groups: Sequence[Group]) 
     """
     dictionary = search.dictionary
     count, wheels = len(dictionary.gram), len(noise.deviation)
-    squares = np.zeros((2, wheels))
+    totals = np.zeros((2, wheels))
     by_term = np.zeros((2, len(named.terms), wheels))
     kept = dictionary.groups
     for fold in range(count):
@@ -53,15 +54,15 @@ def hold_out(search: Search, named: Fit, noise: Noise, groups: Sequence[Group]) 
         dictionary.groups = list(groups)
         chosen = _chosen(train)
         dictionary.groups = kept
-        without = _squares(train, train.fit(()), fold)
-        with_all = _squares(train, train.fit(chosen), fold)
-        squares += np.stack((without, with_all))
+        without = squares(train, train.fit(()), fold)
+        with_all = squares(train, train.fit(chosen), fold)
+        totals += np.stack((without, with_all))
         for index, term in enumerate(named.terms):
             rest = tuple(t for t in chosen if t.name != term.name)
-            by_term[0, index] += _squares(train, train.fit(rest), fold)
+            by_term[0, index] += squares(train, train.fit(rest), fold)
             by_term[1, index] += with_all
     counts = dictionary.counts.sum(axis=0)
-    rms = np.sqrt(squares.sum(axis=1) / counts.sum())
+    rms = np.sqrt(totals.sum(axis=1) / counts.sum())
     on = [list(term.wheels) for term in named.terms]
     pairs = [[float(np.sqrt(by_term[k, i, w].sum() / counts[w].sum())) for i, w in enumerate(on)] for k in (0, 1)]
     return HeldOut(float(rms[0]), float(rms[1]), tuple(pairs[0]), tuple(pairs[1]))
@@ -82,19 +83,3 @@ def _chosen(train: Search) -> tuple[Term, ...]:
             break
         terms = best.terms
     return terms
-
-
-def _squares(train: Search, fit: Fit, fold: int) -> Array:
-    """Return the sum of squared errors on a fold, for each wheel."""
-    dictionary = train.dictionary
-    total = dictionary.energy[fold].copy()
-    for w in range(len(total)):
-        on = [(c, v) for (c, wheels), v in zip(fit.columns, fit.coefficients, strict=True) if w in wheels]
-        if not on:
-            continue
-        at = [c for c, _ in on]
-        values = np.array([v for _, v in on])
-        total[w] += (
-            values @ dictionary.gram[fold, w][np.ix_(at, at)] @ values - 2 * values @ dictionary.moment[fold, w, at]
-        )
-    return total

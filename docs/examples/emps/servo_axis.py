@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from asymmetric_friction import AsymmetricFriction
+from linear_friction import LinearFriction
 from scipy.signal import butter, sosfiltfilt
 
 from calibration.mismatch.candidates import library
@@ -55,9 +56,9 @@ class ServoAxis(Simulation):
         return {"time": inputs["t_s"], "wheel_speed": inputs["speed_m_s"], "position": inputs["position_m"]}
 
     def candidates(self) -> Sequence[Candidate]:
-        """Return the library without what this machine cannot have, and one effect of its own.
+        """Return the library without what this machine cannot have, and two effects as its literature has them.
 
         A slide has no wheel angle, and the voltage is the controller's own command: no sensor reads it with an offset.
         """
-        foreign = {"wheel-angle-ripple", "current-sensor-bias"}
-        return (*(c for c in library() if c.name not in foreign), AsymmetricFriction())
+        foreign = {"wheel-angle-ripple", "current-sensor-bias", "viscous-friction"}
+        return (*(c for c in library() if c.name not in foreign), LinearFriction(), AsymmetricFriction())
