@@ -29,6 +29,10 @@ Array = NDArray[np.float64]
 
 FURTHER_SHARE = 0.01
 """A further term must gain this share of what the others gained: no form is nature's to the last percent."""
+TELLING_SHARE = 0.1
+"""Unless it takes this share of all that they left."""
+BESIDE_THE_UNKNOWN = 0.1
+"""Of what a curve without a name gains, the least that a name beside it must gain: what leaks from one is less."""
 UNNAMED_BY = 16.0
 """Likewise for a curve, of which there are more and freer ones."""
 WORTH_A_NAME = 0.02
@@ -228,7 +232,9 @@ def _polished_best(search: Search, sets: Sequence[tuple[Term, ...]]) -> list[Fit
 
 def enough(search: Search, more: Fit, less: Fit) -> bool:
     """Say whether a larger set has earned its further names."""
-    needed = max(search.threshold, FURTHER_SHARE * less.gain) * (len(more.terms) - len(less.terms))
+    remaining = float(np.sum(residual_of(search, less) ** 2 * search.weights))
+    worthwhile = min(FURTHER_SHARE * less.gain, TELLING_SHARE * remaining)
+    needed = max(search.threshold, worthwhile) * (len(more.terms) - len(less.terms))
     return search.score(more) - search.score(less) > needed
 
 
@@ -242,7 +248,7 @@ def decide(search: Search, candidates: Sequence[Candidate]) -> Decision:
     for fit in best_named(search)[1:]:
         if enough(search, fit, named):
             named = fit
-    named, unnamed = _without_a_name(search, that_transfer(search, named, NAMED_BY))
+    named, unnamed = _without_a_name(search, that_transfer(search, named, search.threshold))
     whole = search.fit((*named.terms, *unnamed))
     noise = estimate_noise(residual_of(search, whole), search.dictionary.scene.mask)
     search.weights = noise.weights
@@ -262,7 +268,7 @@ def _without_a_name(search: Search, named: Fit) -> tuple[Fit, tuple[Term, ...]]:
     curve = alone[0][1]
     by_curve = search.fit((curve,))
     imitated = len(named.terms) > 1 and search.score(by_curve) >= search.score(named)
-    imitated &= any(term.group.candidate and term.group.candidate.covariate != curve.name for term in named.terms)
+    imitated &= any(_covariate(term) != curve.name for term in named.terms)
     left = best_per_family(search, named.terms, named=False)
     beside = search.fit((*named.terms, left[0][1])) if left else named
     misfit = (beside.gain - named.gain) / max(beside.gain, 1e-9)
@@ -276,5 +282,23 @@ def _without_a_name(search: Search, named: Fit) -> tuple[Fit, tuple[Term, ...]]:
         if search.score(trial) - search.score(fit) > search.threshold and acceptable(search, trial):
             kept, fit = (*kept, term), trial
     if imitated or search.score(fit) >= search.score(beside):
-        return search.fit(kept), (curve,)
-    return named, (left[0][1],)
+        return _that_stand_beside(search, search.fit(kept), curve), (curve,)
+    return _that_stand_beside(search, named, left[0][1]), (left[0][1],)
+
+
+def _covariate(term: Term) -> str:
+    """Return the covariate whose curve could imitate a term: that of speed, along the motion, holds a constant drag."""
+    found = term.group.candidate.covariate if term.group.candidate else term.name
+    return "wheel_speed" if found == "direction" else found
+
+
+def _that_stand_beside(search: Search, named: Fit, curve: Term) -> Fit:
+    """Leave out names that say little beside a curve that says much: what has no form leaks into every form."""
+    both = search.fit((*named.terms, curve))
+    unknown = both.gain - named.gain
+    kept = []
+    for index, term in enumerate(named.terms):
+        rest = [*named.terms[:index], *named.terms[index + 1 :], curve]
+        if both.gain - search.fit(rest).gain >= BESIDE_THE_UNKNOWN * unknown:
+            kept.append(term)
+    return search.fit(kept)

@@ -319,8 +319,10 @@ def _method(answer: Answer, provenance: Provenance) -> str:
 <p>The simulation is first calibrated within its stated uncertainty: what its own parameters can do is no evidence of
 missing physics. Candidates are physical models with units, signs and bounds, fitted inside the simulation together with
 those parameters. Noisy inputs are replaced by what they most probably were. Each candidate pays for the freedom it
-has – wheels, onsets, shapes – in units of the noise with its own memory, so that one error rate holds for the whole
-search; free curves without a name compete, and where one explains clearly more than any name does, no name is given.
+has – wheels, onsets, shapes – and must gain more than the whole search finds by chance, as told by the same search
+over the residual’s own blocks with their signs drawn anew. What it gains must come back on blocks, or runs, that did
+not fit it.
+Free curves without a name compete, and where one explains clearly more than any name does, no name is given.
 Errors called held-out come from blocks of time that neither chose the effects nor fitted them.</p>
 {said}
 <table><tbody>
