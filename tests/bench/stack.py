@@ -51,6 +51,8 @@ class Stack:
 channel = "{self.channel}"
 [sync]
 rate_Hz = {self.rate_Hz}
+[nodes]
+heartbeat_timeout_ms = 3000  # the guest has one processor: starting a command may hold everybody else up for a second
 [recording]
 enabled = false
 [mqtt]
