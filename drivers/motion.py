@@ -28,6 +28,7 @@ class Motion:
         self._drives = drives
         self._status = status
         self._gear_ratio = gear_ratio
+        self._stops = 0  # how often they were stopped or disabled
         self._locked = "they have not been enabled yet"
 
     def live(self) -> list[Drive]:
@@ -40,7 +41,10 @@ class Motion:
             if not self._operational(node_id):
                 status = self._status(node_id)
                 raise DriveError(f"the drive is not operational ({status.phase}). {status.text}", node_id=node_id)
+        stops = self._stops
         failures = await each(drive.enable() for drive in self._drives.values())
+        if self._stops != stops:
+            failures.append(DriveError(f"they were stopped meanwhile: {self._locked}"))
         if failures:
             await each(drive.disable() for drive in self.live())
             raise _drive_error(failures)
@@ -84,6 +88,7 @@ class Motion:
             raise _drive_error(failures)
 
     def _lock(self, why: str) -> None:
+        self._stops += 1
         self._locked = why
         self.moving = False
 

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from drivers.frame import Frame
+    from drivers.pdo import Pdo
     from drivers.signals import NodeDescription
 
 __all__ = ["Network", "NetworkCounters", "NetworkSettings", "NodePhase", "NodeStatus"]
@@ -57,8 +58,8 @@ _BUS_STATES = {
     BusState.ACTIVE: "the bus works",
     BusState.WARNING: "many errors on the bus: check terminators (60 Ω between the wires), length and plugs",
     BusState.PASSIVE: "the controller is error passive: is any other node powered, and is the bit rate right?",
-    BusState.OFF: "bus-off: the controller left the bus. `ip link set can0 type can restart-ms 100` lets it return",
-    BusState.DOWN: "the link is down or the adapter is gone: `ip link set can0 up`, or plug it in",
+    BusState.OFF: "bus-off: the controller left the bus. `ip link set {channel} type can restart-ms 100` mends that",
+    BusState.DOWN: "the link is down or the adapter is gone: `ip link set {channel} up`, or plug it in",
 }
 
 
@@ -180,8 +181,8 @@ class Network:
         self._handlers[EMCY_COB_ID + node_id] = lambda frame: self._take_emergency(supervisor, frame)
         if node.kind is NodeKind.MOTOR:
             drive = self._drives[node_id] = Drive(self.bus, link)
-            tpdo = tpdos(node.kind)[0].cob_id(node_id)
-            self._handlers[tpdo] = lambda frame: self._take_statusword(drive, frame)
+            tpdo = tpdos(node.kind)[0]
+            self._handlers[tpdo.cob_id(node_id)] = lambda frame: self._take_statusword(drive, tpdo, frame)
 
     def _status(self, node_id: int) -> NodeStatus:
         status = self._supervisors[node_id].status
@@ -199,7 +200,8 @@ class Network:
                     handler(frame)
             if self.bus.state is not self._bus_state:
                 self._bus_state = self.bus.state
-                self._emit(BusStateChanged(time.time_ns(), self._bus_state, _BUS_STATES[self._bus_state]))
+                text = _BUS_STATES[self._bus_state].format(channel=self.bus.channel)
+                self._emit(BusStateChanged(time.time_ns(), self._bus_state, f"{self.bus.channel}: {text}"))
 
     def _take_emergency(self, supervisor: Supervisor, frame: Frame) -> None:
         node = supervisor.link.node
@@ -211,9 +213,11 @@ class Network:
         text = f"node {node.node_id} ({node.kind.value}): {said}"
         self._emit(NodeEmergency(frame.time_ns, node.node_id, emergency, text))
 
-    def _take_statusword(self, drive: Drive, frame: Frame) -> None:
+    def _take_statusword(self, drive: Drive, tpdo: Pdo, frame: Frame) -> None:
+        if len(frame.data) != tpdo.layout.size:
+            return  # the decoder counts it
         before = drive.reported
-        state = drive.take_statusword(int.from_bytes(frame.data[:2], "little"))
+        state = drive.take_statusword(tpdo.layout.unpack(frame.data)[0])
         if state is not before:
             text = f"drive {drive.node_id}: {before} → {state}"
             self._emit(DriveStateChanged(frame.time_ns, drive.node_id, state, text))
@@ -223,12 +227,12 @@ class Network:
         self._counters.heartbeats_failed += not sent
 
     def _emit(self, event: NetworkEvent) -> None:
-        self._on_event(event)
         if isinstance(event, NodeLost) and event.node_id in self._drives:
             self._drives[event.node_id].forget()
         if self._motion.moving and self._ends_motion(event):
             self._must_stop = event
             self._stop_wanted.set()
+        self._on_event(event)
 
     def _ends_motion(self, event: NetworkEvent) -> bool:
         match event:

@@ -80,6 +80,35 @@ async def test_nothing_turns_before_it_is_enabled() -> None:
         assert not [frame for frame in r.frames if frame.can_id & 0x780 == 0x200]
 
 
+async def test_a_stop_while_the_drives_are_being_enabled_wins() -> None:
+    """Enabling that was under way fails and leaves no drive enabled."""
+    async with rig(MOTORS) as r:
+        await r.network.settled()
+        enabling = asyncio.ensure_future(r.network.enable())
+        await r.until_transfers(1, r.network._supervisors[1].link.sdo.transfers + 2)
+        await r.network.quick_stop()
+        with pytest.raises(DriveError, match="stopped meanwhile: a quick stop was commanded"):
+            await enabling
+        await until(
+            lambda: {r.network.status[node].drive_state for node in range(1, 7)} == {DriveState.SWITCH_ON_DISABLED},
+            "all drives switched off",
+        )
+        with pytest.raises(DriveError, match="locked"):
+            await r.network.set_speed(CREEP_rad_s)
+
+
+async def test_a_mutilated_statusword_is_none() -> None:
+    """A TPDO that is too short does not say that a drive has left its state."""
+    async with rig(MOTORS) as r:
+        await r.network.settled()
+        await r.network.enable()
+        await r.network.set_speed(CREEP_rad_s)
+        r.rover.tell("short 2 7")
+        await until(lambda: r.decoder.undecodable["wrong-length"] > 3, "short frames")
+        assert r.network.status[2].drive_state is DriveState.ENABLED
+        assert not r.told(MotionStopped)
+
+
 async def test_a_missing_drive_cannot_be_enabled_and_the_message_says_why() -> None:
     """The message names the node, and why it is not on the bus."""
     async with rig(MOTORS[:5], known=MOTORS) as r:
