@@ -1,7 +1,10 @@
 """What was published arrives: in order, late ones marked, whatever happens to the broker."""
 
 import asyncio
+import gc
 import logging
+import shutil
+import subprocess
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
@@ -254,6 +257,50 @@ async def test_a_refused_password_is_told_and_tried_again_until_it_is_mended(
         await asyncio.to_thread(mosquitto.start)
         await until(lambda: publisher.connected)
     assert sum("refused. Mend" in record.getMessage() for record in caplog.records) == 1
+
+
+@pytest.fixture
+def secured(mosquitto: Mosquitto) -> Mosquitto:
+    """A broker that speaks TLS alone, with a certificate that it has signed itself."""
+    if shutil.which("openssl") is None:
+        pytest.skip("no openssl here: apt-get install openssl")
+    key, certificate = mosquitto.folder / "key.pem", mosquitto.folder / "certificate.pem"
+    request = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost"]
+    request += ["-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1", "-keyout", key, "-out", certificate]
+    subprocess.run(request, check=True, capture_output=True)
+    mosquitto.stop()
+    mosquitto.settings += f"certfile {certificate}\nkeyfile {key}\n"
+    mosquitto.start()
+    return mosquitto
+
+
+async def test_messages_go_over_tls_to_a_broker_that_proves_itself(secured: Mosquitto, tmp_path: Path) -> None:
+    """By an authority that the configuration names."""
+    publisher = new_publisher(tmp_path, secured.port, tls=True, ca_file=secured.folder / "certificate.pem")
+    async with running(publisher):
+        await until(lambda: publisher.connected)
+        publisher.estimate(estimate())
+        await until(lambda: publisher.report.acknowledged == 1)
+
+
+# paho leaves the socket of a failed handshake to the garbage collector.
+@pytest.mark.filterwarnings("ignore:Exception ignored in. <ssl.SSLSocket:pytest.PytestUnraisableExceptionWarning")
+async def test_a_broker_that_does_not_prove_itself_gets_nothing(secured: Mosquitto, tmp_path: Path) -> None:
+    """The system's authorities do not know it."""
+    publisher = new_publisher(tmp_path, secured.port, tls=True)
+    async with running(publisher):
+        await until(lambda: "TLS failed" in publisher.problem)
+        assert "ca_file" in publisher.problem
+        assert not publisher.connected
+    gc.collect()  # here, where the warning is expected
+
+
+async def test_two_of_the_same_name_are_told_so(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """The broker throws out the one for the other; neither floods it with attempts, and nothing is lost."""
+    rivals = [new_publisher(tmp_path / name, mosquitto.port) for name in "ab"]
+    async with running(rivals[0]), running(rivals[1]):
+        await until(lambda: all(rival.report.connections >= 3 for rival in rivals))
+        assert any("another client has the same [rover] name" in rival.problem for rival in rivals)
 
 
 async def test_the_daemon_subscribes_to_nothing(mosquitto: Mosquitto, tmp_path: Path) -> None:
