@@ -1,4 +1,4 @@
-"""The bus and its nodes: whether there is a link, up and at the right bit rate, and who answers."""
+"""The bus and its nodes: whether there is a link, up, at the right bit rate and not overfull, and who answers."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from daemon.check.finding import Finding, good, unknown, warning, wrong
 from drivers.bus import open_bus
 from drivers.errors import BusError
+from drivers.load import bus_load
 from drivers.probe import probe
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 CAN_LINK = "280"  # ARPHRD_CAN, if_arp.h
 _LINKS = Path("/sys/class/net")
 _UP = 0x1  # IFF_UP
+_CROWDED = 0.8  # above it, frames of low priority come late
 
 
 async def check_bus(configuration: Configuration, running: Status | None) -> list[Finding]:
@@ -31,14 +33,15 @@ async def check_bus(configuration: Configuration, running: Status | None) -> lis
     link = check_link(bus, await _details(bus.channel)) if bus.interface == "socketcan" else []
     if any(finding.verdict == "wrong" for finding in link):
         return [*link, unknown("nodes", "they cannot be asked without the bus")]
+    load = check_load(configuration)
     if running is not None:
-        return [*link, *nodes_of_daemon(running)]
+        return [*link, *load, *nodes_of_daemon(running)]
     try:
         async with open_bus(bus.interface, bus.channel, bitrate=bus.bitrate) as opened:
             found = await probe(opened, configuration.nodes.described())
     except BusError as error:
         return [*link, wrong("bus", error.what, error.cure), unknown("nodes", "they cannot be asked without the bus")]
-    return [*(link or [good("bus", f"{bus.interface} {bus.channel} is open")]), *judge_nodes(found)]
+    return [*(link or [good("bus", f"{bus.interface} {bus.channel} is open")]), *load, *judge_nodes(found)]
 
 
 def check_link(bus: Bus, details: dict[str, Any]) -> list[Finding]:
@@ -55,6 +58,24 @@ def check_link(bus: Bus, details: dict[str, Any]) -> list[Finding]:
     if not int(_text(folder / "flags") or "0", 16) & _UP:
         return [wrong("bus", f"{bus.channel} is down", up)]
     return [judge_link(bus, details)]
+
+
+def check_load(configuration: Configuration) -> list[Finding]:
+    """Compute how full the bus will be; say nothing where there is room."""
+    rate_Hz, bitrate = configuration.sync.rate_Hz, configuration.bus.bitrate
+    heartbeat_s = configuration.nodes.heartbeat_ms / 1000
+    share = bus_load(
+        configuration.nodes.described(),
+        sync_rate_Hz=rate_Hz,
+        bitrate=bitrate,
+        node_heartbeat_s=heartbeat_s,
+        master_heartbeat_s=heartbeat_s / 2,
+    )
+    if share <= _CROWDED:
+        return []
+    text = f"at {rate_Hz:g} Hz its frames take up to {share:.0%} of {bitrate} bit/s"
+    cure = "Lower [sync] rate_Hz, or raise the bit rate of all nodes and [bus] bitrate."
+    return [(warning if share <= 1.0 else wrong)("bus load", text, cure)]
 
 
 def judge_link(bus: Bus, details: dict[str, Any]) -> Finding:

@@ -13,7 +13,7 @@ from broker import Mosquitto, unused_port
 
 from calibration.model_card import ModelCard, Variable
 from daemon.check.broker import check_broker
-from daemon.check.bus import check_bus, check_link, judge_link, judge_nodes, nodes_of_daemon
+from daemon.check.bus import check_bus, check_link, check_load, judge_link, judge_nodes, nodes_of_daemon
 from daemon.check.clock import Discipline, check_clock, judge_clock, kernel_discipline
 from daemon.check.control import check_control, running_daemon
 from daemon.check.disk import check_folder
@@ -154,6 +154,22 @@ def test_a_link_that_is_no_can_link_is_told() -> None:
     """The loopback interface is there everywhere."""
     (finding,) = check_link(Bus(channel="lo"), {})
     assert (finding.verdict, "no CAN link" in finding.text) == (Verdict.WRONG, True)
+
+
+@pytest.mark.parametrize(
+    ("rate_Hz", "bitrate", "verdicts"),
+    [
+        (2, 125_000, []),
+        (200, 1_000_000, []),
+        (100, 250_000, []),
+        (200, 250_000, ["wrong"]),
+        (150, 250_000, ["warning"]),
+    ],
+)
+def test_a_bus_that_will_be_too_full_is_told(rate_Hz: int, bitrate: int, verdicts: list[str]) -> None:
+    """By the worst case of every frame that the configured nodes send."""
+    configuration = Configuration(sync={"rate_Hz": rate_Hz}, bus={"bitrate": bitrate})
+    assert [finding.verdict for finding in check_load(configuration)] == verdicts
 
 
 async def test_an_in_process_bus_has_nobody_to_ask() -> None:
