@@ -47,6 +47,7 @@ class Facts:
     recording_trouble: str = ""
     control_trouble: str = ""
     clock_jump_s: float = 0.0
+    soil_change: str = ""
     stuck: tuple[tuple[Quantity, int], ...] = ()
 
 
@@ -66,6 +67,7 @@ def known_names(node_ids: Iterable[int]) -> tuple[str, ...]:
         "control",
         "clock",
         "sensor",
+        "soil-change",
         *(f"node-{number}" for number in node_ids),
     )
 
@@ -107,6 +109,9 @@ def _own_alarms(facts: Facts) -> Iterable[Alarm]:
         text = f"{which}: the same to the last digit for seconds, while other wheels' readings change"
         cure = "Do not trust it: switch the node off and on, look at its plug, exchange it."
         yield Alarm("sensor", Severity.ERROR, text, cure)
+    if facts.soil_change:
+        cure = "Stop and look before the wheels dig in: less slip, another way, or back."
+        yield Alarm("soil-change", Severity.WARNING, facts.soil_change, cure)
     if facts.clock_jump_s:
         text = f"the clock jumped by {facts.clock_jump_s:+.3f} s: times before and after do not fit together"
         yield Alarm(

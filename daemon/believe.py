@@ -15,8 +15,10 @@ import numpy as np
 from calibration.posterior import SHIPPED_POSTERIOR, Belief, Buffer, Estimator, PosteriorError
 from calibration.window import Knowledge
 from daemon.snapshot import SlipSource
+from daemon.soil_change import SoilChange
 
 if TYPE_CHECKING:
+    from calibration.change import Alarm
     from daemon.config import Configuration
     from daemon.snapshot import Array
 
@@ -36,16 +38,24 @@ class BeliefStage:
         self._gain_std = drivetrain.gain_relative_std
         self._no_load_std_A = float(np.mean(drivetrain.no_load_current_std_A))
         self._soil = settings.soil
+        self._change = SoilChange(configuration) if configuration.change.enabled else None
 
     def step(
         self, time_ns: int, load_N: Array, slip: Array, driving_torque_Nm: Array, sources: tuple[SlipSource, ...]
-    ) -> Belief | None:
-        """Return a belief when a half second has closed; arrays of shape (6,), unsmoothed, NaN where a wheel stands."""
+    ) -> tuple[Belief | None, Alarm | None]:
+        """Return a belief when a half second has closed, and an alarm when the soil has changed.
+
+        Arrays have shape (6,), unsmoothed, NaN where a wheel stands.
+        """
         if not self._buffer.add(time_ns, load_N, slip, driving_torque_Nm):
-            return None
+            return None, None
         window = self._buffer.window()
         if not window.size:
-            return None
+            return None, None
+        alarm = self._change.step(time_ns, *window[:, -1]) if self._change else None
+        return self._believe(window, sources), alarm
+
+    def _believe(self, window: Array, sources: tuple[SlipSource, ...]) -> Belief | None:
         guessed = SlipSource.CONFIGURED in sources
         knowledge = Knowledge(
             gain_relative_std=self._gain_std,

@@ -104,6 +104,13 @@ class Posterior(Table):
     soil: Literal["lete-sand", "sandy-loam", "clayey-soil", "medium-soil"] | None = None
 
 
+class Change(Table):
+    """`[change]`: the alarm when the soil changes; needs a calibrated drivetrain, and `[posterior]`."""
+
+    enabled: bool = True
+    threshold: Annotated[float, Field(ge=3, le=100)] = 10.8
+
+
 class Recording(Table):
     """`[recording]`: where everything that was acquired is kept, and how much of it."""
 
@@ -151,6 +158,7 @@ class Configuration(Table):
     smoothing: Smoothing = Smoothing()
     estimator: Estimator = Estimator()
     posterior: Posterior = Posterior()
+    change: Change = Change()
     recording: Recording = Recording()
     mqtt: Mqtt = Mqtt()
     control: Control = Control()

@@ -245,7 +245,7 @@ class EventMessage(Header):
 
     kind: str
     """`node-booted`, `node-boot-failed`, `node-lost`, `node-returned`, `drive-state-changed`, `motion-stopped`,
-    `bus-state-changed`."""
+    `bus-state-changed`, `soil-change`."""
     node_id: NodeNumber | None
     text: str
 

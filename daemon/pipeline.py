@@ -51,7 +51,9 @@ class Pipeline:
         smoothed = self._smoother.step(snapshot.time_ns, driving, load, measured)
         slip, source = choose_slip(smoothed.slip, self._slip.constant, turning)
         raw_slip, sources = choose_slip(measured, self._slip.constant, turning)
-        belief = self._belief.step(snapshot.time_ns, load, raw_slip, driving, sources) if self._belief else None
+        belief, alarm = None, None
+        if self._belief:
+            belief, alarm = self._belief.step(snapshot.time_ns, load, raw_slip, driving, sources)
         terrain = self._network.estimate(self._inputs(smoothed.torque, smoothed.load, slip, np.abs(speed)))
         return Estimate(
             snapshot=snapshot,
@@ -67,6 +69,7 @@ class Pipeline:
             outside=terrain.outside,
             model_version=self._network.card.version,
             belief=belief,
+            soil_change=alarm,
         )
 
     def _forget_reversed(self, direction: Array) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from drivers.signals import Quantity
 
 if TYPE_CHECKING:
+    from calibration.change import Alarm
     from calibration.posterior import Belief
 
 Array = NDArray[np.float64]
@@ -154,6 +155,8 @@ class Estimate:
         The network's version.
     belief
         What the last seconds of all wheels say about the ground, as intervals; where a half second has just ended.
+    soil_change
+        The alarm that the soil has changed, where it has just been noticed.
     """
 
     snapshot: Snapshot
@@ -169,6 +172,7 @@ class Estimate:
     outside: Mask
     model_version: str
     belief: Belief | None = None
+    soil_change: Alarm | None = None
 
     def outside_inputs(self, wheel: int) -> tuple[str, ...]:
         """Return the names of the inputs of one wheel (0–5) that lie outside the training range."""

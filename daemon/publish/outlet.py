@@ -25,6 +25,7 @@ from daemon.messages import (
     SyncReport,
     iso_time,
 )
+from daemon.soil_change import change_text
 from daemon.stuck import StuckWatch
 from drivers.bus import BusState
 from drivers.emcy import register_bits
@@ -43,6 +44,7 @@ HEALTH_EVERY_S = 1.0
 JUMP_NS = 500_000_000
 """A clock that is off by this much against the monotonic one has been set, not slewed."""
 JUMP_SHOWN_S = 60.0
+SOIL_CHANGE_SHOWN_S = 120.0
 PUBLISHING = "publishing"
 PATIENCE_S = 10.0
 _PAGE_MB = resource.getpagesize() / 1e6
@@ -73,12 +75,20 @@ class MqttOutlet:
         self._offset_ns = time.time_ns() - time.monotonic_ns()
         self._jump_s = 0.0
         self._jump_until_ns = 0
+        self._soil_change = ""
+        self._soil_change_until_ns = 0
         self._stuck = StuckWatch()
 
     def estimate(self, estimate: Estimate) -> None:
         """Publish one SYNC."""
         self._stuck.step(estimate.snapshot)
         self.publisher.estimate(estimate)
+        if estimate.soil_change is not None:
+            self._soil_change = change_text(estimate.soil_change)
+            self._soil_change_until_ns = time.monotonic_ns() + int(SOIL_CHANGE_SHOWN_S * 1e9)
+            say = self.publisher.say
+            time_ns = estimate.snapshot.time_ns
+            say("event", EventMessage, time_ns=time_ns, kind="soil-change", node_id=None, text=self._soil_change)
         if estimate.belief is not None:
             self.publisher.say("belief", BeliefMessage, time_ns=estimate.snapshot.time_ns, **asdict(estimate.belief))
 
@@ -153,6 +163,7 @@ class MqttOutlet:
             recording_trouble=(recorder.trouble or "") if recorder is not None else "",
             control_trouble=self._control_trouble(),
             clock_jump_s=self._jump_s,
+            soil_change=self._soil_change if time.monotonic_ns() < self._soil_change_until_ns else "",
             stuck=self._stuck.stuck,
         )
 

@@ -59,4 +59,6 @@ def estimate_json(estimate: Estimate) -> bytes:
     }
     if estimate.belief is not None:
         content["belief"] = asdict(estimate.belief)
+    if estimate.soil_change is not None:
+        content["soil_change"] = asdict(estimate.soil_change)
     return _write(content)

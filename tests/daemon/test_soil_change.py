@@ -1,0 +1,44 @@
+"""The soil gives way, and the rover says so, with what speaks for it."""
+
+import numpy as np
+
+from calibration.change import Alarm
+from daemon.config import Configuration
+from daemon.soil_change import SoilChange, change_text
+
+HALF_SECOND_NS = 500_000_000
+
+
+def watch(torque: np.ndarray) -> list[Alarm]:
+    """Return the alarms of a level drive; torque in half seconds, shape (time, 6)."""
+    detector = SoilChange(Configuration())
+    load, slip = np.full(6, 49.0), np.full(6, 0.025)
+    found = [detector.step(k * HALF_SECOND_NS, load, slip, row) for k, row in enumerate(torque)]
+    return [alarm for alarm in found if alarm is not None]
+
+
+def noisy(half_seconds: int) -> np.ndarray:
+    """Return a torque of 0.4 N·m with more noise than signal, as behind a gearbox."""
+    return 0.4 + 0.3 * np.random.default_rng(3).standard_normal((half_seconds, 6))
+
+
+def test_a_fall_of_torque_raises_one_alarm_within_fifteen_seconds() -> None:
+    """From medium soil to LETE sand: 0.4 to 0.15 N·m, after four minutes."""
+    torque = noisy(600)
+    torque[480:] -= 0.25
+    (alarm,) = watch(torque)
+    assert alarm.direction == "fall"
+    assert 0 < alarm.time_ns / HALF_SECOND_NS - 480 <= 30
+    assert 0.1 < alarm.torque_ratio < 0.8
+    text = change_text(alarm)
+    assert text.startswith("the soil gives way: torque fell to ")
+    assert "alarm at 10.8" in text
+
+
+def test_a_steady_drive_momentary_drops_and_missing_wheels_raise_none() -> None:
+    """Twenty minutes, with a drop to nothing every ten seconds and a wheel that is not measured for a minute."""
+    torque = noisy(2400)
+    torque[::20, 1] = 0.0
+    torque[600:720, 4] = np.nan
+    torque[1000:1010] = np.nan
+    assert watch(torque) == []
