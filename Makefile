@@ -6,7 +6,7 @@ export PYTHON
 
 RECORDINGS ?= ../shared/recordings
 
-.PHONY: demo test check sizing reproduce evaluate pictures prove real scaling install uninstall clean
+.PHONY: demo test check sizing reproduce evaluate pictures prove real scaling frames install uninstall clean
 
 demo: $(VENV)/demo.ready
 	$(BIN)/regolithd demo
@@ -48,6 +48,11 @@ real: $(VENV)/dev.ready
 # How time and memory of a comparison grow with rows and candidates.
 scaling: $(VENV)/dev.ready
 	$(BIN)/python -m calibration.prove.scaling build/figures/scaling.json docs/mismatch-scaling.svg
+
+# What a frame costs, beside python-can and canopen, on vcan; and docs/bus.md as the code has it.
+frames: $(VENV)/dev.ready
+	tests/bench/with-vcan $(BIN)/python -m drivers.benchmark
+	$(BIN)/python -m drivers.reference > docs/bus.md
 
 # On a rover or a bench, as root: docs/install.md.
 install:

@@ -1,7 +1,7 @@
 """How dear is a frame? Our reader and decoder beside python-can's asyncio Notifier with canopen's `.raw`, in one run.
 
+    make frames                                  on vcan, in User Mode Linux where this kernel has none
     python -m drivers.benchmark [vcan0]          where there is no such link: the decoders alone
-    tests/bench/with-vcan python -m drivers.benchmark
 
 Both get the same motor TPDOs and end at the same three SI values, which is checked.
 
