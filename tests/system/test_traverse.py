@@ -138,9 +138,12 @@ def test_a_traverse_takes_its_time_and_stops_clean(stack: Stack, wheels: Wheels)
     assert wheels.emergencies == []
 
 
-def test_ctrl_c_stops_the_wheels(stack: Stack, wheels: Wheels, driving: subprocess.Popen[str]) -> None:
-    """At once, and the command says so with a shell's status for it."""
-    driving.send_signal(signal.SIGINT)
+@pytest.mark.parametrize("key", [signal.SIGINT, signal.SIGTSTP], ids=["Ctrl-C", "Ctrl-Z"])
+def test_a_key_stops_the_wheels(
+    stack: Stack, wheels: Wheels, driving: subprocess.Popen[str], key: signal.Signals
+) -> None:
+    """At once, and the command says so with a shell's status for it; one that sleeps could not be told to stop."""
+    driving.send_signal(key)
     assert driving.wait(60) == 130, stack.said("traverse")
     assert "Quick-stopped after" in stack.said("traverse")
     until(wheels.stand, "the wheels stand")
