@@ -91,7 +91,11 @@ def compare(
         confusions(decision.search, decision.named, decision.whole),
         sensitivities(decision.search, decision.whole, simulation.candidates()),
         FitImprovement(simulation.channel, held.before, held.after, _floor(decision)),
-        (*recording.notes, *_about_the_mask(scene), *_not_looked_for(scene, simulation, [c.name for c in fitting])),
+        (
+            *scene.recording.notes,
+            *_about_the_mask(scene),
+            *_not_looked_for(scene, simulation, [c.name for c in fitting]),
+        ),
     )
     return Comparison(answer, _evidence(decision))
 

@@ -32,7 +32,7 @@ def expected_inputs(recording: Recording, sensors: Mapping[str, SensorError]) ->
         return recording
     values = np.concatenate([recording.channels[name] for name in names], axis=1)
     scale = [
-        sensors[name].absolute + sensors[name].relative * np.nan_to_num(np.nanmean(np.abs(column)))
+        sensors[name].absolute + sensors[name].relative * float(known_mean(np.abs(column)))
         for name in names
         for column in recording.channels[name].T
     ]
@@ -40,6 +40,12 @@ def expected_inputs(recording: Recording, sensors: Mapping[str, SensorError]) ->
     smooth = conditional_expectation(values, np.array(scale) ** 2, starts)
     parts = np.split(smooth, len(names), axis=1)
     return recording.with_channels(**dict(zip(names, parts, strict=True)))
+
+
+def known_mean(values: Array, axis: int = 0) -> Array:
+    """Return the mean of what is known; 0 where nothing is."""
+    known = np.isfinite(values)
+    return np.asarray(np.sum(np.where(known, values, 0.0), axis=axis) / np.maximum(known.sum(axis=axis), 1))
 
 
 def conditional_expectation(values: Array, error_variance: Array, starts: NDArray[np.int64]) -> Array:

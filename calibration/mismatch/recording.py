@@ -62,6 +62,10 @@ class Recording:
         found = self.channels.get(name)
         return np.full(self.shape, np.nan) if found is None else found
 
+    def with_notes(self, *notes: str) -> Recording:
+        """Return the recording with more said about it."""
+        return replace(self, notes=(*self.notes, *notes))
+
     def with_channels(self, **channels: Array) -> Recording:
         """Return the recording with channels added or replaced (derived ones, say)."""
         return replace(self, channels={**self.channels, **channels})

@@ -81,7 +81,15 @@ class RoverWheel(Simulation):
         load = recording.channel("load_N")
         never = ~np.isfinite(load).any(axis=0)
         share = self.tables.rover.mass_kg * GRAVITY_M_S2 / recording.shape[1]
-        return recording.with_channels(slip=slip, load_N=np.where(never, share, load))
+        assumed = self.tables.simulation.slip_without_ground_speed
+        notes = []
+        if never.any():
+            notes.append(f"Where load_N was never measured, the wheel is taken to carry {share:.1f} N.")
+        if blank := int(np.sum(turning & ~np.isfinite(ground))):
+            notes.append(
+                f"ground_speed_m_s is blank at {blank} turning wheels' readings; slip is taken as {assumed:g}."
+            )
+        return recording.with_channels(slip=slip, load_N=np.where(never, share, load)).with_notes(*notes)
 
     def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
         """Return the motor currents [A], shape (time, wheel)."""

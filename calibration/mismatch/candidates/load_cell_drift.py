@@ -8,6 +8,7 @@ import numpy as np
 
 from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
 from calibration.mismatch.curves import broken_lines
+from calibration.mismatch.inputs import known_mean
 from calibration.mismatch.noise import estimate_noise
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class LoadCellDrift(Candidate):
         The cell shows how the drift went, but not what it was on the mean: that is the offset, in mean readings.
         """
         load = scene.covariates["load"]
-        wrong = np.nanmean(load, axis=0) * (self._drift(scene) + float(shape["relative_offset"]))
+        wrong = known_mean(load) * (self._drift(scene) + float(shape["relative_offset"]))
         return (scene.with_input("load_N", np.maximum(load - wrong, 0.1 * load)) - scene.filled)[None]
 
     def evidence(self, scene: Scene, shape: Shape) -> tuple[Array, Array]:  # noqa: ARG002
@@ -75,7 +76,7 @@ class LoadCellDrift(Candidate):
         key = ("unexplained load", 0.0)
         if key not in scene.made:
             load = scene.covariates["load"]
-            scene.made[key] = _without_posture(scene, load / np.nanmean(load, axis=0))
+            scene.made[key] = _without_posture(scene, load / np.where(known_mean(load) > 0, known_mean(load), 1.0))
         return scene.made[key]
 
 

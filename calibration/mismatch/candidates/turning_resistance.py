@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from calibration.mismatch.inputs import known_mean
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,7 +48,7 @@ class TurningResistance(Candidate):
         turned = np.abs(yaw)
         if shape["by"] == "angle":
             # Where a wheel points is off from where it goes by yaw rate × lever over the body's speed.
-            body = np.abs(np.nanmean(scene.covariates["wheel_speed"], axis=1, keepdims=True))
+            body = np.abs(known_mean(scene.covariates["wheel_speed"], axis=1))[:, None]
             turned = turned / (body + 0.1 * np.mean(body))
         typical = float(np.mean(turned[yaw != 0])) if np.any(yaw != 0) else 1.0
         relative = turned / typical

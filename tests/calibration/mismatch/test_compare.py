@@ -1,0 +1,146 @@
+"""What the tool says of short drives: nothing of nothing, the name of what was added, and the same always."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from drives import TABLES, columns, recording, simulation
+
+from calibration.mismatch.answer import Contribution
+from calibration.mismatch.compare import Comparison, compare
+from calibration.mismatch.corrected import corrected_tables, effect_of, stated_effects, to_toml
+from calibration.mismatch.recording import from_columns
+from calibration.mismatch.scene import build_scene
+from calibration.mismatch.simulation import load_simulation
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+def with_drag(
+    share: float, wheels: tuple[int, ...] = (1, 2, 3, 4, 5, 6), **drive: float
+) -> dict[str, NDArray[np.float64]]:
+    """Return a drive with Coulomb friction added, as a share of the mean current."""
+    table = columns(3, **drive)
+    current = table["motor_current_A"]
+    on = np.isin(table["wheel"], wheels)
+    table["motor_current_A"] = current + share * np.mean(np.abs(current)) * np.sign(table["motor_speed_rad_s"]) * on
+    return table
+
+
+@pytest.fixture(scope="module")
+def coulomb() -> Comparison:
+    """Return what is said of a drive with Coulomb friction of a fifth of the mean current."""
+    return compare(from_columns(with_drag(0.2)), simulation())
+
+
+def test_nothing_missing_is_consistent_and_says_what_that_is_worth() -> None:
+    """No names, nothing unexplained, and a smallest detectable effect for every candidate."""
+    answer = compare(recording(1), simulation()).answer
+    assert answer.verdict == "consistent"
+    assert not answer.effects
+    assert not answer.unexplained
+    assert len(answer.sensitivity) >= 16
+    assert all(s.smallest_detectable > 0 for s in answer.sensitivity)
+    assert answer.fit.held_out_rmse_after == pytest.approx(answer.fit.noise_floor_rmse, rel=0.02)
+
+
+def test_coulomb_friction_is_named_measured_and_pays(coulomb: Comparison) -> None:
+    """Name, wheels, size within its bounds, and a held-out error at the noise floor."""
+    (effect,) = coulomb.answer.effects
+    assert effect.name == "coulomb-friction"
+    assert effect.wheels == (1, 2, 3, 4, 5, 6)
+    size = effect.parameters["coulomb_current"]
+    assert size.low < size.value < size.high
+    assert effect.rmse_after < effect.rmse_before
+    assert coulomb.answer.fit.held_out_rmse_after < 1.02 * coulomb.answer.fit.noise_floor_rmse
+
+
+def test_the_same_input_has_the_same_answer(coulomb: Comparison) -> None:
+    """To the last digit of the JSON, whatever the order of the rows."""
+    table = with_drag(0.2)
+    order = np.random.default_rng(0).permutation(len(table["t_s"]))
+    again = compare(from_columns({name: values[order] for name, values in table.items()}), simulation())
+    one, other = (json.dumps(c.answer.to_json() | {"notes": []}) for c in (coulomb, again))
+    assert one == other
+
+
+@pytest.fixture(scope="module")
+def worn() -> Comparison:
+    """Return what is said of a drive with drag on wheel 3 alone."""
+    return compare(from_columns(with_drag(0.6, (3,))), simulation())
+
+
+def test_a_mirrored_rover_has_the_mirrored_answer(worn: Comparison) -> None:
+    """Left for right, with roll and yaw rate turned round: the same fault on the opposite wheel."""
+    table = with_drag(0.6, (3,))
+    table["wheel"] = np.where(table["wheel"] % 2 == 1, table["wheel"] + 1, table["wheel"] - 1)
+    for name in ("roll_rad", "yaw_rate_rad_s"):
+        table[name] = -table[name]
+    mirrored = compare(from_columns(table), simulation()).answer
+    assert [e.wheels for e in worn.answer.effects] == [(3,)]
+    assert [e.wheels for e in mirrored.effects] == [(4,)]
+    assert [e.name for e in worn.answer.effects] == [e.name for e in mirrored.effects]
+
+
+def test_effects_of_other_kinds_are_read_again_too(worn: Comparison) -> None:
+    """One wheel's drag from some time on has no table in the daemon: it stands in `[[effects]]`."""
+    drag = Contribution("bearing-drag", {"onset_s": 100.0, "rise_s": 30.0}, (0.004,), (3,))
+    tables = tomllib.loads(to_toml(corrected_tables(TABLES, simulation(), worn.evidence.values, (drag,))))
+    assert stated_effects(tables) == (drag,)
+    scene = build_scene(recording(3), simulation())
+    added = effect_of(scene, stated_effects(tables))
+    assert added[scene.time_s[:, 0] < 100].max() == 0
+    assert np.abs(added[:, 2]).max() == pytest.approx(0.004, rel=0.01)
+    assert np.abs(np.delete(added, 2, axis=1)).max() == 0
+
+
+def test_the_corrected_simulation_is_consistent_with_the_recording(coulomb: Comparison) -> None:
+    """What `--corrected` writes is read again, has the drag in the daemon's table, and leaves nothing."""
+    sim = simulation()
+    text = to_toml(corrected_tables(TABLES, sim, coulomb.evidence.values, coulomb.evidence.contributions))
+    tables = tomllib.loads(text)
+    assert min(tables["drivetrain"]["no_load_current_A"]) > 0
+    again = compare(from_columns(with_drag(0.2)), load_simulation(tables), effects=stated_effects(tables)).answer
+    assert again.verdict == "consistent"
+
+
+def test_constant_speed_on_flat_ground_cannot_tell_frictions_apart() -> None:
+    """Coulomb and viscous friction and cohesion are one there; the answer says so, and what to drive."""
+    answer = compare(from_columns(with_drag(0.25, speed=0.25)), simulation()).answer
+    (found,) = [one for one in answer.indistinguishable if "coulomb-friction" in one.effects]
+    assert "viscous-friction" in found.effects
+    assert "staircase" in found.experiment
+
+
+@pytest.mark.parametrize("missing", [("load_N", "pitch_rad"), ("motor_temperature_degC", "bus_voltage_V")])
+def test_missing_columns_cost_only_what_needs_them(missing: tuple[str, ...]) -> None:
+    """The rest is answered, and what could not be looked for is said."""
+    table = with_drag(0.5)
+    for name in missing:
+        del table[name]
+    answer = compare(from_columns(table), simulation()).answer
+    assert "coulomb-friction" in {effect.name for effect in answer.effects}
+    assert any("was not looked for" in note for note in answer.notes)
+
+
+def test_a_wheel_that_never_turns_is_said_and_left_out() -> None:
+    """Nothing is claimed of it."""
+    table = with_drag(0.3)
+    table["motor_speed_rad_s"] = np.where(table["wheel"] == 5, 0.0, table["motor_speed_rad_s"])
+    answer = compare(from_columns(table), simulation()).answer
+    assert any("nothing to compare at wheel 5" in note for note in answer.notes)
+    assert all(5 not in effect.wheels for effect in answer.effects)
+
+
+def test_single_readings_far_out_are_left_out() -> None:
+    """Ten readings of an ampere are a fault of the recording."""
+    table = columns(5)
+    table["motor_current_A"][::1800] = 1.0
+    answer = compare(from_columns(table), simulation()).answer
+    assert answer.verdict == "consistent"
+    assert any("far outside" in note for note in answer.notes)
