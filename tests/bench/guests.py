@@ -1,9 +1,9 @@
 """Runs the tests marked `vcan` or `systemd` inside one guest each, and reports them here under their own names.
 
-The marked tests are moved to the end of the run. The first of them boots its guest (`with-vcan`, `with-systemd`), in
-which one nested pytest runs all of them and writes each report as a line of JSON; this pytest reads the lines as they
-come and reports them as if it had run the tests itself. Inside the guest, or where this kernel has the links already,
-the tests simply run.
+The marked tests are moved to the end of the run. The first of them boots its guest (`with-vcan`; `with-systemd` as
+soon as the run begins), in which one nested pytest runs all of them and writes each report as a line of JSON; this
+pytest reads the lines as they come and reports them as if it had run the tests itself. Inside the guest, or where this
+kernel has the links already, the tests simply run.
 """
 
 from __future__ import annotations
@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 HERE = Path(__file__).parent
 INSIDE = "BENCH_GUEST"
 REPORTS = "BENCH_REPORTS"
-SILENCE_s = 300
+SILENCE_s = 600
 """How long a guest may report nothing before it counts as hung: a boot and the longest test's own time limit."""
+WITH_WHEELS = '"$0" "$1" && exec env PIP_NO_INDEX=1 PIP_FIND_LINKS="$1" "${@:2}"'
 CURES = {
     "vcan": "apt-get install user-mode-linux iproute2 kmod hostname (Debian), or root on a kernel that has vcan",
     "systemd": "apt-get install user-mode-linux iproute2 kmod hostname systemd (Debian; Ubuntu has no user-mode-linux)",
@@ -84,14 +85,13 @@ class Guest:
         lines = self.folder / "reports"
         lines.touch()
         pytest_command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--durations=0", f"@{selection}"]
-        inside = {INSIDE: self.name, REPORTS: str(lines), "BENCH_SHARED": str(self.folder)}
+        command: list[str | Path] = [HERE / f"with-{self.name}", *pytest_command]
         if self.name == "systemd":  # there `make install` runs, and no network is
-            wheels = self.root / "build/wheelhouse"
-            subprocess.run([HERE / "wheelhouse", wheels], check=True)
-            inside |= {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(wheels)}
+            command = ["bash", "-c", WITH_WHEELS, HERE / "wheelhouse", self.root / "build/wheelhouse", *command]
+        inside = {INSIDE: self.name, REPORTS: str(lines), "BENCH_SHARED": str(self.folder)}
         with (self.folder / "output").open("wb") as output:
             self.process = subprocess.Popen(
-                [HERE / f"with-{self.name}", *pytest_command],
+                command,
                 cwd=self.root,
                 env={**os.environ, **inside},
                 stdin=subprocess.DEVNULL,
@@ -162,6 +162,13 @@ class Guests:
             if guest_of(item):
                 item.add_marker(pytest.mark.timeout(0), append=False)  # the nested run keeps the time
 
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session: pytest.Session) -> None:
+        """Let systemd's guest boot and install while the tests of this machine run: it takes a processor of its own."""
+        first = next((item for item in session.items if guest_of(item) == "systemd"), None)
+        if first and not session.config.option.collectonly:
+            self.guest_for(first)
+
     def guest_for(self, item: pytest.Item) -> Guest | None:
         """Return the running guest of a test, booted if it is the first to need it; None if there can be none."""
         name = guest_of(item)
@@ -204,11 +211,7 @@ class Guests:
                 report.longrepr = tuple(report.longrepr)
             yield report
         if not complete:
-            how = (
-                "ended"
-                if guest.process is None or guest.process.poll() is not None
-                else f"said nothing for {SILENCE_s} s"
-            )
+            how = f"said nothing for {SILENCE_s} s" if guest.runs() else "ended"
             guest.stop()
             if guest.finished:  # it did run: this test took it down, and the others get a new one
                 del self.guests[guest.name]

@@ -241,6 +241,7 @@ def test_a_wrong_configuration_is_not_tried_again(pid: int) -> None:
         CONFIGURATION.write_text(right)
 
 
+@pytest.mark.timeout(600)  # two installations
 def test_an_upgrade_keeps_what_was_configured(pid: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """A version that would refuse the configuration changes nothing; one that reads it replaces the running one."""
     monkeypatch.setenv("PIP_NO_COMPILE", "1")  # half the time, and not what this is about
