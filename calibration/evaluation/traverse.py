@@ -54,7 +54,7 @@ def torque_curve(soil: Soil, wheel: Wheel) -> TorqueCurve:
     torque = wheel_torque(contact_angle(load, slip, wheel, soil), slip, wheel, soil)
     basis = np.polynomial.polynomial.polyvander2d(_x(load).ravel(), _y(slip).ravel(), [_DEGREE, _DEGREE])
     solution, *_ = np.linalg.lstsq(basis, np.log(torque).ravel(), rcond=None)
-    return TorqueCurve(solution.reshape(_DEGREE + 1, _DEGREE + 1))
+    return TorqueCurve(np.asarray(solution, np.float64).reshape(_DEGREE + 1, _DEGREE + 1))
 
 
 @dataclass(frozen=True, slots=True)

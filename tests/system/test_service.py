@@ -133,6 +133,7 @@ def enabled() -> bool:
 def traverse(pid: int) -> Iterator[subprocess.Popen[str]]:
     """A traverse under way, far from its end."""
     assert pid
+    until(lambda: run(REGOLITHD, "status", check=False).returncode == 0, "every node is operational")
     drive = [REGOLITHD, "traverse", "--distance", "10", "--speed", "0.022"]
     with subprocess.Popen(drive, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         try:
