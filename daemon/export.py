@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import csv
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from daemon.recording.content import SNAPSHOT, snapshot_from_json
-from daemon.recording.mcap_file import read_messages
+from daemon.recording.mcap_file import open_mcap, read_messages
 from daemon.snapshot import WHEELS
 from drivers.signals import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from daemon.snapshot import Snapshot
@@ -36,10 +37,12 @@ class ExportError(Exception):
     """The table cannot be written; the message says why and what to do."""
 
 
-def recorded_snapshots(recordings: Iterable[Path]) -> Iterator[Snapshot]:
+def recorded_snapshots(
+    recordings: Iterable[Path], opening: Callable[[Path], AbstractContextManager[IO[bytes]]] = open_mcap
+) -> Iterator[Snapshot]:
     """Yield the snapshots of MCAP files, in their order."""
     for recording in recordings:
-        for message in read_messages(recording):
+        for message in read_messages(recording, opening):
             if message.topic == SNAPSHOT:
                 yield snapshot_from_json(message.content)
 
@@ -56,15 +59,19 @@ def rows(snapshots: Iterable[Snapshot]) -> Iterator[Row]:
             yield (t_s, wheel + 1, *(None if value != value else value for value in values))  # noqa: PLR0124  # NaN
 
 
-def export(recordings: Iterable[Path], out: Path) -> int:
-    """Write `out`, CSV or Parquet by its name; return the number of rows.
+def export(
+    recordings: Iterable[Path],
+    out: Path,
+    opening: Callable[[Path], AbstractContextManager[IO[bytes]]] = open_mcap,
+) -> int:
+    """Write `out`, CSV or Parquet by its name; return the number of rows. `opening` may show how far it is.
 
     Raises
     ------
     ExportError
         It is neither, or nothing can write it.
     """
-    table = rows(recorded_snapshots(recordings))
+    table = rows(recorded_snapshots(recordings, opening))
     if out.suffix == ".csv":
         return _write_csv(table, out)
     if out.suffix == ".parquet":

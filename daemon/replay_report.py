@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
-from daemon.recording.candump import read_log
+from daemon.recording.candump import open_log, read_log
 from daemon.recording.content import ESTIMATE, SNAPSHOT, estimate_json, snapshot_json
 from daemon.recording.mcap_file import read_messages
 from daemon.replay import Chain, Digest
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from daemon.config import Configuration
@@ -40,23 +41,22 @@ def replay_logs(
     logs: Iterable[Path],
     configuration: Configuration,
     network: Network,
-    take: Callable[[Estimate], None] = lambda _estimate: None,
+    opening: Callable[[Path], AbstractContextManager[IO[str]]] = open_log,
 ) -> Replayed:
     """Feed the logs through the pipeline, in their order; compare with the recordings beside them, where there are any.
 
-    `take` is called with each estimate.
+    `opening` opens a log; it may show how far the reading is.
     """
     result = Replayed()
     chain = Chain(configuration, network)
     recorded: dict[tuple[str, int], dict[str, Any]] = {}
     for log in logs:
         recorded |= _recorded(log.with_suffix(".mcap"))
-        for batch in _batches(read_log(log)):
+        for batch in _batches(read_log(log, opening)):
             result.frames += len(batch)
             for estimate in chain.feed(batch):
                 result.digest.add(estimate)
                 _compare(estimate, recorded, result)
-                take(estimate)
     result.counters = chain.acquisition.counters
     result.undecodable = {str(reason): count for reason, count in chain.decoder.undecodable.items()}
     result.different += [f"{topic} {sequence} was recorded, and is not in the log" for topic, sequence in recorded]

@@ -20,9 +20,10 @@ def export(
     """Write the columns that `regolithd mismatch` reads."""
     from daemon.export import ExportError
     from daemon.export import export as write
+    from daemon.progress import open_binary
 
     try:
-        count = write(recordings, to)
+        count = write(recordings, to, open_binary)
     except (ExportError, OSError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error

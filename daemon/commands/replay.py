@@ -21,6 +21,7 @@ def replay(
     model: Annotated[Path | None, typer.Option(help="estimate with this network instead")] = None,
 ) -> None:
     """Print what came of it; status 1 where a number is not the same as then."""
+    from daemon.progress import open_text
     from daemon.replay_report import replay_logs
     from daemon.start_up import configuration_or_exit, network_or_exit, recorded_configuration
 
@@ -29,7 +30,7 @@ def replay(
     if model is not None:
         estimator = configuration.estimator.model_copy(update={"model": model})
         configuration = configuration.model_copy(update={"estimator": estimator})
-    result = replay_logs(logs, configuration, network_or_exit(configuration))
+    result = replay_logs(logs, configuration, network_or_exit(configuration), open_text)
     typer.echo(f"frames     {result.frames}")
     typer.echo(f"snapshots  {result.digest.count}")
     if result.counters:

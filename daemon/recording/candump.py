@@ -10,12 +10,13 @@ it received. Microseconds are what all of can-utils read, and one bit at 1 Mbit/
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from drivers.frame import Frame
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
 ERROR_FLAG = 0x2000_0000
@@ -55,9 +56,14 @@ def parse_line(line: str) -> Frame | None:
     )
 
 
-def read_log(path: Path) -> Iterator[Frame]:
+def open_log(path: Path) -> AbstractContextManager[IO[str]]:
+    """Open a log for reading."""
+    return path.open(encoding="ascii", errors="replace")
+
+
+def read_log(path: Path, opening: Callable[[Path], AbstractContextManager[IO[str]]] = open_log) -> Iterator[Frame]:
     """Yield the frames of a log in their order. Lines that are cut off, or no frames, are passed over."""
-    with path.open(encoding="ascii", errors="replace") as lines:
+    with opening(path) as lines:
         for line in lines:
             frame = parse_line(line)
             if frame is not None:

@@ -18,7 +18,8 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
 _CUT_OFF = (McapError, ValueError, struct.error, zstandard.ZstdError)
@@ -71,10 +72,17 @@ class Recorded:
     content: dict[str, Any]
 
 
-def read_messages(path: Path) -> Iterator[Recorded]:
+def open_mcap(path: Path) -> AbstractContextManager[IO[bytes]]:
+    """Open a file for reading."""
+    return path.open("rb")
+
+
+def read_messages(
+    path: Path, opening: Callable[[Path], AbstractContextManager[IO[bytes]]] = open_mcap
+) -> Iterator[Recorded]:
     """Yield the messages of a file in their order, as far as its whole chunks go."""
     topics: dict[int, str] = {}
-    for record in _records(path):
+    for record in _records(path, opening):
         if isinstance(record, Channel):
             topics[record.id] = record.topic
         elif isinstance(record, Message):
@@ -83,11 +91,11 @@ def read_messages(path: Path) -> Iterator[Recorded]:
 
 def read_metadata(path: Path) -> dict[str, str]:
     """Return what was written about the recording at its start; empty where nothing was."""
-    return next((record.metadata for record in _records(path) if isinstance(record, Metadata)), {})
+    return next((record.metadata for record in _records(path, open_mcap) if isinstance(record, Metadata)), {})
 
 
-def _records(path: Path) -> Iterator[object]:
-    with path.open("rb") as stream:
+def _records(path: Path, opening: Callable[[Path], AbstractContextManager[IO[bytes]]]) -> Iterator[object]:
+    with opening(path) as stream:
         records = StreamReader(stream, validate_crcs=False).records
         while True:
             try:

@@ -1,0 +1,35 @@
+"""Opens a file to be read while a bar on the terminal shows how far; nothing is shown where nobody watches."""
+
+from __future__ import annotations
+
+from typing import IO, TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import open as open_with_bar
+
+if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+    from pathlib import Path
+
+
+def open_text(path: Path) -> AbstractContextManager[IO[str]]:
+    """Open a text file with a bar."""
+    console = Console(stderr=True)
+    return open_with_bar(
+        path,
+        "r",
+        encoding="ascii",
+        errors="replace",
+        description=path.name,
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    )
+
+
+def open_binary(path: Path) -> AbstractContextManager[IO[bytes]]:
+    """Open a binary file with a bar."""
+    console = Console(stderr=True)
+    return open_with_bar(
+        path, "rb", description=path.name, console=console, transient=True, disable=not console.is_terminal
+    )
