@@ -41,7 +41,6 @@ class Facts:
     bus_trouble: str = ""
     bus_state: BusState = BusState.ACTIVE
     kernel_drops: int = 0
-    syncs_failed: int = 0
     store_dropped: int = 0
     store_unstored: int = 0
     recording_trouble: str = ""
