@@ -33,6 +33,9 @@ LAG = 40
 MEMORY = 240.0
 """Half seconds over which the reference forgets."""
 
+THRESHOLD = 10.8
+"""One false alarm in 8 h of driving over one soil, slopes and drops of current and all (`regolithd evaluate`)."""
+
 SETTLING = 240
 """Half seconds before the first alarm: the lag, and 100 s of reference."""
 
@@ -160,7 +163,7 @@ def _accumulate(state: State, level: Array) -> tuple[Array, Array]:
     return sums, np.where(sums > 0, state.since + 1, 0.0)
 
 
-def alarm(state: State, time_ns: int, threshold: float) -> Alarm | None:
+def alarm(state: State, time_ns: int, threshold: float = THRESHOLD) -> Alarm | None:
     """Return the alarm that one rover's state amounts to, or None."""
     where = np.unravel_index(int(np.argmax(state.sums)), state.sums.shape)
     statistic = float(state.sums[where])

@@ -20,7 +20,7 @@ import onnxruntime
 from numpy.typing import NDArray
 
 from calibration.mixture import TARGETS, Mixture, unpack
-from calibration.window import INTERVAL_S, LONGEST, Knowledge, Windows, reduce_windows
+from calibration.window import INTERVAL_S, KNOWN, LONGEST, Knowledge, Windows, reduce_windows
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -34,6 +34,8 @@ LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
 """The quantiles that are told: of the 90 % interval, of the 50 % interval, and the median."""
 
 WHEELS = 6
+_SAMPLES = 4000
+_SEED = 20
 
 
 class PosteriorError(ValueError):
@@ -61,6 +63,15 @@ class Belief:
     drawbar_margin: Interval
     wheels: int
     instants: int
+
+
+@dataclass(frozen=True, slots=True)
+class Fall:
+    """How likely it is that each quantity fell between two windows: the evidence of an alarm."""
+
+    cohesion: float
+    friction_angle: float
+    drawbar_margin: float
 
 
 @dataclass(slots=True)
@@ -118,8 +129,8 @@ class Estimator:
         options.inter_op_num_threads = 1
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")
         self._session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
-        # One trained without classes of soil takes the numbers before them, and is told of none.
-        self._known = {each.name: each.shape for each in self._session.get_inputs()}["known"][1]
+        if {each.name: each.shape[-1] for each in self._session.get_inputs()}.get("known") != KNOWN:
+            raise PosteriorError(f"{path}: was trained with other inputs. Train one with `regolithd train-posterior`.")
         metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
         try:
             targets = json.loads(metadata["regolithd.targets"])
@@ -134,21 +145,42 @@ class Estimator:
 
     def mixtures(self, windows: Windows) -> Mixture:
         """Return the posterior of each window."""
-        inputs = {"wheels": windows.wheels, "mask": windows.mask, "known": windows.known[:, : self._known]}
+        inputs = {"wheels": windows.wheels, "mask": windows.mask, "known": windows.known}
         (raw,) = self._session.run(None, {name: value.astype(np.float32) for name, value in inputs.items()})
         return unpack(raw, self._centre, self._unit)
 
+    def fall(self, before: Array, after: Array, knowledge: Knowledge) -> Fall | None:
+        """Return how likely each quantity fell from one window, (3, instants, 6), to another; None if either is empty.
+
+        The two windows share the errors of gain and no-load current, which are counted in each as if they were not
+        shared: the probabilities err towards one half.
+        """
+        if not (_usable(before).any() and _usable(after).any()):
+            return None
+        samples = [
+            self.mixtures(self._reduce(window, knowledge)).sample(_SAMPLES, np.random.default_rng(_SEED + k))[0]
+            for k, window in enumerate((before, after))
+        ]
+        return Fall(*np.mean(samples[1] < samples[0], axis=0).tolist())
+
     def believe(self, window: Array, knowledge: Knowledge) -> Belief | None:
         """Return what a window of shape (3, instants, 6) says; None where no wheel was measured."""
-        usable = np.logical_and.reduce(np.isfinite(window))
+        usable = _usable(window)
         if not usable.any():
             return None
-        windows = reduce_windows(
-            window[0:1], window[1:2], window[2:3], knowledge.deviations(), self.radius_m, knowledge.told()
-        )
+        windows = self._reduce(window, knowledge)
         mixture = self.mixtures(windows)
         means, quantiles = mixture.means()[0], mixture.quantiles(np.array(LEVELS))[0]
         cohesion, angle, margin = (
             Interval(float(mean), *map(float, row)) for mean, row in zip(means, quantiles, strict=True)
         )
         return Belief(cohesion, angle, margin, int(windows.mask.sum()), int(np.any(usable, axis=1).sum()))
+
+    def _reduce(self, window: Array, knowledge: Knowledge) -> Windows:
+        load, slip, torque = window[:, None]
+        return reduce_windows(load, slip, torque, knowledge.deviations(), self.radius_m, knowledge.told())
+
+
+def _usable(window: Array) -> NDArray[np.bool_]:
+    """Return where load, slip and torque were all measured, shape (instants, 6)."""
+    return np.logical_and.reduce(np.isfinite(window))

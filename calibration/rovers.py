@@ -50,7 +50,7 @@ class Noise:
 class Rovers:
     """Rovers standing ready: truth, and what is known of each.
 
-    Soils have shape (N,), `slip_error` (N, 1), `known` (N, 3) in the order of `window.Knowledge`, the others (N, 6).
+    Soils have shape (N,), `slip_error` (N, 1), `known` (N, 4) in the order of `window.Knowledge`, the others (N, 6).
     """
 
     soils: Soils
@@ -75,9 +75,9 @@ class Measured:
 
 
 def draw_noise(count: int, rng: np.random.Generator) -> Noise:
-    """Return noise as uncertain as it is before one knows the ground: 3–45 % of the current."""
+    """Return noise as uncertain as it is before one knows the ground: 10–45 % of the current."""
     return Noise(
-        current=rng.uniform(0.03, 0.45, (count, WHEELS)),
+        current=rng.uniform(0.10, 0.45, (count, WHEELS)),
         load=rng.uniform(0.01, 0.16, (count, WHEELS)),
         drop_rate=rng.uniform(0.0, 0.08, (count, 1)),
         memory_s=rng.uniform(0.05, 1.5, (count, 1)),
@@ -103,15 +103,15 @@ def no_noise(count: int) -> Noise:
 def draw_rovers(
     count: int, rng: np.random.Generator, known: Array | None = None, no_load_A: float | None = None
 ) -> Rovers:
-    """Return rovers on soils that they may meet; `known`, shape (N, 3), as in `Rovers`, or drawn where it is None."""
+    """Return rovers on soils that they may meet; `known`, shape (N, 4), as in `Rovers`, or drawn where it is None."""
     soils, nearest = draw_soils(count, rng)
     if known is None:
-        known = np.exp(rng.uniform(np.log(KNOWN_LOW), np.log(KNOWN_HIGH), (count, 3)))
+        known = np.exp(rng.uniform(np.log(KNOWN_LOW), np.log(KNOWN_HIGH), (count, len(KNOWN_LOW))))
     slope = np.radians(5) * rng.standard_normal((count, 2))
     load = wheel_loads(slope[:, 0], slope[:, 1], Rover()) * np.exp(0.05 * rng.standard_normal((count, 1)))
     load *= np.exp(0.2 * rng.standard_normal((count, WHEELS)))
     slip = np.exp(rng.uniform(np.log(0.005), np.log(0.2), (count, 1)) + 0.15 * rng.standard_normal((count, WHEELS)))
-    gain_std, no_load_std, slip_std = known.T[:, :, None]
+    gain_std, no_load_std, slip_std = known.T[:3, :, None]
     return Rovers(
         soils=soils,
         nearest=nearest,

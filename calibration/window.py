@@ -9,7 +9,7 @@ Torque enters as the traction coefficient μ = T/(r W), in which load, radius an
 | slip | how far the soil is sheared |
 | mean μ | the soil's answer |
 | median μ | the same without momentary drops of current |
-| log standard error of μ | how well it is known; 0.3 for a single instant |
+| log standard error of μ | how well it is known; of one or two instants, by the known noise |
 | lag-1 autocorrelation of μ | how many instants are worth one |
 | relative standard deviation of the load | how much of the noise is ground |
 """
@@ -28,12 +28,13 @@ Array = NDArray[np.float64]
 INTERVAL_S = 0.5
 LONGEST = 40
 FEATURES = 7
-KNOWN = 8
-KNOWN_LOW = np.array([0.01, 0.0003, 0.003])
-KNOWN_HIGH = np.array([0.10, 0.010, 0.030])
-"""How well and how badly a rover may be known for the posterior, in the order of `Knowledge`."""
+KNOWN = 9
+LEAST_ERROR, LEAST_SPREAD = 0.003, 0.01
+"""Floors of the standard error of μ and of the load's spread: data quieter than in training count as that quiet."""
 
-_UNKNOWN_ERROR = 0.3
+KNOWN_LOW = np.array([0.01, 0.0003, 0.003, 0.01])
+KNOWN_HIGH = np.array([0.10, 0.010, 0.030, 0.60])
+"""How well and how badly a rover may be known for the posterior, in the order of `Knowledge`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,18 +42,21 @@ class Knowledge:
     """What is known beside the measurements: deviations of gain (relative), no-load current and slip; and the ground.
 
     The posterior widens with each of them. After a wheels-up spin the no-load current is known to about 1 mA, before
-    it to 10 mA and worse; slip without a ground-speed sensor is a guess. `soil` is the class of `SOILS` that the ground
-    is said to be nearest to, by a geologist or an earlier trench; the posterior then knows that much.
+    it to 10 mA and worse; slip without a ground-speed sensor is a guess. `torque_noise_Nm` is the scatter of torque
+    from one instant to the next at a wheel, which a single instant cannot show: 35 % of 50 mA by default. `soil` is
+    the class of `SOILS` that the ground is said to be nearest to, by a geologist or an earlier trench; the posterior
+    then knows that much.
     """
 
     gain_relative_std: float = 0.03
     no_load_current_std_A: float = 0.001
     slip_std: float = 0.005
+    torque_noise_Nm: float = 0.28
     soil: str | None = None
 
     def deviations(self) -> Array:
-        """Return the three deviations, within what the posterior takes, shape (1, 3)."""
-        told = np.array([[self.gain_relative_std, self.no_load_current_std_A, self.slip_std]])
+        """Return the four numbers, within what the posterior takes, shape (1, 4)."""
+        told = np.array([[self.gain_relative_std, self.no_load_current_std_A, self.slip_std, self.torque_noise_Nm]])
         return np.clip(told, KNOWN_LOW, KNOWN_HIGH)
 
     def told(self) -> NDArray[np.intp]:
@@ -71,7 +75,7 @@ class Windows:
     mask
         Shape (N, 6): 1 where the wheel was measured, else 0.
     known
-        Shape (N, `KNOWN`): logarithms of the three deviations of `Knowledge` and of the instants; and the class of
+        Shape (N, `KNOWN`): logarithms of the four numbers of `Knowledge` and of the instants; and the class of
         soil that is told as a one among four zeros, or zeros.
     """
 
@@ -90,7 +94,7 @@ def reduce_windows(
 ) -> Windows:
     """Reduce windows of shape (N, instants, 6); NaN is "not measured".
 
-    `known` has shape (N, 3), the deviations of `Knowledge`; `told`, shape (N,), the class of soil or −1.
+    `known` has shape (N, 4), the numbers of `Knowledge`; `told`, shape (N,), the class of soil or −1.
     """
     usable = np.isfinite(load_N) & np.isfinite(slip) & np.isfinite(torque_Nm) & (load_N > 0)
     count = usable.sum(axis=1)
@@ -105,8 +109,10 @@ def reduce_windows(
     residual = np.where(usable, coefficient - level[:, None], 0.0)
     variance = (residual**2).sum(axis=1) / np.maximum(count - 1, 1)
     lagged = (residual[:, 1:] * residual[:, :-1]).sum(axis=1) / np.maximum((residual**2).sum(axis=1), 1e-12)
-    error = np.where(count > 2, np.sqrt(variance / some) + 1e-4, _UNKNOWN_ERROR)
-    spread = np.sqrt(mean((np.where(usable, load_N, 0.0) - load[:, None]) ** 2)) / load
+    expected = known[:, 3:4] / (radius_m * load * np.sqrt(some))
+    error = np.maximum(np.where(count > 2, np.sqrt(variance / some), expected), LEAST_ERROR)
+    wander = np.sqrt(mean((np.where(usable, load_N, 0.0) - load[:, None]) ** 2)) / load
+    spread = np.maximum(wander, LEAST_SPREAD)
     features = [np.log(load / 50), mean(slip), level, _median(coefficient, usable), np.log(error), lagged, spread]
     instants = np.log(np.maximum(count.max(axis=1), 1))
     mask = (count > 0).astype(np.float64)

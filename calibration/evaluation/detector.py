@@ -27,6 +27,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+CASES = {"": (0.0, 5.0), "_correlated": (0.5, 5.0), "_flat": (0.0, 0.0)}
+"""Memory of the noise [s] and slope [°]: as asked; with harder noise; and on ground as flat as the paper's."""
+
 METHODS = ("cusum", "paper_instant", "paper_10_s", "paper_shift")
 EIGHT_HOURS = round(8 * 3600 / INTERVAL_S)
 QUIET = 120
@@ -124,18 +127,18 @@ def delays(drive: Drive, thresholds: dict[str, float], rng: np.random.Generator)
 def figures(
     rovers: int, hours: float, seed: int, progress: Callable[[int], None] = lambda _: None
 ) -> tuple[dict[str, float], dict[str, Array]]:
-    """Return the figures, and the delays they are of: white noise and, as a harder case, noise with a memory."""
+    """Return the figures, and the delays they are of: all of `CASES`."""
     rng = np.random.default_rng(seed)
     out: dict[str, float] = {}
     samples: dict[str, Array] = {}
-    for case, memory in {"": 0.0, "_correlated": 0.5}.items():
-        null = null_drives(Drive(rovers, memory_s=memory), hours, rng, progress)
+    for case, (memory, slope) in CASES.items():
+        null = null_drives(Drive(rovers, memory_s=memory, slope_deg=slope), hours, rng, progress)
         limits = {name: threshold(null, name) for name in METHODS}
         for name in METHODS:
             out[f"{name}_threshold{case}"] = -limits[name] if name in {"paper_instant", "paper_10_s"} else limits[name]
             out[f"{name}_false_alarms_in_8_h{case}"] = false_alarms(null, name, limits[name])
         for crossing, at_once in {"": True, "_by_axle": False}.items():
-            drive = Drive(rovers, _CHANGE_AT, at_once=at_once, memory_s=memory)
+            drive = Drive(rovers, _CHANGE_AT, at_once=at_once, memory_s=memory, slope_deg=slope)
             for name, delay in delays(drive, limits, rng).items():
                 key = f"{name}_delay{crossing}{case}"
                 samples[key] = delay[~np.isnan(delay)]

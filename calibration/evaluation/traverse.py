@@ -74,6 +74,7 @@ class Drive:
     memory_s: float = 0.0
     drop_rate: float = 0.03
     no_load_A: float = NO_LOAD_A
+    slope_deg: float = 5.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +99,7 @@ def instants(drive: Drive, length: int, rng: np.random.Generator) -> Iterator[In
     between = 0 if drive.at_once else Rover().wheelbase_m / 2 / SPEED_M_S / INTERVAL_S
     meets = np.repeat([0, between, 2 * between], 2) + (length if drive.change_at is None else drive.change_at)
     for k in range(length):
-        pitch, roll = np.radians(5) * np.sin(2 * np.pi * k / period + phase)
+        pitch, roll = np.radians(drive.slope_deg) * np.sin(2 * np.pi * k / period + phase)
         ground = 0.6 * ground + 0.8 * rng.standard_normal(shape)
         load = wheel_loads(pitch, roll, Rover()) * np.clip(1 + TABLE_4_LOAD / np.sqrt(2) * ground, 0.3, None)
         slip = np.broadcast_to((0.025 + 0.5 * np.clip(np.sin(pitch), -0.03, None))[:, None], shape)

@@ -10,8 +10,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from calibration.parameters import LoadCells
 from daemon.cli import app
-from daemon.config import Configuration
+from daemon.config import Configuration, Smoothing
+from daemon.estimate import SHIPPED_MODEL, Network
+from daemon.pipeline import Pipeline
+from daemon.snapshot import QUANTITIES, ROW, Snapshot
+from drivers.signals import Quantity
 
 ROOT = Path(__file__).parents[2]
 
@@ -72,3 +77,15 @@ def test_a_recording_without_the_weights_says_what_is_missing(spin: Path) -> Non
     done = calibrate("load-cell", spin, "--config", ROOT / "rover.toml")
     assert done.returncode == 1
     assert "weight_kg" in done.stderr
+
+
+def test_the_daemon_corrects_loads_by_what_the_bench_found() -> None:
+    """A cell that reads 2 N too much and a tenth too little is put right before anything is estimated from it."""
+    cells = LoadCells(zero_N=2.0, span=1.1)  # type: ignore[arg-type]  # one value for six wheels
+    configuration = Configuration(load_cells=cells, smoothing=Smoothing(window_s=0.0, time_constant_s=0.0))
+    values = np.full((len(QUANTITIES), 6), np.nan)
+    values[ROW[Quantity.LOAD]] = 52.0
+    values[ROW[Quantity.MOTOR_CURRENT]] = 0.08
+    values[ROW[Quantity.MOTOR_SPEED]] = 400.0
+    estimate = Pipeline(configuration, Network(SHIPPED_MODEL)).step(Snapshot(0, 10**18, values))
+    np.testing.assert_allclose(estimate.smoothed_load_N, 55.0)

@@ -34,9 +34,9 @@ def test_an_absent_wheel_changes_nothing_but_the_count() -> None:
     """A wheel that was not measured has mask 0 and no features; the others keep theirs."""
     rng = np.random.default_rng(0)
     load, slip, torque = rng.uniform(40, 60, (1, 20, 6)), np.full((1, 20, 6), 0.03), rng.normal(0.3, 0.1, (1, 20, 6))
-    whole = reduce_windows(load, slip, torque, np.full((1, 3), 0.01), 0.075)
+    whole = reduce_windows(load, slip, torque, np.full((1, 4), 0.01), 0.075)
     torque[:, :, 2] = np.nan
-    part = reduce_windows(load, slip, torque, np.full((1, 3), 0.01), 0.075)
+    part = reduce_windows(load, slip, torque, np.full((1, 4), 0.01), 0.075)
     assert part.mask.tolist() == [[1, 1, 0, 1, 1, 1]]
     np.testing.assert_array_equal(part.wheels[:, 2], 0)
     np.testing.assert_allclose(np.delete(part.wheels, 2, axis=1), np.delete(whole.wheels, 2, axis=1))
@@ -46,7 +46,7 @@ def test_median_ignores_a_momentary_drop() -> None:
     """One instant of no torque moves the mean coefficient, and not the median."""
     load, slip, torque = np.full((1, 9, 6), 50.0), np.full((1, 9, 6), 0.03), np.full((1, 9, 6), 0.3)
     torque[0, 4] = 0.0
-    features = reduce_windows(load, slip, torque, np.full((1, 3), 0.01), 0.075).wheels[0, 0]
+    features = reduce_windows(load, slip, torque, np.full((1, 4), 0.01), 0.075).wheels[0, 0]
     assert features[2] == pytest.approx(0.08 * 8 / 9)
     assert features[3] == pytest.approx(0.08)
 
@@ -68,7 +68,7 @@ def test_the_buffer_averages_half_seconds_and_begins_anew_after_a_gap() -> None:
 def test_simulated_currents_are_as_noisy_as_the_table_says() -> None:
     """The relative standard deviation of 2000 currents of a rover is that of Table 4, drops included."""
     rng = np.random.default_rng(0)
-    rovers = draw_rovers(4, rng, np.full((4, 3), 1e-6), no_load_A=0.2)
+    rovers = draw_rovers(4, rng, np.full((4, 4), 1e-6), no_load_A=0.2)
     current = drive(rovers, table_4_noise(4), 2000, rng, Drivetrain(), Wheel()).current_A
     np.testing.assert_allclose((current.std(axis=1) / current.mean(axis=1)).mean(axis=0), TABLE_4_CURRENT, rtol=0.08)
 
@@ -126,3 +126,16 @@ def test_no_measurement_is_no_belief(estimator: Estimator) -> None:
     """An empty window, or one of NaN, has nothing to say."""
     assert estimator.believe(np.empty((3, 0, 6)), Knowledge()) is None
     assert estimator.believe(np.full((3, 5, 6), np.nan), Knowledge()) is None
+
+
+def test_a_fall_is_told_by_its_probability(estimator: Estimator) -> None:
+    """Half the torque at the same load and slip: cohesion fell, likely; the same window again: nobody knows."""
+    strong, weak = window(20), window(20)
+    weak[2] /= 2
+    fell = estimator.fall(strong, weak, Knowledge())
+    same = estimator.fall(strong, strong, Knowledge())
+    assert fell is not None
+    assert same is not None
+    assert fell.cohesion > 0.8
+    assert 0.45 < same.cohesion < 0.55
+    assert estimator.fall(strong, np.empty((3, 0, 6)), Knowledge()) is None

@@ -1,0 +1,34 @@
+"""The evaluation: the alarm's threshold keeps its rate, delays count from the crossing, coverage is counted right."""
+
+import numpy as np
+
+from calibration.evaluation import detector, estimators
+from calibration.evaluation.traverse import Drive
+from calibration.posterior import Estimator
+
+
+def test_the_threshold_gives_the_rate_that_was_asked_for() -> None:
+    """Of independent peaks, the threshold lets through as many as one in 8 h, and not one more."""
+    rng = np.random.default_rng(0)
+    peaks = rng.exponential(1.0, (600, 40))
+    null = detector.NullDrives({"cusum": peaks}, peaks.size * detector.QUIET)
+    limit = detector.threshold(null, "cusum")
+    assert 0.9 < detector.false_alarms(null, "cusum", limit) <= 1.0
+
+
+def test_delays_count_from_the_crossing() -> None:
+    """With no doubt about the change, the alarm comes within seconds after it, and none before."""
+    drive = Drive(8, 400, at_once=True, noise=0.05, drop_rate=0.0, no_load_A=0.0)
+    found = detector.delays(drive, {"cusum": 11.2}, np.random.default_rng(0))["cusum"]
+    assert np.nanmedian(found) < 10
+    assert np.nanmin(found) > 0
+
+
+def test_the_posterior_is_better_than_no_data_and_covers_as_it_says() -> None:
+    """On 600 new rovers: less error than the prior's mean, and 90 % intervals that hold between 86 and 94 %."""
+    found = estimators.figures(estimators.answers(600, estimators.Case(), 1, Estimator()), "")
+    assert found["posterior_rmse_cohesion_Pa"] < 0.85 * found["prior_mean_rmse_cohesion_Pa"]
+    assert found["posterior_rmse_cohesion_Pa"] < 0.6 * found["paper_rmse_cohesion_Pa"]
+    for target in ("cohesion", "friction_angle", "margin"):
+        assert 0.86 < found[f"coverage_90_{target}"] < 0.94
+        assert 0.43 < found[f"coverage_50_{target}"] < 0.57
