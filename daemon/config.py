@@ -15,6 +15,7 @@ from calibration.parameters import Drivetrain, LoadCells, Positive, Rover, Table
 from drivers.signals import NodeDescription, NodeKind
 
 NodeId = Annotated[int, Field(ge=1, le=126, strict=True)]
+WheelNumber = Annotated[int, Field(ge=1, le=6, strict=True)]
 SixNodes = Annotated[tuple[NodeId, ...], Field(min_length=6, max_length=6)]
 MASTER_NODE = 127
 """The daemon's own node number: its heartbeat is what keeps the drives alive."""
@@ -55,6 +56,7 @@ class Nodes(Table):
     load_cells: SixNodes = (11, 12, 13, 14, 15, 16)
     inclinometer: NodeId | None = None
     ground_speed: NodeId | None = None
+    mirrored_wheels: tuple[WheelNumber, ...] = ()
     motor_diagnostics: bool = False
     heartbeat_ms: Annotated[int, Field(ge=20, le=10_000)] = 200
     heartbeat_timeout_ms: Annotated[int, Field(ge=50, le=30_000)] = 600
@@ -62,7 +64,13 @@ class Nodes(Table):
     def described(self) -> tuple[NodeDescription, ...]:
         """Return every node in the vocabulary of the drivers."""
         wheels = [
-            NodeDescription(node, kind, wheel, diagnostics=self.motor_diagnostics and kind is NodeKind.MOTOR)
+            NodeDescription(
+                node,
+                kind,
+                wheel,
+                diagnostics=self.motor_diagnostics and kind is NodeKind.MOTOR,
+                mirrored=wheel + 1 in self.mirrored_wheels and kind is NodeKind.MOTOR,
+            )
             for kind, nodes in ((NodeKind.MOTOR, self.motors), (NodeKind.LOAD_CELL, self.load_cells))
             for wheel, node in enumerate(nodes)
         ]

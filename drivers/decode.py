@@ -17,7 +17,7 @@ from enum import StrEnum
 from drivers.emcy import EMCY_COB_ID, parse
 from drivers.frame import Frame
 from drivers.nmt import ERROR_CONTROL_COB_ID, NMT_COB_ID, parse_state
-from drivers.pdo import Meaning, Pdo, Validity, rpdos, tpdos
+from drivers.pdo import DIRECTED, Meaning, Pdo, Validity, rpdos, tpdos
 from drivers.signals import Emergency, NodeDescription, NodeState, Quantity, Reading, Signal, Sync
 
 SYNC_COB_ID = 0x080
@@ -78,7 +78,7 @@ class Decoder:
         for pdo in rpdos(node.kind):
             handlers[pdo.cob_id(node_id)] = _nothing
         for pdo in tpdos(node.kind, diagnostics=node.diagnostics):
-            handlers[pdo.cob_id(node_id)] = self._reading(pdo, node_id)
+            handlers[pdo.cob_id(node_id)] = self._reading(pdo, node)
 
     def _emergency(self, node: NodeDescription) -> _Handler:
         def decode(frame: Frame) -> Emergency | None:
@@ -100,10 +100,11 @@ class Decoder:
 
         return decode
 
-    def _reading(self, pdo: Pdo, node_id: int) -> _Handler:
+    def _reading(self, pdo: Pdo, node: NodeDescription) -> _Handler:
+        node_id = node.node_id
         size, unpack, cob_id = pdo.layout.size, pdo.layout.unpack, pdo.cob_id(node_id)
-        scales: tuple[tuple[int, Quantity, float], ...] = tuple(
-            (place, meaning.quantity, meaning.factor)
+        scales: tuple[tuple[int, Quantity, int, float], ...] = tuple(
+            (place, meaning.quantity, -1 if node.mirrored and meaning.quantity in DIRECTED else 1, meaning.factor)
             for place, meaning in enumerate(pdo.meanings)
             if isinstance(meaning, Meaning)
         )
@@ -117,7 +118,7 @@ class Decoder:
             for place, mask in masks:
                 if raw[place] & mask:
                     return Reading(frame.time_ns, node_id, cob_id, ())
-            values = tuple([(quantity, raw[place] * factor) for place, quantity, factor in scales])
+            values = tuple([(quantity, sign * raw[place] * factor) for place, quantity, sign, factor in scales])
             return Reading(frame.time_ns, node_id, cob_id, values)
 
         return decode

@@ -93,8 +93,9 @@ class Drive:
         self.reported = DriveState.UNKNOWN
 
     async def turn(self, motor_speed_rad_s: float) -> None:
-        """Send the target velocity [rad/s at the motor]; the drive must be in operation enabled."""
-        await self._command(Controlword.ENABLE_OPERATION, round(motor_speed_rad_s * _RPM_PER_RAD_S))
+        """Send the target velocity [rad/s at the motor, forward positive]; the drive must be in operation enabled."""
+        direction = -1 if self.link.node.mirrored else 1
+        await self._command(Controlword.ENABLE_OPERATION, direction * round(motor_speed_rad_s * _RPM_PER_RAD_S))
 
     async def send_quick_stop(self) -> None:
         """Send the quick stop and do not wait."""

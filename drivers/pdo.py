@@ -63,6 +63,10 @@ MEANINGS: dict[tuple[NodeKind, int, int], Meaning | Validity] = {
 }
 
 
+# What has the sign of a motor's own direction, which is the other way round where it is mounted mirrored.
+DIRECTED = (Quantity.MOTOR_CURRENT, Quantity.MOTOR_SPEED)
+
+
 @dataclass(frozen=True, slots=True)
 class Layout:
     """What the master wants in one PDO. `number` counts from 1; `entries` are (index, subindex) in their order."""

@@ -42,7 +42,9 @@ class NodeDescription:
     """A node that the configuration says is on the bus. `wheel` is 0–5 (wheel k of the paper is k − 1), else None.
 
     `diagnostics` asks a motor controller for TPDO 2 as well: supply voltage and winding temperature, which not every
-    controller has as objects. `serial` (0x1018:04), where given, must match.
+    controller has as objects. `mirrored` is a motor that turns backwards, by its own count, when the rover drives
+    forward: its current and speed change their sign on the way in, its target velocity on the way out. `serial`
+    (0x1018:04), where given, must match.
     """
 
     node_id: int
@@ -50,6 +52,7 @@ class NodeDescription:
     wheel: int | None
     required: bool = True
     diagnostics: bool = False
+    mirrored: bool = False
     serial: int | None = None
 
 

@@ -48,6 +48,15 @@ def test_a_motor_speaks_in_si() -> None:
     )
 
 
+def test_a_mirrored_motor_has_the_signs_of_the_rover() -> None:
+    """Current and speed change their sign; the statusword does not, and nothing is minus zero."""
+    mirrored = Decoder([NodeDescription(2, NodeKind.MOTOR, 1, mirrored=True)])
+    values = dict(mirrored.decode(Frame(5, 0x182, struct.pack("<Hhi", 0x0637, -80, 0))).values)
+    assert values[Quantity.STATUSWORD] == 0x0637
+    assert values[Quantity.MOTOR_CURRENT] == pytest.approx(0.080)
+    assert math.copysign(1.0, values[Quantity.MOTOR_SPEED]) == 1.0
+
+
 def test_diagnostics_and_sensors_speak_in_si() -> None:
     """Supply voltage and temperature, load, slopes and yaw rate, ground speed."""
     decoder = Decoder(NODES)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 from rig import rig, until
@@ -68,6 +69,24 @@ async def test_wheels_turn_at_the_speed_that_is_asked_and_stop() -> None:
             await r.network.set_speed(CREEP_rad_s)
         await r.network.disable()
         assert not any(r.told(MotionStopped))
+
+
+async def test_mirrored_motors_turn_the_other_way_and_read_as_forward() -> None:
+    """Both sides drive forward; the right side's motors turn backwards for it."""
+    known = [replace(motor, mirrored=motor.node_id % 2 == 0) for motor in MOTORS]
+    async with rig(MOTORS, known=known) as r:
+        await r.network.settled()
+        await r.network.enable()
+        await r.network.set_speed((0.1,) * 6)
+        for node_id in range(1, 7):
+            await until(
+                lambda node_id=node_id: (
+                    values(r.readings(node_id), Quantity.MOTOR_SPEED)[-1] == pytest.approx(140.0, abs=0.06)
+                ),
+                f"motor {node_id} reads as forward",
+            )
+        assert r.rover.nodes[1].device.speed_rad_s > 0.0
+        assert r.rover.nodes[2].device.speed_rad_s < 0.0
 
 
 async def test_nothing_turns_before_it_is_enabled() -> None:
