@@ -90,7 +90,7 @@ class Slip(Table):
 
 
 class Smoothing(Table):
-    """`[smoothing]`: the filter that removes momentary current drops (docs/decisions/010-smoothing.md)."""
+    """`[smoothing]`: the filter that removes momentary current drops (docs/decisions/016-smoothing.md)."""
 
     window_s: Annotated[float, Field(ge=0, le=60)] = 3.5
     threshold: Annotated[float, Field(ge=0, le=10)] = 2.5

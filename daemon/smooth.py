@@ -8,7 +8,7 @@ and slips have no drops; they go through the low-pass alone, and so stay beside 
 
 Delay with the defaults, at any rate: with the noise of the paper's Table 4 a step is half through after 1.0 s and 90 %
 through after 3.0 s (25 %) to 3.5 s (60 %); the low-pass alone takes as long. A step far outside the noise waits for the
-median: 2.7 s and 5.1 s at worst. Why this and no other: docs/decisions/010-smoothing.md.
+median: 2.7 s and 5.1 s at worst. Why this and no other: docs/decisions/016-smoothing.md.
 """
 
 from __future__ import annotations

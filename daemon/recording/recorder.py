@@ -6,6 +6,7 @@ is full or gone stops the recording and nothing else: `trouble` says why, and a 
 
 from __future__ import annotations
 
+import shutil
 import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 FLUSH_S = 0.4
 RETRY_S = 10.0
 MEGABYTE = 1_000_000
+RESERVE = 0.05
+"""Of the limit: what the disk must have left, or old recordings go."""
 
 
 @dataclass(slots=True)
@@ -141,18 +144,17 @@ class Recorder:
         self.trouble = None
 
     def _make_room(self) -> None:
-        """Remove the oldest pairs until all of them together are within the limit."""
-        files = sorted(
-            path
-            for path in self._settings.directory.iterdir()
-            if path.suffix in {".mcap", ".log"} and path.name.startswith("rover-")
-        )
-        total = sum(path.stat().st_size for path in files)
-        for path in files:
-            if total <= self._settings.limit_MB * MEGABYTE:
+        """Remove the oldest files until all of them are within the limit, and the disk has a reserve."""
+        folder = self._settings.directory
+        limit = self._settings.limit_MB * MEGABYTE
+        ours = [path for path in folder.glob("rover-*") if path.suffix in {".mcap", ".log"}]
+        files = sorted((path.stat().st_mtime_ns, path.name, path.stat().st_size, path) for path in ours)
+        total = sum(size for _, _, size, _ in files)
+        for _, _, size, path in files:
+            if total <= limit and shutil.disk_usage(folder).free >= RESERVE * limit:
                 return
-            total -= path.stat().st_size
             path.unlink()
+            total -= size
 
     def _attempt(self, action: Callable[[], object]) -> None:
         """Do what touches the disk; its failure ends this pair, and nothing else."""

@@ -159,6 +159,31 @@ def test_the_oldest_files_go_when_the_limit_is_reached(tmp_path: Path, drive: Ca
     assert foreign.read_text() == "mine"
 
 
+def test_a_disk_that_others_fill_costs_old_recordings_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, drive: Callable
+) -> None:
+    """Far below the limit, but the disk has less left than the reserve until two files are gone."""
+    frames = list(drive().frames(5))
+
+    def record(hour: int) -> None:
+        recorder = Recorder(Recording(directory=tmp_path), "can0", {}, now_ns=lambda: 10**18 + hour * 3600 * 10**9)
+        recorder.frames(frames)
+        recorder.close()
+
+    for hour in range(3):
+        record(hour)
+    before = sorted(tmp_path.iterdir(), key=lambda path: (path.stat().st_mtime_ns, path.name))
+    assert len(before) == 6
+    monkeypatch.setattr(
+        "daemon.recording.recorder.shutil.disk_usage",
+        lambda folder: shutil._ntuple_diskusage(0, 0, 10**9 if len(list(folder.iterdir())) <= 4 else 0),
+    )
+    record(3)
+    assert not before[0].exists()
+    assert not before[1].exists()
+    assert all(path.exists() for path in before[2:])
+
+
 def test_a_disk_that_fails_stops_the_recording_and_nothing_else(tmp_path: Path, drive: Callable) -> None:
     """It says why, and begins again when it can."""
     now = 10**18
