@@ -6,7 +6,7 @@ export PYTHON
 
 RECORDINGS ?= ../shared/recordings
 
-.PHONY: demo test check sizing reproduce evaluate pictures prove real scaling frames install uninstall clean
+.PHONY: demo test check sizing reproduce evaluate pictures prove real scaling picture frames install uninstall clean
 
 demo: $(VENV)/demo.ready
 	$(BIN)/regolithd demo
@@ -53,6 +53,10 @@ scaling: $(VENV)/dev.ready
 frames: $(VENV)/dev.ready
 	tests/bench/with-vcan $(BIN)/python -m drivers.benchmark
 	$(BIN)/python -m drivers.reference > docs/bus.md
+
+# The README's first figure: the head of a real report. Needs chromium.
+picture: $(VENV)/dev.ready
+	$(BIN)/python -m calibration.prove.picture docs/mismatch-report.png build/picture
 
 # On a rover or a bench, as root: docs/install.md.
 install:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calibration.mismatch.report_axes import number
+from calibration.mismatch.report_curves import curve_of
 from calibration.mismatch.report_figures import (
     covariate_label,
     curve_figure,
@@ -35,7 +36,12 @@ COMPARED = ("numpy", "scipy", "pyarrow")
 """Packages whose versions a repetition would want to know."""
 
 
-PARAMETERS = {"onset_s": "onset", "relative_size": "share of the mean reading", "rise_s": "rise"}
+PARAMETERS = {
+    "onset_s": "onset",
+    "relative_size": "share of the mean reading",
+    "rise_s": "rise",
+    "scale_K": "temperature scale",
+}
 """Parameters whose names read better in other words."""
 
 
@@ -61,8 +67,8 @@ def render_report(answer: Answer, evidence: Evidence, provenance: Provenance) ->
     sections = (
         _header(answer, evidence, provenance),
         _where(answer, evidence),
-        _effects(answer),
-        _unexplained(answer),
+        _effects(answer, evidence),
+        _unexplained(answer, evidence),
         _fit(answer, evidence),
         _indistinguishable(answer),
         _sensitivity(answer, evidence),
@@ -96,8 +102,10 @@ def wheels_in_words(wheels: Sequence[int], everything: Sequence[int]) -> str:
     return f"wheel {wheels[0]}" if len(wheels) == 1 else f"wheels {listed([str(wheel) for wheel in wheels])}"
 
 
-def which_wheels(wheels: Sequence[int]) -> str:
+def which_wheels(wheels: Sequence[int], everything: Sequence[int]) -> str:
     """Return the wheels as a short label."""
+    if len(wheels) == len(everything) > 1:
+        return f"all {len(wheels)} wheels"
     return f"wheel {wheels[0]}" if len(wheels) == 1 else f"wheels {', '.join(map(str, wheels))}"
 
 
@@ -135,7 +143,6 @@ def _header(answer: Answer, evidence: Evidence, provenance: Provenance) -> str:
 
 
 def _where(answer: Answer, evidence: Evidence) -> str:
-    curve = leading_curve(answer, evidence)
     parts = ["<h2>Where they differ</h2>"]
     if len(evidence.map_time_s):
         parts.append(
@@ -143,16 +150,29 @@ def _where(answer: Answer, evidence: Evidence) -> str:
             "along the direction of rotation, in units of its standard error with the noise’s own memory counted in. "
             "Beyond ±3 is rarely noise; pale is agreement.</figcaption></figure>"
         )
-    if curve is not None:
-        where = wheels_in_words(curve.wheels, evidence.wheels)
-        of = f" of {where}" if where else ""
-        picture = curve_figure(curve, evidence.unit, corrected=bool(answer.effects))
-        parts.append(
-            f"<figure>{picture}<figcaption><b>{_what_orders(answer)}{escape(spoken(curve.covariate))}.</b> "
-            f"Mean residual{of} "
-            f"in bins that share the data evenly; bars are two standard errors. {_key(answer)}</figcaption></figure>"
-        )
+    found = [*_places(answer)]
+    curves = [curve for curve in (curve_of(evidence, name, wheels) for name, wheels in found) if curve is not None]
+    if not curves and evidence.curves:
+        curves = [evidence.curves[0]]
+    parts += [_curve(curve, answer, evidence) for curve in curves[:3]]
     return "\n".join(parts)
+
+
+def _places(answer: Answer) -> Iterable[tuple[str, tuple[int, ...]]]:
+    """Return the covariate and wheels of everything that was found, each once."""
+    named = [(effect.covariate, effect.wheels) for effect in answer.effects]
+    return dict.fromkeys([*named, *((place.covariate, place.wheels) for place in answer.unexplained)])
+
+
+def _curve(curve: Curve, answer: Answer, evidence: Evidence) -> str:
+    where = wheels_in_words(curve.wheels, evidence.wheels)
+    of = f" of {where}" if where else ""
+    picture = curve_figure(curve, evidence.unit, corrected=bool(answer.effects))
+    return (
+        f"<figure>{picture}<figcaption><b>{_what_orders(answer)}{escape(spoken(curve.covariate))}.</b> "
+        f"Mean residual{of} in bins that share the data evenly; bars are two standard errors. "
+        f"{_key(answer)}</figcaption></figure>"
+    )
 
 
 def _what_orders(answer: Answer) -> str:
@@ -169,25 +189,15 @@ def _key(answer: Answer) -> str:
     return f"{before}{after if answer.effects else ''}."
 
 
-def leading_curve(answer: Answer, evidence: Evidence) -> Curve | None:
-    """Return the curve that belongs to what was found, else the most telling one."""
-    wanted = [*(effect.covariate for effect in answer.effects), *(place.covariate for place in answer.unexplained)]
-    by_covariate = {curve.covariate: curve for curve in reversed(evidence.curves)}
-    for covariate in wanted:
-        if covariate in by_covariate and len(by_covariate[covariate].at) > 2:
-            return by_covariate[covariate]
-    return evidence.curves[0] if evidence.curves else None
-
-
-def _effects(answer: Answer) -> str:
+def _effects(answer: Answer, evidence: Evidence) -> str:
     if not answer.effects:
         return ""
-    return "<h2>What was left out</h2>\n" + "\n".join(_effect(effect) for effect in answer.effects)
+    return "<h2>What was left out</h2>\n" + "\n".join(_effect(effect, evidence) for effect in answer.effects)
 
 
-def _effect(effect: Effect) -> str:
+def _effect(effect: Effect, evidence: Evidence) -> str:
     since = "" if effect.onset_s is None else f"<span>from {number(effect.onset_s / 60)} min on</span>"
-    at = which_wheels(effect.wheels)
+    at = which_wheels(effect.wheels, evidence.wheels)
     factor, unit_of_error = scaled(_unit_of(effect))
     before, after = factor * effect.rmse_before, factor * effect.rmse_after
     gain = 100 * (1 - after / before) if before else 0.0
@@ -195,7 +205,7 @@ def _effect(effect: Effect) -> str:
         f"<tr><td>{escape(PARAMETERS.get(name, words(name)))}</td>"
         f'<td class="n">{number(f * p.value)}</td><td class="n">{number(f * p.low)} … {number(f * p.high)}</td>'
         f"<td>{escape(unit)}</td><td>{interval_figure(p.value, p.low, p.high)}</td></tr>"
-        for name, p, f, unit in ((name, p, *scaled(p.unit)) for name, p in effect.parameters.items())
+        for name, p, f, unit in ((name, p, *_read_in(name, p.unit)) for name, p in effect.parameters.items())
         if np.isfinite(p.value)
     )
     return f"""<section class="effect"><h3>{escape(capital(words(effect.name)))}</h3>
@@ -207,23 +217,28 @@ def _effect(effect: Effect) -> str:
 </thead><tbody>{rows}</tbody></table></section>"""
 
 
+def _read_in(name: str, unit: str) -> tuple[float, str]:
+    """Return factor and unit in which a parameter is read: shares in percent."""
+    return (100.0, "%") if name == "relative_size" else scaled(unit)
+
+
 def _unit_of(effect: Effect) -> str:
     """Return the unit that the channel's name ends in."""
     return effect.channel.rsplit("_", 1)[-1] if "_" in effect.channel else ""
 
 
-def _unexplained(answer: Answer) -> str:
+def _unexplained(answer: Answer, evidence: Evidence) -> str:
     if not answer.unexplained:
         return ""
-    parts = "\n".join(_open_question(place) for place in answer.unexplained)
+    parts = "\n".join(_open_question(place, evidence) for place in answer.unexplained)
     return (
         "<h2>What is there and has no name</h2><p>This is above the noise, and none of the known effects explains it. "
         f"It is measured and located; a name it has not earned.</p>\n{parts}"
     )
 
 
-def _open_question(place: Unexplained) -> str:
-    at = which_wheels(place.wheels)
+def _open_question(place: Unexplained, evidence: Evidence) -> str:
+    at = which_wheels(place.wheels, evidence.wheels)
     return f"""<section class="effect open"><h3>Ordered by {escape(spoken(place.covariate))}</h3>
 <div class="chips"><span>{escape(place.channel)}</span><span>{at}</span>
 <span>{number(place.from_s / 60)} to {number(place.to_s / 60)} min</span>
@@ -267,7 +282,9 @@ def _sensitivity(answer: Answer, evidence: Evidence) -> str:
     if not answer.sensitivity:
         return ""
     mean = float(np.nanmean(np.abs(evidence.measured)))
-    rows = "".join(_sensitivity_row(one.name, one.smallest_detectable, one.unit, mean) for one in answer.sensitivity)
+    found = {effect.name for effect in answer.effects}
+    silent = [one for one in answer.sensitivity if one.name not in found]
+    rows = "".join(_sensitivity_row(one.name, one.smallest_detectable, one.unit, mean) for one in silent)
     return (
         "<h2>What this recording would have shown</h2>"
         "<p>The smallest effect of each kind that would have been found nine times in ten. An effect smaller than this "
@@ -291,9 +308,9 @@ def _sensitivity_row(name: str, size: float, unit: str, mean: float) -> str:
 
 
 def _other_curves(answer: Answer, evidence: Evidence) -> str:
-    leading = leading_curve(answer, evidence)
+    shown = {name for name, _ in _places(answer)} or {curve.covariate for curve in evidence.curves[:1]}
     first = {curve.covariate: curve for curve in reversed(evidence.curves) if len(curve.at) > 2}
-    others = [c for c in evidence.curves if first.get(c.covariate) is c and c is not leading][:8]
+    others = [c for c in evidence.curves if first.get(c.covariate) is c and c.covariate not in shown][:8]
     if not others:
         return ""
     drawn = "".join(

@@ -67,7 +67,7 @@ def map_figure(answer: Answer, evidence: Evidence) -> str:
         if effect.onset_s is not None:
             at = panels[0].at_x(effect.onset_s / 60)
             parts += [line([(at, p.top - 4), (at, p.top + p.height + 4)], "onset") for p in panels]
-            parts.append(text(at, panels[0].top - 9, f"onset {effect.onset_s / 60:.1f} min", anchor="middle"))
+            parts.append(text(at + 5, panels[0].top + panels[0].height + 15, f"onset {effect.onset_s / 60:.1f} min"))
     last = panels[-1]
     parts += [axes(Panel(last.left, last.top, last.width, last.height, last.x, (0, 0)), "time (min)", "", y_about=0)]
     parts += _colour_key(left + wide - 250, 8)

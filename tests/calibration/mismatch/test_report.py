@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from calibration.mismatch.answer import (
 )
 from calibration.mismatch.report import Provenance, render_report, verdict_sentence, words
 from calibration.mismatch.report_axes import number, ticks
+from calibration.mismatch.report_curves import curve_of
 
 FROM = Provenance("drive.csv", "SIM.toml", "ab" * 32, "cd" * 32, "regolithd mismatch drive.csv --simulation SIM.toml")
 WORN = Effect(
@@ -151,6 +153,24 @@ def test_the_verdict_never_names_what_is_unexplained() -> None:
     told = verdict_sentence(ANSWERS["unexplained"])
     assert "bus voltage" in told
     assert "no known effect explains" in told
+
+
+def test_an_effect_s_curve_shows_its_own_wheels(evidence: Evidence) -> None:
+    """The curve of a drag on one wheel is that wheel's residual along its rotation, before and after."""
+    rng = np.random.default_rng(1)
+    direction = np.where(rng.uniform(size=(900, 6)) > 0.5, 1.0, -1.0)
+    drag = np.zeros((900, 6))
+    drag[:, 3] = 0.5 * direction[:, 3]
+    time_s = np.broadcast_to(evidence.time_s[:, None], (900, 6))
+    scene = SimpleNamespace(covariates={"time": time_s, "direction": direction}, row=None, mask=np.ones((900, 6), bool))
+    noise = 0.01 * rng.normal(size=(900, 6))
+    seen = replace(evidence, measured=drag + noise, before=0 * drag, after=drag, scene=scene)  # type: ignore[arg-type]
+    curve = curve_of(seen, "time", (4,))
+    assert curve is not None
+    np.testing.assert_allclose(curve.before, 0.5, atol=0.02)
+    np.testing.assert_allclose(curve.after, 0.0, atol=0.02)
+    assert curve_of(seen, "wheel_angle", (4,)) is None
+    assert curve_of(replace(seen, scene=None), "time", (4,)) is None
 
 
 def test_names_are_spoken_as_people_speak() -> None:
