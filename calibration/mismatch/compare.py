@@ -126,8 +126,7 @@ def _effects(decision: Decision, held: HeldOut, blocks: NDArray[np.int64]) -> tu
     for index, (term, parameters) in enumerate(zip(named.terms, parameters_of(search, named, blocks), strict=True)):
         candidate = term.group.candidate
         assert candidate is not None  # noqa: S101  # named terms are candidates
-        names = _names(scene, term.wheels)
-        wheels = candidate.wheels(term.group.shape, names, scene.simulation.row(names))
+        wheels = _names(scene, term.wheels)
         onset = parameters.get("onset_s")
         errors = (held.without[index], held.with_it[index])
         told = statement(

@@ -32,11 +32,11 @@ def statement(
     size = parameters["relative_size"]
     where = wheels_in_words(wheels, of, kind)
     onset = parameters.get("onset_s")
-    begins = f" from {onset.value:.0f} s on ({onset.low:.0f} to {onset.high:.0f} s)" if onset else ""
-    gained = 100 * (1 - errors[1] / errors[0]) if errors[0] > 0 else 0.0
+    begins = f" from {onset.value:.0f} s on (90 % sure: {onset.low:.0f} to {onset.high:.0f} s)" if onset else ""
+    costs = 100 * (errors[0] / errors[1] - 1) if errors[1] > 0 else 0.0
     words = candidate.words[:1].upper() + candidate.words[1:]
     return (
-        f"{words} on {where}{begins}: {100 * size.value:.0f} % of the mean reading "
+        f"{words}, on {where}{begins}: {100 * size.value:.0f} % of the mean reading "
         f"(90 % sure: {100 * size.low:.0f} to {100 * size.high:.0f} %); "
-        f"with it the held-out error there falls by {gained:.1f} %."
+        f"left out, it makes the held-out error there {costs:.1f} % larger."
     )

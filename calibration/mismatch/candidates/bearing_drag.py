@@ -18,7 +18,7 @@ class BearingDrag(Candidate):
     name = "bearing-drag"
     covariate = "time"
     equation = "ΔI = I_b g(t − t_0) sign(ω)"
-    words = "drag on one wheel that was not there before"
+    words = "drag that was not there before"
     signature = "one wheel's residual along sign(ω), none before its onset, growing after"
     experiment = "lift the wheels, spin all six at one speed and compare their currents"
     source = "seal and bearing failures: from percents of rated current to stalling"

@@ -88,10 +88,6 @@ class Candidate:
         found = {c.name: float(v) for c, v in zip(self.coefficients, values, strict=False)}
         return {**found, **{name: float(shape[name]) for name in self.free if name in shape}}
 
-    def wheels(self, shape: Shape, wheels: tuple[int, ...], row: Array | None) -> tuple[int, ...]:  # noqa: ARG002
-        """Return the wheels on which it really acts, of those that share it."""
-        return wheels
-
 
 def onsets(scene: Scene, count: int = 24) -> list[float]:
     """Return times at which something may begin [s]: evenly spread, not within 3 % of either end."""

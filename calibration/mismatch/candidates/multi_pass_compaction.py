@@ -50,9 +50,3 @@ class MultiPassCompaction(Candidate):
         done = np.where(passes > 0, 1.0, 0.0) + np.where(passes > 1, kept * (passes - 1), 0.0)
         base = scene.filled if shape["by"] == "current" else scene.secant("stiffness_factor", 0.3)
         return (base * done)[None]
-
-    def wheels(self, shape: Shape, wheels: tuple[int, ...], row: Array | None) -> tuple[int, ...]:
-        """Leave out the first row where passes count from the front: it is never in a rut."""
-        if shape["leads"] == "travel" or row is None:
-            return wheels
-        return tuple(wheel for wheel, at in zip(wheels, row, strict=True) if at > 0)
