@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import json
 import re
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 from pydantic.json_schema import models_json_schema
 
+from daemon.message_examples import example
 from daemon.messages import CHANNELS, SCHEMA_VERSION, QoS
 
 if TYPE_CHECKING:
@@ -34,7 +36,7 @@ def _title(channel: Channel) -> str:
 
 
 def _summary(channel: Channel) -> str:
-    return (channel.message.__doc__ or "").strip()
+    return (channel.message.__doc__ or "").strip().splitlines()[0]
 
 
 def json_schemas() -> dict[str, dict[str, Any]]:
@@ -108,6 +110,7 @@ def _message(channel: Channel) -> dict[str, Any]:
         "title": _title(channel),
         "summary": _summary(channel),
         "payload": {"$ref": f"#/components/schemas/{_title(channel)}"},
+        "examples": [{"payload": example(channel)}],
     }
 
 
@@ -145,7 +148,21 @@ in their unit; `null` means that it was not measured or could not be estimated. 
   other. While `state` is `offline`, every retained message tells of the past.
 - `snapshot` is complete and in order; `wheel/…` shows the newest without waiting, and is not kept
   while the broker is away.
+
+## Examples
+
+{_example_lines()}
 """
+
+
+def _example_lines() -> str:
+    """Return an example of each message, in the order of the table."""
+    parts = []
+    for channel in CHANNELS:
+        text = json.dumps(example(channel), ensure_ascii=False)
+        wrapped = textwrap.fill(text, 118, break_long_words=False, break_on_hyphens=False)
+        parts.append(f"### {channel.name}\n\n```json\n{wrapped}\n```")
+    return "\n\n".join(parts)
 
 
 def documents() -> dict[str, str]:

@@ -99,6 +99,15 @@ def test_schemas_accept_what_is_sent_and_refuse_what_is_not() -> None:
     wheel.validate(json.loads(wheels[2]))
 
 
+def test_every_message_has_an_example_that_its_schema_accepts() -> None:
+    """As a reader would check it: from the documents alone."""
+    document = json.loads((DOCS / "asyncapi.json").read_text())
+    for channel in CHANNELS:
+        (shown,) = document["components"]["messages"][channel.message.__name__]["examples"]
+        schema = json.loads((DOCS / f"{channel.name}.schema.json").read_text())
+        jsonschema.Draft202012Validator(schema).validate(shown["payload"])
+
+
 def test_every_reference_in_the_asyncapi_document_leads_somewhere() -> None:
     """And every channel has its operation, with QoS and retain."""
     document = json.loads((DOCS / "asyncapi.json").read_text())
