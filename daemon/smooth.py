@@ -81,7 +81,8 @@ class LowPass:
         """Return the filtered values; where nothing arrived (NaN) the state waits, and NaN is returned."""
         if self._time_constant_ns == 0:
             return values
-        share = -np.expm1((self._time_ns - time_ns) / self._time_constant_ns)
+        elapsed_ns = np.maximum(time_ns - self._time_ns, 0.0)  # a clock that was set back has not un-elapsed
+        share = -np.expm1(-elapsed_ns / self._time_constant_ns)
         moved = np.where(np.isnan(self._state), values, self._state + share * (values - self._state))
         arrived = ~np.isnan(values)
         np.copyto(self._state, moved, where=arrived)

@@ -19,8 +19,13 @@ def demo(
 ) -> None:
     """Drive, show, summarise."""
     import asyncio
+    from importlib.util import find_spec
 
     from rich.console import Console
+
+    if missing := [name for name in ("amqtt", "matplotlib") if find_spec(name) is None]:
+        typer.echo(f"the demo needs {' and '.join(missing)}: pip install 'regolithd[demo]', or `make demo`", err=True)
+        raise typer.Exit(1)
 
     from daemon.demo.drive import drive
     from daemon.demo.picture import draw

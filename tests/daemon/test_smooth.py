@@ -85,6 +85,17 @@ def test_a_reset_wheel_begins_anew_and_the_others_go_on() -> None:
     assert (torque[1:] > 0.9).all()
 
 
+def test_a_clock_that_is_set_back_does_no_harm() -> None:
+    """By an hour: the next value changes nothing, and from then on all is as before."""
+    smoother = Smoother(2.0, **DEFAULTS.model_dump())
+    six = np.full(6, 1.0)
+    for k in range(10):
+        smoother.step(10**18 + k * 500_000_000, six, six, six)
+    back = 10**18 - 3600 * 10**9
+    assert smoother.step(back, 2 * six, six, six).torque.tolist() == [1.0] * 6
+    assert smoother.step(back + 1_500_000_000, 2 * six, six, six).torque == pytest.approx(six * (2 - np.exp(-1)))
+
+
 def test_both_parts_can_be_turned_off() -> None:
     """Then everything passes as it is."""
     torque = noisy(10.0, 3)
