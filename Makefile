@@ -36,6 +36,7 @@ evaluate: $(VENV)/dev.ready
 # docs/*.svg, from what `make sizing`, `make reproduce` and `make evaluate` found.
 pictures: reproduce
 	$(BIN)/regolithd pictures
+	$(BIN)/python -m daemon.demo.photograph docs/demo.svg
 
 # The proof of `regolithd mismatch`: 200 recordings with an effect concealed. SEED=… repeats one; interrupted, it goes on.
 prove: $(VENV)/dev.ready

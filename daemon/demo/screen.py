@@ -29,10 +29,11 @@ def screen(console: Console, seconds: float) -> Iterator[Callable[[Viewer, float
         yield _plain(console, seconds)
         return
     with Live(Text(TITLE, style="bold"), console=console, auto_refresh=False) as live:
-        yield lambda viewer, elapsed: live.update(_frame(viewer, elapsed, seconds), refresh=True)
+        yield lambda viewer, elapsed: live.update(frame(viewer, elapsed, seconds), refresh=True)
 
 
-def _frame(viewer: Viewer, elapsed: float, seconds: float) -> RenderableType:
+def frame(viewer: Viewer, elapsed: float, seconds: float) -> RenderableType:
+    """Return the whole screen at one moment."""
     progress = Table.grid(padding=(0, 2))
     bar = ProgressBar(total=seconds, completed=elapsed, width=40)
     progress.add_row(Text("driving", style="dim"), bar, Text(f"{elapsed:.0f} of {seconds:.0f} s", style="dim"))
