@@ -64,8 +64,8 @@ def brake(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plot = 
 
 def radius(
     recording: Recorded = None,
-    distance: Annotated[float, typer.Option(help="what the tape says [m]")] = 0.0,
-    distance_std: Annotated[float, typer.Option(help="how sure the tape is [m]")] = 0.005,
+    distance: Annotated[float, typer.Option(help="what the tape says, in metres")] = 0.0,
+    distance_std: Annotated[float, typer.Option(help="how sure the tape is, in metres")] = 0.005,
     config: Config = ROVER_TOML,
     write: Write = True,
 ) -> None:

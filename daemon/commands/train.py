@@ -15,7 +15,7 @@ def register(app: typer.Typer) -> None:
 
 def train(
     out: Annotated[Path, typer.Option(help="where the network goes")] = Path("calibration/models/terrain.onnx"),
-    config: Annotated[Path | None, typer.Option(help="take [drivetrain] and [wheel] from this TOML")] = None,
+    config: Annotated[Path | None, typer.Option(help="take the tables drivetrain and wheel from this TOML")] = None,
     neurons: Annotated[int, typer.Option(min=1, help="hidden neurons")] = 64,
     trainings: Annotated[int, typer.Option(min=1, help="how many to train; the one with the lowest MSE is kept")] = 100,
     epochs: Annotated[int, typer.Option(min=1, help="the most epochs of one training")] = 10_000,

@@ -25,8 +25,8 @@ def register(app: typer.Typer) -> None:
 
 def traverse(
     *,
-    distance: Annotated[float, typer.Option(help="How far the wheels' rims move [m].")],
-    speed: Annotated[float, typer.Option(help="How fast [m/s]; negative: backwards.")] = 0.022,
+    distance: Annotated[float, typer.Option(help="How far the wheels' rims move, in metres.")],
+    speed: Annotated[float, typer.Option(help="How fast, in m/s; negative: backwards.")] = 0.022,
     config: Config = None,
 ) -> None:
     """Drive DISTANCE at constant wheel SPEED through the running daemon, then stop clean.
