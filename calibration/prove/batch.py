@@ -6,6 +6,7 @@ In the batch's folder:
     trials/NNN/         what the solver is given: recording.csv.gz and SIM.toml, nothing else
     answers/NNN.json    what it said, and in how many seconds
     peers/NNN.json      what the peers said of the same two files
+    experiments/NNN.json  where one speed could tell nothing: what it said after the experiment that it proposed
     opened/NNN.json     salt and truth, written after the answer
 
 A batch that was interrupted goes on where it stopped: what has an answer and an opened envelope is not done again. No
@@ -76,6 +77,8 @@ class Outcome:
     truth: Truth
     answer: dict[str, Any]
     peers: dict[str, Any]
+    experiment: dict[str, Any] | None = None
+    """What the solver says after its own experiment was driven, where it proposed one."""
 
 
 def truth_of(trial: Trial, files: dict[str, str]) -> Truth:
@@ -155,10 +158,23 @@ def run_trial(batch: Batch, plan: Plan) -> Outcome:
     solve(batch, batch.solver, "answers", plan.number)
     if batch.peers:
         solve(batch, batch.peers, "peers", plan.number)
+    if plan.group == "constant":
+        drive_the_experiment(batch, plan)
     envelope.open_into(batch.path("opened", plan.number), committed)
     if not batch.keep:
         shutil.rmtree(batch.path("trials", plan.number, ""))
     return outcome(batch, plan.number)
+
+
+def drive_the_experiment(batch: Batch, plan: Plan) -> None:
+    """Simulate the experiment that the answer proposes, and let the solver answer again, the envelope still closed."""
+    said = json.loads(batch.path("answers", plan.number).read_text())["answer"]
+    proposed = "; ".join(one.get("experiment", "") for one in said.get("indistinguishable", []))
+    if not proposed:
+        return
+    trial = make_trial(plan, duration_s=batch.duration_s, experiment=proposed)
+    write_trial(trial, batch.path("trials", plan.number, ""))
+    solve(batch, batch.solver, "experiments", plan.number)
 
 
 def reopened(batch: Batch, plan: Plan) -> Outcome:
@@ -171,12 +187,13 @@ def reopened(batch: Batch, plan: Plan) -> Outcome:
 
 def outcome(batch: Batch, number: int) -> Outcome:
     """Return a finished trial from its files, its seal checked."""
-    peers = batch.path("peers", number)
+    peers, driven = batch.path("peers", number), batch.path("experiments", number)
     return Outcome(
         number=number,
         truth=read_opened(batch.path("opened", number)),
         answer=json.loads(batch.path("answers", number).read_text()),
         peers=json.loads(peers.read_text())["answer"] if peers.exists() else {},
+        experiment=json.loads(driven.read_text())["answer"] if driven.exists() else None,
     )
 
 

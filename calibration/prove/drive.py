@@ -35,6 +35,21 @@ class Habit:
     turn: float
 
 
+EVERYTHING = frozenset({"speed", "reverse", "stop", "turn", "slope", "temperature", "slip"})
+"""What a drive may move."""
+
+ASKS = {
+    "speed": ("staircase", "speeds"),
+    "reverse": ("backwards", "both ways", "reverse"),
+    "stop": ("start, stop", "stand still"),
+    "turn": ("turn on the spot", "arcs"),
+    "slope": ("slope",),
+    "temperature": ("cold", "warm"),
+    "slip": ("sledge", "slip"),
+    "ballast": ("ballast", "weights"),
+}
+"""What an experiment, told in words, asks to be moved."""
+
 KINDS = {
     "patrol": Habit((8, 36), (0.08, 0.46), (2.0, 2.0), 0.10, 0.06, 0.35),
     "shuttle": Habit((20, 50), (0.10, 0.45), (1.5, 4.0), 0.45, 0.05, 0.15),
@@ -147,30 +162,63 @@ def slips(rng: Generator, t_s: Array, pitch: Array) -> Array:
     return np.asarray(np.clip((shared + uphill)[:, None] * apart, 0.003, 0.4), np.float64)
 
 
-def make_drive(
-    rng: Generator, kind: str, *, duration_s: float, step_s: float, radius_m: float, track_m: float, mass_kg: float
-) -> Drive:
-    """Return a drive of this kind; `constant` is one speed on flat ground, which tells nothing apart."""
-    t_s: Array = np.arange(round(duration_s / step_s), dtype=np.float64) * step_s
-    flat = kind == "constant"
-    quiet = 0.0 if flat else 1.0
-    speed, yaw = (
-        (np.full_like(t_s, rng.uniform(0.15, 0.4)), np.zeros_like(t_s)) if flat else legs(rng, KINDS[kind], t_s)
+def moves_of(experiment: str) -> frozenset[str]:
+    """Return what an experiment in words asks to be moved."""
+    told = experiment.lower()
+    return frozenset(move for move, words in ASKS.items() if any(word in told for word in words))
+
+
+def asked_for(rng: Generator, moves: frozenset[str]) -> Habit:
+    """Return a habit that moves what an experiment asks for, and nothing else: one speed where none are asked for."""
+    one = rng.uniform(0.15, 0.4)
+    speeds = (0.06, 0.46) if "speed" in moves else (one, one)
+    return Habit(
+        leg_s=(25, 50),
+        speed_rad_s=speeds,
+        ramp_s=(2, 3),
+        reverse=0.5 if "reverse" in moves else 0.0,
+        stop=0.3 if "stop" in moves else 0.0,
+        turn=0.4 if "turn" in moves else 0.0,
     )
-    pitch = quiet * rng.uniform(0.04, 0.08) * wander(rng, t_s, (150, 500))
-    roll = quiet * rng.uniform(0.03, 0.05) * wander(rng, t_s, (180, 550))
+
+
+def make_drive(
+    rng: Generator,
+    kind: str,
+    *,
+    duration_s: float,
+    step_s: float,
+    radius_m: float,
+    track_m: float,
+    mass_kg: float,
+    moves: frozenset[str] = EVERYTHING,
+) -> Drive:
+    """Return a drive of this kind; `constant` moves nothing and tells nothing apart, `experiment` what is asked for."""
+    t_s: Array = np.arange(round(duration_s / step_s), dtype=np.float64) * step_s
+    moved = frozenset[str]() if kind == "constant" else moves
+    if kind == "constant":
+        speed, yaw = np.full_like(t_s, rng.uniform(0.15, 0.4)), np.zeros_like(t_s)
+    else:
+        speed, yaw = legs(rng, KINDS[kind] if kind in KINDS else asked_for(rng, moved), t_s)
+    hilly = float("slope" in moved)
+    pitch = hilly * rng.uniform(0.04, 0.08) * wander(rng, t_s, (150, 500))
+    roll = hilly * rng.uniform(0.03, 0.05) * wander(rng, t_s, (180, 550))
     warm = temperatures(rng, t_s)
     voltage = 25.2 - rng.uniform(0.5, 1.8) * t_s / t_s[-1] + rng.uniform(0.3, 0.6) * wander(rng, t_s, (60, 180))
     slip = slips(rng, t_s, pitch)
-    if flat:
+    load = loads(rng, t_s, pitch, roll, mass_kg)
+    if "temperature" not in moved:
         warm = np.broadcast_to(warm.mean(axis=0), warm.shape)
+    if "slip" not in moved:
         slip = np.full_like(slip, rng.uniform(0.02, 0.06))
+    if "ballast" in moved and kind == "experiment":
+        load = load * np.where(np.sin(2 * np.pi * t_s / 400) > 0, 1.0, 1.5)[:, None]
     return Drive(
         kind=kind,
         t_s=t_s,
         wheel_speed_rad_s=speed[:, None] - yaw[:, None] * LEFT * track_m / 2 / radius_m,
         slip=slip,
-        load_N=loads(rng, t_s, pitch, roll, mass_kg),
+        load_N=load,
         pitch_rad=pitch,
         roll_rad=roll,
         yaw_rate_rad_s=yaw,

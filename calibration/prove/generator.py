@@ -7,14 +7,14 @@ autocorrelated noise of about 30 % of the mean current.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibration.prove.concealed import EFFECTS
-from calibration.prove.drive import KINDS, Drive, coloured, make_drive
+from calibration.prove.drive import EVERYTHING, KINDS, Drive, coloured, make_drive, moves_of
 from calibration.prove.ground import Ground, TorqueTable
 from calibration.prove.outside import OUTSIDE
 from calibration.prove.scene import Concealed, Scene, of_strength
@@ -159,12 +159,15 @@ def true_scene(rng: Generator, tables: Tables, drive: Drive) -> Scene:
 
 def conceal(rng: Generator, plan: Plan, scene: Scene) -> tuple[Concealed, ...]:
     """Return the plan's effects, each of a strength between 5 and 25 % of the mean current."""
+    strengths = [rng.uniform(0.05, 0.25) for _ in plan.names]
+    made = (concealed_in(plan, scene, index) for index in range(len(plan.names)))
+    return tuple(of_strength(scene, effect, strength) for effect, strength in zip(made, strengths, strict=True))
+
+
+def concealed_in(plan: Plan, scene: Scene, index: int) -> Concealed:
+    """Return one of the plan's effects in a scene, of no size yet: its law is the same in every scene."""
     makers = {**EFFECTS, **OUTSIDE}
-    drawn = []
-    for name in plan.names:
-        strength = rng.uniform(0.05, 0.25)
-        drawn.append(of_strength(scene, makers[name](rng, scene), strength))
-    return tuple(drawn)
+    return makers[plan.names[index]](np.random.default_rng([plan.seed, 2, plan.number, index]), scene)
 
 
 def motor_effects(effects: tuple[Concealed, ...], drive: Drive) -> Array:
@@ -173,12 +176,31 @@ def motor_effects(effects: tuple[Concealed, ...], drive: Drive) -> Array:
     return np.asarray(sum(at_motor, np.zeros(drive.load_N.shape)), np.float64)
 
 
-def make_trial(plan: Plan, *, duration_s: float = 1800.0, step_s: float = 0.2) -> Trial:
-    """Return the trial of this plan: the same for the same plan, always."""
+def make_trial(plan: Plan, *, duration_s: float = 1800.0, step_s: float = 0.2, experiment: str = "") -> Trial:
+    """Return the trial of this plan: the same for the same plan, always.
+
+    With an experiment in words, the same rover with the same effects drives again, and moves what the words ask for.
+    """
     rng = np.random.default_rng([plan.seed, 1, plan.number])
     tables = simulation_tables(rng)
     kind = "constant" if plan.group == "constant" else str(rng.choice(["patrol", "patrol", "patrol", *KINDS]))
-    drive = make_drive(
+    drive = _driven(rng, kind, tables, duration_s, step_s)
+    scene = true_scene(rng, tables, drive)
+    effects = conceal(rng, plan, scene)
+    if experiment:
+        rng = np.random.default_rng([plan.seed, 3, plan.number])
+        drive = _driven(rng, "experiment", tables, duration_s, step_s, moves_of(experiment))
+        scene = replace(scene, drive=drive)
+        again = (concealed_in(plan, scene, index) for index in range(len(effects)))
+        effects = tuple(replace(now, size=before.size) for now, before in zip(again, effects, strict=True))
+    return _recorded(rng, plan, scene, tables, effects)
+
+
+def _driven(  # what a drive is made of
+    rng: Generator, kind: str, tables: Tables, duration_s: float, step_s: float, moves: frozenset[str] = EVERYTHING
+) -> Drive:
+    """Return a drive of the rover that the tables describe."""
+    return make_drive(
         rng,
         kind,
         duration_s=duration_s,
@@ -186,9 +208,14 @@ def make_trial(plan: Plan, *, duration_s: float = 1800.0, step_s: float = 0.2) -
         radius_m=_number(tables, "wheel", "radius_m"),
         track_m=_number(tables, "rover", "track_m"),
         mass_kg=_number(tables, "rover", "mass_kg"),
+        moves=moves,
     )
-    scene = true_scene(rng, tables, drive)
-    effects = conceal(rng, plan, scene)
+
+
+def _recorded(rng: Generator, plan: Plan, scene: Scene, tables: Tables, effects: tuple[Concealed, ...]) -> Trial:
+    """Return the trial with the motors' noise on it, as its sensors report it."""
+    drive = scene.drive
+    step_s = float(drive.t_s[1] - drive.t_s[0])
     added = motor_effects(effects, drive)
     noise_A = rng.uniform(0.27, 0.32) * scene.mean_current_A
     slow = rng.uniform(0.3, 0.55)

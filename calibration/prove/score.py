@@ -36,6 +36,8 @@ class Verdict:
     held_out_ratio: float | None
     undecided: bool | None
     """On one constant speed: whether the answer says what cannot be told apart, with an experiment."""
+    decided: bool | None
+    """Whether the experiment that it proposed, once driven, led to the right name."""
     seconds: float
 
     @property
@@ -65,6 +67,7 @@ def judge(outcome: Outcome) -> Verdict:
         intervals=tuple(_intervals(pairs)),
         held_out_ratio=_held_out(truth, said),
         undecided=_undecided(truth, said) if truth["group"] == "constant" else None,
+        decided=_decided(wanted, outcome) if truth["group"] == "constant" else None,
         seconds=float(outcome.answer["seconds"]),
     )
 
@@ -115,6 +118,12 @@ def _undecided(truth: Truth, said: dict[str, Any]) -> bool:
     return any(hidden["name"] in one["effects"] and len(one["effects"]) > 1 and one.get("experiment") for one in sets)
 
 
+def _decided(wanted: frozenset[str], outcome: Outcome) -> bool:
+    """Whether the experiment led to the right name, and to no other."""
+    said = outcome.experiment or {}
+    return frozenset(effect["name"] for effect in said.get("effects", [])) == wanted
+
+
 def share(answers: Iterable[bool | None]) -> float:
     """Return how many of the questions that arose were answered yes; NaN if none arose."""
     asked = [answer for answer in answers if answer is not None]
@@ -140,6 +149,7 @@ def figures(verdicts: list[Verdict]) -> Figures:
         "held_out_within_2_percent": share(ratio <= 1.02 for ratio in ratios),
         "held_out_ratio_median": sorted(ratios)[len(ratios) // 2] if ratios else math.nan,
         "constant_speed_undecided": share(v.undecided for v in by_group.get("constant", [])),
+        "constant_speed_decided_by_experiment": share(v.decided for v in by_group.get("constant", [])),
         "seconds_median": sorted(v.seconds for v in verdicts)[len(verdicts) // 2] if verdicts else math.nan,
     }
     for group, those in sorted(by_group.items()):

@@ -30,6 +30,15 @@ json.dump({'verdict': 'consistent', 'effects': [], 'files': sorted(os.listdir('.
 """
 
 
+ASKS = """
+import gzip, json, sys
+speeds = {line.split(',')[3] for line in gzip.open('recording.csv.gz', 'rt')}
+told = {'effects': ['coulomb-friction', 'viscous-friction'], 'experiment': 'a staircase of speeds, both ways'}
+said = {'verdict': 'consistent', 'effects': [], 'indistinguishable': [told] if len(speeds) < 5 else []}
+json.dump(said | {'speeds': len(speeds)}, open(sys.argv[1], 'w'))
+"""
+
+
 @pytest.fixture
 def batch(tmp_path: Path) -> Batch:
     """Ten recordings of two minutes, solved by a program that looks around and finds nothing wrong."""
@@ -128,6 +137,20 @@ def test_silence_on_nothing_and_a_place_for_the_unknown() -> None:
     assert not judge(answered("outside", [unknown], verdict="unexplained", unexplained=elsewhere)).right
     named = judge(answered("outside", [unknown], verdict="unexplained", unexplained=place, effects=[FOUND]))
     assert not named.right
+
+
+def test_the_proposed_experiment_is_driven_with_the_same_truth(batch: Batch, tmp_path: Path) -> None:
+    """Where one speed tells nothing apart, the drive that the answer proposes is made, and answered under the seal."""
+    asks = tmp_path / "asks.py"
+    asks.write_text(ASKS)
+    asking = replace(batch, recordings=12, solver=f"{sys.executable} {asks} {{answer}}", groups=("constant",))
+    (outcome,) = run_batch(asking)
+    assert outcome.answer["answer"]["speeds"] == 2
+    assert outcome.experiment is not None
+    assert outcome.experiment["speeds"] > 5
+    verdict = judge(outcome)
+    assert verdict.undecided
+    assert not verdict.decided
 
 
 def test_figures_are_flat(batch: Batch) -> None:

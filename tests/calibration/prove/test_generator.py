@@ -103,6 +103,20 @@ def test_nothing_concealed_leaves_nothing_but_noise() -> None:
     assert with_effect.true_rmse_A == trial.true_rmse_A
 
 
+def test_an_experiment_moves_what_it_asks_for_and_keeps_the_effect() -> None:
+    """The same rover with the same drag drives a staircase both ways, on ground as flat as before."""
+    plan = Plan(3, 11, "constant", ("coulomb-friction",))
+    before, after = (
+        make_trial(plan, duration_s=400, experiment=told) for told in ("", "a staircase of speeds, both ways")
+    )
+    assert before.tables == after.tables
+    assert before.effects[0].size == after.effects[0].size
+    assert np.ptp(before.drive.wheel_speed_rad_s) == 0
+    assert after.drive.wheel_speed_rad_s.min() < -0.05 < 0.05 < after.drive.wheel_speed_rad_s.max()
+    assert not after.drive.pitch_rad.any()
+    assert np.ptp(after.drive.temperature_degC[:, 0]) == 0
+
+
 def test_a_batch_gives_every_name_its_turn() -> None:
     """Two hundred recordings hold every name and every unnamed effect, and the groups in their shares."""
     plans = plan_batch(5, 200)
