@@ -66,7 +66,11 @@ class Wheels:
         return {node for node, code in self.emergencies if code == 0x8130}
 
     def at_rest(self) -> bool:
-        """Whether all six say, asked by SDO as no SYNC may be produced any more, that they do not turn (0x606C)."""
+        """Whether all six say, asked by SDO as no SYNC may be produced any more, that they do not turn (0x606C).
+
+        What has come meanwhile is taken first: an answer finds no place in a socket that nobody has read for long.
+        """
+        self.listen(2.0)
         return not any(self._velocity_rpm(node) for node in MOTORS)
 
     def _velocity_rpm(self, node: int) -> int:
