@@ -7,18 +7,18 @@ an unknown no-load current would be taken for soil.
 
 from __future__ import annotations
 
+from collections import deque
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from calibration.posterior import SHIPPED_POSTERIOR, Belief, Buffer, Estimator, PosteriorError
-from calibration.window import Knowledge
+from calibration.window import INTERVAL_S, LONGEST, Knowledge
 from daemon.snapshot import SlipSource
-from daemon.soil_change import SoilChange
+from daemon.soil_change import ChangeOfSoil, SoilChange
 
 if TYPE_CHECKING:
-    from calibration.change import Alarm
     from daemon.config import Configuration
     from daemon.snapshot import Array
 
@@ -26,6 +26,9 @@ SLIP_STD_MEASURED = 0.005
 SLIP_STD_GUESSED = 0.03
 RADIUS_WITHIN = 0.02
 """Relative: a wheel that differs by more from the one that the posterior was trained for needs its own."""
+
+HISTORY = 400
+"""Half seconds that are kept to compare before and after a change."""
 
 
 class BeliefStage:
@@ -38,11 +41,12 @@ class BeliefStage:
         self._gain_std = drivetrain.gain_relative_std
         self._no_load_std_A = float(np.mean(drivetrain.no_load_current_std_A))
         self._soil = settings.soil
+        self._history: deque[Array] = deque(maxlen=HISTORY)
         self._change = SoilChange(configuration) if configuration.change.enabled else None
 
     def step(
         self, time_ns: int, load_N: Array, slip: Array, driving_torque_Nm: Array, sources: tuple[SlipSource, ...]
-    ) -> tuple[Belief | None, Alarm | None]:
+    ) -> tuple[Belief | None, ChangeOfSoil | None]:
         """Return a belief when a half second has closed, and an alarm when the soil has changed.
 
         Arrays have shape (6,), unsmoothed, NaN where a wheel stands.
@@ -52,18 +56,31 @@ class BeliefStage:
         window = self._buffer.window()
         if not window.size:
             return None, None
-        alarm = self._change.step(time_ns, *window[:, -1]) if self._change else None
-        return self._believe(window, sources), alarm
+        knowledge = self._knowledge(sources)
+        return self._estimator.believe(window, knowledge), self._watch(time_ns, window[:, -1], knowledge)
 
-    def _believe(self, window: Array, sources: tuple[SlipSource, ...]) -> Belief | None:
+    def _watch(self, time_ns: int, means: Array, knowledge: Knowledge) -> ChangeOfSoil | None:
+        """Return the alarm, if any, with how likely each quantity fell between before its onset and since."""
+        if self._change is None:
+            return None
+        self._history.append(means)
+        alarm = self._change.step(time_ns, *means)
+        if alarm is None:
+            return None
+        past = np.stack(self._history, axis=1)
+        since = max(1, round((alarm.time_ns - alarm.onset_ns) / (INTERVAL_S * 1e9)))
+        before, after = past[:, :-since][:, -LONGEST:], past[:, -since:][:, -LONGEST:]
+        fall = self._estimator.fall(before, after, knowledge) if before.size else None
+        return ChangeOfSoil(alarm, fall)
+
+    def _knowledge(self, sources: tuple[SlipSource, ...]) -> Knowledge:
         guessed = SlipSource.CONFIGURED in sources
-        knowledge = Knowledge(
+        return Knowledge(
             gain_relative_std=self._gain_std,
             no_load_current_std_A=self._no_load_std_A,
             slip_std=SLIP_STD_GUESSED if guessed else SLIP_STD_MEASURED,
             soil=self._soil,
         )
-        return self._estimator.believe(window, knowledge)
 
 
 def belief_stage(configuration: Configuration) -> BeliefStage | None:

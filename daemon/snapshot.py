@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from drivers.signals import Quantity
 
 if TYPE_CHECKING:
-    from calibration.change import Alarm
     from calibration.posterior import Belief
+    from daemon.soil_change import ChangeOfSoil
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -172,7 +172,7 @@ class Estimate:
     outside: Mask
     model_version: str
     belief: Belief | None = None
-    soil_change: Alarm | None = None
+    soil_change: ChangeOfSoil | None = None
 
     def outside_inputs(self, wheel: int) -> tuple[str, ...]:
         """Return the names of the inputs of one wheel (0–5) that lie outside the training range."""

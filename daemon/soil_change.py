@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from calibration import change
@@ -9,11 +10,20 @@ from calibration.parameters import SOILS
 from calibration.wheel_soil import contact_angle, wheel_torque
 
 if TYPE_CHECKING:
+    from calibration.posterior import Fall
     from daemon.config import Configuration
     from daemon.snapshot import Array
 
 REFERENCE = SOILS["sandy-loam"]
 """How torque follows load and slip; how large it is, the detector learns on the way."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeOfSoil:
+    """An alarm, and how likely it is that each quantity fell; `fall` is None where too little was measured before."""
+
+    alarm: change.Alarm
+    fall: Fall | None
 
 
 class SoilChange:
@@ -35,12 +45,20 @@ class SoilChange:
         return alarm
 
 
-def change_text(alarm: change.Alarm) -> str:
+def change_text(changed: ChangeOfSoil) -> str:
     """Return an alarm with its evidence, in one sentence."""
+    alarm = changed.alarm
     what = "gives way: torque fell" if alarm.direction == "fall" else "resists more: torque rose"
     ago_s = (alarm.time_ns - alarm.onset_ns) / 1e9
     wheels = {"all": "all wheels", "front": "the front wheels", "front-and-middle": "the front and middle wheels"}
+    likely = ""
+    if (fall := changed.fall) is not None:
+        likely = (
+            f"; that it fell is {100 * fall.cohesion:.0f} % likely of the cohesion, {100 * fall.friction_angle:.0f} % "
+            f"of the friction angle, {100 * fall.drawbar_margin:.0f} % of the drawbar margin"
+        )
     return (
         f"the soil {what} to {100 * alarm.torque_ratio:.0f} % of what load and slip let expect, since {ago_s:g} s, "
         f"under {wheels.get(alarm.group, alarm.group)} (score {alarm.statistic:.1f}, alarm at {alarm.threshold:g})"
+        f"{likely}"
     )

@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING
 
+from calibration.posterior import PosteriorError
+from daemon.believe import belief_stage
 from daemon.check.finding import Finding, good, warning, wrong
 from daemon.estimate import SHIPPED_MODEL, ModelError, Network
 
@@ -20,7 +22,21 @@ async def check_network(configuration: Configuration) -> list[Finding]:
         network = await asyncio.to_thread(Network, path)  # it reads a file and runs the network
     except ModelError as error:
         return [wrong("model", str(error), "")]
-    return [judge_card(network.card, configuration)]
+    try:
+        stage = await asyncio.to_thread(belief_stage, configuration)
+    except PosteriorError as error:
+        return [judge_card(network.card, configuration), wrong("posterior", str(error), "")]
+    return [judge_card(network.card, configuration), judge_posterior(configuration, there=stage is not None)]
+
+
+def judge_posterior(configuration: Configuration, *, there: bool) -> Finding:
+    """Return whether there will be intervals, and alarms of a changed soil."""
+    if there:
+        return good("posterior", f"intervals from the last {configuration.posterior.window_s:g} s of all wheels")
+    if not configuration.posterior.enabled:
+        return good("posterior", "switched off: no intervals, and no alarm when the soil changes")
+    text = "[drivetrain] no_load_current_A is not known: no intervals, and no alarm when the soil changes"
+    return warning("posterior", text, "`regolithd calibrate wheels-up` measures it.")
 
 
 def judge_card(card: ModelCard, configuration: Configuration) -> Finding:

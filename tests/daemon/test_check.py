@@ -263,7 +263,7 @@ async def test_a_network_that_does_not_suit_the_rover_is_told(tmp_path: Path) ->
     (tmp_path / "broken.onnx").write_bytes(b"no network")
     (finding,) = await check_network(Configuration(estimator=Estimator(model=tmp_path / "broken.onnx")))
     assert finding.verdict is Verdict.WRONG
-    (finding,) = await check_network(Configuration())
+    finding, _ = await check_network(Configuration())
     assert finding.verdict is Verdict.GOOD
 
 
@@ -280,3 +280,16 @@ async def test_who_may_command_is_told(tmp_path: Path) -> None:
     silent = await asyncio.start_unix_server(lambda _, writer: writer.close(), configuration.control.socket)
     async with silent:
         assert await running_daemon(configuration) is None
+
+
+async def test_a_drivetrain_that_nobody_calibrated_means_no_intervals_and_a_known_one_does() -> None:
+    """And a posterior that was trained for another wheel is wrong."""
+    known = {"no_load_current_A": 0.037}
+    cases = {
+        Verdict.WARNING: Configuration(),
+        Verdict.GOOD: Configuration.model_validate({"drivetrain": known}),
+        Verdict.WRONG: Configuration.model_validate({"drivetrain": known, "wheel": {"radius_m": 0.2}}),
+    }
+    for verdict, configuration in cases.items():
+        _, finding = await check_network(configuration)
+        assert (finding.subject, finding.verdict) == ("posterior", verdict)

@@ -3,8 +3,15 @@
 import numpy as np
 
 from calibration.change import Alarm
+from calibration.parameters import SOILS
+from calibration.posterior import Fall
 from daemon.config import Configuration
-from daemon.soil_change import SoilChange, change_text
+from daemon.estimate import SHIPPED_MODEL, Network
+from daemon.pipeline import Pipeline
+from daemon.scenario import Ground, Scenario, Stretch
+from daemon.snapshot import QUANTITIES, Snapshot
+from daemon.soil_change import ChangeOfSoil, SoilChange, change_text
+from daemon.virtual_rover import VirtualWorld
 
 HALF_SECOND_NS = 500_000_000
 
@@ -30,9 +37,9 @@ def test_a_fall_of_torque_raises_one_alarm_within_fifteen_seconds() -> None:
     assert alarm.direction == "fall"
     assert 0 < alarm.time_ns / HALF_SECOND_NS - 480 <= 30
     assert 0.1 < alarm.torque_ratio < 0.8
-    text = change_text(alarm)
+    text = change_text(ChangeOfSoil(alarm, Fall(0.97, 0.6, 0.9)))
     assert text.startswith("the soil gives way: torque fell to ")
-    assert "alarm at 10.8" in text
+    assert "alarm at 10.8); that it fell is 97 % likely of the cohesion" in text
 
 
 def test_a_steady_drive_momentary_drops_and_missing_wheels_raise_none() -> None:
@@ -42,3 +49,25 @@ def test_a_steady_drive_momentary_drops_and_missing_wheels_raise_none() -> None:
     torque[600:720, 4] = np.nan
     torque[1000:1010] = np.nan
     assert watch(torque) == []
+
+
+def test_through_the_whole_pipeline_the_alarm_says_how_likely_the_soil_is_weaker() -> None:
+    """From medium soil to LETE sand on the virtual rover, at 2 Hz and 5 cm/s."""
+    stretches = (Stretch(soil=SOILS["medium-soil"], until_m=8.0), Stretch(soil=SOILS["lete-sand"]))
+    scenario = Scenario(ground=Ground(stretches=stretches))
+    world = VirtualWorld(scenario)
+    known = scenario.drivetrain.model_dump() | {"no_load_current_std_A": 0.001, "gain_relative_std": 0.03}
+    pipeline = Pipeline(Configuration.model_validate({"drivetrain": known}), Network(SHIPPED_MODEL))
+    speed = np.full(6, 0.05 / 0.075 * scenario.drivetrain.ratio)
+    changes = []
+    for k in range(420):
+        measured = world.measure(k / 2, speed)
+        values = np.full((len(QUANTITIES), 6), np.nan)
+        values[:3] = measured.motor_current_A, speed, measured.load_N
+        values[3] = measured.ground_speed_m_s
+        estimate = pipeline.step(Snapshot(k, 10**18 + k * HALF_SECOND_NS, values))
+        changes += [estimate.soil_change] if estimate.soil_change else []
+    (changed,) = changes
+    assert changed.alarm.direction == "fall"
+    assert changed.fall is not None
+    assert changed.fall.cohesion > 0.7
