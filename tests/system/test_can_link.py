@@ -62,8 +62,11 @@ class Adapter:
 def adapter() -> Iterator[Adapter]:
     """An adapter whose link exists, and is down."""
     plugged = Adapter()
-    yield plugged
-    plugged.close()
+    try:
+        yield plugged
+    finally:
+        subprocess.run(["systemctl", "stop", f"regolithd-can@{plugged.link}"], check=False, capture_output=True)
+        plugged.close()
 
 
 def run(*command: str) -> str:
@@ -76,7 +79,7 @@ def run(*command: str) -> str:
 def start(unit: str) -> None:
     """Start the unit; where a busy machine made the adapter's answer late, the unit's next try is waited for."""
     subprocess.run(["systemctl", "start", unit], check=False, capture_output=True)
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 90
     while subprocess.run(["systemctl", "is-active", "--quiet", unit], check=False).returncode:
         assert time.monotonic() < deadline, run("journalctl", "--no-pager", "--unit", unit)
         time.sleep(0.2)

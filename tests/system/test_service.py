@@ -14,6 +14,7 @@ import signal
 import struct
 import subprocess
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +32,7 @@ REGOLITHD = "/usr/local/bin/regolithd"
 PASSWORD = "a secret"
 WAIT_s = 60
 MOTORS = range(1, 7)
-VELOCITY, STATUSWORD = 0x606C, 0x6041
+HEARTBEAT_LOST = struct.pack("<H", 0x8130)  # the code in an EMCY message, CiA 301
 
 
 def run(*command: str | Path, check: bool = True, text: str | None = None) -> subprocess.CompletedProcess[str]:
@@ -102,31 +103,50 @@ def pid() -> int:
     return int(shown("MainPID")["MainPID"])
 
 
-def objects(index: int, layout: str) -> list[int]:
-    """Read one object of every motor controller by SDO (CiA 301, expedited upload)."""
-    values = []
+@dataclass(frozen=True)
+class Drives:
+    """What the six motor controllers say of themselves."""
+
+    statuswords: tuple[int, ...]
+    speeds_rpm: tuple[int, ...]
+
+    @property
+    def enabled(self) -> bool:
+        """Whether any is in `operation enabled` (CiA 402)."""
+        return any(word & 0x6F == 0x27 for word in self.statuswords)
+
+
+def heard_drives() -> Drives:
+    """Listen for the next TPDO1 of each: statusword U16, current I16, velocity I32."""
+    said: dict[int, tuple[int, int]] = {}
+    deadline = time.monotonic() + WAIT_s
     with can.Bus("vcan0", interface="socketcan") as bus:
-        for node in MOTORS:
-            request = struct.pack("<BHB4x", 0x40, index, 0)
-            bus.send(can.Message(arbitration_id=0x600 + node, data=request, is_extended_id=False))
-            deadline = time.monotonic() + WAIT_s
-            while True:
-                message = bus.recv(WAIT_s)
-                if message and message.arbitration_id == 0x580 + node and message.data[1:4] == request[1:4]:
-                    break
-                assert time.monotonic() < deadline, f"node {node} does not answer"
-            values.append(struct.unpack_from(layout, message.data, 4)[0])
-    return values
+        while len(said) < len(MOTORS):
+            assert time.monotonic() < deadline, f"only {sorted(said)} are heard\n{journal()}"
+            message = bus.recv(1)
+            if message and message.arbitration_id - 0x180 in MOTORS:
+                word, _, speed = struct.unpack("<Hhi", message.data)
+                said[message.arbitration_id - 0x180] = (word, speed)
+    return Drives(*zip(*said.values(), strict=True))
 
 
-def turning() -> bool:
-    """Whether all six wheels turn."""
-    return all(objects(VELOCITY, "<i"))
+def asked_drives() -> Drives:
+    """Read statusword and velocity by SDO (CiA 301, expedited upload): without a daemon nothing is sent unasked."""
+    with can.Bus("vcan0", interface="socketcan") as bus:
+        words = tuple(asked(bus, node, 0x6041, "<H") for node in MOTORS)
+        return Drives(words, tuple(asked(bus, node, 0x606C, "<i") for node in MOTORS))
 
 
-def enabled() -> bool:
-    """Whether any drive is in `operation enabled` (statusword, CiA 402)."""
-    return any(word & 0x6F == 0x27 for word in objects(STATUSWORD, "<H"))
+def asked(bus: can.BusABC, node: int, index: int, layout: str) -> int:
+    """Read one object of one node."""
+    request = struct.pack("<BHB4x", 0x40, index, 0)
+    deadline = time.monotonic() + WAIT_s
+    bus.send(can.Message(arbitration_id=0x600 + node, data=request, is_extended_id=False))
+    while time.monotonic() < deadline:
+        message = bus.recv(1)
+        if message and message.arbitration_id == 0x580 + node and message.data[1:4] == request[1:4]:
+            return int(struct.unpack_from(layout, message.data, 4)[0])
+    raise AssertionError(f"node {node} does not answer\n{journal('virtual-rover')}")
 
 
 @pytest.fixture
@@ -137,7 +157,7 @@ def traverse(pid: int) -> Iterator[subprocess.Popen[str]]:
     drive = [REGOLITHD, "traverse", "--distance", "10", "--speed", "0.022"]
     with subprocess.Popen(drive, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         try:
-            until(lambda: process.poll() is not None or turning(), "all wheels turn")
+            until(lambda: process.poll() is not None or all(heard_drives().speeds_rpm), "all wheels turn")
             if process.poll() is not None:
                 said = process.stdout.read() if process.stdout else ""
                 pytest.fail(f"traverse ended at once ({process.returncode}):\n{said}\n{journal()}", pytrace=False)
@@ -195,7 +215,7 @@ def test_only_its_group_may_command_it(pid: int) -> None:
         assert path.stat().st_mode & 0o007 == 0
     refused = run("setpriv", "--reuid=nobody", "--clear-groups", REGOLITHD, "traverse", "--distance", "1", check=False)
     assert refused.returncode
-    assert not enabled()
+    assert not heard_drives().enabled
 
 
 def test_a_hung_daemon_is_killed_and_started_again(pid: int) -> None:
@@ -212,20 +232,30 @@ def test_a_hung_daemon_is_killed_and_started_again(pid: int) -> None:
 def test_a_clean_stop_stops_the_drives(traverse: subprocess.Popen[str]) -> None:
     """When `systemctl stop` returns, no wheel turns and no drive is enabled; the traverse says that it failed."""
     run("systemctl", "stop", "regolithd")
-    assert not any(objects(VELOCITY, "<i"))
-    assert not enabled()
+    drives = asked_drives()
+    assert not any(drives.speeds_rpm)
+    assert not drives.enabled
     assert traverse.wait(WAIT_s) != 0
     assert shown("Result")["Result"] == "success"
 
 
 def test_the_drives_stop_when_the_daemon_dies(traverse: subprocess.Popen[str]) -> None:
-    """After kill -9 the drives stop by themselves, and stand still when the daemon is back."""
-    run("systemctl", "kill", "--signal=KILL", "regolithd")
-    until(lambda: not any(objects(VELOCITY, "<i")), "all wheels stand")
+    """After kill -9 each drive misses the heartbeat and stops; all stand still when the daemon is back."""
+    noticed: set[int] = set()
+    with can.Bus("vcan0", interface="socketcan") as bus:
+        run("systemctl", "kill", "--signal=KILL", "regolithd")
+        deadline = time.monotonic() + WAIT_s
+        while len(noticed) < len(MOTORS):
+            assert time.monotonic() < deadline, f"only {noticed} noticed\n{journal('virtual-rover')}"
+            message = bus.recv(1)
+            if message and message.arbitration_id - 0x80 in MOTORS and message.data[:2] == HEARTBEAT_LOST:
+                noticed.add(message.arbitration_id - 0x80)
     until(lambda: shown("NRestarts")["NRestarts"] != "0", "it is started again")
     until(lambda: shown("ActiveState")["ActiveState"] == "active", "it is ready again")
     asyncio.run(snapshot())
-    assert not enabled()
+    drives = heard_drives()
+    assert not any(drives.speeds_rpm)
+    assert not drives.enabled
     assert traverse.wait(WAIT_s) != 0
 
 
