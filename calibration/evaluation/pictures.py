@@ -159,6 +159,7 @@ def alarm(delays: Mapping[str, Array], path: Path) -> None:
         ("paper_instant_delay", "paper's network: fall of c", {"color": "#bdc3c7"}),
         ("paper_10_s_delay", "paper's network: fall of 10 s mean", {"color": PAPER}),
         ("paper_shift_delay", "paper's network: shift of 10 s mean", {"color": PAPER, "linestyle": "--"}),
+        ("paper_shift_delay_flat", "the same, on flat ground", {"color": "#2c3e50", "linestyle": "--"}),
     ]
     with mpl.rc_context(STYLE):
         made = figure(11, 4.2)
@@ -176,7 +177,7 @@ def alarm(delays: Mapping[str, Array], path: Path) -> None:
                     [0, *values[reached], 120],
                     [0, *share[reached], share[reached].max(initial=0.0)],
                     where="post",
-                    label=label,
+                    label=label if reached.any() else f"{label}: never",
                     **style,
                 )
             panel.axvline(15, color="black", linewidth=0.8, linestyle=":")

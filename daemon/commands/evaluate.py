@@ -44,7 +44,7 @@ def evaluate(
     import numpy as np
     from rich.progress import Progress
 
-    from calibration.evaluation import detector, drivetrain, estimators
+    from calibration.evaluation import bias, detector, drivetrain, estimators
     from calibration.posterior import Estimator
 
     found: dict[str, float | None] = json.loads(out.read_text(encoding="utf-8")) if out.is_file() else {}
@@ -60,6 +60,7 @@ def evaluate(
                 progress.advance(task)
             found["rovers"] = rovers
             found |= drivetrain.figures(min(rovers, 4000), seed + 1, estimator)
+            found |= bias.figures(2000, seed + 3, estimator)
             progress.advance(task)
         if part != Part.ESTIMATORS:
             task = progress.add_task("alarm", total=len(detector.CASES) * round(hours * 7200) * drives)
