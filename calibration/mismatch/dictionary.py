@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 
+FIRST_ROOM = 640
+"""Columns to make room for at first: about what a rover's library needs."""
+
 
 @dataclass(frozen=True)
 class Group:
@@ -45,6 +48,11 @@ class Group:
     flavour: str = ""
     evidence: tuple[Array, Array] | None = None
     """For a fault of another channel: for each wheel, what that channel says for it, and how large it is there."""
+
+    @property
+    def span(self) -> slice:
+        """Its columns, which lie side by side."""
+        return slice(self.columns[0], self.columns[-1] + 1)
 
     @property
     def named(self) -> bool:
@@ -131,7 +139,7 @@ class Dictionary:
         room = len(self._columns)
         if size <= room:
             return
-        more = max(size, room + room // 2)
+        more = max(size, room + room // 4, FIRST_ROOM)
         for name, axes in (("_columns", (0,)), ("_gram", (2, 3)), ("_moment", (2,))):
             before = getattr(self, name)
             shape = tuple(more if axis in axes else length for axis, length in enumerate(before.shape))

@@ -122,9 +122,9 @@ def _unit(name: str) -> str:
 def _relative_size(search: Search, fit: Fit, index: int, moved: Array) -> Parameter:
     """Return the effect's root mean square on its wheels over the channel's mean magnitude."""
     scene, term = search.dictionary.scene, fit.terms[index]
-    columns = list(term.group.columns)
     on = list(term.wheels)
-    gram = search.dictionary.gram[:, on].sum(axis=(0, 1))[np.ix_(columns, columns)] / scene.mask[:, on].sum()
+    span = term.group.span
+    gram = search.dictionary.gram[:, on, span, span].sum(axis=(0, 1)) / scene.mask[:, on].sum()
     at = fit.of_term(index)
     drawn = fit.coefficients[at] + moved[:, at]
     sizes = np.sqrt(np.maximum(np.einsum("da,ab,db->d", drawn, gram, drawn), 0)) / scene.mean_size
@@ -140,16 +140,24 @@ def _onset_bounds(search: Search, fit: Fit, index: int) -> tuple[float, float]:
     assert candidate is not None  # noqa: S101
     others = [t for i, t in enumerate(fit.terms) if i != index]
     profile = Profile(search, others, candidate, term.wheels)
-    at, length = float(shape["onset_s"]), search.dictionary.scene.length_s
-    best = profile(shape)
+    scene = search.dictionary.scene
+    at, length = float(shape["onset_s"]), scene.length_s
+    # How it grew after its onset is not known either: at each onset the best growth counts.
+    growths = {tuple(sorted((k, v) for k, v in s.items() if k != "onset_s")) for s in candidate.shapes(scene)}
+    ways_to_grow = [dict(g) for g in sorted(growths, key=str)]
+
+    def gain(onset_s: float) -> float:
+        return max(profile({**growth, "onset_s": onset_s}) for growth in ways_to_grow)
+
+    best = max(profile(shape), gain(at))
     bounds = []
     for way in (-1, 1):
         near, far = 0.0, 0.002 * length
-        while far < 0.3 * length and profile({**shape, "onset_s": at + way * far}) > best - NINE_TENTHS:
+        while far < 0.3 * length and gain(at + way * far) > best - NINE_TENTHS:
             near, far = far, 2 * far
         for _ in range(6):
             middle = 0.5 * (near + far)
-            inside = profile({**shape, "onset_s": at + way * middle}) > best - NINE_TENTHS
+            inside = gain(at + way * middle) > best - NINE_TENTHS
             near, far = (middle, far) if inside else (near, middle)
         bounds.append(float(np.clip(at + way * far, 0, length)))
     return bounds[0], bounds[1]

@@ -100,17 +100,24 @@ class Search:
         self.threshold = 10.0
         """The score that a name must earn; `null.naming_threshold` sets it."""
         self.folds = list(range(len(dictionary.gram))) if folds is None else list(folds)
+        self.gram: Array = np.zeros((0, 0, 0))
+        self._weighed: Array = np.zeros(0)
         self.refresh()
 
     def refresh(self) -> None:
         """Take in new weights, and columns that were added to the dictionary since."""
-        gram, moment = self.dictionary.gram, self.dictionary.moment
-        self.gram = np.zeros(gram.shape[1:])
+        size, old = len(self.dictionary.scale), 0
+        if len(self.gram) and np.array_equal(self.weights, self._weighed):
+            old = self.gram.shape[1]
+        gram = np.zeros((len(self.weights), size, size))
+        if old:
+            gram[:, :old, :old] = self.gram
         for fold in self.folds:
-            self.gram += gram[fold]
-        self.gram *= self.weights[:, None, None]
-        self.moment = moment[self.folds].sum(axis=0) * self.weights[:, None]
-        self._whole = self.gram.sum(axis=0)
+            gram[:, old:, :] += self.dictionary.gram[fold][:, old:, :]
+        gram[:, old:, :] *= self.weights[:, None, None]
+        gram[:, :old, old:] = np.swapaxes(gram[:, old:, :old], 1, 2)
+        self.gram, self._weighed = gram, self.weights
+        self.moment = self.dictionary.moment[self.folds].sum(axis=0) * self.weights[:, None]
 
     @property
     def patterns(self) -> dict[tuple[int, ...], str]:
@@ -146,28 +153,35 @@ class Search:
 
     def conditional(self, given: Iterable[Term], groups: Sequence[Group] | None = None) -> list[tuple[float, Term]]:
         """Return the further gain of every group beside `given`, on all wheels and on each alone."""
-        columns = self._columns(tuple(given))
-        matrix, moment = self._normal(columns)
-        inverse = np.linalg.pinv(matrix, rcond=1e-10, hermitian=True) if columns else np.zeros((0, 0))
-        index = [c for c, _ in columns]
-        share = np.zeros((len(columns), len(self.weights)))
-        for row, (_, wheels) in enumerate(columns):
-            share[row, list(wheels)] = 1
-        cross = np.stack([share[:, w, None] * self.gram[w][index] for w in self.all_wheels])
+        wanted = self.dictionary.groups if groups is None else groups
+        fitted = self.fit(given)
+        at = np.array(sorted({column for group in wanted for column in group.columns}), np.int64)
+        place = {int(column): k for k, column in enumerate(at)}
+        index = np.array([column for column, _ in fitted.columns], np.int64)
+        own = self.gram[:, at, at]
         found: list[tuple[float, Term]] = []
         for pattern, kind in self.patterns.items():
             chosen = list(pattern)
-            reach = cross[chosen].sum(axis=0)
-            solved = inverse @ reach
-            left = self.moment[chosen].sum(axis=0) - reach.T @ (inverse @ moment)
-            block = self._whole if kind == "all" else self.gram[chosen].sum(axis=0)
-            single = np.diag(block) - np.einsum("sp,sp->p", reach, solved)
-            for group in self.dictionary.groups if groups is None else groups:
-                if shared(group, kind) or len(self.weights) == 1:
-                    gain = _gain(group, left, block, reach, solved, single)
-                    term = Term(group, pattern)
-                    if gain > 0 and term.visible:
-                        found.append((gain, term))
+            sharing = [group for group in wanted if shared(group, kind) or len(self.weights) == 1]
+            reach = np.zeros((len(index), len(at)))
+            for w in chosen:
+                on = np.array([w in wheels for _, wheels in fitted.columns], np.float64)
+                reach += on[:, None] * self.gram[w][np.ix_(index, at)]
+            solved = fitted.covariance @ reach
+            left = self.moment[chosen][:, at].sum(axis=0) - fitted.coefficients @ reach
+            total = own[chosen].sum(axis=0)
+            single = total - np.einsum("sp,sp->p", reach, solved)
+            gains = np.where(single > OUTSIDE_REACH * total, left**2 / np.where(single > 0, single, 1.0), 0.0)
+            for group in sharing:
+                here = [place[column] for column in group.columns]
+                if len(here) == 1:
+                    gain = float(gains[here[0]]) if group.signs[0] * left[here[0]] >= 0 else 0.0
+                else:
+                    block = _summed([self.gram[w][group.span, group.span] for w in chosen])
+                    gain = _gain(group.signs, left[here], block, reach[:, here].T @ solved[:, here])
+                term = Term(group, pattern)
+                if gain > 0 and term.visible:
+                    found.append((gain, term))
         return found
 
     def beside(self, given: Iterable[Term], term: Term) -> tuple[Array, Array]:
@@ -197,19 +211,19 @@ class Search:
         return matrix, moment
 
 
-def _gain(group: Group, left: Array, block: Array, reach: Array, solved: Array, single: Array) -> float:
-    """Return what a group adds: zero where a coefficient has the wrong sign, or nothing of it is new."""
-    if len(group.columns) == 1:
-        (c,) = group.columns
-        if single[c] <= OUTSIDE_REACH * block[c, c] or group.signs[0] * left[c] < 0:
-            return 0.0
-        return float(left[c] ** 2 / single[c])
-    at = list(group.columns)
-    matrix = block[np.ix_(at, at)] - reach[:, at].T @ solved[:, at]
-    values, vectors = np.linalg.eigh(matrix)
-    kept = values > OUTSIDE_REACH * np.max(np.diag(block)[at])
-    along = vectors[:, kept].T @ left[at]
+def _summed(blocks: Sequence[Array]) -> Array:
+    total = blocks[0].copy()
+    for block in blocks[1:]:
+        total += block
+    return total
+
+
+def _gain(signs: tuple[int, ...], left: Array, block: Array, reached: Array) -> float:
+    """Return what several columns add: zero where a coefficient has the wrong sign, or nothing of them is new."""
+    values, vectors = np.linalg.eigh(block - reached)
+    kept = values > OUTSIDE_REACH * np.max(np.diag(block))
+    along = vectors[:, kept].T @ left
     coefficients = vectors[:, kept] @ (along / values[kept])
-    if any(sign * value < 0 for sign, value in zip(group.signs, coefficients, strict=True)):
+    if any(sign * value < 0 for sign, value in zip(signs, coefficients, strict=True)):
         return 0.0
     return float(np.sum(along**2 / values[kept]))

@@ -51,7 +51,7 @@ def _smallest(search: Search, given: Fit, term: Term) -> float:
     if outside <= 1e-9 * total:
         return float("inf")
     on = list(term.wheels)
-    at = list(term.group.columns)
-    energy = float(np.trace(dictionary.gram[:, on].sum(axis=(0, 1))[np.ix_(at, at)])) / len(at)
+    own_span = term.group.span
+    energy = float(np.trace(dictionary.gram[:, on, own_span, own_span].sum(axis=(0, 1)))) / len(own)
     rms = np.sqrt(energy / max(int(scene.mask[:, on].sum()), 1))
     return float(max(np.sqrt(needed / outside) * rms, WORTH_A_NAME * scene.mean_size))
