@@ -33,7 +33,7 @@ Parameters = dict[str, Any]
 
 COMPONENTS = 8
 WIDTH = 96
-INSTANTS = {1: 0.2, 2: 0.08, 4: 0.08, 8: 0.1, 20: 0.46, 40: 0.08}
+INSTANTS = {1: 0.15, 2: 0.08, 4: 0.1, 8: 0.12, 20: 0.45, 40: 0.1}
 """How many instants a window has, and the share of the training set that has so many."""
 
 _CHUNK = 4000
@@ -158,7 +158,7 @@ def scaling(examples: Examples) -> Scaling:
 
 
 def fit(
-    examples: Examples, seed: int, steps: int, batch: int = 1024, progress: Callable[[float], None] = lambda _: None
+    examples: Examples, seed: int, steps: int, batch: int = 512, progress: Callable[[float], None] = lambda _: None
 ) -> tuple[Parameters, Scaling]:
     """Return the weights after `steps` of Adam with a cosine decay; `progress` is told the loss every 50 steps."""
     by = scaling(examples)

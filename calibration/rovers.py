@@ -75,9 +75,9 @@ class Measured:
 
 
 def draw_noise(count: int, rng: np.random.Generator) -> Noise:
-    """Return noise as uncertain as it is before one knows the ground: 10–45 % of the current."""
+    """Return noise as uncertain as it is before one knows the ground: 5–45 % of the current."""
     return Noise(
-        current=rng.uniform(0.10, 0.45, (count, WHEELS)),
+        current=rng.uniform(0.05, 0.45, (count, WHEELS)),
         load=rng.uniform(0.01, 0.16, (count, WHEELS)),
         drop_rate=rng.uniform(0.0, 0.08, (count, 1)),
         memory_s=rng.uniform(0.05, 1.5, (count, 1)),
