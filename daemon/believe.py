@@ -15,8 +15,8 @@ import numpy as np
 
 from calibration.posterior import SHIPPED_POSTERIOR, Belief, Buffer, Estimator, PosteriorError
 from calibration.window import INTERVAL_S, LONGEST, Knowledge
-from daemon.snapshot import SlipSource
-from daemon.soil_change import ChangeOfSoil, SoilChange
+from daemon.snapshot import ChangeOfSoil, SlipSource
+from daemon.soil_change import SoilChange
 
 if TYPE_CHECKING:
     from daemon.config import Configuration

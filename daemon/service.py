@@ -29,9 +29,9 @@ from daemon.notify import READY, STOPPING, WATCHDOG, notify, watchdog_period_s
 from daemon.pulse import Pulses
 from daemon.recording.recorder import FLUSH_S, Recorder
 from daemon.replay import Chain
-from drivers.bus import open_bus
 from drivers.errors import BusOpenError
 from drivers.network import Network, NetworkSettings
+from drivers.open_bus import open_bus
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from drivers.signals import Quantity
 
 if TYPE_CHECKING:
-    from calibration.posterior import Belief
-    from daemon.soil_change import ChangeOfSoil
+    from calibration.change import Alarm
+    from calibration.posterior import Belief, Fall
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -127,6 +127,14 @@ class SlipSource(StrEnum):
     MEASURED = "ground-speed"
     CONFIGURED = "configured"
     NONE = "none"  # the wheel stands still: there is no slip to speak of
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeOfSoil:
+    """An alarm, and how likely it is that each quantity fell; `fall` is None where too little was measured before."""
+
+    alarm: Alarm
+    fall: Fall | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

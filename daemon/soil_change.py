@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from calibration import change
@@ -10,20 +9,11 @@ from calibration.parameters import SOILS
 from calibration.wheel_soil import contact_angle, wheel_torque
 
 if TYPE_CHECKING:
-    from calibration.posterior import Fall
     from daemon.config import Configuration
-    from daemon.snapshot import Array
+    from daemon.snapshot import Array, ChangeOfSoil
 
 REFERENCE = SOILS["sandy-loam"]
 """How torque follows load and slip; how large it is, the detector learns on the way."""
-
-
-@dataclass(frozen=True, slots=True)
-class ChangeOfSoil:
-    """An alarm, and how likely it is that each quantity fell; `fall` is None where too little was measured before."""
-
-    alarm: change.Alarm
-    fall: Fall | None
 
 
 class SoilChange:

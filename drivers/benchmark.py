@@ -29,12 +29,12 @@ from typing import TYPE_CHECKING
 import can
 import canopen
 
-from drivers.bus import open_bus
 from drivers.decode import Decoder
 from drivers.eds import eds_path
 from drivers.errors import BusOpenError
 from drivers.frame import Frame
 from drivers.kernel_batch import CAN_FRAME
+from drivers.open_bus import open_bus
 from drivers.pdo import tpdos
 from drivers.signals import NodeDescription, NodeKind, Reading
 

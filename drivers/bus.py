@@ -16,15 +16,12 @@ from __future__ import annotations
 
 import asyncio
 from abc import ABC, abstractmethod
-from contextlib import asynccontextmanager
 from enum import StrEnum
 from typing import TYPE_CHECKING, Self
 
 from drivers.counters import BusCounters
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator
-
     from drivers.frame import Frame
 
 
@@ -122,29 +119,3 @@ class Bus(ABC):
         self.counters.bus_off += state is BusState.OFF
         self.counters.link_down += state is BusState.DOWN
         self._arrived.set()
-
-
-@asynccontextmanager
-async def open_bus(interface: str, channel: str, *, bitrate: int | None = None) -> AsyncIterator[Bus]:
-    """Open `channel` of any python-can interface (`socketcan`, `virtual`, `slcan`, …) for the time of the context.
-
-    `bitrate` (bit/s) is for adapters that set it themselves; a SocketCAN link gets its own when it is brought up.
-
-    Raises
-    ------
-    BusOpenError
-        It cannot be opened; the message says why and what to do.
-    """
-    bus: Bus
-    if interface == "socketcan":
-        from drivers.socketcan import SocketCanBus  # noqa: PLC0415  # Linux only: `virtual` works anywhere
-
-        bus = SocketCanBus(channel)
-    else:
-        from drivers.adapter import AdapterBus  # noqa: PLC0415  # likewise: not where the kernel does it all
-
-        bus = AdapterBus(interface, channel, bitrate=bitrate)
-    try:
-        yield bus
-    finally:
-        bus.close()

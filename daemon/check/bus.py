@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from daemon.check.finding import Finding, good, unknown, warning, wrong
-from drivers.bus import open_bus
 from drivers.errors import BusError
 from drivers.load import bus_load
+from drivers.open_bus import open_bus
 from drivers.probe import probe
 
 if TYPE_CHECKING:

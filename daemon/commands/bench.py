@@ -106,7 +106,7 @@ async def _run(
     import asyncio
     import signal
 
-    from drivers.bus import open_bus
+    from drivers.open_bus import open_bus
     from drivers.virtual.control import control_socket
 
     ended = asyncio.Event()

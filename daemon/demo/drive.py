@@ -24,8 +24,8 @@ from daemon.estimate import Network as TerrainNetwork
 from daemon.scenario import Ground, Scenario, Stretch
 from daemon.service import Service
 from daemon.virtual_rover import VirtualWorld
-from drivers.bus import open_bus
 from drivers.network import NodePhase
+from drivers.open_bus import open_bus
 from drivers.virtual import VirtualRover
 
 if TYPE_CHECKING:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import asyncio
 import heapq
 import itertools
+import json
 import time
 from collections import Counter
 from typing import TYPE_CHECKING
@@ -132,8 +133,8 @@ class VirtualRover:
         return frames
 
     def tell(self, line: str) -> str:
-        """Obey a command (`drivers.virtual.tell`) and return its answer."""
-        return tell(self, line, self._monotonic_ns())
+        """Obey a command (`drivers.virtual.tell`) and return its answer; `counts` asks for `counts`, as JSON."""
+        return json.dumps(self.counts()) if line.split() == ["counts"] else tell(self.nodes, line, self._monotonic_ns())
 
     def counts(self) -> dict[str, dict[str, int]]:
         """Return what was seen and sent: `bus` for the whole, then each node by its ID."""

@@ -12,7 +12,6 @@ A command that cannot be done is answered by a line that starts with `error:` an
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -21,10 +20,9 @@ from drivers.virtual.motor_controller import MotorController
 from drivers.virtual.node import State
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from drivers.virtual.node import VirtualNode
-    from drivers.virtual.rover import VirtualRover
 
 _IDENTITY = {"vendor": 1, "product": 2, "revision": 3, "serial": 4}
 
@@ -125,18 +123,16 @@ COMMANDS = {
 }
 
 
-def tell(rover: VirtualRover, line: str, now: int) -> str:
+def tell(nodes: Mapping[int, VirtualNode], line: str, now: int) -> str:
     """Do what a line says and return the answer; `N` is a node-ID or `all`."""
     words = line.split()
     if not words:
         return ""
     if words[0] == "help":
         return "\n".join(f"{each.usage:46} {each.meaning}" for each in COMMANDS.values())
-    if words[0] == "counts":
-        return json.dumps(rover.counts())
     try:
         command = _find(words[0])
-        for node in _nodes(rover, words[1:]):
+        for node in _chosen(nodes, words[1:]):
             command.act(node, words[2:], now)
     except TellError as error:
         return f"error: {error}"
@@ -149,10 +145,10 @@ def _find(name: str) -> _Command:
     return COMMANDS[name]
 
 
-def _nodes(rover: VirtualRover, words: list[str]) -> list[VirtualNode]:
+def _chosen(nodes: Mapping[int, VirtualNode], words: list[str]) -> list[VirtualNode]:
     if words[:1] == ["all"]:
-        return list(rover.nodes.values())
+        return list(nodes.values())
     number = _number(words)
-    if number not in rover.nodes:
-        raise TellError(f"there is no node {number}; there are {', '.join(map(str, rover.nodes))}")
-    return [rover.nodes[number]]
+    if number not in nodes:
+        raise TellError(f"there is no node {number}; there are {', '.join(map(str, nodes))}")
+    return [nodes[number]]

@@ -16,7 +16,7 @@ import sys
 
 import numpy as np
 
-from drivers.bus import open_bus
+from drivers.open_bus import open_bus
 from drivers.virtual import Measurement, VirtualRover
 
 WHEEL = np.arange(1, 7)

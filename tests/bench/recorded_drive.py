@@ -13,8 +13,8 @@ from daemon.config import Configuration
 from daemon.estimate import SHIPPED_MODEL, Network
 from daemon.service import Service
 from daemon.snapshot import Estimate
-from drivers.bus import open_bus
 from drivers.events import NetworkEvent
+from drivers.open_bus import open_bus
 from drivers.virtual import Bench, VirtualRover
 
 

@@ -20,8 +20,8 @@ from daemon.recording.mcap_file import read_messages
 from daemon.replay import Digest
 from daemon.service import Service, event_json
 from daemon.snapshot import Estimate
-from drivers.bus import open_bus
 from drivers.events import NetworkEvent, NodeEmergency
+from drivers.open_bus import open_bus
 from drivers.signals import Emergency
 from drivers.virtual import Bench, VirtualRover
 

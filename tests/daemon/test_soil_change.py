@@ -9,8 +9,8 @@ from daemon.config import Configuration
 from daemon.estimate import SHIPPED_MODEL, Network
 from daemon.pipeline import Pipeline
 from daemon.scenario import Ground, Scenario, Stretch
-from daemon.snapshot import QUANTITIES, Snapshot
-from daemon.soil_change import ChangeOfSoil, SoilChange, change_text
+from daemon.snapshot import QUANTITIES, ChangeOfSoil, Snapshot
+from daemon.soil_change import SoilChange, change_text
 from daemon.virtual_rover import VirtualWorld
 
 HALF_SECOND_NS = 500_000_000

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from drivers.bus import Bus, open_bus
 from drivers.decode import Decoder
 from drivers.network import Network, NetworkSettings
+from drivers.open_bus import open_bus
 from drivers.signals import Reading
 from drivers.virtual.plant import Bench
 from drivers.virtual.rover import KAPVIK, VirtualRover
@@ -20,6 +20,7 @@ from drivers.virtual.rover import KAPVIK, VirtualRover
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Sequence
 
+    from drivers.bus import Bus
     from drivers.events import NetworkEvent
     from drivers.frame import Frame
     from drivers.signals import NodeDescription, Signal

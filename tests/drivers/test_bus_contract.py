@@ -9,9 +9,10 @@ import can
 import pytest
 from rig import until
 
-from drivers.bus import Bus, BusState, open_bus
+from drivers.bus import Bus, BusState
 from drivers.errors import BusDownError, BusOpenError
 from drivers.frame import Frame
+from drivers.open_bus import open_bus
 
 BOTH = pytest.mark.parametrize(
     ("interface", "channel"),

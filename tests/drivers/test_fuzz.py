@@ -7,8 +7,8 @@ import random
 import pytest
 from rig import rig, until
 
-from drivers.bus import open_bus
 from drivers.frame import Frame
+from drivers.open_bus import open_bus
 from drivers.virtual.rover import KAPVIK
 
 BASES = (0x000, 0x080, 0x180, 0x280, 0x380, 0x480, 0x580, 0x700)

@@ -8,7 +8,6 @@ from dataclasses import replace
 import pytest
 from rig import rig, until
 
-from drivers.bus import open_bus
 from drivers.cia402 import DriveState
 from drivers.errors import DriveError
 from drivers.events import (
@@ -21,6 +20,7 @@ from drivers.events import (
     NodeReturned,
 )
 from drivers.nmt import NmtState
+from drivers.open_bus import open_bus
 from drivers.probe import probe
 from drivers.signals import NodeDescription, NodeKind, Quantity, Sync
 

@@ -14,10 +14,11 @@ import pytest
 from lawicel import Adapter
 from rig import Rig, settings, until
 
-from drivers.bus import Bus, BusState, open_bus
+from drivers.bus import Bus, BusState
 from drivers.errors import BusDownError, BusFullError, BusOpenError
 from drivers.events import BusStateChanged, NodeBooted, NodeLost
 from drivers.frame import Frame
+from drivers.open_bus import open_bus
 from drivers.signals import Sync
 from drivers.virtual.plant import Bench
 from drivers.virtual.rover import KAPVIK, VirtualRover

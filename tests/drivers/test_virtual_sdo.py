@@ -8,8 +8,8 @@ import canopen
 import pytest
 from virtual_master import MOTOR_TPDO, AbortedError, Master
 
-from drivers.bus import open_bus
 from drivers.eds import eds_path
+from drivers.open_bus import open_bus
 from drivers.signals import NodeKind
 from drivers.virtual import KAPVIK, Bench, VirtualRover
 

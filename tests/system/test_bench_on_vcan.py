@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from drivers.bus import open_bus
 from drivers.events import NodeBooted, NodeLost
 from drivers.network import Network, NetworkSettings, NodePhase
+from drivers.open_bus import open_bus
 from drivers.virtual import KAPVIK
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from daemon.estimate import SHIPPED_MODEL
 from daemon.estimate import Network as TerrainNetwork
 from daemon.service import Service
 from daemon.virtual_rover import VirtualWorld
-from drivers.bus import open_bus
+from drivers.open_bus import open_bus
 from drivers.virtual import VirtualRover
 from drivers.virtual.tell import COMMANDS
 
