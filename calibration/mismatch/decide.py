@@ -37,6 +37,8 @@ UNNAMED_BY = 16.0
 """Likewise for a curve, of which there are more and freer ones."""
 WORTH_A_NAME = 0.02
 """Of the predicted channel's mean magnitude: an effect with a smaller root mean square on its wheels is no finding."""
+FURTHER_NAME = 2.0
+"""A second name is chosen beside a first that was chosen too: it needs a little more."""
 SHAPE_MISFIT = 0.12
 """A name whose form explains all but this share of what a free curve could explain has the right form: nature's
 friction curves are not ours to the last percent."""
@@ -234,7 +236,8 @@ def enough(search: Search, more: Fit, less: Fit) -> bool:
     """Say whether a larger set has earned its further names."""
     remaining = float(np.sum(residual_of(search, less) ** 2 * search.weights))
     worthwhile = min(FURTHER_SHARE * less.gain, TELLING_SHARE * remaining)
-    needed = max(search.threshold, worthwhile) * (len(more.terms) - len(less.terms))
+    further = FURTHER_NAME if less.terms else 0.0
+    needed = max(search.threshold + further, worthwhile) * (len(more.terms) - len(less.terms))
     return search.score(more) - search.score(less) > needed
 
 
@@ -244,11 +247,13 @@ def decide(search: Search, candidates: Sequence[Candidate]) -> Decision:
     none = search.fit(())
     search.threshold = naming_threshold(search, left, blocks_of_time(search.dictionary.scene, noise))
     seek_in_residual(search, candidates, ())
+    sets = best_named(search)[1:]
     named = none
-    for fit in best_named(search)[1:]:
+    for fit in sets:
         if enough(search, fit, named):
             named = fit
-    named, unnamed = _without_a_name(search, that_transfer(search, named, search.threshold))
+    named = that_transfer(search, named, search.threshold)
+    named, unnamed = _without_a_name(search, named, [fit for fit in sets if len(fit.terms) < len(named.terms)])
     whole = search.fit((*named.terms, *unnamed))
     noise = estimate_noise(residual_of(search, whole), search.dictionary.scene.mask)
     search.weights = noise.weights
@@ -256,11 +261,12 @@ def decide(search: Search, candidates: Sequence[Candidate]) -> Decision:
     return Decision(search, noise, search.fit(named.terms), unnamed, search.fit((*named.terms, *unnamed)))
 
 
-def _without_a_name(search: Search, named: Fit) -> tuple[Fit, tuple[Term, ...]]:
+def _without_a_name(search: Search, named: Fit, simpler: Sequence[Fit]) -> tuple[Fit, tuple[Term, ...]]:
     """Hold the names against curves that have none.
 
     A curve wins in two ways: beside the names, where it finds much that they leave; and against them, where one curve
-    says as much as several names of unlike covariates, which then only imitate it.
+    says as much as several names of unlike covariates, which then only imitate it. But a single name that leaves
+    nothing significant beside it is simpler than either.
     """
     alone = best_per_family(search, (), named=False)
     if not alone:
@@ -269,11 +275,11 @@ def _without_a_name(search: Search, named: Fit) -> tuple[Fit, tuple[Term, ...]]:
     by_curve = search.fit((curve,))
     imitated = len(named.terms) > 1 and search.score(by_curve) >= search.score(named)
     imitated &= any(_covariate(term) != curve.name for term in named.terms)
-    left = best_per_family(search, named.terms, named=False)
-    beside = search.fit((*named.terms, left[0][1])) if left else named
-    misfit = (beside.gain - named.gain) / max(beside.gain, 1e-9)
-    significant = bool(left) and left[0][0] > UNNAMED_BY and (not named.terms or misfit > SHAPE_MISFIT)
-    if not (imitated or significant):
+    for fit in simpler if imitated else ():
+        if _left_over(search, fit) is None:
+            return fit, ()
+    left = _left_over(search, named)
+    if left is None and not imitated:
         return named, ()
     kept: tuple[Term, ...] = ()
     fit = by_curve
@@ -281,9 +287,19 @@ def _without_a_name(search: Search, named: Fit) -> tuple[Fit, tuple[Term, ...]]:
         trial = search.fit((*kept, term, curve))
         if search.score(trial) - search.score(fit) > search.threshold and acceptable(search, trial):
             kept, fit = (*kept, term), trial
-    if imitated or search.score(fit) >= search.score(beside):
+    if left is None or imitated or search.score(fit) >= search.score(search.fit((*named.terms, left))):
         return _that_stand_beside(search, search.fit(kept), curve), (curve,)
-    return _that_stand_beside(search, named, left[0][1]), (left[0][1],)
+    return _that_stand_beside(search, named, left), (left,)
+
+
+def _left_over(search: Search, named: Fit) -> Term | None:
+    """Return the curve that finds much which the names leave, if one does."""
+    left = best_per_family(search, named.terms, named=False)
+    if not left or left[0][0] <= UNNAMED_BY:
+        return None
+    beside = search.fit((*named.terms, left[0][1]))
+    misfit = (beside.gain - named.gain) / max(beside.gain, 1e-9)
+    return None if named.terms and misfit < SHAPE_MISFIT else left[0][1]
 
 
 def _covariate(term: Term) -> str:
