@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DRAWS = 4000
+UNLIKELY = 0.02
+"""A shape that fits worse than this, relative to the best, is not counted."""
 NINE_TENTHS = 2.706
 """A profile may fall this far within a 90 % interval (χ² with one degree of freedom)."""
 
@@ -129,8 +131,30 @@ def _relative_size(search: Search, fit: Fit, index: int, moved: Array) -> Parame
     drawn = fit.coefficients[at] + moved[:, at]
     sizes = np.sqrt(np.maximum(np.einsum("da,ab,db->d", drawn, gram, drawn), 0)) / scene.mean_size
     value = float(np.sqrt(np.mean(contribution(search, fit, index)[:, on][scene.mask[:, on]] ** 2))) / scene.mean_size
-    low, high = np.quantile(sizes, [0.05, 0.95])
-    return Parameter(value, float(low), float(high), "1")
+    low, high = np.quantile(np.concatenate(_over_shapes(search, fit, index, sizes, value)), [0.05, 0.95])
+    return Parameter(value, float(min(low, value)), float(max(high, value)), "1")
+
+
+def _over_shapes(search: Search, fit: Fit, index: int, sizes: Array, value: float) -> list[Array]:
+    """Return draws of an effect's relative size over the shapes that it may as well have, each as likely as it fits.
+
+    Where a reference temperature, an exponent or a rise is not known, neither is what hangs on it. `sizes` are
+    draws for the fitted shape, `value` its best.
+    """
+    scene, term = search.dictionary.scene, fit.terms[index]
+    others = [other for i, other in enumerate(fit.terms) if i != index]
+    family = [group for group in search.dictionary.groups if group.named and group.name == term.name]
+    found = [(gain, other) for gain, other in search.conditional(others, family) if other.wheels == term.wheels]
+    best = max((gain for gain, _ in found), default=0.0)
+    drawn = []
+    for gain, other in found:
+        if (weight := float(np.exp(0.5 * (gain - best)))) < UNLIKELY:
+            continue
+        refit = search.fit((*others, other))
+        values = contribution(search, refit, len(others))[:, list(term.wheels)][scene.mask[:, list(term.wheels)]]
+        size = float(np.sqrt(np.mean(values**2))) / scene.mean_size
+        drawn.append(size / max(value, 1e-30) * sizes[: max(int(weight * len(sizes)), 1)])
+    return drawn or [sizes]
 
 
 def _onset_bounds(search: Search, fit: Fit, index: int) -> tuple[float, float]:
