@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.mismatch.answer import Contribution
+from calibration.mismatch.answer import Contribution, Effect
 from calibration.mismatch.errors import SimulationError
 
 if TYPE_CHECKING:
@@ -23,39 +23,80 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+FURTHEST_STD = 3.0
+NINE_TENTHS_WIDTH = 2 * 1.645
+"""How many standard deviations a 90 % interval is wide."""
+
 
 def corrected_tables(
     tables: Mapping[str, Any],
     simulation: Simulation,
     values: Mapping[str, float],
     contributions: Sequence[Contribution],
+    effects: Sequence[Effect] = (),
 ) -> dict[str, Any]:
-    """Return SIM.toml's tables with the calibrated parameters and every effect."""
-    corrected = {**tables, **simulation.corrected_tables(values)}
-    rest = [c for c in contributions if not _into_drivetrain(corrected, simulation, c)]
+    """Return SIM.toml's tables with the calibrated parameters and every effect.
+
+    `effects` say how sure the contributions are, in the same order; left out, nothing is written of that.
+    """
+    corrected = {**tables, **simulation.corrected_tables(_within_reason(simulation, values))}
+    shares = [_relative_std(effect) for effect in effects] or [0.0] * len(contributions)
+    rest = [
+        {**{name: _toml(value) for name, value in asdict(effect).items()}, "relative_std": share}
+        for effect, share in zip(contributions, shares, strict=True)
+        if not _into_drivetrain(corrected, simulation, effect, share)
+    ]
     before = list(tables.get("effects", []))
     if before or rest:
-        corrected["effects"] = before + [{k: _toml(v) for k, v in asdict(c).items()} for c in rest]
+        corrected["effects"] = before + rest
     return corrected
 
 
-def _into_drivetrain(tables: dict[str, Any], simulation: Simulation, effect: Contribution) -> bool:
+def _within_reason(simulation: Simulation, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the parameters no further from what was stated than it can be off: three standard deviations.
+
+    Where something is missing that has no name, the parameters lean over to stand in for it.
+    """
+    kept = {}
+    for name, value in values.items():
+        prior = simulation.parameters.get(name)
+        reach = 0.0 if prior is None else FURTHEST_STD * prior.std
+        kept[name] = value if prior is None else min(max(value, prior.value - reach), prior.value + reach)
+    return kept
+
+
+def _relative_std(effect: Effect) -> float:
+    """Return the relative standard deviation of an effect's size, whose 90 % interval is known."""
+    size = effect.parameters.get("relative_size")
+    return 0.0 if size is None or size.value == 0 else (size.high - size.low) / NINE_TENTHS_WIDTH / size.value
+
+
+def _into_drivetrain(tables: dict[str, Any], simulation: Simulation, effect: Contribution, share: float) -> bool:
     """Put Coulomb and viscous friction where the daemon keeps them; say whether that could be done."""
     drivetrain = tables.get("drivetrain")
     if simulation.channel != "motor_current_A" or not isinstance(drivetrain, dict):
         return False
-    six = np.isin(np.arange(1, 7), effect.wheels)
+    six: Array = np.isin(np.arange(1, 7), effect.wheels).astype(np.float64)
     (value, *_) = effect.coefficients
     if effect.name == "coulomb-friction" and value >= 0:
-        drivetrain["no_load_current_A"] = (np.array(_six(drivetrain, "no_load_current_A")) + value * six).tolist()
+        _add(drivetrain, "no_load_current_A", value * six)
+        _add_squared(drivetrain, "no_load_current_std_A", share * value * six)
         return True
     if effect.name == "viscous-friction" and value >= 0 and abs(float(effect.shape["power"]) - 1) < 1e-9:
         # The daemon's viscous term is per motor speed, the effect's per wheel speed.
         ratio = drivetrain["planetary_ratio"] * drivetrain["harmonic_ratio"]
-        name = "viscous_current_A_s_per_rad"
-        drivetrain[name] = (np.array(_six(drivetrain, name)) + value / ratio * six).tolist()
+        _add(drivetrain, "viscous_current_A_s_per_rad", value / ratio * six)
+        _add_squared(drivetrain, "viscous_current_std_A_s_per_rad", share * value / ratio * six)
         return True
     return False
+
+
+def _add(drivetrain: dict[str, Any], name: str, six: Array) -> None:
+    drivetrain[name] = (np.array(_six(drivetrain, name)) + six).tolist()
+
+
+def _add_squared(drivetrain: dict[str, Any], name: str, six: Array) -> None:
+    drivetrain[name] = np.hypot(_six(drivetrain, name), six).tolist()
 
 
 def _six(drivetrain: Mapping[str, Any], name: str) -> list[float]:

@@ -58,7 +58,9 @@ def _run(recording: Path, simulation: Path, json: Path | None, report: Path | No
         _write_json(json, found.answer)
     if corrected:
         evidence = found.evidence
-        text = to_toml(corrected_tables(tables, simulated, evidence.values, evidence.contributions))
+        text = to_toml(
+            corrected_tables(tables, simulated, evidence.values, evidence.contributions, found.answer.effects)
+        )
         corrected.write_text(text, encoding="utf-8")
     if report:
         _write_report(report, found, recording, simulation)
