@@ -24,11 +24,14 @@ ROVER_TOML = Path("rover.toml")
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    bench = typer.Typer(no_args_is_help=True, help="Take load cells, drivetrain and wheel radius from the bench.")
+    bench = typer.Typer(
+        no_args_is_help=True, help="Take load cells, drivetrain and wheel radius from the bench or a comparison."
+    )
     bench.command("load-cell", help="Zero and span of the load cells, from known weights.")(load_cell)
     bench.command("wheels-up", help="No-load current against speed, from a spin off the ground.")(wheels_up)
     bench.command("brake", help="Gain of the drivetrain, from a brake.")(brake)
     bench.command("radius", help="Wheel radius, from a measured distance.")(radius)
+    bench.command("corrected", help="Drivetrain, from what `regolithd mismatch --corrected` wrote.")(corrected)
     app.add_typer(bench, name="calibrate")
 
 
@@ -76,6 +79,17 @@ def radius(
         typer.echo(procedures.RADIUS)
         return
     _finish(lambda: session.radius(recording, config, distance, distance_std), config, write)
+
+
+def corrected(
+    simulation: Annotated[Path, typer.Argument(help="what `regolithd mismatch --corrected` wrote")],
+    config: Config = ROVER_TOML,
+    write: Write = True,
+) -> None:
+    """Copy what the comparison found of the drivetrain."""
+    from calibration.bench.simulation import drivetrain
+
+    _finish(lambda: drivetrain(simulation, config), config, write)
 
 
 def _finish(fit: Callable[[], Written], config: Path, write: bool) -> None:
