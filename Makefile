@@ -6,7 +6,7 @@ export PYTHON
 
 RECORDINGS ?= ../shared/recordings
 
-.PHONY: demo test check sizing reproduce evaluate pictures prove real scaling picture frames install uninstall clean
+.PHONY: demo test check sizing reproduce evaluate loop pictures prove real scaling picture frames install uninstall clean
 
 demo: $(VENV)/demo.ready
 	$(BIN)/regolithd demo
@@ -33,8 +33,13 @@ reproduce: $(VENV)/dev.ready
 evaluate: $(VENV)/dev.ready
 	$(BIN)/regolithd evaluate
 
-# docs/*.svg, from what `make sizing`, `make reproduce` and `make evaluate` found.
+# A rover conceals a drivetrain effect, the comparison finds it, the daemon is corrected. SEED=… conceals another size.
+loop: $(VENV)/dev.ready
+	$(BIN)/regolithd loop $(if $(SEED),--seed $(SEED))
+
+# docs/*.svg, from what `make sizing`, `make reproduce`, `make evaluate` and `make loop` found.
 pictures: reproduce
+	test ! -f build/loop/loop.svg || cp build/loop/loop.svg docs/loop.svg
 	$(BIN)/regolithd pictures
 	$(BIN)/python -m daemon.demo.photograph docs/demo.svg
 
