@@ -294,7 +294,10 @@ def _without_a_name(search: Search, named: Fit, simpler: Sequence[Fit]) -> tuple
 
 def _left_over(search: Search, named: Fit) -> Term | None:
     """Return the curve that finds much which the names leave, if one does."""
-    left = best_per_family(search, named.terms, named=False)
+    # How a sensor wandered is known only as well as it shows it itself: what that leaves on its wheel is no unknown.
+    wandering = {w for term in named.terms if term.group.evidence is not None for w in term.wheels}
+    curves = best_per_family(search, named.terms, named=False)
+    left = [(score, term) for score, term in curves if not set(term.wheels) <= wandering]
     if not left or left[0][0] <= UNNAMED_BY:
         return None
     beside = search.fit((*named.terms, left[0][1]))
