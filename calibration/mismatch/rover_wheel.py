@@ -11,6 +11,7 @@ from pydantic import Field, ValidationError
 from calibration.drivetrain import motor_current
 from calibration.mismatch.errors import SimulationError
 from calibration.mismatch.simulation import Prior, SensorError, Simulation
+from calibration.mismatch.supply import open_circuit_voltage
 from calibration.parameters import Drivetrain, Rover, Sensors, Soil, Table, Wheel
 from calibration.wheel_soil import LARGEST_CONTACT_ANGLE_RAD, contact_angle, wheel_torque
 
@@ -71,7 +72,7 @@ class RoverWheel(Simulation):
             raise SimulationError(f"the simulation's tables are wrong: {told}") from error
 
     def prepare(self, recording: Recording) -> Recording:
-        """Add `slip`, and the load that each wheel has on level ground where no cell measured it."""
+        """Add `slip`, and the load where no cell measured it; take the motors' sag out of the voltage."""
         speed = self._wheel_speed(recording.channels)
         turning = np.abs(speed) > SLOWEST_RAD_S
         rim = np.where(turning, self.tables.wheel.radius_m * speed, np.nan)
@@ -89,7 +90,11 @@ class RoverWheel(Simulation):
             notes.append(
                 f"ground_speed_m_s is blank at {blank} turning wheels' readings; slip is taken as {assumed:g}."
             )
-        return recording.with_channels(slip=slip, load_N=np.where(never, share, load)).with_notes(*notes)
+        channels = {"slip": slip, "load_N": np.where(never, share, load)}
+        if "bus_voltage_V" in recording.channels and "motor_current_A" in recording.channels:
+            voltage, current = recording.channels["bus_voltage_V"], recording.channels["motor_current_A"]
+            channels["bus_voltage_V"] = open_circuit_voltage(voltage, current)
+        return recording.with_channels(**channels).with_notes(*notes)
 
     def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
         """Return the motor currents [A], shape (time, wheel)."""
