@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
 from calibration.mixture import TARGETS, Mixture, unpack
+from calibration.onnx_session import open_session
 from calibration.window import INTERVAL_S, KNOWN, LONGEST, Knowledge, Windows, reduce_windows
 
 if TYPE_CHECKING:
@@ -124,11 +124,7 @@ class Estimator:
     def __init__(self, path: Path = SHIPPED_POSTERIOR) -> None:
         if not path.is_file():
             raise PosteriorError(f"{path}: no such file. Train one with `regolithd train-posterior`.")
-        options = onnxruntime.SessionOptions()
-        options.intra_op_num_threads = 1
-        options.inter_op_num_threads = 1
-        options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-        self._session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        self._session = open_session(path)
         if {each.name: each.shape[-1] for each in self._session.get_inputs()}.get("known") != KNOWN:
             raise PosteriorError(f"{path}: was trained with other inputs. Train one with `regolithd train-posterior`.")
         metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map

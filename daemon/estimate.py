@@ -7,13 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import onnxruntime
 
 from calibration.model_card import ModelCard, ModelCardError, read_card
+from calibration.onnx_session import open_session
 from daemon.snapshot import WHEELS, Array, Mask
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    import onnxruntime
 
 SHIPPED_MODEL = Path(__file__).parent.parent / "calibration" / "models" / "terrain.onnx"
 """The network that comes with regolithd."""
@@ -78,13 +80,8 @@ class Network:
 def _session(path: Path) -> onnxruntime.InferenceSession:
     if not path.is_file():
         raise ModelError(f"{path}: no such file. Train one (`regolithd train`), or mend [estimator] model.")
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
-    options.inter_op_num_threads = 1
-    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-    options.log_severity_level = 3
     try:
-        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        return open_session(path)
     except Exception as error:  # onnxruntime's errors have no common class
         raise ModelError(f"{path}: not a usable ONNX model: {error}") from error
 

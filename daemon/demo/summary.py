@@ -14,14 +14,7 @@ if TYPE_CHECKING:
 
 def summary(stretches: list[Stretch]) -> Table:
     """Return the table: estimated, and true in brackets."""
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-        title="By each wheel alone, the paper's network: mean over each soil (true)",
-        title_justify="left",
-        title_style="bold",
-        padding=(0, 2, 0, 0),
-    )
+    table = _titled("By each wheel alone, the paper's network: mean over each soil (true)")
     table.add_column("\nwheel", justify="right")
     table.add_column("\nsoil")
     for name in ("torque\nN·m", "c\nkPa", "φ\n°"):
@@ -43,14 +36,7 @@ def summary(stretches: list[Stretch]) -> Table:
 
 def ground_summary(grounds: list[Ground]) -> Table:
     """Return the table of what the posterior said where all six wheels were on one soil: 90 % intervals, and true."""
-    table = Table(
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-        title="By all six wheels together: median, 90 % interval (true)",
-        title_justify="left",
-        title_style="bold",
-        padding=(0, 2, 0, 0),
-    )
+    table = _titled("By all six wheels together: median, 90 % interval (true)")
     table.add_column("\nsoil")
     table.add_column("c\nkPa", justify="right", no_wrap=True)
     table.add_column("φ\n°", justify="right", no_wrap=True)
@@ -64,3 +50,14 @@ def ground_summary(grounds: list[Ground]) -> Table:
             f"({math.degrees(each.true_friction_angle_rad):.1f})",
         )
     return table
+
+
+def _titled(title: str) -> Table:
+    return Table(
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        title=title,
+        title_justify="left",
+        title_style="bold",
+        padding=(0, 2, 0, 0),
+    )
