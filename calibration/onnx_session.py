@@ -1,4 +1,4 @@
-"""How the rover runs its networks: one thread that does not spin, since one call of six wheels takes microseconds."""
+"""How the rover opens and runs its networks: one thread that does not spin, since one call of six wheels is quick."""
 
 from __future__ import annotations
 
@@ -10,11 +10,26 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def open_session(path: Path) -> onnxruntime.InferenceSession:
-    """Return the network of a file, ready to run; raises what onnxruntime raises where it is none."""
+class NetworkError(Exception):
+    """A network cannot be used; the message says which file, what is wrong with it, and the cure."""
+
+
+def open_session(path: Path, cure: str) -> onnxruntime.InferenceSession:
+    """Return the network of a file, ready to run.
+
+    Raises
+    ------
+    NetworkError
+        There is no such file, or it is damaged or no network; the message ends with `cure`.
+    """
+    if not path.is_file():
+        raise NetworkError(f"{path}: no such file. {cure}")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = 3
-    return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    try:
+        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    except Exception as error:  # onnxruntime's errors have no common class
+        raise NetworkError(f"{path}: damaged, or not an ONNX model ({error}). {cure}") from error

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.mixture import TARGETS, Mixture, unpack
-from calibration.onnx_session import open_session
+from calibration.onnx_session import NetworkError, open_session
 from calibration.window import INTERVAL_S, KNOWN, LONGEST, Knowledge, Windows, reduce_windows
 
 if TYPE_CHECKING:
@@ -38,8 +38,11 @@ _SAMPLES = 4000
 _SEED = 20
 
 
-class PosteriorError(ValueError):
-    """The posterior network cannot be used."""
+CURE = "Train one (`regolithd train-posterior`), or mend [posterior] model."
+
+
+class PosteriorError(NetworkError):
+    """A file's network is not a posterior as the daemon needs it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,22 +125,20 @@ class Estimator:
     """The posterior network, ready to run."""
 
     def __init__(self, path: Path = SHIPPED_POSTERIOR) -> None:
-        if not path.is_file():
-            raise PosteriorError(f"{path}: no such file. Train one with `regolithd train-posterior`.")
-        self._session = open_session(path)
+        self._session = open_session(path, CURE)
         if {each.name: each.shape[-1] for each in self._session.get_inputs()}.get("known") != KNOWN:
-            raise PosteriorError(f"{path}: was trained with other inputs. Train one with `regolithd train-posterior`.")
+            raise PosteriorError(f"{path}: was trained with other inputs. {CURE}")
         metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
         try:
             targets = json.loads(metadata["regolithd.targets"])
             self.version = metadata["regolithd.version"]
             self.radius_m = float(metadata["regolithd.radius_m"])
             if tuple(target["name"] for target in targets) != TARGETS:
-                raise PosteriorError(f"{path}: its targets are not {', '.join(TARGETS)}, in this order")
+                raise PosteriorError(f"{path}: its targets are not {', '.join(TARGETS)}, in this order. {CURE}")
             self._centre = np.array([float(target["centre"]) for target in targets])
             self._unit = np.array([float(target["unit"]) for target in targets])
         except (KeyError, ValueError, TypeError) as error:
-            raise PosteriorError(f"{path}: its metadata are not a posterior's: {error}") from error
+            raise PosteriorError(f"{path}: its metadata are not a posterior's: {error}. {CURE}") from error
 
     def mixtures(self, windows: Windows) -> Mixture:
         """Return the posterior of each window."""

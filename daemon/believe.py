@@ -88,8 +88,8 @@ def belief_stage(configuration: Configuration) -> BeliefStage | None:
 
     Raises
     ------
-    PosteriorError
-        The posterior network cannot be used, or was trained for another wheel.
+    NetworkError
+        The posterior network cannot be used, or (`PosteriorError`) was trained for another wheel.
     """
     settings, drivetrain = configuration.posterior, configuration.drivetrain
     if not settings.enabled or not any(drivetrain.no_load_current_A):

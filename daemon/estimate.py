@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calibration.model_card import ModelCard, ModelCardError, read_card
-from calibration.onnx_session import open_session
+from calibration.onnx_session import NetworkError, open_session
 from daemon.snapshot import WHEELS, Array, Mask
 
 if TYPE_CHECKING:
@@ -21,8 +21,11 @@ SHIPPED_MODEL = Path(__file__).parent.parent / "calibration" / "models" / "terra
 """The network that comes with regolithd."""
 
 
-class ModelError(Exception):
-    """The network cannot be used; the message says which file, everything that is wrong with it, and the cure."""
+CURE = "Train one (`regolithd train`), or mend [estimator] model."
+
+
+class ModelError(NetworkError):
+    """A file's network is not a terrain network as the daemon needs it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +42,7 @@ class Network:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._session = _session(path)
+        self._session = open_session(path, CURE)
         self.card = _card(path, self._session)
         self._low = np.array([[variable.low] for variable in self.card.inputs])
         self._high = np.array([[variable.high] for variable in self.card.inputs])
@@ -75,15 +78,6 @@ class Network:
             raise ModelError(f"{self.path}: does not run on a batch of six: {error}") from error
         if not np.isfinite(answer).all():
             raise ModelError(f"{self.path}: gives no finite numbers in the middle of its own training range")
-
-
-def _session(path: Path) -> onnxruntime.InferenceSession:
-    if not path.is_file():
-        raise ModelError(f"{path}: no such file. Train one (`regolithd train`), or mend [estimator] model.")
-    try:
-        return open_session(path)
-    except Exception as error:  # onnxruntime's errors have no common class
-        raise ModelError(f"{path}: not a usable ONNX model: {error}") from error
 
 
 def _card(path: Path, session: onnxruntime.InferenceSession) -> ModelCard:

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, NoReturn
 
 import typer
 
-from calibration.posterior import PosteriorError
+from calibration.onnx_session import NetworkError
 from daemon.believe import belief_stage
 from daemon.config import Configuration
 from daemon.config_reader import EXIT_STATUS, ConfigurationError, read_configuration
-from daemon.estimate import SHIPPED_MODEL, ModelError, Network
+from daemon.estimate import SHIPPED_MODEL, Network
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -31,7 +31,7 @@ def network_or_exit(configuration: Configuration) -> Network:
     try:
         belief_stage(configuration)  # not kept: the pipeline makes its own, but what does not fit shall show now
         return Network(configuration.estimator.model or SHIPPED_MODEL)
-    except (ModelError, PosteriorError) as error:
+    except NetworkError as error:
         _end([str(error)])
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING
 
-from calibration.posterior import PosteriorError
+from calibration.onnx_session import NetworkError
 from daemon.believe import belief_stage
 from daemon.check.finding import Finding, good, warning, wrong
-from daemon.estimate import SHIPPED_MODEL, ModelError, Network
+from daemon.estimate import SHIPPED_MODEL, Network
 
 if TYPE_CHECKING:
     from calibration.model_card import ModelCard
@@ -20,11 +20,11 @@ async def check_network(configuration: Configuration) -> list[Finding]:
     path = configuration.estimator.model or SHIPPED_MODEL
     try:
         network = await asyncio.to_thread(Network, path)  # it reads a file and runs the network
-    except ModelError as error:
+    except NetworkError as error:
         return [wrong("model", str(error), "")]
     try:
         stage = await asyncio.to_thread(belief_stage, configuration)
-    except PosteriorError as error:
+    except NetworkError as error:
         return [judge_card(network.card, configuration), wrong("posterior", str(error), "")]
     return [judge_card(network.card, configuration), judge_posterior(configuration, there=stage is not None)]
 

@@ -1,12 +1,15 @@
 """The window, the mixture that is read out of the network, and the ONNX graph against what was trained."""
 
+from pathlib import Path
+
 import numpy as np
 import onnxruntime
 import pytest
 
 from calibration.mixture import PARAMETERS, unpack
+from calibration.onnx_session import NetworkError
 from calibration.parameters import Drivetrain, Wheel
-from calibration.posterior import Buffer, Estimator
+from calibration.posterior import SHIPPED_POSTERIOR, Buffer, Estimator
 from calibration.posterior_training import apply, freeze, initial, scaling, simulate
 from calibration.rovers import TABLE_4_CURRENT, draw_rovers, drive, table_4_noise
 from calibration.window import KNOWN_HIGH, Knowledge, reduce_windows
@@ -34,9 +37,9 @@ def test_an_absent_wheel_changes_nothing_but_the_count() -> None:
     """A wheel that was not measured has mask 0 and no features; the others keep theirs."""
     rng = np.random.default_rng(0)
     load, slip, torque = rng.uniform(40, 60, (1, 20, 6)), np.full((1, 20, 6), 0.03), rng.normal(0.3, 0.1, (1, 20, 6))
-    whole = reduce_windows(load, slip, torque, np.full((1, 4), 0.01), 0.075)
+    whole = reduce_windows(load, slip, torque, np.full((1, 5), 0.01), 0.075)
     torque[:, :, 2] = np.nan
-    part = reduce_windows(load, slip, torque, np.full((1, 4), 0.01), 0.075)
+    part = reduce_windows(load, slip, torque, np.full((1, 5), 0.01), 0.075)
     assert part.mask.tolist() == [[1, 1, 0, 1, 1, 1]]
     np.testing.assert_array_equal(part.wheels[:, 2], 0)
     np.testing.assert_allclose(np.delete(part.wheels, 2, axis=1), np.delete(whole.wheels, 2, axis=1))
@@ -46,7 +49,7 @@ def test_median_ignores_a_momentary_drop() -> None:
     """One instant of no torque moves the mean coefficient, and not the median."""
     load, slip, torque = np.full((1, 9, 6), 50.0), np.full((1, 9, 6), 0.03), np.full((1, 9, 6), 0.3)
     torque[0, 4] = 0.0
-    features = reduce_windows(load, slip, torque, np.full((1, 4), 0.01), 0.075).wheels[0, 0]
+    features = reduce_windows(load, slip, torque, np.full((1, 5), 0.01), 0.075).wheels[0, 0]
     assert features[2] == pytest.approx(0.08 * 8 / 9)
     assert features[3] == pytest.approx(0.08)
 
@@ -68,7 +71,7 @@ def test_the_buffer_averages_half_seconds_and_begins_anew_after_a_gap() -> None:
 def test_simulated_currents_are_as_noisy_as_the_table_says() -> None:
     """The relative standard deviation of 2000 currents of a rover is that of Table 4, drops included."""
     rng = np.random.default_rng(0)
-    rovers = draw_rovers(4, rng, np.full((4, 4), 1e-6), no_load_A=0.2)
+    rovers = draw_rovers(4, rng, np.full((4, 5), 1e-6), no_load_A=0.2)
     current = drive(rovers, table_4_noise(4), 2000, rng, Drivetrain(), Wheel()).current_A
     np.testing.assert_allclose((current.std(axis=1) / current.mean(axis=1)).mean(axis=0), TABLE_4_CURRENT, rtol=0.08)
 
@@ -139,3 +142,20 @@ def test_a_fall_is_told_by_its_probability(estimator: Estimator) -> None:
     assert fell.cohesion > 0.8
     assert 0.45 < same.cohesion < 0.55
     assert estimator.fall(strong, np.empty((3, 0, 6)), Knowledge()) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("absent.onnx", "no such file"),
+        ("half.onnx", "damaged, or not an ONNX model"),
+        ("terrain.onnx", "was trained with other inputs"),
+    ],
+)
+def test_a_file_that_is_no_posterior_is_refused_with_the_cure(tmp_path: Path, name: str, says: str) -> None:
+    """An absent file, one that was cut off in the middle, and another network: each is named, with what to do."""
+    shipped = SHIPPED_POSTERIOR.read_bytes()
+    (tmp_path / "half.onnx").write_bytes(shipped[: len(shipped) // 2])
+    (tmp_path / "terrain.onnx").write_bytes(SHIPPED_POSTERIOR.with_name("terrain.onnx").read_bytes())
+    with pytest.raises(NetworkError, match=rf"{name}: {says}.*Train one \(`regolithd train-posterior`\)"):
+        Estimator(tmp_path / name)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from calibration.model_card import ModelCard, ModelCardError, Variable, read_card
+from calibration.onnx_session import NetworkError
 from daemon.estimate import ModelError, Network
 
 KNOWN = {
@@ -71,9 +72,9 @@ def test_a_network_that_gives_no_numbers_is_refused(make_network: Callable[..., 
 
 def test_a_missing_or_broken_file_is_refused(tmp_path: Path) -> None:
     """With its path, and the cure."""
-    with pytest.raises(ModelError, match="no such file"):
+    with pytest.raises(NetworkError, match=r"absent.onnx: no such file. Train one \(`regolithd train`\)"):
         Network(tmp_path / "absent.onnx")
     broken = tmp_path / "broken.onnx"
     broken.write_bytes(b"not a model")
-    with pytest.raises(ModelError, match="not a usable ONNX model"):
+    with pytest.raises(NetworkError, match=r"broken.onnx: damaged, or not an ONNX model .*Train one"):
         Network(broken)
