@@ -70,7 +70,12 @@ def test_file_names_say_what_is_inside() -> None:
 def test_nothing_committed_names_one_machine() -> None:
     """No file of the project holds a path of the machine that it was written on."""
     rooms = (*ROOMS, "tests", "docs", "systemd", ".ci")
-    paths = [path for room in rooms for path in (ROOT / room).rglob("*") if path.is_file() and path.suffix != ".pyc"]
+    paths = [
+        path
+        for room in rooms
+        for path in (ROOT / room).rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    ]
     paths += [path for path in ROOT.iterdir() if path.is_file() and path.name != ".git"]
     homes = re.compile(rb"(^|[\s\"'=(])/(work|home/\w+|root)/\w")
     found = [str(path.relative_to(ROOT)) for path in paths if homes.search(path.read_bytes())]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import socket
@@ -12,8 +13,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pytest
+from broker import Mosquitto, mosquitto_program
+
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 ROOT = Path(__file__).resolve().parents[2]
 PATIENCE_S = 60
@@ -139,3 +143,20 @@ group = "{os.getgid()}"
                 process.kill()
             process.wait()
         self.processes.clear()
+
+
+@contextlib.contextmanager
+def stack_on(channel: str, folder: Path) -> Iterator[Stack]:
+    """A broker and a virtual rover, and the configuration of a daemon that does not run yet; at the end, nothing."""
+    if mosquitto_program() is None:
+        pytest.skip("no broker here: apt-get install mosquitto")
+    broker = Mosquitto(folder)
+    stack = Stack(folder, channel, broker.port)
+    stack.write_configuration()
+    try:
+        broker.start()
+        stack.start_rover()
+        yield stack
+    finally:
+        stack.end()
+        broker.stop()

@@ -6,8 +6,7 @@ import json
 from typing import TYPE_CHECKING
 
 import pytest
-from broker import Mosquitto, mosquitto_program
-from stack import Stack
+from stack import Stack, stack_on
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -18,19 +17,8 @@ pytestmark = [pytest.mark.vcan, pytest.mark.timeout(240)]
 @pytest.fixture(scope="module")
 def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
     """A broker and a virtual rover, and the configuration of a daemon that does not run yet."""
-    if mosquitto_program() is None:
-        pytest.skip("no broker here: apt-get install mosquitto")
-    folder = tmp_path_factory.mktemp("check")
-    broker = Mosquitto(folder)
-    stack = Stack(folder, "vcan0", broker.port)
-    stack.write_configuration()
-    try:
-        broker.start()
-        stack.start_rover()
+    with stack_on("vcan0", tmp_path_factory.mktemp("check")) as stack:
         yield stack
-    finally:
-        stack.end()
-        broker.stop()
 
 
 def check(stack: Stack) -> tuple[int, dict[str, dict[str, str]]]:

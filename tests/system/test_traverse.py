@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 import can
 import pytest
-from broker import Mosquitto, mosquitto_program
-from stack import Stack, until
+from stack import Stack, stack_on, until
 
 if TYPE_CHECKING:
     import subprocess
@@ -87,18 +86,8 @@ class Wheels:
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
     """A broker, a virtual rover and a daemon, for all tests of this file: a start takes long in the guest."""
-    if mosquitto_program() is None:
-        pytest.skip("no broker here: apt-get install mosquitto")
-    folder = tmp_path_factory.mktemp("stack")
-    broker = Mosquitto(folder)
-    stack = Stack(folder, CHANNEL, broker.port)
-    try:
-        broker.start()
-        stack.start_rover()
+    with stack_on(CHANNEL, tmp_path_factory.mktemp("stack")) as stack:
         yield stack
-    finally:
-        stack.end()
-        broker.stop()
 
 
 @pytest.fixture
