@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 pytestmark = [pytest.mark.systemd, pytest.mark.timeout(300)]
 ROOT = Path(__file__).resolve().parents[2]
+RMEM_MAX = Path("/proc/sys/net/core/rmem_max")
+RECEIVE_BUFFER_BYTES = 4 << 20
 CONFIGURATION = Path("/etc/regolithd/rover.toml")
 REGOLITHD = "/usr/local/bin/regolithd"
 PASSWORD = "a secret"
@@ -186,6 +188,14 @@ def test_the_units_are_right() -> None:
     assert done.stdout + done.stderr == ""
 
 
+def test_the_receive_buffer_may_be_as_large_as_the_daemon_asks_for() -> None:
+    """At once, and after the next boot."""
+    assert int(RMEM_MAX.read_text()) >= RECEIVE_BUFFER_BYTES
+    RMEM_MAX.write_text("212992")  # as the kernel boots
+    run("/lib/systemd/systemd-sysctl")
+    assert int(RMEM_MAX.read_text()) >= RECEIVE_BUFFER_BYTES
+
+
 async def test_it_is_ready_and_acquires_under_the_hardening(pid: int) -> None:
     """`systemctl start` returns with a daemon, not root, that hears all six wheels over CAN and says so over MQTT."""
     assert shown("ActiveState", "SubState") == {"ActiveState": "active", "SubState": "running"}
@@ -300,5 +310,6 @@ def test_zz_what_uninstall_leaves(pid: int) -> None:
     run("systemd/uninstall")
     assert not Path("/opt/regolithd").exists()
     assert run("systemctl", "cat", "regolithd", check=False).returncode
+    assert not list(Path("/usr/local/lib").glob("*.d/*regolithd*"))
     assert CONFIGURATION.exists()
     assert any(Path("/var/lib/regolithd/recordings").iterdir())

@@ -13,6 +13,8 @@ import aiomqtt
 import pytest
 from broker import Mosquitto, mosquitto_program
 
+from drivers import socketcan
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -75,3 +77,12 @@ async def test_nobody_is_anonymous(guarded: Mosquitto) -> None:
     with pytest.raises(aiomqtt.MqttError):
         async with aiomqtt.Client(guarded.host, guarded.port):
             pass
+
+
+def test_the_kernel_is_asked_for_the_receive_buffer_that_the_daemon_asks_for() -> None:
+    """The limit that the installation sets is what the driver's socket wants, and both scripts know its file."""
+    said = re.search(r"(?m)^-net\.core\.rmem_max = (\d+)$", (SYSTEMD / "sysctl.conf").read_text())
+    assert said
+    assert int(said[1]) == socketcan._RECEIVE_BUFFER_BYTES  # the two files must agree
+    for script in ("install", "uninstall"):
+        assert "/usr/local/lib/sysctl.d/10-regolithd.conf" in (SYSTEMD / script).read_text()
