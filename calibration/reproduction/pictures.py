@@ -38,6 +38,10 @@ STYLE: Any = {
 }
 
 
+EVERY = 3
+"""Of a traverse's records one in so many is drawn, and all are in the mean: more do not show at this width."""
+
+
 def figure(width: float, height: float) -> Figure:
     """Return an empty figure."""
     return Figure(figsize=(width, height), layout="constrained")
@@ -106,7 +110,8 @@ def traverse(traverses: Sequence[Traverse], path: Path, wheel: int = 5) -> None:
 
 
 def _trace(panel: Axes, time: Array, values: Array, said: float, label: str) -> None:
-    panel.plot(time, values, color=OURS, linewidth=0.7, label="paper's network, synthetic traverse")
+    shown = np.s_[::EVERY]
+    panel.plot(time[shown], values[shown], color=OURS, linewidth=0.7, label="paper's network, synthetic traverse")
     panel.axhline(values.mean(), color=OURS, linestyle="--", label="its mean")
     panel.axhline(said, color=PAPER, linewidth=2, label="the paper's mean")
     panel.set_ylabel(label)

@@ -37,6 +37,8 @@ STYLE: Any = {
 SPEEDS_RAD_S = np.linspace(0.0, 0.45, 50)
 HIGHEST, HIGHEST_ERROR = (12.5, 45.0), (6.8, 12.5)
 """Of the axes of cohesion [kPa] and friction angle [°]."""
+POINTS = 150
+"""Of a trace: as many as the eye tells apart, since a window of 10 s moves little from one half second to the next."""
 SYMBOLS = (("c", "kPa"), ("φ", "°"))
 TITLE = "Friction concealed in the drivetrain, found by one drive on a known soil – then the same rover on other soils"
 CAPTION = (
@@ -100,7 +102,8 @@ def _trace(panel: Axes, closed: Closed, k: int, label: str) -> None:
     withheld = "" if any(name.startswith("no_load") for name in closed.case.known) else " (the daemon withholds it)"
     shown = [(closed.before, BEFORE, f"before{withheld}"), (closed.after, AFTER, "after")]
     for reading, colour, name in shown if closed.says else [(closed.before, AFTER, "before and after")]:
-        at = np.flatnonzero(np.isfinite(reading.mean[:, k]))[::2]  # a second apart is enough for the eye
+        there = np.flatnonzero(np.isfinite(reading.mean[:, k]))
+        at = there[:: max(1, len(there) // POINTS)]
         time, values = reading.time_s[at], [each[at, k] for each in (reading.low, reading.mean, reading.high)]
         panel.fill_between(time, values[0], values[2], color=colour, alpha=0.18, linewidth=0)
         panel.plot(time, values[1], color=colour, linewidth=1.3, label=name)
