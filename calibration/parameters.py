@@ -38,8 +38,9 @@ class Drivetrain(Table):
     """Motor, planetary gear and harmonic drive, from current to torque at the wheel (Eq. 11).
 
     The last fields are what a wheels-up spin and a brake measure, one value for each wheel (or one for all): the
-    current that only turns the drivetrain, I = `no_load_current_A` + `viscous_current_A_s_per_rad` |ω_motor|, and a
-    factor on the gain. Eq. 11 has none of them; with the defaults it is Eq. 11.
+    current that only turns the drivetrain, I = `no_load_current_A` + `viscous_current_A_s_per_rad` |ω_motor|, a factor
+    on the gain, and how much more current a torque takes for each newton metre of it: the efficiency at the torque T is
+    Eq. 11's × `gain_factor` / (1 + `load_loss_per_Nm` |T|). Eq. 11 has none of them; with the defaults it is Eq. 11.
     """
 
     torque_constant_Nm_per_A: Positive = 0.0234
@@ -54,6 +55,8 @@ class Drivetrain(Table):
     viscous_current_std_A_s_per_rad: SixNotNegative = (0.0,) * 6
     gain_factor: SixPositive = (1.0,) * 6
     gain_factor_std: SixNotNegative = (0.0,) * 6
+    load_loss_per_Nm: SixNumbers = (0.0,) * 6
+    load_loss_std_per_Nm: SixNotNegative = (0.0,) * 6
 
     @property
     def ratio(self) -> float:

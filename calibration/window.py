@@ -32,6 +32,9 @@ KNOWN = 9
 LEAST_ERROR, LEAST_SPREAD = 0.003, 0.01
 """Floors of the standard error of μ and of the load's spread: data quieter than in training count as that quiet."""
 
+USUAL_TORQUE_Nm = 0.3
+"""The torque at which the scatter of torque is told: one and the same, so that it does not tell of the soil."""
+
 KNOWN_LOW = np.array([0.01, 0.0003, 0.003, 0.01])
 KNOWN_HIGH = np.array([0.10, 0.010, 0.030, 0.60])
 """How well and how badly a rover may be known for the posterior, in the order of `Knowledge`."""

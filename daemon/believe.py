@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calibration.posterior import SHIPPED_POSTERIOR, Belief, Buffer, Estimator, PosteriorError
-from calibration.window import INTERVAL_S, LONGEST, Knowledge
+from calibration.window import INTERVAL_S, LONGEST, Knowledge, USUAL_TORQUE_Nm
 from daemon.snapshot import ChangeOfSoil, SlipSource
 from daemon.soil_change import SoilChange
 
 if TYPE_CHECKING:
+    from calibration.parameters import Drivetrain
     from daemon.config import Configuration
     from daemon.snapshot import Array
 
@@ -38,7 +39,7 @@ class BeliefStage:
         settings, drivetrain = configuration.posterior, configuration.drivetrain
         self._estimator = estimator
         self._buffer = Buffer(settings.window_s)
-        self._gain_std = drivetrain.gain_relative_std
+        self._gain_std = gain_doubt(drivetrain)
         self._no_load_std_A = float(np.mean(drivetrain.no_load_current_std_A))
         self._soil = settings.soil
         self._history: deque[Array] = deque(maxlen=HISTORY)
@@ -81,6 +82,16 @@ class BeliefStage:
             slip_std=SLIP_STD_GUESSED if guessed else SLIP_STD_MEASURED,
             soil=self._soil,
         )
+
+
+def gain_doubt(drivetrain: Drivetrain) -> float:
+    """Return how well the gain is known at a usual torque, relative: from the brake where a wheel had one, mean of all.
+
+    A brake measures the whole gain, so that how well Eq. 11's constants are known no longer counts at its wheels.
+    """
+    factor, std = np.array(drivetrain.gain_factor), np.array(drivetrain.gain_factor_std)
+    braked = np.hypot(std / factor, USUAL_TORQUE_Nm * np.array(drivetrain.load_loss_std_per_Nm))
+    return float(np.mean(np.where(braked > 0, braked, drivetrain.gain_relative_std)))
 
 
 def belief_stage(configuration: Configuration) -> BeliefStage | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from calibration.bench.efficiency import Efficiency, fit_efficiency
 from calibration.bench.line import BenchError, Line, fit_line
 
 Array = NDArray[np.float64]
@@ -30,7 +31,8 @@ Wheels up: what the drivetrain takes by itself.
 BRAKE = """\
 Brake: the gears' efficiency against the torque they carry, for one wheel.
   1. Wheels up. Put a brake with a balance on the wheel.
-  2. At your driving speed, brake with five torques or more, up to about 2 N m; twenty seconds each.
+  2. At your driving speed, brake with five torques or more, from none to about 2 N m, up and down again; twenty
+     seconds each.
 The recording's column `brake_torque_Nm` says what the balance showed; rows without it are left out."""
 
 RADIUS = """\
@@ -66,21 +68,6 @@ class NoLoad:
     def line(self, motor_speed_rad_s: Array) -> Array:
         """Return the current that a speed takes [A]."""
         return np.sign(motor_speed_rad_s) * self.coulomb_A + self.viscous_A_s_per_rad * motor_speed_rad_s
-
-
-@dataclass(frozen=True, slots=True)
-class Gain:
-    """The gain of one wheel over Eq. 11's, and the no-load current that the brake shows as well."""
-
-    factor: float
-    factor_std: float
-    no_load_A: float
-    no_load_std_A: float
-    slope_A_per_Nm: float
-
-    def line(self, torque_Nm: Array) -> Array:
-        """Return the current that a torque takes [A]."""
-        return self.no_load_A + self.slope_A_per_Nm * torque_Nm
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,13 +107,9 @@ def wheels_up(motor_speed_rad_s: Array, motor_current_A: Array, settle: float = 
     return NoLoad(max(line.offset, 0.0), line.offset_std, line.slope, line.slope_std)
 
 
-def brake(brake_torque_Nm: Array, motor_current_A: Array, gain_Nm_per_A: float) -> Gain:
-    """Return one wheel's gain from the torques of a brake: current = no-load + torque / gain."""
-    line = fit_line(brake_torque_Nm, np.abs(motor_current_A), _runs(brake_torque_Nm))
-    if line.slope <= 0:
-        raise BenchError("the current does not grow with the brake's torque")
-    factor = 1 / (line.slope * gain_Nm_per_A)
-    return Gain(factor, factor * line.slope_std / line.slope, line.offset, line.offset_std, line.slope)
+def brake(brake_torque_Nm: Array, motor_current_A: Array, gain_Nm_per_A: float) -> Efficiency:
+    """Return one wheel's efficiency against torque from the torques of a brake."""
+    return fit_efficiency(np.abs(brake_torque_Nm), np.abs(motor_current_A), _runs(brake_torque_Nm), gain_Nm_per_A)
 
 
 def radius(

@@ -10,7 +10,7 @@ import numpy as np
 
 from calibration.bench import procedures
 from calibration.bench.line import BenchError
-from calibration.bench.plot import Fit, draw
+from calibration.bench.plot import Braked, Fit, draw, draw_brake, draw_radius
 from calibration.bench.toml_edit import set_value
 from calibration.mismatch.recording import read_recording
 from calibration.parameters import Drivetrain, LoadCells
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
+
+    from calibration.bench.efficiency import Efficiency
 
     Array = NDArray[np.float64]
 
@@ -81,36 +83,50 @@ def wheels_up(recording: Path, config: Path, plot: Path | None) -> Written:
 
 
 def brake(recording: Path, config: Path, plot: Path | None) -> Written:
-    """Fit the gain of each wheel that was braked."""
+    """Fit the efficiency against torque of each wheel that was braked."""
     text = config.read_text(encoding="utf-8")
     table = _drivetrain(text)
-    names = {"gain_factor": "factor", "gain_factor_std": "factor_std"}
+    names = ("gain_factor", "gain_factor_std", "load_loss_per_Nm", "load_loss_std_per_Nm")
     values = {name: list(getattr(table, name)) for name in names}
     says: list[str] = []
-    drawn: dict[int, Fit] = {}
+    drawn: dict[int, Braked] = {}
+    ideal = table.torque_constant_Nm_per_A * table.ratio
     for wheel, (torque, current) in _wheels(recording, "brake_torque_Nm", "motor_current_A"):
         found = procedures.brake(torque, current, table.gain_Nm_per_A)
-        for name, field in names.items():
-            values[name][wheel - 1] = getattr(found, field)
-        says.append(
-            f"wheel {wheel}: gain {found.factor:.3f} ± {found.factor_std:.3f} of Eq. 11's; "
-            f"no-load current here {1e3 * found.no_load_A:.1f} ± {1e3 * found.no_load_std_A:.1f} mA"
-        )
-        drawn[wheel] = (torque, np.abs(current), found.line)
+        for name in names:
+            values[name][wheel - 1] = getattr(found, name)
+        says += _told_of_brake(wheel, found, np.abs(torque), ideal)
+        drawn[wheel] = Braked(np.abs(torque), np.abs(current), found, ideal)
     if plot:
-        draw(plot, drawn, "brake torque [N m]", "motor current [A]")
+        draw_brake(plot, drawn)
     return Written(_edited(text, "drivetrain", values), says)
 
 
-def radius(recording: Path, config: Path, distance_m: float, distance_std_m: float) -> Written:
+def _told_of_brake(wheel: int, found: Efficiency, torque_Nm: Array, ideal_gain_Nm_per_A: float) -> list[str]:
+    ends = np.array([torque_Nm[torque_Nm > 0].min(), torque_Nm.max()])
+    share, std = (100 * each for each in found.efficiency(ends, ideal_gain_Nm_per_A))
+    bend = f"changes by {-100 * found.load_loss_per_Nm:+.1f} ± {100 * found.load_loss_std_per_Nm:.1f} % for each N m"
+    none = "too few torques to tell whether it depends on the torque"
+    if found.load_loss_std_per_Nm > 0 and not found.bent:
+        none = f"does not depend on the torque, give or take {100 * found.load_loss_std_per_Nm:.1f} % for each N m"
+    gain = f"gain {found.gain_factor:.3f} ± {found.gain_factor_std:.3f} of Eq. 11's"
+    efficiency = (
+        f"  efficiency {share[0]:.1f} ± {std[0]:.1f} % at {ends[0]:.2g} N m, {share[1]:.1f} ± {std[1]:.1f} % at "
+        f"{ends[1]:.2g} N m; no-load current here {1e3 * found.no_load_A:.1f} ± {1e3 * found.no_load_std_A:.1f} mA"
+    )
+    return [f"wheel {wheel}: {gain}; {bend if found.bent else none}", efficiency]
+
+
+def radius(recording: Path, config: Path, distance_m: float, distance_std_m: float, plot: Path | None) -> Written:
     """Take the mean radius of the wheels that turned."""
     if distance_m <= 0:
         raise BenchError("tell the distance: --distance 5.03 --distance-std 0.005")
     text = config.read_text(encoding="utf-8")
     ratio = _drivetrain(text).ratio
+    turned = dict(_wheels(recording, "t_s", "motor_speed_rad_s"))
     found = {
         wheel: procedures.radius(time, speed, ratio, distance_m, distance_std_m)
-        for wheel, (time, speed) in _wheels(recording, "t_s", "motor_speed_rad_s")
+        for wheel, (time, speed) in turned.items()
     }
     mean = float(np.mean([each.radius_m for each in found.values()]))
     # The tape's error is common to all wheels; what they differ by is not.
@@ -120,6 +136,9 @@ def radius(recording: Path, config: Path, distance_m: float, distance_std_m: flo
         f"wheel {wheel}: {1e3 * each.radius_m:.2f} ± {1e3 * each.radius_std_m:.2f} mm" for wheel, each in found.items()
     ]
     says.append(f"all: {1e3 * mean:.2f} ± {1e3 * std:.2f} mm")
+    if plot:
+        rolled = {wheel: (time, speed / ratio) for wheel, (time, speed) in turned.items()}
+        draw_radius(plot, rolled, found, procedures.Radius(mean, std))
     return Written(set_value(set_value(text, "wheel", "radius_m", mean), "wheel", "radius_std_m", std), says)
 
 

@@ -1,8 +1,9 @@
 """A corrected simulation's drivetrain into the daemon's configuration: what `regolithd mismatch --corrected` found.
 
-Constant and viscous friction and the gain have the same names in both files and are copied, with how sure they are.
-Viscous friction of another power than 1 becomes the straight line nearest to it over the speeds that the rover may
-drive. What else was found is not the drivetrain's, or nothing that the daemon could take out: that is said.
+Friction, gain and the loss under load have the same names in both files and are copied, with how sure they are. Viscous
+friction of another power than 1 becomes the straight line nearest to it over the speeds that the rover may drive; an
+efficiency that is wrong at every torque alike goes into gain and no-load current. What else was found is not the
+drivetrain's, or nothing that the daemon could take out: that is said.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ EQUATION_11 = (
 )
 TAKEN = (
     *("no_load_current_A", "no_load_current_std_A", "viscous_current_A_s_per_rad", "viscous_current_std_A_s_per_rad"),
-    *("gain_factor", "gain_factor_std"),
+    *("gain_factor", "gain_factor_std", "load_loss_per_Nm", "load_loss_std_per_Nm"),
 )
 SLOWEST_RAD_S, SPEED_LIMIT_M_S = 0.05, 0.05
 """Between which speeds a straight line must fit, where the configuration does not say."""
@@ -69,6 +70,8 @@ def drivetrain(simulation: Path, config: Path) -> Written:
 
 def _take(values: dict[str, Array], effect: Mapping[str, Any], ratio: float, speeds: Array) -> list[str]:
     """Add an effect that stands beside the tables; return what there is to say of it."""
+    if effect["name"] == "load-dependent-efficiency" and effect["shape"].get("power") == 0:
+        return _take_proportional(values, effect)
     if effect["name"] != "viscous-friction":
         return [f"{effect['name']} stays in the simulation: the daemon has no such term."]
     power = float(effect["shape"]["power"])
@@ -89,6 +92,18 @@ def _take(values: dict[str, Array], effect: Mapping[str, Any], ratio: float, spe
         f"wheel, nowhere more than {1e3 * worst:.1f} mA beside it."
     )
     return [said]
+
+
+def _take_proportional(values: dict[str, Array], effect: Mapping[str, Any]) -> list[str]:
+    """Take a loss that is the same share a of the current at every torque: I (1 + a), no-load current and all."""
+    share, std = float(effect["coefficients"][0]), float(effect.get("relative_std", 0.0))
+    more = 1 + share * np.isin(np.arange(1, 7), effect["wheels"])
+    for name in ("no_load_current_A", "viscous_current_A_s_per_rad"):
+        values[name] = values[name] * more
+    values["gain_factor"] = values["gain_factor"] / more
+    doubt = values["gain_factor"] * std * np.abs(more - 1) / more
+    values["gain_factor_std"] = np.hypot(values["gain_factor_std"], doubt)
+    return [f"load-dependent-efficiency that does not depend on the load: {100 * share:+.1f} % of the current."]
 
 
 def _line(speeds: Array, drag: Array) -> tuple[float, float]:

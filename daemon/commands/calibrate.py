@@ -29,7 +29,7 @@ def register(app: typer.Typer) -> None:
     )
     bench.command("load-cell", help="Zero and span of the load cells, from known weights.")(load_cell)
     bench.command("wheels-up", help="No-load current against speed, from a spin off the ground.")(wheels_up)
-    bench.command("brake", help="Gain of the drivetrain, from a brake.")(brake)
+    bench.command("brake", help="Efficiency of the drivetrain against torque, from a brake.")(brake)
     bench.command("radius", help="Wheel radius, from a measured distance.")(radius)
     bench.command("corrected", help="Drivetrain, from what `regolithd mismatch --corrected` wrote.")(corrected)
     app.add_typer(bench, name="calibrate")
@@ -70,6 +70,7 @@ def radius(
     distance: Annotated[float, typer.Option(help="what the tape says, in metres")] = 0.0,
     distance_std: Annotated[float, typer.Option(help="how sure the tape is, in metres")] = 0.005,
     config: Config = ROVER_TOML,
+    plot: Plot = None,
     write: Write = True,
 ) -> None:
     """Divide the distance by what the wheels turned."""
@@ -78,7 +79,7 @@ def radius(
     if recording is None:
         typer.echo(procedures.RADIUS)
         return
-    _finish(lambda: session.radius(recording, config, distance, distance_std), config, write)
+    _finish(lambda: session.radius(recording, config, distance, distance_std, plot), config, write)
 
 
 def corrected(

@@ -3,11 +3,12 @@
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from calibration.bench.line import BenchError
 from calibration.bench.simulation import drivetrain
-from calibration.drivetrain import no_load_current
+from calibration.drivetrain import motor_current, no_load_current
 from calibration.parameters import Drivetrain
 
 ROVER = """\
@@ -68,6 +69,33 @@ wheels = [1, 2, 3, 4, 5, 6]
         assert drag == pytest.approx([0.037 + 0.05 * speed**1.2] * 6, abs=0.0015)
     assert found.viscous_current_std_A_s_per_rad[0] == pytest.approx(0.1 * found.viscous_current_A_s_per_rad[0])
     assert any("grade-resistance stays" in said for said in written.says)
+
+
+def test_an_efficiency_that_is_wrong_everywhere_alike_becomes_the_gain(tmp_path: Path) -> None:
+    """A tenth more current at wheels 1 and 2, at every torque; a loss that is curved stays where it was."""
+    corrected = """\
+[drivetrain]
+no_load_current_A = 0.037
+[[effects]]
+name = "load-dependent-efficiency"
+shape = { power = 0.0 }
+coefficients = [0.1]
+wheels = [1, 2]
+relative_std = 0.2
+[[effects]]
+name = "load-dependent-efficiency"
+shape = { power = 1.0 }
+coefficients = [0.1]
+wheels = [3]
+"""
+    written = drivetrain(*_files(tmp_path, corrected))
+    found = Drivetrain(**tomllib.loads(written.text)["drivetrain"])
+    torque, speed = np.full(6, 0.5), np.full(6, 400.0)
+    before = Drivetrain(no_load_current_A=0.037)  # type: ignore[arg-type]  # one value for six wheels
+    ratio = motor_current(torque, speed, found) / motor_current(torque, speed, before)
+    assert ratio == pytest.approx([1.1, 1.1, 1, 1, 1, 1], rel=1e-5)
+    assert found.gain_factor_std[0] == pytest.approx(0.2 * 0.1 / 1.1**2, rel=1e-4)
+    assert any("load-dependent-efficiency stays" in said for said in written.says)
 
 
 def test_another_drivetrain_is_refused(tmp_path: Path) -> None:

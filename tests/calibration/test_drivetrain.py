@@ -19,12 +19,30 @@ def test_without_friction_it_is_equation_11() -> None:
     np.testing.assert_allclose(torque, 0.0234 * 14 * 100 * 0.7 * 0.7 * 0.080)
 
 
-@given(torque=st.floats(-5, 5), speed=st.floats(-900, 900))
-def test_current_and_torque_invert_each_other(torque: float, speed: float) -> None:
-    """Whatever the torque and speed, the way to current and back changes nothing."""
+@given(torque=st.floats(-4, 4), speed=st.floats(-900, 900), loss=st.floats(-0.12, 0.5))
+def test_current_and_torque_invert_each_other(torque: float, speed: float, loss: float) -> None:
+    """Whatever the torque and speed, the way to current and back changes nothing, for gears better or worse at load."""
     torques, speeds = np.full(6, torque), np.full(6, speed)
-    back = wheel_torque(motor_current(torques, speeds, FRICTION), speeds, FRICTION)
+    drivetrain = FRICTION.model_copy(update={"load_loss_per_Nm": (loss,) * 6, "gain_factor": (0.9,) * 6})
+    back = wheel_torque(motor_current(torques, speeds, drivetrain), speeds, drivetrain)
     np.testing.assert_allclose(back, torques, atol=1e-12)
+
+
+def test_efficiency_follows_the_torque() -> None:
+    """A loss of 0.1 for each newton metre takes a fifth more current at 2 N·m, and nothing at none."""
+    lossy = Drivetrain(load_loss_per_Nm=0.1)  # type: ignore[arg-type]  # one value for six wheels
+    torque, speed = np.array([0.0, 0.5, 1.0, 2.0, -2.0, 4.0]), np.full(6, 400.0)
+    ratio = motor_current(torque, speed, lossy)[1:] / motor_current(torque, speed, Drivetrain())[1:]
+    np.testing.assert_allclose(ratio, [1.05, 1.1, 1.2, 1.2, 1.4])
+    assert motor_current(torque, speed, lossy)[0] == 0
+
+
+def test_a_current_beyond_all_torques_is_a_number() -> None:
+    """Where gears that are better at load would need no current at all, the torque stays finite and grows with it."""
+    better = Drivetrain(load_loss_per_Nm=-0.2)  # type: ignore[arg-type]  # one value for six wheels
+    torque = wheel_torque(np.linspace(0, 1.0, 6), np.full(6, 400.0), better)
+    assert (np.diff(torque) > 0).all()
+    assert np.isfinite(torque).all()
 
 
 def test_friction_opposes_either_direction_and_rests_at_standstill() -> None:

@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 import pytest
 
+from calibration.parameters import Drivetrain
 from calibration.posterior import PosteriorError
-from daemon.believe import belief_stage
+from daemon.believe import belief_stage, gain_doubt
 from daemon.config import Configuration
 from daemon.estimate import Network
 from daemon.replay import Chain
@@ -60,3 +61,12 @@ def test_a_posterior_for_another_wheel_is_refused(configuration: Configuration) 
     """With the cure."""
     with pytest.raises(PosteriorError, match=r"trained for wheels of 0\.075 m radius, not 0\.1 m\. Train one"):
         belief_stage(changed(configuration, drivetrain=CALIBRATED, wheel={"radius_m": 0.1}))
+
+
+def test_a_brake_says_how_well_the_gain_is_known() -> None:
+    """Where a wheel had one; elsewhere, and without any, it is what was stated of Eq. 11's constants."""
+    assert gain_doubt(Drivetrain(gain_relative_std=0.05)) == pytest.approx(0.05)
+    one = Drivetrain(gain_relative_std=0.05, gain_factor=0.8, gain_factor_std=(0.008, 0, 0, 0, 0, 0))  # type: ignore[arg-type]
+    assert gain_doubt(one) == pytest.approx((0.01 + 5 * 0.05) / 6)
+    bent = Drivetrain(gain_factor_std=0.03, load_loss_std_per_Nm=0.1)  # type: ignore[arg-type]  # one value for six
+    assert gain_doubt(bent) == pytest.approx(0.03 * 2**0.5)
