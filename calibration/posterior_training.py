@@ -23,7 +23,7 @@ from onnx import TensorProto, helper, numpy_helper
 from calibration import rovers as rover_simulation
 from calibration.mixture import PARAMETERS, TARGETS
 from calibration.parameters import Drivetrain, Wheel
-from calibration.window import FEATURES, KNOWN, KNOWN_HIGH, KNOWN_LOW, Windows, reduce_windows
+from calibration.window import FEATURES, KNOWN, Windows, reduce_windows
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,7 +33,7 @@ Parameters = dict[str, Any]
 
 COMPONENTS = 8
 WIDTH = 96
-INSTANTS = {1: 0.15, 2: 0.08, 4: 0.1, 8: 0.12, 20: 0.45, 40: 0.1}
+INSTANTS = {1: 0.2, 2: 0.06, 4: 0.07, 8: 0.1, 20: 0.47, 40: 0.1}
 """How many instants a window has, and the share of the training set that has so many."""
 
 _CHUNK = 4000
@@ -71,10 +71,9 @@ def _simulate_chunk(count: int, instants: int, rng: np.random.Generator) -> Exam
     noise = rover_simulation.draw_noise(count, rng)
     measured = rover_simulation.drive(rovers, noise, instants, rng, Drivetrain(), wheel)
     known = rovers.known.copy()
-    scatter = Drivetrain().gain_Nm_per_A * np.mean(noise.current * measured.current_A.mean(axis=1), axis=1)
-    known[:, 3] = np.clip(scatter * np.exp(0.15 * rng.standard_normal(count)), KNOWN_LOW[3], KNOWN_HIGH[3])
+    known[:, 3] = rover_simulation.told_scatter(rovers, noise, Drivetrain().gain_Nm_per_A, rng)
     told = np.where(rng.random(count) < 0.5, rovers.nearest, -1)
-    load = np.where(_measured_wheels(count, rng)[:, None], measured.load_N, np.nan)
+    load = np.where(_measured_wheels(count, instants, rng)[:, None], measured.load_N, np.nan)
     windows = reduce_windows(load, measured.slip, measured.torque_Nm, known, wheel.radius_m, told)
     truth = np.column_stack(
         [
@@ -86,9 +85,10 @@ def _simulate_chunk(count: int, instants: int, rng: np.random.Generator) -> Exam
     return Examples(windows, truth)
 
 
-def _measured_wheels(count: int, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """Return which wheels were measured: all six in seven of ten, else some, and at least one."""
-    share = rng.choice([1.0, 0.75, 0.0], size=(count, 1), p=[0.7, 0.15, 0.15])
+def _measured_wheels(count: int, instants: int, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """Return which wheels were measured: mostly all six, else some, at least one; at one instant, often just one."""
+    shares = [0.4, 0.15, 0.45] if instants == 1 else [0.75, 0.15, 0.1]
+    share = rng.choice([1.0, 0.75, 0.0], size=(count, 1), p=shares)
     measured = rng.random((count, 6)) < share
     measured[np.arange(count), rng.integers(6, size=count)] = True
     return measured
@@ -158,7 +158,7 @@ def scaling(examples: Examples) -> Scaling:
 
 
 def fit(
-    examples: Examples, seed: int, steps: int, batch: int = 512, progress: Callable[[float], None] = lambda _: None
+    examples: Examples, seed: int, steps: int, batch: int = 1024, progress: Callable[[float], None] = lambda _: None
 ) -> tuple[Parameters, Scaling]:
     """Return the weights after `steps` of Adam with a cosine decay; `progress` is told the loss every 50 steps."""
     by = scaling(examples)
@@ -199,7 +199,7 @@ def fit(
 
 
 def freeze(parameters: Parameters, by: Scaling, radius_m: float) -> onnx.ModelProto:
-    """Return the network as ONNX: wheels (N, 6, 7), mask (N, 6), known (N, 9) → mixture (N, 10 K)."""
+    """Return the network as ONNX: wheels (N, 6, 7), mask (N, 6), known (N, 10) → mixture (N, 10 K)."""
     constants = {
         "wheels_mean": by.wheels[0],
         "wheels_std": by.wheels[1],

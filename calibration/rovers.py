@@ -18,7 +18,7 @@ from calibration.parameters import Drivetrain, Rover, Wheel
 from calibration.soils import Soils, draw_soils
 from calibration.wheel_loads import wheel_loads
 from calibration.wheel_soil import contact_angle, wheel_torque
-from calibration.window import INTERVAL_S, KNOWN_HIGH, KNOWN_LOW
+from calibration.window import INTERVAL_S, KNOWN_HIGH, KNOWN_LOW, Knowledge, USUAL_TORQUE_Nm
 
 Array = NDArray[np.float64]
 WHEELS = 6
@@ -29,7 +29,14 @@ TABLE_4_CURRENT = np.array([31.2, 38.8, 31.3, 36.5, 31.2, 35.1]) / 100
 TABLE_4_LOAD = np.array([14.2, 11.9, 9.6, 7.0, 6.7, 7.2]) / 100
 """Relative standard deviation of the recorded loads, prepared ground."""
 
-MOTOR_SPEED_RAD_S = 0.022 / 0.075 * 1400
+USUALLY = 1 / 3
+"""How many of the rovers that are drawn are known as `window.Knowledge` says by default."""
+
+TOLD_WRONG = 0.35
+"""How many of the rovers are told the scatter of another ground."""
+
+QUIET = 0.06
+"""How many of the rovers whose noise is drawn are on ground that makes hardly any."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +57,7 @@ class Noise:
 class Rovers:
     """Rovers standing ready: truth, and what is known of each.
 
-    Soils have shape (N,), `slip_error` (N, 1), `known` (N, 4) in the order of `window.Knowledge`, the others (N, 6).
+    Soils have shape (N,), `slip_error` (N, 1), `known` (N, 5) in the order of `window.Knowledge`, the others (N, 6).
     """
 
     soils: Soils
@@ -75,11 +82,16 @@ class Measured:
 
 
 def draw_noise(count: int, rng: np.random.Generator) -> Noise:
-    """Return noise as uncertain as it is before one knows the ground: 5–45 % of the current."""
+    """Return noise as uncertain as before one knows the ground: 5–45 % of the current, much alike at all wheels.
+
+    A few are on ground so even that there is hardly any, and no drops: else the posterior would not know it.
+    """
+    quiet = rng.random((count, 1)) < QUIET
+    level = np.where(quiet, rng.uniform(0.0, 0.05, (count, 1)), rng.uniform(0.05, 0.45, (count, 1)))
     return Noise(
-        current=rng.uniform(0.05, 0.45, (count, WHEELS)),
-        load=rng.uniform(0.01, 0.16, (count, WHEELS)),
-        drop_rate=rng.uniform(0.0, 0.08, (count, 1)),
+        current=np.clip(level * np.exp(0.12 * rng.standard_normal((count, WHEELS))), 0.0, 0.5),
+        load=np.where(quiet, 0.1, 1.0) * rng.uniform(0.01, 0.16, (count, WHEELS)),
+        drop_rate=np.where(quiet, 0.0, rng.uniform(0.0, 0.08, (count, 1))),
         memory_s=rng.uniform(0.05, 1.5, (count, 1)),
     )
 
@@ -103,10 +115,9 @@ def no_noise(count: int) -> Noise:
 def draw_rovers(
     count: int, rng: np.random.Generator, known: Array | None = None, no_load_A: float | None = None
 ) -> Rovers:
-    """Return rovers on soils that they may meet; `known`, shape (N, 4), as in `Rovers`, or drawn where it is None."""
+    """Return rovers on soils that they may meet; `known`, shape (N, 5), as in `Rovers`, or drawn where it is None."""
     soils, nearest = draw_soils(count, rng)
-    if known is None:
-        known = np.exp(rng.uniform(np.log(KNOWN_LOW), np.log(KNOWN_HIGH), (count, len(KNOWN_LOW))))
+    known = _draw_known(count, rng) if known is None else known
     slope = np.radians(5) * rng.standard_normal((count, 2))
     load = wheel_loads(slope[:, 0], slope[:, 1], Rover()) * np.exp(0.05 * rng.standard_normal((count, 1)))
     load *= np.exp(0.2 * rng.standard_normal((count, WHEELS)))
@@ -117,12 +128,34 @@ def draw_rovers(
         nearest=nearest,
         load_N=np.clip(load, 8, 120),
         slip=slip,
-        no_load_A=np.ones((count, WHEELS)) * (rng.uniform(0, 0.05, (count, 1)) if no_load_A is None else no_load_A),
+        no_load_A=np.ones((count, WHEELS)) * (known[:, 4:5] if no_load_A is None else no_load_A),
         gain_error=gain_std * (rng.standard_normal((count, 1)) + 0.5 * rng.standard_normal((count, WHEELS))),
         no_load_error_A=no_load_std * (rng.standard_normal((count, 1)) + 0.5 * rng.standard_normal((count, WHEELS))),
         slip_error=slip_std * rng.standard_normal((count, 1)),
         known=known,
     )
+
+
+def _draw_known(count: int, rng: np.random.Generator) -> Array:
+    """Return how well rovers may be known, shape (N, 5): anything in its range, and in one of three what is usual.
+
+    All of it is told to the posterior, so that these shares say where it learns most, and nothing of the soil.
+    """
+    known = np.exp(rng.uniform(np.log(KNOWN_LOW), np.log(KNOWN_HIGH), (count, len(KNOWN_LOW))))
+    known[:, 4] = rng.uniform(KNOWN_LOW[4], KNOWN_HIGH[4], count)
+    return np.where(rng.random((count, 1)) < USUALLY, Knowledge().deviations(), known)
+
+
+def told_scatter(rovers: Rovers, noise: Noise, gain_Nm_per_A: float, rng: np.random.Generator) -> Array:
+    """Return the scatter of torque that is told [N·m], shape (N,): known to 15 %, or that of another rover's ground.
+
+    It is that of a wheel at `USUAL_TORQUE_Nm`. The scatter at the torque which the soil asks for would tell the soil.
+    A rover that tells what is usual may be on other ground, so that what is told must not be believed too much.
+    """
+    usual = USUAL_TORQUE_Nm + gain_Nm_per_A * rovers.no_load_A.mean(axis=1)
+    level = noise.current.mean(axis=1)
+    told = np.where(rng.random(len(level)) < TOLD_WRONG, rng.permutation(level), level)
+    return np.clip(told * usual * np.exp(0.15 * rng.standard_normal(len(usual))), KNOWN_LOW[3], KNOWN_HIGH[3])
 
 
 def margins(rovers: Rovers, wheel: Wheel) -> Array:

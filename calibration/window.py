@@ -28,15 +28,15 @@ Array = NDArray[np.float64]
 INTERVAL_S = 0.5
 LONGEST = 40
 FEATURES = 7
-KNOWN = 9
+KNOWN = 10
 LEAST_ERROR, LEAST_SPREAD = 0.003, 0.01
 """Floors of the standard error of μ and of the load's spread: data quieter than in training count as that quiet."""
 
 USUAL_TORQUE_Nm = 0.3
 """The torque at which the scatter of torque is told: one and the same, so that it does not tell of the soil."""
 
-KNOWN_LOW = np.array([0.01, 0.0003, 0.003, 0.01])
-KNOWN_HIGH = np.array([0.10, 0.010, 0.030, 0.60])
+KNOWN_LOW = np.array([0.01, 0.0003, 0.003, 0.01, 0.001])
+KNOWN_HIGH = np.array([0.10, 0.010, 0.030, 0.60, 0.060])
 """How well and how badly a rover may be known for the posterior, in the order of `Knowledge`."""
 
 
@@ -46,21 +46,23 @@ class Knowledge:
 
     The posterior widens with each of them. After a wheels-up spin the no-load current is known to about 1 mA, before
     it to 10 mA and worse; slip without a ground-speed sensor is a guess. `torque_noise_Nm` is the scatter of torque
-    from one instant to the next at a wheel, which a single instant cannot show: 35 % of 50 mA by default. `soil` is
-    the class of `SOILS` that the ground is said to be nearest to, by a geologist or an earlier trench; the posterior
+    from one instant to the next at a wheel that pulls `USUAL_TORQUE_Nm`, which a single instant cannot show: by default
+    a third of the current. `no_load_current_A` has been taken out of the torque, but not its share of the noise. `soil`
+    is the class of `SOILS` that the ground is said to be nearest to, by a geologist or an earlier trench; the posterior
     then knows that much.
     """
 
     gain_relative_std: float = 0.03
     no_load_current_std_A: float = 0.001
     slip_std: float = 0.005
-    torque_noise_Nm: float = 0.28
+    torque_noise_Nm: float = 0.30
+    no_load_current_A: float = 0.037
     soil: str | None = None
 
     def deviations(self) -> Array:
-        """Return the four numbers, within what the posterior takes, shape (1, 4)."""
-        told = np.array([[self.gain_relative_std, self.no_load_current_std_A, self.slip_std, self.torque_noise_Nm]])
-        return np.clip(told, KNOWN_LOW, KNOWN_HIGH)
+        """Return the five numbers, within what the posterior takes, shape (1, 5)."""
+        deviations = (self.gain_relative_std, self.no_load_current_std_A, self.slip_std, self.torque_noise_Nm)
+        return np.clip([[*deviations, self.no_load_current_A]], KNOWN_LOW, KNOWN_HIGH)
 
     def told(self) -> NDArray[np.intp]:
         """Return the class of soil that is told as its index in `SOILS`, shape (1,); −1 where none is."""
@@ -78,7 +80,7 @@ class Windows:
     mask
         Shape (N, 6): 1 where the wheel was measured, else 0.
     known
-        Shape (N, `KNOWN`): logarithms of the four numbers of `Knowledge` and of the instants; and the class of
+        Shape (N, `KNOWN`): logarithms of the five numbers of `Knowledge` and of the instants; and the class of
         soil that is told as a one among four zeros, or zeros.
     """
 
@@ -97,7 +99,7 @@ def reduce_windows(
 ) -> Windows:
     """Reduce windows of shape (N, instants, 6); NaN is "not measured".
 
-    `known` has shape (N, 4), the numbers of `Knowledge`; `told`, shape (N,), the class of soil or −1.
+    `known` has shape (N, 5), the numbers of `Knowledge`; `told`, shape (N,), the class of soil or −1.
     """
     usable = np.isfinite(load_N) & np.isfinite(slip) & np.isfinite(torque_Nm) & (load_N > 0)
     count = usable.sum(axis=1)

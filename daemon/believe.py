@@ -41,6 +41,7 @@ class BeliefStage:
         self._buffer = Buffer(settings.window_s)
         self._gain_std = gain_doubt(drivetrain)
         self._no_load_std_A = float(np.mean(drivetrain.no_load_current_std_A))
+        self._no_load_A = float(np.mean(drivetrain.no_load_current_A))
         self._soil = settings.soil
         self._history: deque[Array] = deque(maxlen=HISTORY)
         self._change = SoilChange(configuration) if configuration.change.enabled else None
@@ -80,6 +81,7 @@ class BeliefStage:
             gain_relative_std=self._gain_std,
             no_load_current_std_A=self._no_load_std_A,
             slip_std=SLIP_STD_GUESSED if guessed else SLIP_STD_MEASURED,
+            no_load_current_A=self._no_load_A,
             soil=self._soil,
         )
 

@@ -14,7 +14,7 @@ import numpy as np
 from calibration import rovers as simulation
 from calibration.evaluation.estimators import NO_LOAD_A
 from calibration.parameters import Drivetrain, Wheel
-from calibration.window import KNOWN_HIGH, Knowledge, reduce_windows
+from calibration.window import KNOWN_HIGH, KNOWN_LOW, Knowledge, reduce_windows
 
 if TYPE_CHECKING:
     from calibration.posterior import Estimator
@@ -25,7 +25,9 @@ def figures(count: int, seed: int, estimator: Estimator) -> dict[str, float]:
     rng = np.random.default_rng(seed)
     wheel, drivetrain = Wheel(), Drivetrain()
     known = np.tile(Knowledge().deviations(), (count, 1))
-    doubtful = known.copy()
+    unknown = known.copy()
+    unknown[:, 4] = KNOWN_LOW[4]
+    doubtful = unknown.copy()
     doubtful[:, 1] = KNOWN_HIGH[1]
     rovers = simulation.draw_rovers(count, rng, known, no_load_A=NO_LOAD_A)
     measured = simulation.drive(rovers, simulation.table_4_noise(count), 20, rng, drivetrain, wheel)
@@ -34,7 +36,7 @@ def figures(count: int, seed: int, estimator: Estimator) -> dict[str, float]:
     out = {"hidden_no_load_A": NO_LOAD_A}
     for name, torque, doubt in (
         ("calibrated", measured.torque_Nm, known),
-        ("uncalibrated", all_of_it, known),
+        ("uncalibrated", all_of_it, unknown),
         ("uncalibrated_and_doubted", all_of_it, doubtful),
     ):
         mixture = estimator.mixtures(reduce_windows(measured.load_N, measured.slip, torque, doubt, wheel.radius_m))

@@ -85,7 +85,8 @@ def answers(count: int, case: Case, seed: int, estimator: Estimator) -> Answers:
 
 def _chunk(count: int, case: Case, rng: np.random.Generator, estimator: Estimator) -> Answers:
     wheel, drivetrain = Wheel(), Drivetrain()
-    known = np.tile(Knowledge().deviations(), (count, 1))
+    knowledge = Knowledge() if case.noise else Knowledge(torque_noise_Nm=0.0)
+    known = np.tile(knowledge.deviations(), (count, 1))
     rovers = simulation.draw_rovers(count, rng, known, no_load_A=NO_LOAD_A)
     noise = simulation.table_4_noise(count) if case.noise else simulation.no_noise(count)
     measured = simulation.drive(rovers, noise, case.instants, rng, drivetrain, wheel)

@@ -17,8 +17,8 @@ def register(app: typer.Typer) -> None:
 
 def train_posterior(
     out: Annotated[Path, typer.Option(help="where the network goes")] = Path("calibration/models/posterior.onnx"),
-    rovers: Annotated[int, typer.Option(min=1000, help="how many windows to simulate")] = 300_000,
-    steps: Annotated[int, typer.Option(min=50, help="how many steps of Adam")] = 18_000,
+    rovers: Annotated[int, typer.Option(min=1000, help="how many windows to simulate")] = 1_500_000,
+    steps: Annotated[int, typer.Option(min=50, help="how many steps of Adam")] = 40_000,
     seed: Annotated[int, typer.Option(help="of rovers and initial weights")] = 1,
 ) -> None:
     """Simulate, fit, freeze: some minutes on two cores."""

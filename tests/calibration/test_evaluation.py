@@ -34,6 +34,15 @@ def test_the_posterior_is_better_than_no_data_and_covers_as_it_says() -> None:
         assert 0.43 < found[f"coverage_50_{target}"] < 0.57
 
 
+def test_a_single_instant_is_told_without_bias_though_most_of_the_current_is_friction() -> None:
+    """At 37 mA of no-load current, on 3000 rovers: c less than 0.2 kPa off on average, and intervals as they say."""
+    found = estimators.figures(estimators.answers(3000, estimators.CASES["instant"], 1, Estimator()), "")
+    assert abs(found["posterior_bias_cohesion_Pa"]) < 200
+    for target in ("cohesion", "friction_angle", "margin"):
+        assert 0.875 < found[f"coverage_90_{target}"] < 0.925
+        assert 0.465 < found[f"coverage_50_{target}"] < 0.535
+
+
 def test_noise_pulls_the_papers_friction_angle_down_and_leaves_the_posteriors() -> None:
     """The scatter of Table 4 lowers the paper network's mean φ by more than half a degree; ours by less than half."""
     found = bias.figures(300, 1, Estimator())

@@ -11,7 +11,7 @@ from calibration.onnx_session import NetworkError
 from calibration.parameters import Drivetrain, Wheel
 from calibration.posterior import SHIPPED_POSTERIOR, Buffer, Estimator
 from calibration.posterior_training import apply, freeze, initial, scaling, simulate
-from calibration.rovers import TABLE_4_CURRENT, draw_rovers, drive, table_4_noise
+from calibration.rovers import TABLE_4_CURRENT, draw_noise, draw_rovers, drive, no_noise, table_4_noise, told_scatter
 from calibration.window import KNOWN_HIGH, Knowledge, reduce_windows
 
 
@@ -74,6 +74,17 @@ def test_simulated_currents_are_as_noisy_as_the_table_says() -> None:
     rovers = draw_rovers(4, rng, np.full((4, 5), 1e-6), no_load_A=0.2)
     current = drive(rovers, table_4_noise(4), 2000, rng, Drivetrain(), Wheel()).current_A
     np.testing.assert_allclose((current.std(axis=1) / current.mean(axis=1)).mean(axis=0), TABLE_4_CURRENT, rtol=0.08)
+
+
+def test_the_scatter_that_is_told_does_not_tell_the_soil() -> None:
+    """Over 6000 windows it goes with the noise of the current, and neither with cohesion nor with the torque at all."""
+    rng = np.random.default_rng(0)
+    rovers, noise = draw_rovers(6000, rng), draw_noise(6000, rng)
+    told = told_scatter(rovers, noise, Drivetrain().gain_Nm_per_A, rng)
+    torque = drive(rovers, no_noise(6000), 1, rng, Drivetrain(), Wheel()).torque_Nm.mean(axis=(1, 2))
+    assert np.corrcoef(told, noise.current.mean(axis=1))[0, 1] > 0.4
+    for of_the_soil in (np.log(rovers.soils.cohesion_Pa), rovers.soils.friction_angle_deg, torque):
+        assert abs(np.corrcoef(told, of_the_soil)[0, 1]) < 3.5 / np.sqrt(6000)
 
 
 def test_the_onnx_graph_is_the_trained_network() -> None:
