@@ -137,9 +137,12 @@ def seek_in_residual(search: Search, candidates: Sequence[Candidate], terms: Ite
     """Let candidates with too fine a grid look at the residual for their shapes."""
     scene = search.dictionary.scene
     residual = residual_of(search, search.fit(terms))
+    counts = np.maximum(scene.mask.sum(axis=0), 1)
+    memory = float(np.median(counts / np.maximum(search.weights * np.sum(residual**2, axis=0), 1e-300)))
     for candidate in candidates:
         if shapes := candidate.seek(scene, residual):
-            add_candidate(search.dictionary, candidate, shapes)
+            quieter = [max(memory / candidate.memory_at(scene, residual, shape), 1.0) for shape in shapes]
+            add_candidate(search.dictionary, candidate, shapes, quieter)
     search.refresh()
 
 
@@ -301,6 +304,8 @@ def _left_over(search: Search, named: Fit) -> Term | None:
     if not left or left[0][0] <= UNNAMED_BY:
         return None
     beside = search.fit((*named.terms, left[0][1]))
+    if size_of(search, beside, len(named.terms)) < WORTH_A_NAME:
+        return None
     misfit = (beside.gain - named.gain) / max(beside.gain, 1e-9)
     return None if named.terms and misfit < SHAPE_MISFIT else left[0][1]
 

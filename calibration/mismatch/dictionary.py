@@ -46,6 +46,8 @@ class Group:
     candidate: Candidate | None = None
     shape: Shape = field(default_factory=dict)
     flavour: str = ""
+    quieter: float = 1.0
+    """How many times less noise there is where its columns live than the long run has: for a line in the spectrum."""
     evidence: tuple[Array, Array] | None = None
     """For a fault of another channel: for each wheel, what that channel says for it, and how large it is there."""
 

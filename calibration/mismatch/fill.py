@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 CURVE_KNOTS = 8
 TIME_KNOTS = 48
 """Time has no physics of its own that is smooth: spells and beats must show, down to a fortieth of the recording."""
-NOT_FOR_CURVES = frozenset({"direction", "wheel_angle", "wheel_acceleration"})
+NOT_FOR_CURVES = frozenset({"direction", "wheel_angle", "wheel_acceleration", "place"})
 
 
 @dataclass(frozen=True)
@@ -46,12 +46,14 @@ def add_nuisance(dictionary: Dictionary) -> Nuisance:
     return Nuisance(tuple(free), tuple(places), precision)
 
 
-def add_candidate(dictionary: Dictionary, candidate: Candidate, shapes: Sequence[Shape]) -> list[Group]:
-    """Add a candidate in each of these shapes."""
+def add_candidate(
+    dictionary: Dictionary, candidate: Candidate, shapes: Sequence[Shape], quieter: Sequence[float] = ()
+) -> list[Group]:
+    """Add a candidate in each of these shapes; `quieter` says where there is less noise than in the long run."""
     scene, made, columns = dictionary.scene, [], []
     start = len(dictionary.columns)
     price = 2 * float(np.log(candidate.tried(scene)))
-    for shape in shapes:
+    for shape, less in zip(shapes, quieter or [1.0] * len(shapes), strict=True):
         found = np.asarray(candidate.columns(scene, shape), np.float64)
         places = tuple(range(start, start + len(found)))
         start += len(found)
@@ -59,7 +61,9 @@ def add_candidate(dictionary: Dictionary, candidate: Candidate, shapes: Sequence
         signs = tuple(c.sign for c in candidate.coefficients[: len(found)])
         signs += (0,) * (len(found) - len(signs))
         evidence = candidate.evidence(scene, shape)
-        made.append(Group(candidate.name, places, signs, candidate.sharing, price, candidate, shape, "", evidence))
+        made.append(
+            Group(candidate.name, places, signs, candidate.sharing, price, candidate, shape, "", less, evidence)
+        )
     dictionary.append(columns)
     dictionary.groups += made
     return made

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from calibration.mismatch.answer import Parameter
 from calibration.mismatch.decide import contribution, residual_of
+from calibration.mismatch.discrepancy import FORM, bends
 from calibration.mismatch.refine import Profile
 
 if TYPE_CHECKING:
@@ -19,18 +20,32 @@ Array = NDArray[np.float64]
 DRAWS = 4000
 UNLIKELY = 0.02
 """A shape that fits worse than this, relative to the best, is not counted."""
-NINE_TENTHS = 2.706
-"""A profile may fall this far within a 90 % interval (χ² with one degree of freedom)."""
+NINE_TENTHS = 5.94
+"""A profile over onsets may fall this far within a 90 % interval. The gain of a sudden change is no parabola but a
+random walk to both sides, whose supremum is exponential: (1 − exp(−fall / 2))² = 0.9."""
 
 
 def parameters_of(search: Search, fit: Fit, blocks: NDArray[np.int64]) -> list[dict[str, Parameter]]:
-    """Return each term's parameters with bounds that hold them nine times in ten."""
+    """Return each term's parameters with bounds that hold them nine times in ten.
+
+    What the laws may be wrong by (`discrepancy`) is fitted beside them, in one step from where they stand.
+    """
     columns, names = _design(search, fit)
-    spread = _sandwich(search, fit, columns, blocks)
+    bent = [bends(search, fit, index) for index in range(len(fit.terms))]
+    slack = np.concatenate((np.zeros(len(columns)), np.full(sum(map(len, bent)), FORM**-2)))
+    slack[: len(search.nuisance.columns)] = search.nuisance.precision
+    step, spread = _sandwich(search, fit, np.concatenate((columns, *bent)), slack, blocks)
     generator = np.random.default_rng(0)
     root = np.linalg.cholesky(spread + 1e-12 * np.trace(spread) / len(spread) * np.eye(len(spread)))
-    moved = generator.standard_normal((DRAWS, len(spread))) @ root.T
-    return [_of_term(search, fit, index, moved, names) for index in range(len(fit.terms))]
+    moved = step + generator.standard_normal((DRAWS, len(spread))) @ root.T
+    ends = len(columns) + np.cumsum([0, *map(len, bent)])
+    found = []
+    for index, own in enumerate(bent):
+        at = fit.of_term(index)
+        parts = np.concatenate((columns[at], own))
+        size = _sizes(search, fit, index, parts, np.hstack((moved[:, at], moved[:, ends[index] : ends[index + 1]])))
+        found.append(_of_term(search, fit, index, moved, names, size))
+    return found
 
 
 def _design(search: Search, fit: Fit) -> tuple[Array, list[tuple[int, str, float]]]:
@@ -68,25 +83,30 @@ def _design(search: Search, fit: Fit) -> tuple[Array, list[tuple[int, str, float
     return np.stack(parts) if parts else np.zeros((0, *scene.mask.shape)), names
 
 
-def _sandwich(search: Search, fit: Fit, columns: Array, blocks: NDArray[np.int64]) -> Array:
-    """Return the covariance of all coefficients: what the blocks' scores really did, not what white noise would."""
+def _sandwich(
+    search: Search, fit: Fit, columns: Array, precision: Array, blocks: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """Return how far the coefficients would move, and their covariance.
+
+    The covariance is of what the blocks' scores really did, not of what white noise would; `precision` holds the
+    priors of those that have one.
+    """
     weights = search.weights
     matrix = np.einsum("atw,w,btw->ab", columns, weights, columns, optimize=True)
-    base = len(search.nuisance.columns)
-    prior = np.zeros(len(matrix))
-    prior[:base] = search.nuisance.precision
-    inverse = np.linalg.pinv(matrix + np.diag(prior), rcond=1e-9, hermitian=True)
+    inverse = np.linalg.pinv(matrix + np.diag(precision), rcond=1e-9, hermitian=True)
     scores = columns * (residual_of(search, fit) * weights)[None]
     count = int(blocks.max()) + 1
     # Wheels are independent of each other, so each block of each wheel is one draw.
     sums = np.stack([np.add.reduceat(scores, np.flatnonzero(np.diff(blocks, prepend=-1)), axis=1)])[0]
     rows = sums.transpose(1, 2, 0).reshape(-1, len(matrix))
-    middle = rows.T @ rows * count / max(count - 1, 1) + np.diag(prior)
-    return inverse @ middle @ inverse
+    middle = rows.T @ rows * count / max(count - 1, 1) + np.diag(precision)
+    # The fit's own coefficients are where they want to be, priors and all; what stands beside them is not.
+    pull = np.where(np.arange(len(matrix)) < len(fit.columns), 0.0, rows.sum(axis=0))
+    return inverse @ pull, inverse @ middle @ inverse
 
 
 def _of_term(
-    search: Search, fit: Fit, index: int, moved: Array, names: list[tuple[int, str, float]]
+    search: Search, fit: Fit, index: int, moved: Array, names: list[tuple[int, str, float]], size: Parameter
 ) -> dict[str, Parameter]:
     dictionary, term = search.dictionary, fit.terms[index]
     candidate, shape = term.group.candidate, term.group.shape
@@ -99,8 +119,8 @@ def _of_term(
     free = [(len(fit.columns) + k, name, size) for k, (i, name, size) in enumerate(names) if i == index]
     for row in moved[:1000]:
         other = dict(shape)
-        for place, name, size in free:
-            other[name] = float(shape[name]) + row[place] / size
+        for place, name, unit in free:
+            other[name] = float(shape[name]) + row[place] / unit
         for name, value in candidate.parameters(other, ((fit.coefficients[at] + row[at]) / scale).tolist()).items():
             drawn[name].append(value)
     units = {c.name: c.unit.format(unit=dictionary.scene.simulation.unit) for c in candidate.coefficients}
@@ -108,11 +128,10 @@ def _of_term(
     found = {}
     for name, value in central.items():
         low, high = np.quantile(drawn[name], [0.05, 0.95])
-        found[name] = Parameter(value, float(low), float(high), units.get(name, "1"))
+        found[name] = Parameter(value, float(min(low, value)), float(max(high, value)), units.get(name, "1"))
     if "onset_s" in shape and "onset_s" in candidate.free:
         found["onset_s"] = Parameter(float(shape["onset_s"]), *_onset_bounds(search, fit, index), "s")
-    found["relative_size"] = _relative_size(search, fit, index, moved)
-    return found
+    return {**found, "relative_size": size}
 
 
 def _unit(name: str) -> str:
@@ -121,14 +140,17 @@ def _unit(name: str) -> str:
     return next((unit for ending, unit in endings.items() if name.endswith(ending)), "1")
 
 
-def _relative_size(search: Search, fit: Fit, index: int, moved: Array) -> Parameter:
-    """Return the effect's root mean square on its wheels over the channel's mean magnitude."""
+def _sizes(search: Search, fit: Fit, index: int, parts: Array, moved: Array) -> Parameter:
+    """Return the effect's root mean square on its wheels over the channel's mean magnitude.
+
+    `parts` are its columns and its bends (part, time, wheel), `moved` how far each went in each draw (draw, part).
+    """
     scene, term = search.dictionary.scene, fit.terms[index]
     on = list(term.wheels)
-    span = term.group.span
-    gram = search.dictionary.gram[:, on, span, span].sum(axis=(0, 1)) / scene.mask[:, on].sum()
-    at = fit.of_term(index)
-    drawn = fit.coefficients[at] + moved[:, at]
+    flat = parts[:, :, on].reshape(len(parts), -1)
+    gram = flat @ flat.T / scene.mask[:, on].sum()
+    drawn = moved.copy()
+    drawn[:, : len(term.group.columns)] += fit.coefficients[fit.of_term(index)]
     sizes = np.sqrt(np.maximum(np.einsum("da,ab,db->d", drawn, gram, drawn), 0)) / scene.mean_size
     value = float(np.sqrt(np.mean(contribution(search, fit, index)[:, on][scene.mask[:, on]] ** 2))) / scene.mean_size
     low, high = np.quantile(np.concatenate(_over_shapes(search, fit, index, sizes, value)), [0.05, 0.95])
@@ -167,8 +189,7 @@ def _onset_bounds(search: Search, fit: Fit, index: int) -> tuple[float, float]:
     scene = search.dictionary.scene
     at, length = float(shape["onset_s"]), scene.length_s
     # How it grew after its onset is not known either: at each onset the best growth counts.
-    growths = {tuple(sorted((k, v) for k, v in s.items() if k != "onset_s")) for s in candidate.shapes(scene)}
-    ways_to_grow = [dict(g) for g in sorted(growths, key=str)]
+    ways_to_grow = candidate.growths(scene)
 
     def gain(onset_s: float) -> float:
         return max(profile({**growth, "onset_s": onset_s}) for growth in ways_to_grow)

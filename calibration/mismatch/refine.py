@@ -84,7 +84,7 @@ def refined(search: Search, others: Sequence[Term], term: Term) -> Term:
             best, gain = {**best, name: value}, found
     if best == term.group.shape:
         return term
-    (group,) = add_candidate(search.dictionary, candidate, [best])
+    (group,) = add_candidate(search.dictionary, candidate, [best], [term.group.quieter])
     search.refresh()
     return Term(group, term.wheels)
 

@@ -27,6 +27,8 @@ CANNOT_LEAD = 10.8
 """Energy apart, below which the wrong one of two leads more than one time in twenty: (2 × 1.645)²."""
 WORTH_WORRYING = 0.15
 """Of the mean magnitude of the predicted channel: the size at which two effects should be told apart."""
+ABSURD = 2.0
+"""How many times that size is more than anybody would overlook."""
 FEW = 2
 SLACK = 4.0
 """A lead that the choice among shapes, and forms that are not nature's, give for nothing."""
@@ -152,11 +154,16 @@ def _representatives(search: Search) -> dict[str, list[Term]]:
 
 
 def _imitates(search: Search, given: Fit, one: list[Term], two: list[Term], size: float) -> bool:
-    """Say whether some shape of `two` would pass for the middle shape of `one`, at this size, one time in twenty."""
+    """Say whether some shape of `two` would pass for the middle shape of `one`, at this size, one time in twenty.
+
+    Where the free parameters hide an effect of this size, one that just shows is meant, unless that is absurdly large.
+    """
     term = one[len(one) // 2]
-    if _energy_apart(search, given.terms, term, size) < 2 * CANNOT_LEAD:
+    alone = _energy_apart(search, given.terms, term, size)
+    if alone < 2 * CANNOT_LEAD / ABSURD**2:
         return False
-    return any(_energy_apart(search, (*given.terms, other), term, size) < CANNOT_LEAD for other in two)
+    shows = max(2 * CANNOT_LEAD / alone, 1.0)
+    return any(shows * _energy_apart(search, (*given.terms, other), term, size) < CANNOT_LEAD for other in two)
 
 
 def experiment_for(covariates: Sequence[str]) -> str:

@@ -10,6 +10,7 @@ from pydantic import Field, ValidationError
 
 from calibration.drivetrain import motor_current
 from calibration.mismatch.errors import SimulationError
+from calibration.mismatch.inputs import known_mean
 from calibration.mismatch.simulation import Prior, SensorError, Simulation
 from calibration.mismatch.supply import open_circuit_voltage
 from calibration.parameters import Drivetrain, Rover, Sensors, Soil, Table, Wheel
@@ -130,7 +131,8 @@ class RoverWheel(Simulation):
             "slip": "slip",
         }
         found = {name: inputs[column] for name, column in named.items() if column in inputs}
-        return {**found, "wheel_speed": self._wheel_speed(inputs), "time": inputs["t_s"]}
+        speed = self._wheel_speed(inputs)
+        return {**found, "wheel_speed": speed, "time": inputs["t_s"], "place": self._place_m(inputs, speed)}
 
     def side(self, wheels: Sequence[int]) -> Array | None:
         """Odd wheels are on the left."""
@@ -153,6 +155,17 @@ class RoverWheel(Simulation):
         soil["cohesion_Pa"] = float(values["cohesion_Pa"])
         soil["friction_angle_deg"] = float(values["friction_angle_deg"])
         return tables
+
+    def _place_m(self, inputs: Mapping[str, Array], speed: Array) -> Array:
+        """Return how far along the way each wheel is [m]: what the middle has driven, and where the axle stands.
+
+        Ways back count as ways on: whether a rover that reverses meets its own tracks is not recorded.
+        """
+        hub = np.abs(self.tables.wheel.radius_m * speed * (1 - inputs["slip"]))
+        steps = np.clip(np.diff(inputs["t_s"][:, 0], prepend=inputs["t_s"][0, 0]), 0, None)
+        driven = np.cumsum(known_mean(hub, axis=1) * np.nan_to_num(steps))
+        rows = np.array([0.5, 0.5, 0.0, 0.0, -0.5, -0.5]) if speed.shape[1] == 6 else np.zeros(speed.shape[1])
+        return driven[:, None] + rows * self.tables.rover.wheelbase_m
 
     def _wheel_speed(self, inputs: Mapping[str, Array]) -> Array:
         return inputs["motor_speed_rad_s"] / self.tables.drivetrain.ratio

@@ -148,8 +148,14 @@ class Search:
         return Fit(terms, columns, solved, inverse, gain)
 
     def score(self, fit: Fit) -> float:
-        """Return the gain less the prices."""
-        return fit.gain - sum(term.price(len(self.weights)) for term in fit.terms)
+        """Return the gain less the prices; what lives where there is little noise gains by so much more."""
+        gain = fit.gain
+        for index, term in enumerate(fit.terms):
+            if term.group.quieter > 1:
+                values, span = fit.coefficients[fit.of_term(index)], term.group.span
+                own = sum(float(values @ self.gram[w][span, span] @ values) for w in term.wheels)
+                gain += (term.group.quieter - 1) * own
+        return gain - sum(term.price(len(self.weights)) for term in fit.terms)
 
     def conditional(self, given: Iterable[Term], groups: Sequence[Group] | None = None) -> list[tuple[float, Term]]:
         """Return the further gain of every group beside `given`, on all wheels and on each alone."""
@@ -181,7 +187,7 @@ class Search:
                     gain = _gain(group.signs, left[here], block, reach[:, here].T @ solved[:, here])
                 term = Term(group, pattern)
                 if gain > 0 and term.visible:
-                    found.append((gain, term))
+                    found.append((gain * group.quieter, term))
         return found
 
     def beside(self, given: Iterable[Term], term: Term) -> tuple[Array, Array]:

@@ -46,7 +46,7 @@ def _smallest(search: Search, given: Fit, term: Term) -> float:
     own = np.linalg.eigvalsh(block - reach)
     total = float(np.trace(block)) / len(block)
     price = term.price(len(search.weights)) + term.bonus
-    needed = (np.sqrt(search.threshold + price) + NINE_IN_TEN) ** 2
+    needed = (np.sqrt(search.threshold + price) + NINE_IN_TEN) ** 2 / term.group.quieter
     outside = float(np.max(own))
     if outside <= 1e-9 * total:
         return float("inf")

@@ -32,8 +32,13 @@ class BearingDrag(Candidate):
         at = onsets(scene)
         rises = (0.0, 0.03 * scene.length_s, 0.15 * scene.length_s, float("inf"))
         soon: list[Shape] = [{"onset_s": t, "rise_s": rise} for t in at for rise in rises]
-        wear: list[Shape] = [{"onset_s": t, "rise_s": float("inf"), "power": p} for t in at for p in (0.5, 2.0)]
+        wear: list[Shape] = [{"onset_s": t, "rise_s": float("inf"), "power": p} for t in at for p in (0.25, 0.5, 2.0)]
         return [*soon, *wear]
+
+    def growths(self, scene: Scene) -> Sequence[Shape]:
+        """Add wear by more powers of time than are worth a search: an onset is only as sure as what follows it."""
+        wear: list[Shape] = [{"rise_s": float("inf"), "power": p} for p in (0.12, 0.18, 0.35, 0.7, 1.4)]
+        return [*super().growths(scene), *wear]
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return sign(ω) g(t − t_0)."""

@@ -63,6 +63,11 @@ class Candidate:
         """Return the grid of shapes that is searched."""
         return [{}]
 
+    def growths(self, scene: Scene) -> Sequence[Shape]:
+        """Return the ways to grow after an onset: every shape but for its onset."""
+        found = {tuple(sorted((k, v) for k, v in s.items() if k != "onset_s")) for s in self.shapes(scene)}
+        return [dict(growth) for growth in sorted(found, key=str)]
+
     def tried(self, scene: Scene) -> float:
         """Return how many different shapes were open to choice: what a choice among them must be paid for."""
         return max(len(self.shapes(scene)), 1)
@@ -70,6 +75,10 @@ class Candidate:
     def seek(self, scene: Scene, residual: Array) -> Sequence[Shape]:  # noqa: ARG002
         """Return further shapes that a residual suggests, where a grid would be too fine to search blindly."""
         return []
+
+    def memory_at(self, scene: Scene, residual: Array, shape: Shape) -> float:  # noqa: ARG002
+        """Return how many readings count as one for this shape's columns; infinite where only the long run is known."""
+        return float("inf")
 
     def evidence(self, scene: Scene, shape: Shape) -> tuple[Array, Array] | None:  # noqa: ARG002
         """Return what the fault's own channel says, for each wheel: the gain there and the coefficient; or nothing."""

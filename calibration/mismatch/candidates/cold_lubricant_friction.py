@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from calibration.mismatch.scene import Scene
 
 
+POLE_DEGC = -110.0
+"""Where Vogel's law for low-temperature greases has its pole, within some ten degrees."""
+
+
 class ColdLubricantFriction(Candidate):
     """Grease viscosity over temperature: a constant drag or one proportional to speed, times a falling function."""
 
@@ -29,13 +33,13 @@ class ColdLubricantFriction(Candidate):
     free: ClassVar = {"scale_K": (5.0, 80.0), "no_drag_above_degC": (-60.0, 80.0)}
 
     def shapes(self, scene: Scene) -> Sequence[Shape]:
-        """Exponentials of several steepnesses, and straight lines that end at several temperatures."""
+        """Vogel's law of several steepnesses, and straight lines that end at several temperatures."""
         temperature = scene.covariates["temperature"][scene.mask]
         ends = np.nanquantile(temperature, [0.35, 0.6, 0.85]).tolist()
         top = float(np.nanmax(temperature))
         found: list[Shape] = []
         for power in (0.0, 1.0):
-            found += [{"power": power, "scale_K": scale} for scale in (8.0, 15.0, 30.0, 60.0)]
+            found += [{"power": power, "scale_K": scale} for scale in (6.0, 11.0, 20.0, 45.0)]
             found += [{"power": power, "no_drag_above_degC": end} for end in (*ends, top, top + 20)]
         return found
 
@@ -44,7 +48,9 @@ class ColdLubricantFriction(Candidate):
         temperature = np.nan_to_num(scene.covariates["temperature"])
         coldest = float(np.quantile(temperature[scene.mask], 0.005))
         if "scale_K" in shape:
-            growth = np.exp(-(temperature - coldest) / float(shape["scale_K"]))
+            # Vogel: ln of viscosity goes with 1/(T − T_0); near the coldest it falls by e over the scale.
+            above, coldest_above = np.maximum(temperature - POLE_DEGC, 5.0), max(coldest - POLE_DEGC, 5.0)
+            growth = np.exp(coldest_above / float(shape["scale_K"]) * (coldest_above / above - 1))
         else:
             end = float(shape["no_drag_above_degC"])
             growth = np.maximum(end - temperature, 0.0) / max(end - coldest, 1.0)

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, onsets, since
+import numpy as np
+
+from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, onsets
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from calibration.mismatch.scene import Scene
+
+
+BORDERS_M = (0.01, 0.5)
+"""Over how much ground one soil becomes the other: a line, or a blend as long as the rover is."""
 
 
 class SoilTransition(Candidate):
@@ -31,8 +37,16 @@ class SoilTransition(Candidate):
         return {"cohesion_Pa", "friction_angle_deg"} <= set(scene.simulation.parameters)
 
     def shapes(self, scene: Scene) -> Sequence[Shape]:
-        """At each of many times, at once."""
-        return [{"onset_s": t, "rise_s": 0.0, "of": "strength"} for t in onsets(scene, 40)]
+        """At each of many times: under all wheels at once, or where each wheel comes to the border in its turn."""
+        return [{"onset_s": t, **way} for t in onsets(scene, 40) for way in self.growths(scene)]
+
+    def growths(self, scene: Scene) -> Sequence[Shape]:
+        """At once everywhere, or along the way: at a line, or over half a metre."""
+        everywhere: Shape = {"along": "time", "of": "strength"}
+        if "place" not in scene.covariates:
+            return [everywhere]
+        borders: list[Shape] = [{"along": "place", "within_m": width, "of": "strength"} for width in BORDERS_M]
+        return [everywhere, *borders]
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return the prediction's answer to stronger soil, after the onset."""
@@ -41,8 +55,18 @@ class SoilTransition(Candidate):
         # d tan φ / tan φ = dφ · 2 / sin 2φ; to a few percent the angle itself scales alike.
         friction = values["friction_angle_deg"] * scene.tangent("friction_angle_deg")
         of = {"strength": cohesion + friction, "cohesion": cohesion, "friction": friction}[str(shape["of"])]
-        return (of * since(scene, float(shape["onset_s"]), float(shape["rise_s"])))[None]
+        return (of * _beyond(scene, shape))[None]
 
     def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Anywhere but at the very ends."""
         return {"onset_s": (0.02 * scene.length_s, 0.97 * scene.length_s)}
+
+
+def _beyond(scene: Scene, shape: Shape) -> Array:
+    """Return how far it is the other soil, 0 to 1, shape (time, wheel); the rover's middle meets it at the onset."""
+    onset_s = float(shape["onset_s"])
+    if shape["along"] == "time":
+        return np.broadcast_to(scene.time_s >= onset_s, scene.mask.shape).astype(np.float64)
+    place = scene.covariates["place"]
+    beyond_m = place - np.interp(onset_s, scene.time_s[:, 0], np.mean(place, axis=1))
+    return np.clip(0.5 + beyond_m / float(shape["within_m"]), 0.0, 1.0)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
-from calibration.mismatch.inputs import known_mean
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,11 +32,11 @@ class TurningResistance(Candidate):
     sharing: ClassVar = ("all",)
 
     def shapes(self, scene: Scene) -> Sequence[Shape]:
-        """Proportional or saturating with yaw rate, or with yaw rate over speed: even, or more at the end rows."""
-        rows = ("alike", "ends") if scene.row is not None and np.ptp(scene.row) > 1 else ("alike",)
+        """Proportional or saturating with yaw rate, or with the slip angle: on all rows alike, or more at the ends."""
+        ends = (0.0, 0.5, 1.0) if scene.row is not None and np.ptp(scene.row) > 1 else (0.0,)
         by = ("rate", "angle") if "wheel_speed" in scene.covariates else ("rate",)
         # An angle cannot grow without end, a rate may.
-        return [{"half_at": h, "rows": row, "by": b} for b in by for h in HALVES[b] for row in rows]
+        return [{"half_at": h, "ends": end, "by": b} for b in by for h in HALVES[b] for end in ends]
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return drag and moment, in multiples of what the typical turn has."""
@@ -45,18 +44,23 @@ class TurningResistance(Candidate):
         noise = scene.simulation.sensors.get("yaw_rate_rad_s")
         # What is within the sensor's error of no turn is no turn: its sign would be noise.
         yaw = np.where(np.abs(yaw) > 3 * noise.absolute, yaw, 0.0) if noise else yaw
-        turned = np.abs(yaw)
+        turned = np.abs(yaw) * self._lever(scene, float(shape["ends"]))
         if shape["by"] == "angle":
-            # Where a wheel points is off from where it goes by yaw rate × lever over the body's speed.
-            body = np.abs(known_mean(scene.covariates["wheel_speed"], axis=1))[:, None]
-            turned = turned / (body + 0.1 * np.mean(body))
+            # Where a wheel points is off from where it goes by yaw rate × lever over its speed.
+            speed = np.abs(np.nan_to_num(scene.covariates["wheel_speed"]))
+            turned = turned / (speed + 0.1 * np.mean(speed[scene.mask]))
         typical = float(np.mean(turned[yaw != 0])) if np.any(yaw != 0) else 1.0
         relative = turned / typical
         half = float(shape["half_at"])
         size = relative * (1 + half) / (relative + half)
-        if shape["rows"] == "ends" and scene.row is not None:
-            size = size * np.abs(scene.row - np.mean(scene.row))
         drag = size * scene.covariates["direction"]
         if scene.side is None:
             return drag[None]
         return np.stack((drag, size * np.sign(yaw) * scene.side))
+
+    def _lever(self, scene: Scene, ends: float) -> Array | float:
+        """Return how far each wheel's row is swept sideways by a turn, over its mean: `ends` 1 leaves the middle be."""
+        if scene.row is None:
+            return 1.0
+        away = np.abs(scene.row - np.mean(scene.row))
+        return 1 - ends + ends * away / max(float(np.mean(away)), 1e-9)

@@ -18,7 +18,7 @@ HIGHEST_ORDER = 64
 
 
 class WheelAngleRipple(Candidate):
-    """A sine of the wheel's angle, each wheel at its own phase, at one order: cycles per wheel turn."""
+    """A sine of the wheel's angle, perhaps with an overtone, each wheel at its own phase."""
 
     name = "wheel-angle-ripple"
     covariate = "wheel_angle"
@@ -37,25 +37,33 @@ class WheelAngleRipple(Candidate):
         return []
 
     def tried(self, scene: Scene) -> float:
-        """Return the number of lines that the angle turned can resolve, of each kind."""
+        """Return the number of lines that the angle turned can resolve, of each kind.
+
+        And ten times as many: of sums of twelve squares the largest is larger than two logarithms allow.
+        """
         turns = float(np.ptp(scene.covariates["wheel_angle"])) / (2 * np.pi)
-        return max(3 * HIGHEST_ORDER * turns, 1.0)
+        return max(10 * 3 * HIGHEST_ORDER * turns, 1.0)
 
     def seek(self, scene: Scene, residual: Array) -> Sequence[Shape]:
-        """Return the strongest order of each kind: the residual summed over angle bins, and its spectrum."""
+        """Return the strongest order of each kind, as a sine and with its overtone.
+
+        The residual is summed over angle bins, and its spectrum taken.
+        """
         kinds = ("drag", "torque", "load") if "direction" in scene.covariates else ("torque",)
-        return [{"order": self._strongest(scene, residual * self._base(scene, kind)), "kind": kind} for kind in kinds]
+        orders = {kind: self._strongest(scene, residual * self._base(scene, kind)) for kind in kinds}
+        return [{"order": orders[kind], "kind": kind, "sines": sines} for kind in kinds for sines in (1.0, 2.0)]
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
-        """Return cosine and sine for each wheel, shape (2 wheels, time, wheel)."""
+        """Return cosine and sine for each wheel, then those of the overtone, shape (2 sines wheels, time, wheel)."""
         phase = float(shape["order"]) * scene.covariates["wheel_angle"]
         base = self._base(scene, str(shape["kind"]))
-        wheels = scene.mask.shape[1]
-        found = np.zeros((2 * wheels, *scene.mask.shape))
-        for k in range(wheels):
-            found[2 * k, :, k] = (base * np.cos(phase))[:, k]
-            found[2 * k + 1, :, k] = (base * np.sin(phase))[:, k]
-        return found
+        wheels, sines = scene.mask.shape[1], int(float(shape["sines"]))
+        found = np.zeros((sines, wheels, 2, *scene.mask.shape))
+        for sine in range(sines):
+            waves = base * np.stack((np.cos((sine + 1) * phase), np.sin((sine + 1) * phase)))
+            for k in range(wheels):
+                found[sine, k, :, :, k] = waves[:, :, k]
+        return found.reshape(-1, *scene.mask.shape)
 
     def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:
         """Within one line's width of where it was found."""
@@ -64,8 +72,9 @@ class WheelAngleRipple(Candidate):
         return {"order": (order - width, order + width)}
 
     def parameters(self, shape: Shape, values: Sequence[float]) -> dict[str, float]:
-        """Return the amplitude (root mean square over the wheels that have it) and the order."""
-        amplitudes = np.hypot(np.asarray(values[0::2]), np.asarray(values[1::2]))
+        """Return the fundamental's amplitude (root mean square over the wheels that have it) and the order."""
+        fundamental = np.asarray(values[: len(values) // int(float(shape["sines"]))])
+        amplitudes = np.hypot(fundamental[0::2], fundamental[1::2])
         amplitude = float(np.sqrt(np.mean(amplitudes**2)))
         return {"amplitude": amplitude, "order": float(shape["order"])}
 
@@ -75,7 +84,21 @@ class WheelAngleRipple(Candidate):
             return scene.covariates["direction"]
         return np.ones(scene.mask.shape) if kind == "torque" else scene.filled / scene.mean_size
 
+    def memory_at(self, scene: Scene, residual: Array, shape: Shape) -> float:
+        """Return the noise's power around this order, over that of white noise: lines stand out of their neighbours."""
+        order, power = self._spectrum(scene, residual * self._base(scene, str(shape["kind"])))
+        away = np.abs(order - float(shape["order"]))
+        around = power[(away > 0.1) & (away < 1.5)]
+        # Half of all squares are below their median: of two a wheel, 1 − 1/9n of the mean, cubed (Wilson, Hilferty).
+        wheels = max(int(scene.mask.any(axis=0).sum()), 1)
+        return float(np.median(around)) / (wheels * (1 - 1 / (9 * wheels)) ** 3) if around.size else float("inf")
+
     def _strongest(self, scene: Scene, weighted: Array) -> float:
+        order, power = self._spectrum(scene, weighted)
+        return float(order[np.argmax(power)])
+
+    def _spectrum(self, scene: Scene, weighted: Array) -> tuple[Array, Array]:
+        """Return orders and the power of a residual at each, summed over the wheels; white noise has 1 on each."""
         angle = scene.covariates["wheel_angle"]
         low = np.min(angle, axis=0)
         bins = np.rint((angle - low) * BINS_PER_TURN / (2 * np.pi)).astype(np.int64)
@@ -87,4 +110,4 @@ class WheelAngleRipple(Candidate):
             power += np.abs(np.fft.rfft(summed)) ** 2 / max(float(np.sum(weighted[here, k] ** 2)), 1e-300)
         order = np.arange(len(power)) * BINS_PER_TURN / length
         sought = (order >= self.free["order"][0]) & (order <= HIGHEST_ORDER)
-        return float(order[np.argmax(np.where(sought, power, 0.0))])
+        return order[sought], power[sought]
