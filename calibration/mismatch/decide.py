@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.mismatch.fill import add_candidate
+from calibration.mismatch.fill import add_beat, add_candidate
 from calibration.mismatch.noise import Noise, blocks_of_time, estimate_noise
 from calibration.mismatch.null import naming_threshold
 from calibration.mismatch.refine import refined
@@ -37,11 +37,15 @@ UNNAMED_BY = 16.0
 """Likewise for a curve, of which there are more and freer ones."""
 WORTH_A_NAME = 0.02
 """Of the predicted channel's mean magnitude: an effect with a smaller root mean square on its wheels is no finding."""
+WORTH_A_CURVE = 0.01
+"""Of the residual's power on its wheels: what is less may be significant and is still nothing to worry about."""
 FURTHER_NAME = 2.0
 """A second name is chosen beside a first that was chosen too: it needs a little more."""
 SHAPE_MISFIT = 0.12
 """A name whose form explains all but this share of what a free curve could explain has the right form: nature's
 friction curves are not ours to the last percent."""
+ONE_IN_A_THOUSAND = 3.09
+"""Quantile of the normal density."""
 QUICK_MEMORY = 5.0
 FORCED_TERMS = 4
 SMOOTH = 12
@@ -143,6 +147,7 @@ def seek_in_residual(search: Search, candidates: Sequence[Candidate], terms: Ite
         if shapes := candidate.seek(scene, residual):
             quieter = [max(memory / candidate.memory_at(scene, residual, shape), 1.0) for shape in shapes]
             add_candidate(search.dictionary, candidate, shapes, quieter)
+    add_beat(search.dictionary, residual)
     search.refresh()
 
 
@@ -274,6 +279,7 @@ def _without_a_name(search: Search, named: Fit, simpler: Sequence[Fit]) -> tuple
     alone = best_per_family(search, (), named=False)
     if not alone:
         return named, ()
+    named = _that_stay(search, named)
     curve = alone[0][1]
     by_curve = search.fit((curve,))
     imitated = len(named.terms) > 1 and search.score(by_curve) >= search.score(named)
@@ -304,7 +310,9 @@ def _left_over(search: Search, named: Fit) -> Term | None:
     if not left or left[0][0] <= UNNAMED_BY:
         return None
     beside = search.fit((*named.terms, left[0][1]))
-    if size_of(search, beside, len(named.terms)) < WORTH_A_NAME:
+    on = list(left[0][1].wheels)
+    power = np.sum(contribution(search, beside, len(named.terms))[:, on] ** 2)
+    if power < WORTH_A_CURVE * np.sum(residual_of(search, named)[:, on] ** 2):
         return None
     misfit = (beside.gain - named.gain) / max(beside.gain, 1e-9)
     return None if named.terms and misfit < SHAPE_MISFIT else left[0][1]
@@ -326,3 +334,29 @@ def _that_stand_beside(search: Search, named: Fit, curve: Term) -> Fit:
         if both.gain - search.fit(rest).gain >= BESIDE_THE_UNKNOWN * unknown:
             kept.append(term)
     return search.fit(kept)
+
+
+def _that_stay(search: Search, named: Fit) -> Fit:
+    """Leave out changes that come and go: what wears or drives onto other soil does not heal.
+
+    They show in a curve over time on the same wheels that is significant beside them; one covariate and one place need
+    no price for having been chosen from many.
+    """
+    kept = []
+    curves = [g for g in search.dictionary.groups if not g.named and g.name == "time" and "periodic" not in g.flavour]
+    for term in named.terms:
+        beside = search.conditional(named.terms, curves) if _covariate(term) == "time" else []
+        more = [
+            gain / (gain + named.gain)
+            for gain, curve in beside
+            if curve.wheels == term.wheels and gain > _by_chance(len(curve.group.columns))
+        ]
+        if max(more, default=0.0) < SHAPE_MISFIT:
+            kept.append(term)
+    return named if len(kept) == len(named.terms) else search.fit(kept)
+
+
+def _by_chance(columns: int) -> float:
+    """Return what that many coefficients gain one time in a thousand where nothing is (Wilson and Hilferty)."""
+    spread = 2 / (9 * columns)
+    return columns * (1 - spread + ONE_IN_A_THOUSAND * float(np.sqrt(spread))) ** 3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -22,6 +23,12 @@ Array = NDArray[np.float64]
 CURVE_KNOTS = 8
 TIME_KNOTS = 48
 """Time has no physics of its own that is smooth: spells and beats must show, down to a fortieth of the recording."""
+BETWEEN_WHEELS = 0.2
+"""Share of a covariate's variance that must be within wheels."""
+LEAST_BEATS = 4
+"""Beats in a recording, below which a sine over time is no more than a slow curve."""
+SHORTEST_BEAT = 5.0
+"""Readings in a beat."""
 NOT_FOR_CURVES = frozenset({"direction", "wheel_angle", "wheel_acceleration", "place"})
 
 
@@ -96,6 +103,8 @@ def add_curves(dictionary: Dictionary) -> None:
     for name, values in scene.covariates.items():
         if name in NOT_FOR_CURVES:
             continue
+        if _tells_wheels_apart(values, scene.mask):
+            continue
         curve = np.abs(values) if name == "wheel_speed" else values
         hats = broken_lines(curve, scene.mask, CURVE_KNOTS)
         if len(hats) < 3:
@@ -111,4 +120,36 @@ def add_curves(dictionary: Dictionary) -> None:
     if places:
         dictionary.groups.append(
             Group("time", tuple(places), (0,) * len(places), ("all", "one"), 0.0, None, {}, flavour)
+        )
+
+
+def _tells_wheels_apart(values: Array, mask: NDArray[np.bool_]) -> bool:
+    """Say whether a covariate hardly varies but from wheel to wheel: a curve over it would be a name for the wheels."""
+    known = np.where(mask & np.isfinite(values), values, np.nan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a wheel of which nothing is known
+        within = float(np.nanmean(np.nanvar(known, axis=0)))
+        return within < BETWEEN_WHEELS * float(np.nanvar(known))
+
+
+def add_beat(dictionary: Dictionary, residual: Array) -> None:
+    """Add the sine over time, acting as drag, that the residual [time, wheel] shows most of: what switches on board."""
+    scene = dictionary.scene
+    along = np.nan_to_num(scene.covariates.get("direction", np.ones(scene.mask.shape)))
+    time_s, step_s = scene.time_s[:, 0], scene.recording.step_s
+    lowest, highest = LEAST_BEATS / scene.length_s, 1 / (SHORTEST_BEAT * step_s)
+    if lowest >= highest:
+        return
+    place = np.rint(time_s / step_s).astype(np.int64)
+    length = 4 * int(2 ** np.ceil(np.log2(place[-1] + 2)))
+    frequency_Hz = np.fft.rfftfreq(length, step_s)
+    summed = [np.bincount(place, weights, minlength=length) for weights in (residual * along * scene.mask).T]
+    power = np.abs(np.fft.rfft(np.stack(summed), axis=1)) ** 2
+    for wheels in (power.sum(axis=0), *power):
+        sought = np.where((frequency_Hz >= lowest) & (frequency_Hz <= highest), wheels, 0.0)
+        phase = 2 * np.pi * frequency_Hz[np.argmax(sought)] * scene.time_s
+        places = dictionary.append([along * np.cos(phase), along * np.sin(phase)])
+        price = 2 * float(np.log(scene.length_s * highest))
+        dictionary.groups.append(
+            Group("time", tuple(places), (0, 0), ("all", "one"), price, None, {}, "drag, periodic")
         )

@@ -87,15 +87,18 @@ class WheelAngleRipple(Candidate):
     def memory_at(self, scene: Scene, residual: Array, shape: Shape) -> float:
         """Return the noise's power around this order, over that of white noise: lines stand out of their neighbours."""
         order, power = self._spectrum(scene, residual * self._base(scene, str(shape["kind"])))
-        away = np.abs(order - float(shape["order"]))
-        around = power[(away > 0.1) & (away < 1.5)]
+        above = order - float(shape["order"])
+        # Slow noise has more power at lower orders: the louder side counts.
+        sides = [power[(side * above > 0.1) & (side * above < 1.5)] for side in (-1, 1)]
         # Half of all squares are below their median: of two a wheel, 1 − 1/9n of the mean, cubed (Wilson, Hilferty).
         wheels = max(int(scene.mask.any(axis=0).sum()), 1)
-        return float(np.median(around)) / (wheels * (1 - 1 / (9 * wheels)) ** 3) if around.size else float("inf")
+        usual = max((float(np.median(side)) for side in sides if side.size), default=float("inf"))
+        return usual / (wheels * (1 - 1 / (9 * wheels)) ** 3)
 
     def _strongest(self, scene: Scene, weighted: Array) -> float:
         order, power = self._spectrum(scene, weighted)
-        return float(order[np.argmax(power)])
+        sought = (order >= self.free["order"][0]) & (order <= HIGHEST_ORDER)
+        return float(order[np.argmax(np.where(sought, power, 0.0))])
 
     def _spectrum(self, scene: Scene, weighted: Array) -> tuple[Array, Array]:
         """Return orders and the power of a residual at each, summed over the wheels; white noise has 1 on each."""
@@ -109,5 +112,4 @@ class WheelAngleRipple(Candidate):
             summed = np.bincount(bins[here, k], weighted[here, k], minlength=length)
             power += np.abs(np.fft.rfft(summed)) ** 2 / max(float(np.sum(weighted[here, k] ** 2)), 1e-300)
         order = np.arange(len(power)) * BINS_PER_TURN / length
-        sought = (order >= self.free["order"][0]) & (order <= HIGHEST_ORDER)
-        return order[sought], power[sought]
+        return order, power
