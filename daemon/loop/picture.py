@@ -37,7 +37,7 @@ STYLE: Any = {
 SPEEDS_RAD_S = np.linspace(0.0, 0.45, 50)
 HIGHEST, HIGHEST_ERROR = (12.5, 45.0), (6.8, 12.5)
 """Of the axes of cohesion [kPa] and friction angle [°]."""
-POINTS = 150
+POINTS = 100
 """Of a trace: as many as the eye tells apart, since a window of 10 s moves little from one half second to the next."""
 SYMBOLS = (("c", "kPa"), ("φ", "°"))
 TITLE = "Friction concealed in the drivetrain, found by one drive on a known soil – then the same rover on other soils"
