@@ -13,7 +13,7 @@ from calibration.mismatch.discrepancy import FORM, bends
 from calibration.mismatch.refine import Profile
 
 if TYPE_CHECKING:
-    from calibration.mismatch.search import Fit, Search
+    from calibration.mismatch.search import Fit, Search, Term
 
 Array = NDArray[np.float64]
 
@@ -41,9 +41,10 @@ def parameters_of(search: Search, fit: Fit, blocks: NDArray[np.int64]) -> list[d
     ends = len(columns) + np.cumsum([0, *map(len, bent)])
     found = []
     for index, own in enumerate(bent):
-        at = fit.of_term(index)
-        parts = np.concatenate((columns[at], own))
-        size = _sizes(search, fit, index, parts, np.hstack((moved[:, at], moved[:, ends[index] : ends[index + 1]])))
+        coefficients = fit.of_term(index)
+        shapes = [len(fit.columns) + place for place, (term, _, _) in enumerate(names) if term == index]
+        at = [*range(coefficients.start, coefficients.stop), *shapes, *range(ends[index], ends[index + 1])]
+        size = _sizes(search, fit, index, np.concatenate((columns[at[: len(at) - len(own)]], own)), moved[:, at])
         found.append(_of_term(search, fit, index, moved, names, size))
     return found
 
@@ -143,7 +144,8 @@ def _unit(name: str) -> str:
 def _sizes(search: Search, fit: Fit, index: int, parts: Array, moved: Array) -> Parameter:
     """Return the effect's root mean square on its wheels over the channel's mean magnitude.
 
-    `parts` are its columns and its bends (part, time, wheel), `moved` how far each went in each draw (draw, part).
+    `parts` are its columns, what its shape changes and its bends (part, time, wheel); `moved` is how far each went in
+    each draw (draw, part).
     """
     scene, term = search.dictionary.scene, fit.terms[index]
     on = list(term.wheels)
@@ -158,18 +160,23 @@ def _sizes(search: Search, fit: Fit, index: int, parts: Array, moved: Array) -> 
 
 
 def _over_shapes(search: Search, fit: Fit, index: int, sizes: Array, value: float) -> list[Array]:
-    """Return draws of an effect's relative size over the shapes that it may as well have, each as likely as it fits.
+    """Return draws of an effect's relative size over the kinds of shape that it may as well have.
 
-    Where a reference temperature, an exponent or a rise is not known, neither is what hangs on it. `sizes` are
-    draws for the fitted shape, `value` its best.
+    Where a reference temperature or the way it grew is not known, neither is what hangs on it: each kind counts, at its
+    best, as it fits. `sizes` are draws for the fitted shape, `value` its best.
     """
     scene, term = search.dictionary.scene, fit.terms[index]
     others = [other for i, other in enumerate(fit.terms) if i != index]
     family = [group for group in search.dictionary.groups if group.named and group.name == term.name]
-    found = [(gain, other) for gain, other in search.conditional(others, family) if other.wheels == term.wheels]
-    best = max((gain for gain, _ in found), default=0.0)
+    free = term.group.candidate.free if term.group.candidate else {}
+    found: dict[str, tuple[float, Term]] = {}
+    for gain, other in search.conditional(others, family):
+        kind = str({k: v for k, v in other.group.shape.items() if k not in free})
+        if other.wheels == term.wheels and gain > found.get(kind, (0.0, None))[0]:
+            found[kind] = gain, other
+    best = max((gain for gain, _ in found.values()), default=0.0)
     drawn = []
-    for gain, other in found:
+    for gain, other in found.values():
         if (weight := float(np.exp(0.5 * (gain - best)))) < UNLIKELY:
             continue
         refit = search.fit((*others, other))

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from calibration.mismatch.scene import Scene
 
 
-POLE_DEGC = -110.0
-"""Where Vogel's law for low-temperature greases has its pole, within some ten degrees."""
+POLES_DEGC = (-125.0, -95.0)
+"""Between which Vogel's law for low-temperature greases has its pole."""
 
 
 class ColdLubricantFriction(Candidate):
@@ -39,7 +39,11 @@ class ColdLubricantFriction(Candidate):
         top = float(np.nanmax(temperature))
         found: list[Shape] = []
         for power in (0.0, 1.0):
-            found += [{"power": power, "scale_K": scale} for scale in (6.0, 11.0, 20.0, 45.0)]
+            found += [
+                {"power": power, "pole_degC": pole, "scale_K": scale}
+                for pole in POLES_DEGC
+                for scale in (6.0, 11.0, 20.0, 45.0)
+            ]
             found += [{"power": power, "no_drag_above_degC": end} for end in (*ends, top, top + 20)]
         return found
 
@@ -49,7 +53,8 @@ class ColdLubricantFriction(Candidate):
         coldest = float(np.quantile(temperature[scene.mask], 0.005))
         if "scale_K" in shape:
             # Vogel: ln of viscosity goes with 1/(T − T_0); near the coldest it falls by e over the scale.
-            above, coldest_above = np.maximum(temperature - POLE_DEGC, 5.0), max(coldest - POLE_DEGC, 5.0)
+            pole = float(shape["pole_degC"])
+            above, coldest_above = np.maximum(temperature - pole, 5.0), max(coldest - pole, 5.0)
             growth = np.exp(coldest_above / float(shape["scale_K"]) * (coldest_above / above - 1))
         else:
             end = float(shape["no_drag_above_degC"])
