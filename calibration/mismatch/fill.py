@@ -68,9 +68,8 @@ def add_candidate(
         signs = tuple(c.sign for c in candidate.coefficients[: len(found)])
         signs += (0,) * (len(found) - len(signs))
         evidence = candidate.evidence(scene, shape)
-        made.append(
-            Group(candidate.name, places, signs, candidate.sharing, price, candidate, shape, "", less, evidence)
-        )
+        paid = price + candidate.reluctance(shape)
+        made.append(Group(candidate.name, places, signs, candidate.sharing, paid, candidate, shape, "", less, evidence))
     dictionary.append(columns)
     dictionary.groups += made
     return made

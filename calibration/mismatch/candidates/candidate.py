@@ -63,6 +63,10 @@ class Candidate:
         """Return the grid of shapes that is searched."""
         return [{}]
 
+    def reluctance(self, shape: Shape) -> float:  # noqa: ARG002
+        """Return what this shape costs over others of its kind, where it contradicts what was stated."""
+        return 0.0
+
     def growths(self, scene: Scene) -> Sequence[Shape]:
         """Return the ways to grow after an onset: every shape but for its onset."""
         found = {tuple(sorted((k, v) for k, v in s.items() if k != "onset_s")) for s in self.shapes(scene)}

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from calibration.mismatch.scene import Scene
 
 
+STATED_WRONGLY = 9.2
+"""Twice the logarithm of a hundred."""
+
+
 class LoadDependentEfficiency(Candidate):
     """An efficiency that is not one number: the loss grows as a power of the torque.
 
@@ -36,6 +40,10 @@ class LoadDependentEfficiency(Candidate):
         curved: list[Shape] = [{"power": p} for p in (0.0, 0.5, 1.0, 2.0)]
         light: list[Shape] = [{"light": s} for s in (0.5, 1.0)]
         return [*curved, *light]
+
+    def reluctance(self, shape: Shape) -> float:
+        """Charge a loss in proportion: it is the stated gain far outside its own doubt, a hundred to one against."""
+        return STATED_WRONGLY if shape.get("power") == 0.0 else 0.0
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return the loss as a multiple of the prediction."""
