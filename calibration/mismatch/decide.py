@@ -244,9 +244,19 @@ def enough(search: Search, more: Fit, less: Fit) -> bool:
     """Say whether a larger set has earned its further names."""
     remaining = float(np.sum(residual_of(search, less) ** 2 * search.weights))
     worthwhile = min(FURTHER_SHARE * less.gain, TELLING_SHARE * remaining)
+    if any(term.group.evidence is None and set(term.wheels) <= _wandering(more) for term in more.terms):
+        worthwhile = BESIDE_THE_UNKNOWN * less.gain
     further = FURTHER_NAME if less.terms else 0.0
     needed = max(search.threshold + further, worthwhile) * (len(more.terms) - len(less.terms))
     return search.score(more) - search.score(less) > needed
+
+
+def _wandering(fit: Fit) -> set[int]:
+    """Return the wheels of which a sensor wanders.
+
+    How it did is known only as well as it shows it itself: what that leaves on its wheel is neither a name nor unknown.
+    """
+    return {w for term in fit.terms if term.group.evidence is not None for w in term.wheels}
 
 
 def decide(search: Search, candidates: Sequence[Candidate]) -> Decision:
@@ -273,7 +283,7 @@ def _without_a_name(search: Search, named: Fit, simpler: Sequence[Fit]) -> tuple
     """Hold the names against curves that have none.
 
     A curve wins in two ways: beside the names, where it finds much that they leave; and against them, where one curve
-    says as much as several names of unlike covariates, which then only imitate it. But a single name that leaves
+    says more than several names of unlike covariates, which then only imitate it. But a single name that leaves
     nothing significant beside it is simpler than either.
     """
     alone = best_per_family(search, (), named=False)
@@ -282,7 +292,7 @@ def _without_a_name(search: Search, named: Fit, simpler: Sequence[Fit]) -> tuple
     named = _that_stay(search, named)
     curve = alone[0][1]
     by_curve = search.fit((curve,))
-    imitated = len(named.terms) > 1 and search.score(by_curve) >= search.score(named)
+    imitated = len(named.terms) > 1 and search.score(by_curve) > search.score(named) + search.threshold
     imitated &= any(_covariate(term) != curve.name for term in named.terms)
     for fit in simpler if imitated else ():
         if _left_over(search, fit) is None:
@@ -303,10 +313,8 @@ def _without_a_name(search: Search, named: Fit, simpler: Sequence[Fit]) -> tuple
 
 def _left_over(search: Search, named: Fit) -> Term | None:
     """Return the curve that finds much which the names leave, if one does."""
-    # How a sensor wandered is known only as well as it shows it itself: what that leaves on its wheel is no unknown.
-    wandering = {w for term in named.terms if term.group.evidence is not None for w in term.wheels}
     curves = best_per_family(search, named.terms, named=False)
-    left = [(score, term) for score, term in curves if not set(term.wheels) <= wandering]
+    left = [(score, term) for score, term in curves if not set(term.wheels) <= _wandering(named)]
     if not left or left[0][0] <= UNNAMED_BY:
         return None
     beside = search.fit((*named.terms, left[0][1]))

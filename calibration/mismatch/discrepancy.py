@@ -23,7 +23,9 @@ Array = NDArray[np.float64]
 FORM = 0.1
 """Standard deviation of an effect's share by which its law is wrong, at each knot and on each wheel."""
 KNOTS = 6
-WITHOUT_A_FORM = frozenset({"direction", "none", "wheel_row", "wheel_angle"})
+CONSTANT = frozenset({"direction", "none"})
+"""What is said to be constant may be wrong in just that: it is bent along time."""
+WITHOUT_A_FORM = frozenset({"wheel_row", "wheel_angle"})
 """Covariates along which there is no law that could be wrong."""
 
 
@@ -34,6 +36,7 @@ def bends(search: Search, fit: Fit, index: int) -> Array:
     effect = np.where(scene.mask, effect, 0.0)
     found = []
     covariate = term.group.candidate.covariate if term.group.candidate else "none"
+    covariate = "time" if covariate in CONSTANT else covariate
     if covariate in scene.covariates and covariate not in WITHOUT_A_FORM:
         values = scene.covariates[covariate]
         values = values if np.nanmin(values) >= 0 or covariate == "temperature" else np.abs(values)

@@ -9,9 +9,17 @@ import numpy as np
 from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from calibration.mismatch.scene import Scene
+
+
+FADES: dict[str, Callable[[Array], Array]] = {
+    "exponent 1": lambda ratio: np.exp(-ratio),
+    "exponent 2": lambda ratio: np.exp(-(ratio**2)),
+    "quotient": lambda ratio: 1 / (1 + ratio**2),
+}
+"""What is left of the extra drag, over speed in Stribeck speeds."""
 
 
 class StribeckFriction(Candidate):
@@ -19,11 +27,11 @@ class StribeckFriction(Candidate):
 
     name = "stribeck-friction"
     covariate = "wheel_speed"
-    equation = "ΔI = I_s sign(ω) exp(−(|ω|/ω_s)^δ)"
+    equation = "ΔI = I_s sign(ω) exp(−(|ω|/ω_s)^δ), or I_s sign(ω) / (1 + (ω/ω_s)²)"
     words = "extra drag near standstill that fades with speed"
     signature = "a residual along sign(ω) that is largest at the slowest speeds"
     experiment = "creep: a staircase of very slow constant speeds on level ground, both ways"
-    source = "Armstrong-Hélouvry, Dupont and Canudas de Wit (1994): δ from 1 to 2"
+    source = "Armstrong-Hélouvry, Dupont and Canudas de Wit (1994): δ from 1 to 2; Hess and Soom (1990): the quotient"
     requires = ("wheel_speed",)
     coefficients: ClassVar = (Coefficient("stribeck_current", "{unit}"),)
     free: ClassVar = {"stribeck_speed_rad_s": (0.0, np.inf)}
@@ -31,16 +39,16 @@ class StribeckFriction(Candidate):
     def shapes(self, scene: Scene) -> Sequence[Shape]:
         """Stribeck speeds between the slowest and the median speed driven."""
         return [
-            {"stribeck_speed_rad_s": float(speed), "exponent": exponent}
-            for exponent in (1.0, 2.0)
+            {"stribeck_speed_rad_s": float(speed), "fades": fades}
+            for fades in ("exponent 1", "exponent 2", "quotient")
             for speed in np.geomspace(*self._range(scene), 6)
         ]
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
-        """Return sign(ω) exp(−(|ω|/ω_s)^δ)."""
+        """Return sign(ω) times what is left of the extra drag at this speed."""
         speed = scene.covariates["wheel_speed"]
         ratio = np.abs(speed) / float(shape["stribeck_speed_rad_s"])
-        return (np.sign(speed) * np.exp(-(ratio ** float(shape["exponent"]))))[None]
+        return (np.sign(speed) * FADES[str(shape["fades"])](ratio))[None]
 
     def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Below the slowest speed driven it cannot be told from nothing, above the median not from viscous."""
