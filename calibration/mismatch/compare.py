@@ -20,8 +20,9 @@ from calibration.mismatch.answer import (
     Verdict,
 )
 from calibration.mismatch.corrected import effect_of
-from calibration.mismatch.decide import Decision, contribution, decide, residual_of
+from calibration.mismatch.decide import Decision, decide
 from calibration.mismatch.dictionary import Dictionary
+from calibration.mismatch.explained import contribution, residual_of
 from calibration.mismatch.fill import NOT_FOR_CURVES, add_candidates, add_curves, add_nuisance
 from calibration.mismatch.held_out import HeldOut, hold_out
 from calibration.mismatch.intervals import parameters_of

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.mismatch.curves import broken_lines
-from calibration.mismatch.decide import contribution
+from calibration.mismatch.explained import contribution
 
 if TYPE_CHECKING:
     from calibration.mismatch.search import Fit, Search

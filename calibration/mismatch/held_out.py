@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.mismatch.decide import best_per_family, enough
+from calibration.mismatch.named import best_per_family, enough
 from calibration.mismatch.search import Fit, Search, Term
 from calibration.mismatch.transfer import squares
 

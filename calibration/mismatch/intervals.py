@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.mismatch.answer import Parameter
-from calibration.mismatch.decide import contribution, residual_of
 from calibration.mismatch.discrepancy import FORM, bends
+from calibration.mismatch.explained import contribution, residual_of
 from calibration.mismatch.refine import Profile
 
 if TYPE_CHECKING:

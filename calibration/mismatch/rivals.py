@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calibration.mismatch.answer import Indistinguishable
-from calibration.mismatch.decide import acceptable, best_per_family, polished
+from calibration.mismatch.named import acceptable, best_per_family, polished
 from calibration.mismatch.search import Term
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calibration.mismatch.answer import Sensitivity
-from calibration.mismatch.decide import WORTH_A_NAME
+from calibration.mismatch.named import WORTH_A_NAME
 from calibration.mismatch.search import Term
 
 if TYPE_CHECKING:
