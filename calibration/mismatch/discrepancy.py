@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-FORM = 0.1
+FORM = 0.15
 """Standard deviation of an effect's share by which its law is wrong, at each knot and on each wheel."""
 KNOTS = 6
 CONSTANT = frozenset({"direction", "none"})
