@@ -33,7 +33,6 @@ def bends(search: Search, fit: Fit, index: int) -> Array:
     """Return how one effect would change were its law wrong by its whole self, shape (bend, time, wheel)."""
     scene, term = search.dictionary.scene, fit.terms[index]
     effect = contribution(search, fit, index)
-    effect = np.where(scene.mask, effect, 0.0)
     found = []
     covariate = term.group.candidate.covariate if term.group.candidate else "none"
     covariate = "time" if covariate in CONSTANT else covariate

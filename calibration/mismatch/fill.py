@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from calibration.mismatch.curves import broken_lines
 from calibration.mismatch.dictionary import Dictionary, Group
+from calibration.mismatch.spectrum import padded_length, power_of_sums
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -140,10 +141,9 @@ def add_beat(dictionary: Dictionary, residual: Array) -> None:
     if lowest >= highest:
         return
     place = np.rint(time_s / step_s).astype(np.int64)
-    length = 4 * int(2 ** np.ceil(np.log2(place[-1] + 2)))
+    length = padded_length(int(place[-1]))
     frequency_Hz = np.fft.rfftfreq(length, step_s)
-    summed = [np.bincount(place, weights, minlength=length) for weights in (residual * along * scene.mask).T]
-    power = np.abs(np.fft.rfft(np.stack(summed), axis=1)) ** 2
+    power = np.stack([power_of_sums(place, values, length) for values in (residual * along * scene.mask).T])
     for wheels in (power.sum(axis=0), *power):
         sought = np.where((frequency_Hz >= lowest) & (frequency_Hz <= highest), wheels, 0.0)
         phase = 2 * np.pi * frequency_Hz[np.argmax(sought)] * scene.time_s

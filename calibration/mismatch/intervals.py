@@ -34,17 +34,18 @@ def parameters_of(search: Search, fit: Fit, blocks: NDArray[np.int64]) -> list[d
     bent = [bends(search, fit, index) for index in range(len(fit.terms))]
     slack = np.concatenate((np.zeros(len(columns)), np.full(sum(map(len, bent)), FORM**-2)))
     slack[: len(search.nuisance.columns)] = search.nuisance.precision
-    step, spread = _sandwich(search, fit, np.concatenate((columns, *bent)), slack, blocks)
+    parts = np.concatenate((columns, *bent))
+    step, spread = _sandwich(search, fit, parts, slack, blocks)
     generator = np.random.default_rng(0)
     root = np.linalg.cholesky(spread + 1e-12 * np.trace(spread) / len(spread) * np.eye(len(spread)))
     moved = step + generator.standard_normal((DRAWS, len(spread))) @ root.T
     ends = len(columns) + np.cumsum([0, *map(len, bent)])
     found = []
-    for index, own in enumerate(bent):
+    for index in range(len(fit.terms)):
         coefficients = fit.of_term(index)
         shapes = [len(fit.columns) + place for place, (term, _, _) in enumerate(names) if term == index]
         at = [*range(coefficients.start, coefficients.stop), *shapes, *range(ends[index], ends[index + 1])]
-        size = _sizes(search, fit, index, np.concatenate((columns[at[: len(at) - len(own)]], own)), moved[:, at])
+        size = _sizes(search, fit, index, parts[at], moved[:, at])
         found.append(_of_term(search, fit, index, moved, names, size))
     return found
 

@@ -125,7 +125,8 @@ def enough(search: Search, more: Fit, less: Fit) -> bool:
     """Say whether a larger set has earned its further names."""
     remaining = float(np.sum(residual_of(search, less) ** 2 * search.weights))
     worthwhile = min(FURTHER_SHARE * less.gain, TELLING_SHARE * remaining)
-    if any(term.group.evidence is None and set(term.wheels) <= wandering(more) for term in more.terms):
+    faulty = wandering(more)
+    if any(term.group.evidence is None and set(term.wheels) <= faulty for term in more.terms):
         worthwhile = BESIDE_THE_UNKNOWN * less.gain
     further = FURTHER_NAME if less.terms else 0.0
     needed = max(search.threshold + further, worthwhile) * (len(more.terms) - len(less.terms))

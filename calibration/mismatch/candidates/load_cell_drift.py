@@ -12,13 +12,11 @@ from calibration.mismatch.inputs import known_mean
 from calibration.mismatch.noise import estimate_noise
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from calibration.mismatch.scene import Scene
 
 WANDER_KNOTS = 24
-
-
 OFFSETS = (-3.0, -2.2, -1.6, -1.1, -0.8, -0.55, -0.4, -0.2, 0.0, 0.15, 0.3, 0.4, 0.5, 0.7, 0.85)
 """Mean readings that a drift may have been off by, at which it is simulated."""
 
@@ -53,7 +51,15 @@ class LoadCellDrift(Candidate):
 
         The cell shows how the drift went, but not what it was on the mean: that is the offset, in mean readings.
         """
-        return self._answer_to_offset(scene)(float(shape["relative_offset"]))[None]
+        # Simulated at a few offsets, since a search asks for hundreds; the parabola through the nearest three between.
+        offset = float(shape["relative_offset"])
+        middle = int(np.clip(np.argmin(np.abs(np.array(OFFSETS) - offset)), 1, len(OFFSETS) - 2))
+        at = OFFSETS[middle - 1 : middle + 2]
+        total = np.zeros(scene.mask.shape)
+        for here in at:
+            weight = np.prod([(offset - other) / (here - other) for other in at if other != here])
+            total += weight * self._simulated(scene, here)
+        return total[None]
 
     def evidence(self, scene: Scene, shape: Shape) -> tuple[Array, Array]:  # noqa: ARG002
         """Return, for each wheel, what this drift explains of its own cell's reading, and how large it is there."""
@@ -66,17 +72,13 @@ class LoadCellDrift(Candidate):
             scene.made[key] = np.maximum(seen - WANDER_KNOTS, 0.0)
         return scene.made[key], np.ones(scene.mask.shape[1])
 
-    def _answer_to_offset(self, scene: Scene) -> Callable[[float], Array]:
-        """Return the column as a smooth function of the offset: simulated at a few, a search asks for hundreds."""
-        found = []
-        for offset in OFFSETS:
-            key = ("drift with offset", offset)
-            if key not in scene.made:
-                load = scene.covariates["load"]
-                wrong = known_mean(load) * (self._drift(scene) + offset)
-                scene.made[key] = scene.with_input("load_N", np.maximum(load - wrong, 0.1 * load)) - scene.filled
-            found.append(scene.made[key])
-        return lambda offset: _between(found, offset)
+    def _simulated(self, scene: Scene, offset: float) -> Array:
+        key = ("drift with offset", offset)
+        if key not in scene.made:
+            load = scene.covariates["load"]
+            wrong = known_mean(load) * (self._drift(scene) + offset)
+            scene.made[key] = scene.with_input("load_N", np.maximum(load - wrong, 0.1 * load)) - scene.filled
+        return scene.made[key]
 
     def _drift(self, scene: Scene) -> Array:
         key = ("drift", 0.0)
@@ -92,16 +94,6 @@ class LoadCellDrift(Candidate):
             load = scene.covariates["load"]
             scene.made[key] = _without_posture(scene, load / np.where(known_mean(load) > 0, known_mean(load), 1.0))
         return scene.made[key]
-
-
-def _between(columns: Sequence[Array], offset: float) -> Array:
-    """Return the column at an offset by the parabola through the three simulated ones about it."""
-    middle = int(np.clip(np.argmin(np.abs(np.array(OFFSETS) - offset)), 1, len(OFFSETS) - 2))
-    at, chosen = OFFSETS[middle - 1 : middle + 2], columns[middle - 1 : middle + 2]
-    total = np.zeros(chosen[0].shape)
-    for here, column in zip(at, chosen, strict=True):
-        total += np.prod([(offset - other) / (here - other) for other in at if other != here]) * column
-    return total
 
 
 def _without_posture(scene: Scene, values: Array) -> Array:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from calibration.mismatch.spectrum import padded_length, power_of_sums
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -105,11 +106,11 @@ class WheelAngleRipple(Candidate):
         angle = scene.covariates["wheel_angle"]
         low = np.min(angle, axis=0)
         bins = np.rint((angle - low) * BINS_PER_TURN / (2 * np.pi)).astype(np.int64)
-        length = 4 * int(2 ** np.ceil(np.log2(np.max(bins) + 2)))
+        length = padded_length(int(np.max(bins)))
         power: Array = np.zeros(length // 2 + 1)
         for k in range(angle.shape[1]):
             here = scene.mask[:, k]
-            summed = np.bincount(bins[here, k], weighted[here, k], minlength=length)
-            power += np.abs(np.fft.rfft(summed)) ** 2 / max(float(np.sum(weighted[here, k] ** 2)), 1e-300)
+            summed = power_of_sums(bins[here, k], weighted[here, k], length)
+            power += summed / max(float(np.sum(weighted[here, k] ** 2)), 1e-300)
         order = np.arange(len(power)) * BINS_PER_TURN / length
         return order, power
