@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -69,7 +68,7 @@ def add_candidate(
         signs = tuple(c.sign for c in candidate.coefficients[: len(found)])
         signs += (0,) * (len(found) - len(signs))
         evidence = candidate.evidence(scene, shape)
-        paid = price + candidate.reluctance(shape)
+        paid = price + candidate.reluctance(scene, shape)
         made.append(Group(candidate.name, places, signs, candidate.sharing, paid, candidate, shape, "", less, evidence))
     dictionary.append(columns)
     dictionary.groups += made
@@ -103,7 +102,7 @@ def add_curves(dictionary: Dictionary) -> None:
     for name, values in scene.covariates.items():
         if name in NOT_FOR_CURVES:
             continue
-        if _tells_wheels_apart(values, scene.mask):
+        if _tells_wheels_apart(scene, values):
             continue
         curve = np.abs(values) if name == "wheel_speed" else values
         hats = broken_lines(curve, scene.mask, CURVE_KNOTS)
@@ -123,13 +122,10 @@ def add_curves(dictionary: Dictionary) -> None:
         )
 
 
-def _tells_wheels_apart(values: Array, mask: NDArray[np.bool_]) -> bool:
+def _tells_wheels_apart(scene: Scene, values: Array) -> bool:
     """Say whether a covariate hardly varies but from wheel to wheel: a curve over it would be a name for the wheels."""
-    known = np.where(mask & np.isfinite(values), values, np.nan)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # a wheel of which nothing is known
-        within = float(np.nanmean(np.nanvar(known, axis=0)))
-        return within < BETWEEN_WHEELS * float(np.nanvar(known))
+    known = values[scene.mask & np.isfinite(values)]
+    return scene.variance_within(values) < BETWEEN_WHEELS * float(np.var(known))
 
 
 def add_beat(dictionary: Dictionary, residual: Array) -> None:

@@ -179,8 +179,11 @@ def _covariate(term: Term) -> str:
 
 def _survives(search: Search, named: Fit, rival: Fit, others: Sequence[Term], term: Term) -> bool:
     """Say whether the rival, were it true, would trail by this much at least one time in twenty."""
-    lead = max(search.score(named) - search.score(rival) - SLACK, 0.0)
     own = rival.terms[-1]
+    candidate, shape = own.group.candidate, own.group.shape
+    # What speaks against a rival beforehand is not what the recording says against it.
+    beforehand = candidate.reluctance(search.dictionary.scene, shape) if candidate else 0.0
+    lead = max(search.score(named) - search.score(rival) - beforehand - SLACK, 0.0)
     block, reach = search.beside((*others, term), own)
     values = rival.coefficients[rival.of_term(len(rival.terms) - 1)]
     apart = float(values @ (block - reach) @ values)

@@ -24,6 +24,8 @@ ALWAYS = frozenset({"wheel_speed", "direction", "wheel_acceleration", "wheel_ang
 """Covariates that mean something even where they are constant."""
 SPIKE = 15.0
 """A residual this many times the usual one is a fault of the recording, not of the simulation."""
+CHANGES = 0.05
+"""Share of its root mean square by which a factor must change on a wheel: less, no law is known to."""
 RELATIVE_STEP = 0.01
 """Of a parameter or an input, for a tangent: small against what matters, large against rounding."""
 
@@ -73,6 +75,16 @@ class Scene:
     def has(self, *names: str) -> bool:
         """Say whether all these covariates were measured and vary."""
         return all(name in self.covariates for name in names)
+
+    def changes_within(self, values: Array) -> bool:
+        """Say whether a factor (time, wheel) changes on a wheel as it drives, not only from wheel to wheel."""
+        return self.variance_within(values) > CHANGES**2 * float(np.mean(values[self.mask] ** 2))
+
+    def variance_within(self, values: Array) -> float:
+        """Return the mean over wheels of what a quantity (time, wheel) varies on each."""
+        known = np.where(self.mask, values, np.nan)
+        turning = self.mask.any(axis=0)
+        return float(np.mean(np.nanvar(known[:, turning], axis=0)))
 
     def changed(self, **changes: float) -> Array:
         """Return the prediction with parameters (or variants) set otherwise."""

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from calibration.mismatch.scene import Scene
 
 Array = NDArray[np.float64]
+UNLIKELY = 9.2
+"""What a shape costs against which the odds are a hundred to one: twice the logarithm of that."""
 Shape = dict[str, float | str]
 """Values of the shape parameters (an onset, an order, a Stribeck speed): what enters nonlinearly."""
 Sharing = Literal["all", "one"]
@@ -63,8 +65,8 @@ class Candidate:
         """Return the grid of shapes that is searched."""
         return [{}]
 
-    def reluctance(self, shape: Shape) -> float:  # noqa: ARG002
-        """Return what this shape costs over others of its kind, where it contradicts what was stated."""
+    def reluctance(self, scene: Scene, shape: Shape) -> float:  # noqa: ARG002
+        """Return what this shape costs where it contradicts what was stated, or says no more than a plainer name."""
         return 0.0
 
     def growths(self, scene: Scene) -> Sequence[Shape]:

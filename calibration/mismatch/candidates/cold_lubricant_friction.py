@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from calibration.mismatch.candidates.candidate import UNLIKELY, Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 POLES_DEGC = (-125.0, -95.0)
 """Between which Vogel's law for low-temperature greases has its pole."""
+STEEPEST_K = 5.0
+"""No grease thins by a factor e, or loses all its drag, within less."""
 
 
 class ColdLubricantFriction(Candidate):
@@ -30,13 +32,14 @@ class ColdLubricantFriction(Candidate):
     source = "Vogel–Fulcher viscosity of low-temperature greases: a factor e in 10 to 40 K; linear in a small range"
     requires = ("temperature", "direction")
     coefficients: ClassVar = (Coefficient("cold_drag", "{unit} (s/rad)^p"),)
-    free: ClassVar = {"scale_K": (5.0, 80.0), "no_drag_above_degC": (-60.0, 80.0)}
+    free: ClassVar = {"scale_K": (STEEPEST_K, 80.0), "no_drag_above_degC": (-60.0, 80.0)}
 
     def shapes(self, scene: Scene) -> Sequence[Shape]:
         """Vogel's law of several steepnesses, and straight lines that end at several temperatures."""
         temperature = scene.covariates["temperature"][scene.mask]
-        ends = np.nanquantile(temperature, [0.35, 0.6, 0.85]).tolist()
-        top = float(np.nanmax(temperature))
+        soonest = _coldest(scene) + STEEPEST_K
+        top = max(float(np.nanmax(temperature)), soonest)
+        ends = np.unique(np.maximum([*np.nanquantile(temperature, [0.35, 0.6, 0.85]), top], soonest)).tolist()
         found: list[Shape] = []
         for power in (0.0, 1.0):
             found += [
@@ -44,28 +47,40 @@ class ColdLubricantFriction(Candidate):
                 for pole in POLES_DEGC
                 for scale in (6.0, 11.0, 20.0, 45.0)
             ]
-            found += [{"power": power, "no_drag_above_degC": end} for end in (*ends, top, top + 20)]
+            found += [{"power": power, "no_drag_above_degC": end} for end in (*ends, top + 20)]
         return found
+
+    def reluctance(self, scene: Scene, shape: Shape) -> float:
+        """Charge a drag that no wheel's own temperature changes: Coulomb and viscous friction are the plainer names."""
+        return 0.0 if scene.changes_within(self._growth(scene, shape)) else UNLIKELY
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return g(T) sign(ω)|ω|^p; g is 1 at the coldest that was driven."""
-        temperature = np.nan_to_num(scene.covariates["temperature"])
-        coldest = float(np.quantile(temperature[scene.mask], 0.005))
-        if "scale_K" in shape:
-            # Vogel: ln of viscosity goes with 1/(T − T_0); near the coldest it falls by e over the scale.
-            pole = float(shape["pole_degC"])
-            above, coldest_above = np.maximum(temperature - pole, 5.0), max(coldest - pole, 5.0)
-            growth = np.exp(coldest_above / float(shape["scale_K"]) * (coldest_above / above - 1))
-        else:
-            end = float(shape["no_drag_above_degC"])
-            growth = np.maximum(end - temperature, 0.0) / max(end - coldest, 1.0)
-        drag = scene.covariates["direction"] * growth
+        drag = scene.covariates["direction"] * self._growth(scene, shape)
         if float(shape["power"]) and "wheel_speed" in scene.covariates:
             drag = drag * np.abs(scene.covariates["wheel_speed"])
         return drag[None]
 
+    def _growth(self, scene: Scene, shape: Shape) -> Array:
+        """Return g(T), shape (time, wheel)."""
+        temperature = np.nan_to_num(scene.covariates["temperature"])
+        coldest = _coldest(scene)
+        if "scale_K" in shape:
+            # Vogel: ln of viscosity goes with 1/(T − T_0); near the coldest it falls by e over the scale.
+            pole = float(shape["pole_degC"])
+            above, coldest_above = np.maximum(temperature - pole, 5.0), max(coldest - pole, 5.0)
+            return np.asarray(np.exp(coldest_above / float(shape["scale_K"]) * (coldest_above / above - 1)))
+        end = float(shape["no_drag_above_degC"])
+        return np.maximum(end - temperature, 0.0) / max(end - coldest, STEEPEST_K)
+
     def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:
         """Only the parameter that this shape has."""
         temperature = scene.covariates["temperature"][scene.mask]
-        ends = (float(np.nanquantile(temperature, 0.2)), float(np.nanmax(temperature)) + 40)
+        soonest = max(float(np.nanquantile(temperature, 0.2)), _coldest(scene) + STEEPEST_K)
+        ends = (soonest, max(float(np.nanmax(temperature)), soonest) + 40)
         return {"scale_K": self.free["scale_K"]} if "scale_K" in shape else {"no_drag_above_degC": ends}
+
+
+def _coldest(scene: Scene) -> float:
+    """Return the coldest that was driven [°C], single readings aside."""
+    return float(np.nanquantile(scene.covariates["temperature"][scene.mask], 0.005))

@@ -6,16 +6,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from calibration.mismatch.candidates.candidate import UNLIKELY, Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from calibration.mismatch.scene import Scene
-
-
-STATED_WRONGLY = 9.2
-"""Twice the logarithm of a hundred."""
 
 
 class LoadDependentEfficiency(Candidate):
@@ -41,9 +37,9 @@ class LoadDependentEfficiency(Candidate):
         light: list[Shape] = [{"light": s} for s in (0.5, 1.0)]
         return [*curved, *light]
 
-    def reluctance(self, shape: Shape) -> float:
-        """Charge a loss in proportion: it is the stated gain far outside its own doubt, a hundred to one against."""
-        return STATED_WRONGLY if shape.get("power") == 0.0 else 0.0
+    def reluctance(self, scene: Scene, shape: Shape) -> float:  # noqa: ARG002
+        """Charge a loss in proportion: it is the stated gain far outside its own doubt."""
+        return UNLIKELY if shape.get("power") == 0.0 else 0.0
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return the loss as a multiple of the prediction."""

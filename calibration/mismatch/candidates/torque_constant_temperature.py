@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from calibration.mismatch.candidates.candidate import UNLIKELY, Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,7 +34,13 @@ class TorqueConstantTemperature(Candidate):
         middle = float(np.nanmean(scene.covariates["temperature"][scene.mask]))
         return [{"reference_degC": t} for t in (25.0, 20.0, 0.0, middle)]
 
+    def reluctance(self, scene: Scene, shape: Shape) -> float:
+        """Charge a factor that no wheel's own temperature changes: that is a gain that was stated wrongly."""
+        return 0.0 if scene.changes_within(self._warmer(scene, shape)) else UNLIKELY
+
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return (T − T_0) times the prediction."""
-        warmer = np.nan_to_num(scene.covariates["temperature"]) - float(shape["reference_degC"])
-        return (warmer * scene.filled)[None]
+        return (self._warmer(scene, shape) * scene.filled)[None]
+
+    def _warmer(self, scene: Scene, shape: Shape) -> Array:
+        return np.nan_to_num(scene.covariates["temperature"]) - float(shape["reference_degC"])
