@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 DRAWS = 4000
+OF_ITS_RANGE = 1e-3
+"""Step of a shape parameter, for a slope."""
 UNLIKELY = 0.02
 """A shape that fits worse than this, relative to the best, is not counted."""
 NINE_TENTHS = 5.94
@@ -67,11 +69,9 @@ def _design(search: Search, fit: Fit) -> tuple[Array, list[tuple[int, str, float
         if candidate is None:
             continue
         values = fit.coefficients[fit.of_term(index)] / dictionary.scale[list(term.group.columns)]
-        for name in candidate.bounds(scene, shape):
+        for name, (low, high) in candidate.bounds(scene, shape).items():
             if name in shape and name != "onset_s":
-                step = 1e-3 * (abs(float(shape[name])) or 1.0)
-                if candidate.name == "wheel-angle-ripple":
-                    step = 1e-5
+                step = OF_ITS_RANGE * (high - low)
                 changed = candidate.columns(scene, {**shape, name: float(shape[name]) + step})
                 before = candidate.columns(scene, shape)
                 slope = np.einsum("c,ctw->tw", values, changed - before) / step

@@ -78,7 +78,7 @@ def refined(search: Search, others: Sequence[Term], term: Term) -> Term:
     for name, (low, high) in candidate.bounds(scene, best).items():
         if name not in best:
             continue
-        reach = _reach(candidate, scene.length_s, name, float(best[name]), low, high)
+        reach = _reach(scene.length_s, name, float(best[name]), low, high)
         value, found = maximise(profile.along(best, name), *reach)
         if found > gain:
             best, gain = {**best, name: value}, found
@@ -89,12 +89,10 @@ def refined(search: Search, others: Sequence[Term], term: Term) -> Term:
     return Term(group, term.wheels)
 
 
-def _reach(candidate: Candidate, length_s: float, name: str, at: float, low: float, high: float) -> tuple[float, float]:
+def _reach(length_s: float, name: str, at: float, low: float, high: float) -> tuple[float, float]:
     """Return where to look: to the neighbouring points of the grid."""
     if name == "onset_s":
         return max(low, at - 0.05 * length_s), min(high, at + 0.05 * length_s)
-    if candidate.name == "wheel-angle-ripple":
-        return low, high
     spread = 0.35 * max(abs(at), 0.2 * (high - low))
     return max(low, at - spread), min(high, at + spread)
 
