@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drives import recording, simulation
@@ -62,3 +64,17 @@ def test_friction_changes_sign_with_rotation_and_slope_does_not(scene: Scene) ->
     np.testing.assert_array_equal(drag[scene.mask], direction[scene.mask])
     slope = by_name["grade-resistance"].columns(scene, {"shared": "evenly"})[0]
     np.testing.assert_allclose(slope, np.sin(scene.covariates["pitch"]))
+
+
+def test_a_temperature_that_no_wheel_changes_is_no_reason_to_call_friction_cold(scene: Scene) -> None:
+    """Wheels that differ by a kelvin and stay there say nothing of grease, nor of magnets; one that warms does."""
+    steady = np.broadcast_to(np.linspace(0.8, 1.6, 6), scene.mask.shape)
+    kept = replace(scene, covariates={**scene.covariates, "temperature": steady})
+    by_name = {c.name: c for c in library()}
+    cold, magnets = by_name["cold-lubricant-friction"], by_name["torque-constant-temperature"]
+    assert all(cold.reluctance(kept, shape) > 5 for shape in cold.shapes(kept))
+    assert all(magnets.reluctance(kept, shape) > 5 for shape in magnets.shapes(kept))
+    assert any(cold.reluctance(scene, shape) == 0 for shape in cold.shapes(scene))
+    assert any(magnets.reluctance(scene, shape) == 0 for shape in magnets.shapes(scene))
+    drag = [cold.columns(kept, shape)[0] for shape in cold.shapes(kept) if shape["power"] == 0.0]
+    assert min(float(np.min(np.abs(d[kept.mask]))) for d in drag) > 0.5, "no grease loses its drag within a kelvin"
