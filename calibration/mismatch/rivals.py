@@ -15,7 +15,8 @@ import numpy as np
 
 from calibration.mismatch.answer import Indistinguishable
 from calibration.mismatch.named import acceptable, best_per_family, polished
-from calibration.mismatch.search import Term
+from calibration.mismatch.search import PER_COEFFICIENT, Term
+from calibration.mismatch.sensitivity import NINE_IN_TEN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,6 +34,13 @@ FEW = 2
 SLACK = 4.0
 """A lead that the choice among shapes, and forms that are not nature's, give for nothing."""
 
+SMALLEST = 0.05
+"""Of the mean magnitude of the predicted channel: the least effect that an experiment is to show."""
+REMAINS = 0.1
+"""Of a friction's energy, outside what gain, cohesion and friction angle can imitate once speed and direction vary."""
+MINUTES = (10, 120)
+"""The least and the most to ask for: a rover's battery ends too."""
+
 DRIVES = {
     "direction": "drive the same stretch forwards and backwards at one speed",
     "wheel_speed": "drive a staircase of at least four constant speeds, from creeping to full speed, both ways",
@@ -48,6 +56,7 @@ DRIVES = {
     "none": "stand still with the motors unpowered, then drive one stretch both ways",
 }
 """For each covariate, the drive that moves it and nothing else."""
+WHEELS_UP = "lift the wheels and spin all six at several speeds, both ways"
 
 
 def confusions(search: Search, named: Fit, whole: Fit) -> tuple[Indistinguishable, ...]:
@@ -63,19 +72,17 @@ def rivals(search: Search, named: Fit) -> tuple[Indistinguishable, ...]:
     found = []
     for index, term in enumerate(named.terms):
         others = [t for i, t in enumerate(named.terms) if i != index]
-        names = [term.name]
-        covariates = [_covariate(term)]
+        members = [term]
         for _, rival in best_per_family(search, others)[:8]:
             if rival.name == term.name:
                 continue
             rival_terms = polished(search, (*others, rival))
             fit = search.fit(rival_terms)
             if acceptable(search, fit) and _survives(search, named, fit, others, term):
-                names.append(rival.name)
-                covariates.append(_covariate(rival))
-        names += _parameters_like(search, others, [term])
+                members.append(rival)
+        names = (*(member.name for member in members), *_parameters_like(search, others, [term]))
         if len(names) > 1:
-            found.append(Indistinguishable(tuple(names), experiment_for(covariates)))
+            found.append(Indistinguishable(names, experiment_for(search, others, members)))
     return tuple(found)
 
 
@@ -102,10 +109,10 @@ def collinear(search: Search, given: Fit) -> tuple[Indistinguishable, ...]:
             continue
         seen.add(frozenset(members))
         in_order = sorted(members)
-        parameters = _parameters_like(search, given.terms, [terms[m][0] for m in in_order])
-        if len(members) + len(parameters) > 1:
-            experiment = experiment_for([_covariate(terms[m][0]) for m in in_order])
-            found.append(Indistinguishable((*in_order, *parameters), experiment))
+        first = [terms[member][0] for member in in_order]
+        names = (*in_order, *_parameters_like(search, given.terms, first))
+        if len(names) > 1:
+            found.append(Indistinguishable(names, experiment_for(search, given.terms, first)))
     return tuple(found)
 
 
@@ -139,9 +146,8 @@ def _parameters_like(search: Search, given: Sequence[Term], members: Sequence[Te
 
 def _energy_apart(search: Search, given: Sequence[Term], term: Term, size: float) -> float:
     """Return the energy of a term of this size outside the reach of all that is in the fit."""
-    block, reach = search.beside(given, term)
     counts = search.weights @ search.dictionary.counts.sum(axis=0)
-    return float((block - reach)[0, 0] * size**2 * counts / max(float(block[0, 0]), 1e-300))
+    return float(_share_outside(search, given, term) * size**2 * counts)
 
 
 def _representatives(search: Search) -> dict[str, list[Term]]:
@@ -166,11 +172,35 @@ def _imitates(search: Search, given: Fit, one: list[Term], two: list[Term], size
     return any(shows * _energy_apart(search, (*given.terms, other), term, size) < CANNOT_LEAD for other in two)
 
 
-def experiment_for(covariates: Sequence[str]) -> str:
-    """Return the drives that move each of these covariates alone, as one sentence."""
-    drives = [DRIVES[c] for c in dict.fromkeys(covariates) if c in DRIVES]
+def minutes_needed(search: Search) -> int:
+    """Return how long a drive must last before an effect of the smallest size shows nine times in ten.
+
+    A drive that moves the right covariates leaves about a tenth of an effect outside the free parameters' reach; each
+    reading then adds to its gain what the noise of this recording lets it.
+    """
+    scene = search.dictionary.scene
+    needed = (sqrt(search.threshold + PER_COEFFICIENT) + NINE_IN_TEN) ** 2
+    readings = 60 / scene.recording.step_s
+    gained = REMAINS * readings * float(search.weights.sum()) * (SMALLEST * scene.mean_size) ** 2
+    return int(np.clip(5 * np.ceil(needed / gained / 5), *MINUTES))
+
+
+def experiment_for(search: Search, given: Sequence[Term], members: Sequence[Term]) -> str:
+    """Return the drives that move each member's covariate alone, and how long they take.
+
+    What gain, cohesion and friction angle may hide shows where there is no soil.
+    """
+    drives = [DRIVES[c] for c in dict.fromkeys(_covariate(member) for member in members) if c in DRIVES]
+    if any(_share_outside(search, given, member) < REMAINS for member in members):
+        drives.append(WHEELS_UP)
     sentence = "; then ".join(drives)
-    return sentence[:1].upper() + sentence[1:] + "."
+    return f"{sentence[:1].upper()}{sentence[1:]}; {minutes_needed(search)} minutes in all."
+
+
+def _share_outside(search: Search, given: Sequence[Term], term: Term) -> float:
+    """Return the share of a term's energy that nothing else in the fit reaches."""
+    block, reach = search.beside(given, term)
+    return float((block - reach)[0, 0] / max(float(block[0, 0]), 1e-300))
 
 
 def _covariate(term: Term) -> str:

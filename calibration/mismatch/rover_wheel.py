@@ -27,6 +27,9 @@ GRAVITY_M_S2 = 9.81
 SLOWEST_RAD_S = 0.05
 """Below this speed at the wheel the model says nothing: slip is a quotient of two small numbers there."""
 
+LIFTED_N = 1.0
+"""What a cell may read under a wheel that hangs in its suspension."""
+
 
 class SimulationTable(Table):
     """SIM.toml's `[simulation]`."""
@@ -79,19 +82,23 @@ class RoverWheel(Simulation):
         rim = np.where(turning, self.tables.wheel.radius_m * speed, np.nan)
         ground = recording.channel("ground_speed_m_s")
         slip = np.where(np.isfinite(ground), 1 - ground / rim, self.tables.simulation.slip_without_ground_speed)
-        slip = np.where(turning, slip, np.nan)
         load = recording.channel("load_N")
+        lifted = _lifted(load)
+        slip = np.where(turning & ~lifted, slip, np.nan)
         never = ~np.isfinite(load).any(axis=0)
         share = self.tables.rover.mass_kg * GRAVITY_M_S2 / recording.shape[1]
         assumed = self.tables.simulation.slip_without_ground_speed
         notes = []
         if never.any():
             notes.append(f"Where load_N was never measured, the wheel is taken to carry {share:.1f} N.")
-        if blank := int(np.sum(turning & ~np.isfinite(ground))):
+        if lifted.any():
+            notes.append(f"No cell carries {LIFTED_N:g} N in {int(lifted.sum())} instants: the wheels turn in the air.")
+        if blank := int(np.sum(turning & ~np.isfinite(ground) & ~lifted)):
             notes.append(
                 f"ground_speed_m_s is blank at {blank} turning wheels' readings; slip is taken as {assumed:g}."
             )
-        channels = {"slip": slip, "load_N": np.where(never, share, load)}
+        on_ground = np.where(never, share, np.where(lifted, np.nan, load))
+        channels = {"slip": slip, "load_N": on_ground, "lifted": np.broadcast_to(lifted.astype(np.float64), load.shape)}
         if "bus_voltage_V" in recording.channels and "motor_current_A" in recording.channels:
             voltage, current = recording.channels["bus_voltage_V"], recording.channels["motor_current_A"]
             channels["bus_voltage_V"] = open_circuit_voltage(voltage, current)
@@ -114,6 +121,7 @@ class RoverWheel(Simulation):
         if sinking := values.get("slip_sinkage", 0.0):
             angle = slip_sunk(angle, slip, sinking)
         torque = np.sign(speed) * wheel_torque(angle, slip, tables.wheel, soil) / values["gain_factor"]
+        torque = np.where(inputs["lifted"] > 0, 0.0, torque)
         torque = np.where(np.abs(speed) > SLOWEST_RAD_S, torque, np.nan)
         if torque.shape[-1] != 6:
             return torque / tables.drivetrain.gain_Nm_per_A
@@ -179,6 +187,12 @@ def slip_sunk(contact_angle_rad: Array, slip: Array, strength: float) -> Array:
     deeper = 1 + strength * ((1 + slip) / (1 - 0.5 * slip) - 1)
     cosine = 1 - deeper * (1 - np.cos(contact_angle_rad))
     return np.minimum(np.arccos(np.clip(cosine, -1, 1)), LARGEST_CONTACT_ANGLE_RAD)
+
+
+def _lifted(load_N: Array) -> NDArray[np.bool_]:
+    """Return the instants in which no wheel carries anything, shape (time, 1): the rover stands on a block."""
+    known = np.isfinite(load_N)
+    return np.asarray(known.any(axis=1) & ~np.any(known & (np.abs(load_N) >= LIFTED_N), axis=1))[:, None]
 
 
 def _priors(tables: RoverWheelTables) -> dict[str, Prior]:

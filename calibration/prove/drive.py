@@ -6,6 +6,7 @@ temperature and voltage wander by sums of slow sinusoids. `KINDS` differ in how 
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -47,6 +48,7 @@ ASKS = {
     "temperature": ("cold", "warm"),
     "slip": ("sledge", "slip"),
     "ballast": ("ballast", "weights"),
+    "lift": ("lift the wheels",),
 }
 """What an experiment, told in words, asks to be moved."""
 
@@ -168,6 +170,11 @@ def moves_of(experiment: str) -> frozenset[str]:
     return frozenset(move for move, words in ASKS.items() if any(word in told for word in words))
 
 
+def lasting_s(experiment: str) -> float:
+    """Return how long an experiment in words asks to drive: the longest time that it names [s], 0 where it does not."""
+    return max((60.0 * float(minutes) for minutes in re.findall(r"(\d+) minutes", experiment)), default=0.0)
+
+
 def asked_for(rng: Generator, moves: frozenset[str]) -> Habit:
     """Return a habit that moves what an experiment asks for, and nothing else: one speed where none are asked for."""
     one = rng.uniform(0.15, 0.4)
@@ -213,6 +220,10 @@ def make_drive(
         slip = np.full_like(slip, rng.uniform(0.02, 0.06))
     if "ballast" in moved and kind == "experiment":
         load = load * np.where(np.sin(2 * np.pi * t_s / 400) > 0, 1.0, 1.5)[:, None]
+    if "lift" in moved and kind == "experiment":
+        # The last third on a block: the wheels carry nothing, and the hubs stay where they are.
+        lifted = t_s[:, None] > 2 / 3 * t_s[-1]
+        load, slip = np.where(lifted, 0.0, load), np.where(lifted, 1.0, slip)
     return Drive(
         kind=kind,
         t_s=t_s,

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration.prove.concealed import EFFECTS
-from calibration.prove.drive import EVERYTHING, KINDS, Drive, coloured, make_drive, moves_of
+from calibration.prove.drive import EVERYTHING, KINDS, Drive, coloured, lasting_s, make_drive, moves_of
 from calibration.prove.ground import Ground, TorqueTable
 from calibration.prove.outside import OUTSIDE
 from calibration.prove.scene import Concealed, Scene, of_strength
@@ -179,7 +179,8 @@ def motor_effects(effects: tuple[Concealed, ...], drive: Drive) -> Array:
 def make_trial(plan: Plan, *, duration_s: float = 1800.0, step_s: float = 0.2, experiment: str = "") -> Trial:
     """Return the trial of this plan: the same for the same plan, always.
 
-    With an experiment in words, the same rover with the same effects drives again, and moves what the words ask for.
+    With an experiment in words, the same rover with the same effects drives again: it moves what the words ask for,
+    and for as long, if that is longer.
     """
     rng = np.random.default_rng([plan.seed, 1, plan.number])
     tables = simulation_tables(rng)
@@ -189,6 +190,7 @@ def make_trial(plan: Plan, *, duration_s: float = 1800.0, step_s: float = 0.2, e
     effects = conceal(rng, plan, scene)
     if experiment:
         rng = np.random.default_rng([plan.seed, 3, plan.number])
+        duration_s = max(duration_s, lasting_s(experiment))
         drive = _driven(rng, "experiment", tables, duration_s, step_s, moves_of(experiment))
         scene = replace(scene, drive=drive)
         again = (concealed_in(plan, scene, index) for index in range(len(effects)))

@@ -89,5 +89,6 @@ class TorqueTable:
         self._spline = RectBivariateSpline(loads, slips, load_and_torque(ground, angle, slip)[1])
 
     def __call__(self, load_N: Array, slip: Array) -> Array:
-        """Return the torque [N·m], shape of the broadcast arguments."""
-        return np.asarray(self._spline.ev(np.clip(load_N, 2, 150), np.clip(slip, -0.15, 0.6)), np.float64)
+        """Return the torque [N·m], shape of the broadcast arguments; none where a wheel carries nothing."""
+        torque = self._spline.ev(np.clip(load_N, 2, 150), np.clip(slip, -0.15, 0.6))
+        return np.where(np.asarray(load_N) == 0, 0.0, np.asarray(torque, np.float64))
