@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from typing import TYPE_CHECKING
 
@@ -115,6 +116,26 @@ def test_constant_speed_on_flat_ground_cannot_tell_frictions_apart() -> None:
     (found,) = [one for one in answer.indistinguishable if "coulomb-friction" in one.effects]
     assert "viscous-friction" in found.effects
     assert "staircase" in found.experiment
+    assert "lift the wheels" in found.experiment, "what cohesion may hide shows where there is no soil"
+    assert re.search(r"\d+ minutes in all", found.experiment)
+
+
+def test_a_twentieth_of_drag_shows_once_the_wheels_are_lifted() -> None:
+    """A drive on soil may hide it in cohesion and gain; wheels that carry nothing have neither."""
+    table, sim = with_drag(0.05), simulation()
+    on_soil = from_columns(table)
+    assert not compare(on_soil, sim).answer.effects
+    asked = np.nan_to_num(build_scene(on_soil, sim).prediction).ravel()
+    lifted = table["t_s"] > 250
+    for name, there in (
+        ("load_N", 0.2),
+        ("ground_speed_m_s", 0.0),
+        ("motor_current_A", table["motor_current_A"] - asked),
+    ):
+        table[name] = np.where(lifted, there, table[name])
+    comparison = compare(from_columns(table), sim)
+    assert {effect.name for effect in comparison.answer.effects} == {"coulomb-friction"}
+    assert any("turn in the air" in note for note in comparison.answer.notes)
 
 
 @pytest.mark.parametrize("missing", [("load_N", "pitch_rad"), ("motor_temperature_degC", "bus_voltage_V")])

@@ -117,6 +117,21 @@ def test_an_experiment_moves_what_it_asks_for_and_keeps_the_effect() -> None:
     assert np.ptp(after.drive.temperature_degC[:, 0]) == 0
 
 
+def test_an_experiment_lasts_as_long_as_it_asks_and_lifts_the_wheels_where_it_says_so() -> None:
+    """The last third is driven on a block: no load, hubs at rest, and nothing but the concealed drag in the current."""
+    plan = Plan(3, 11, "constant", ("coulomb-friction",))
+    trial = make_trial(plan, duration_s=300, experiment="a staircase, both ways; lift the wheels; 10 minutes in all.")
+    drive = trial.drive
+    assert drive.t_s[-1] == pytest.approx(600, abs=1)
+    lifted = drive.t_s > 400
+    assert not drive.load_N[lifted].any()
+    assert not drive.hub_speed_m_s[lifted].any()
+    assert drive.load_N[~lifted].min() > 5
+    turning = drive.moving & lifted[:, None]
+    drag = float(np.mean((trial.current_A * np.sign(drive.wheel_speed_rad_s))[turning]))
+    assert drag == pytest.approx(trial.effects[0].size, rel=0.25)
+
+
 def test_a_batch_gives_every_name_its_turn() -> None:
     """Two hundred recordings hold every name and every unnamed effect, and the groups in their shares."""
     plans = plan_batch(5, 200)
