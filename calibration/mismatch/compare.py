@@ -200,7 +200,7 @@ def _evidence(decision: Decision) -> Evidence:
     blocks = blocks_of_time(scene, noise)
     shift = whole.coefficients[: len(search.nuisance.names)] / dictionary.scale[list(search.nuisance.columns)]
     moved = dict(zip(search.nuisance.names, shift.tolist(), strict=True))
-    values = {name: value + moved.get(name, 0.0) for name, value in scene.values.items()}
+    values = {name: scene.values.get(name, 0.0) + moved.get(name, 0.0) for name in {**scene.values, **moved}}
     contributions = tuple(
         Contribution(
             term.name,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from calibration.mismatch.curves import broken_lines
 from calibration.mismatch.dictionary import Dictionary, Group
+from calibration.mismatch.simulation import own_name
 from calibration.mismatch.spectrum import padded_length, power_of_sums
 
 if TYPE_CHECKING:
@@ -43,14 +44,20 @@ class Nuisance:
 
 
 def add_nuisance(dictionary: Dictionary) -> Nuisance:
-    """Add ∂prediction/∂parameter of every parameter that the priors leave free."""
-    scene = dictionary.scene
-    free = [name for name, prior in scene.simulation.parameters.items() if prior.std > 0]
-    places = dictionary.append([scene.tangent(name) for name in free])
-    stds = np.array([scene.simulation.parameters[name].std for name in free])
+    """Add ∂prediction/∂parameter of every parameter that the priors leave free, and of each wheel's own part of it."""
+    scene, simulation = dictionary.scene, dictionary.scene.simulation
+    free = {name: prior.std for name, prior in simulation.parameters.items() if prior.std > 0}
+    names, stds, tangents = list(free), list(free.values()), [scene.tangent(name) for name in free]
+    wheels = scene.recording.wheels
+    for name in free if len(wheels) > 1 else ():
+        if name in simulation.own_to_each_wheel:
+            names += [own_name(name, wheel) for wheel in wheels]
+            stds += [free[name]] * len(wheels)
+            tangents += [np.where(np.array(wheels) == wheel, scene.tangent(name), 0.0) for wheel in wheels]
+    places = dictionary.append(tangents)
     # A coefficient of a column that was divided by its scale is the parameter's shift times that scale.
-    precision = 1 / (stds * dictionary.scale[places]) ** 2 if places else np.zeros(0)
-    return Nuisance(tuple(free), tuple(places), precision)
+    precision = 1 / (np.array(stds) * dictionary.scale[places]) ** 2 if places else np.zeros(0)
+    return Nuisance(tuple(names), tuple(places), precision)
 
 
 def add_candidate(

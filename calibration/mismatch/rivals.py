@@ -31,6 +31,8 @@ WORTH_WORRYING = 0.15
 ABSURD = 2.0
 """How many times that size is more than anybody would overlook."""
 FEW = 2
+AS_GOOD = 0.5
+"""A gain smaller by less is the same, however many shapes it was chosen from."""
 SLACK = 4.0
 """A lead that the choice among shapes, and forms that are not nature's, give for nothing."""
 
@@ -80,7 +82,7 @@ def rivals(search: Search, named: Fit) -> tuple[Indistinguishable, ...]:
             fit = search.fit(rival_terms)
             if acceptable(search, fit) and _survives(search, named, fit, others, term):
                 members.append(rival)
-        names = (*(member.name for member in members), *_parameters_like(search, others, [term]))
+        names = (*(member.name for member in members), *_parameters_like(search, others, members))
         if len(names) > 1:
             found.append(Indistinguishable(names, experiment_for(search, others, members)))
     return tuple(found)
@@ -217,8 +219,8 @@ def _survives(search: Search, named: Fit, rival: Fit, others: Sequence[Term], te
     block, reach = search.beside((*others, term), own)
     values = rival.coefficients[rival.of_term(len(rival.terms) - 1)]
     apart = float(values @ (block - reach) @ values)
-    if apart <= 1e-9:
-        return lead <= 1.0
+    if apart <= 1e-9 or named.gain - rival.gain < AS_GOOD:
+        return True
     return _tail((lead + apart) / (2 * sqrt(apart))) > ONE_IN_TWENTY
 
 

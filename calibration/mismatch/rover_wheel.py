@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 from calibration.drivetrain import motor_current
 from calibration.mismatch.errors import SimulationError
 from calibration.mismatch.inputs import known_mean
-from calibration.mismatch.simulation import Prior, SensorError, Simulation
+from calibration.mismatch.simulation import Prior, SensorError, Simulation, own_name
 from calibration.mismatch.supply import open_circuit_voltage
 from calibration.parameters import Drivetrain, Rover, Sensors, Soil, Table, Wheel
 from calibration.wheel_soil import LARGEST_CONTACT_ANGLE_RAD, contact_angle, wheel_torque
@@ -55,6 +55,7 @@ class RoverWheel(Simulation):
     channel = "motor_current_A"
     unit = "A"
     inputs = ("motor_speed_rad_s",)
+    own_to_each_wheel: ClassVar = frozenset({"gain_factor"})
     parameter_effects: ClassVar = {
         "gain_factor": "drivetrain-gain",
         "cohesion_Pa": "soil-cohesion",
@@ -157,9 +158,11 @@ class RoverWheel(Simulation):
     def corrected_tables(self, values: Mapping[str, float]) -> dict[str, Any]:
         """Return the tables with gain, cohesion and friction angle where the recording moved them."""
         tables = self.tables.model_dump()
-        factor = values["gain_factor"]
         drivetrain, soil = tables["drivetrain"], tables["soil"]
-        drivetrain["gain_factor"] = [factor * before for before in drivetrain["gain_factor"]]
+        drivetrain["gain_factor"] = [
+            before * (values["gain_factor"] + values.get(own_name("gain_factor", wheel), 0.0))
+            for wheel, before in enumerate(drivetrain["gain_factor"], 1)
+        ]
         soil["cohesion_Pa"] = float(values["cohesion_Pa"])
         soil["friction_angle_deg"] = float(values["friction_angle_deg"])
         return tables

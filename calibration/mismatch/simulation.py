@@ -67,6 +67,8 @@ class Simulation:
     """Columns without which nothing can be predicted."""
     parameters: Mapping[str, Prior] = {}
     """What the simulation knows, and how well."""
+    own_to_each_wheel: ClassVar[frozenset[str]] = frozenset()
+    """Parameters that the wheels need not share: each has an error of its own beside the common one, as large."""
     parameter_effects: ClassVar[Mapping[str, str]] = {}
     """Names of parameters as effects, for saying what a wrong parameter could be mistaken for."""
     sensors: Mapping[str, SensorError] = {}
@@ -125,6 +127,11 @@ class Simulation:
                 name: {"value": float(values[name]), "std": prior.std} for name, prior in self.parameters.items()
             }
         }
+
+
+def own_name(parameter: str, wheel: int) -> str:
+    """Return what a wheel's own part of a parameter is called among the values that a recording gave."""
+    return f"{parameter} of {wheel}"
 
 
 def load_simulation(tables: Mapping[str, Any], *, beside: Path | None = None) -> Simulation:

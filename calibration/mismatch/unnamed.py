@@ -100,7 +100,9 @@ def _that_stay(search: Search, named: Fit) -> Fit:
     kept = []
     curves = [g for g in search.dictionary.groups if not g.named and g.name == "time" and "periodic" not in g.flavour]
     for term in named.terms:
-        beside = search.conditional(named.terms, curves) if _covariate(term) == "time" else []
+        # What another channel shows by itself may come and go: a sensor does.
+        changes = _covariate(term) == "time" and term.group.evidence is None
+        beside = search.conditional(named.terms, curves) if changes else []
         more = [
             gain / (gain + named.gain)
             for gain, curve in beside

@@ -68,8 +68,9 @@ class LoadCellDrift(Candidate):
             reading, drift = self._unexplained_load(scene), self._drift(scene)
             noise = estimate_noise(np.nan_to_num(reading - drift), np.isfinite(reading))
             seen = np.nansum(np.where(np.isfinite(reading), drift**2, 0.0), axis=0) * noise.weights
-            # A line of many pieces follows noise too: each piece gains 1 by chance.
-            scene.made[key] = np.maximum(seen - WANDER_KNOTS, 0.0)
+            # A line of many pieces follows noise too: each piece gains 1 by chance. And the ground: that all cells do.
+            usual = float(np.median(seen)) if len(seen) > 2 else 0.0
+            scene.made[key] = np.maximum(seen - max(usual, WANDER_KNOTS), 0.0)
         return scene.made[key], np.ones(scene.mask.shape[1])
 
     def _simulated(self, scene: Scene, offset: float) -> Array:

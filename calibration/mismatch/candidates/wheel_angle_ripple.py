@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 BINS_PER_TURN = 256
 HIGHEST_ORDER = 64
+READINGS_PER_CYCLE = 2.5
+"""Of fewer, a line is the image of another: at one speed a constant drag can look like a ripple of high order."""
 
 
 class WheelAngleRipple(Candidate):
@@ -86,9 +88,16 @@ class WheelAngleRipple(Candidate):
         return np.ones(scene.mask.shape) if kind == "torque" else scene.filled / scene.mean_size
 
     def memory_at(self, scene: Scene, residual: Array, shape: Shape) -> float:
-        """Return the noise's power around this order, over that of white noise: lines stand out of their neighbours."""
-        order, power = self._spectrum(scene, residual * self._base(scene, str(shape["kind"])))
-        above = order - float(shape["order"])
+        """Return the noise's power around this order, over that of white noise: lines stand out of their neighbours.
+
+        It is the louder one's of torque and drag, so that no kind of ripple is preferred for its estimate.
+        """
+        kinds = ("drag", "torque") if "direction" in scene.covariates else ("torque",)
+        return max(self._memory(scene, residual * self._base(scene, kind), float(shape["order"])) for kind in kinds)
+
+    def _memory(self, scene: Scene, weighted: Array, at: float) -> float:
+        order, power = self._spectrum(scene, weighted)
+        above = order - at
         # Slow noise has more power at lower orders: the louder side counts.
         sides = [power[(side * above > 0.1) & (side * above < 1.5)] for side in (-1, 1)]
         # Half of all squares are below their median: of two a wheel, 1 − 1/9n of the mean, cubed (Wilson, Hilferty).
@@ -98,7 +107,7 @@ class WheelAngleRipple(Candidate):
 
     def _strongest(self, scene: Scene, weighted: Array) -> float:
         order, power = self._spectrum(scene, weighted)
-        sought = (order >= self.free["order"][0]) & (order <= HIGHEST_ORDER)
+        sought = (order >= self.free["order"][0]) & (order <= _resolved(scene))
         return float(order[np.argmax(np.where(sought, power, 0.0))])
 
     def _spectrum(self, scene: Scene, weighted: Array) -> tuple[Array, Array]:
@@ -114,3 +123,9 @@ class WheelAngleRipple(Candidate):
             power += summed / max(float(np.sum(weighted[here, k] ** 2)), 1e-300)
         order = np.arange(len(power)) * BINS_PER_TURN / length
         return order, power
+
+
+def _resolved(scene: Scene) -> float:
+    """Return the highest order that a wheel at its usual speed shows in enough readings a cycle."""
+    usual = float(np.median(np.abs(scene.covariates["wheel_speed"][scene.mask])))
+    return min(HIGHEST_ORDER, 2 * np.pi / (READINGS_PER_CYCLE * scene.recording.step_s * max(usual, 1e-9)))
