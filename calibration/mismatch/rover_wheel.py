@@ -112,6 +112,7 @@ class RoverWheel(Simulation):
             update={
                 "cohesion_Pa": values["cohesion_Pa"],
                 "friction_angle_deg": values["friction_angle_deg"],
+                "shear_modulus_m": tables.soil.shear_modulus_m * values.get("shear_factor", 1.0),
                 "k_phi_kN": tables.soil.k_phi_kN * values.get("stiffness_factor", 1.0),
                 "k_c_kN": tables.soil.k_c_kN * values.get("stiffness_factor", 1.0),
             }
@@ -153,7 +154,7 @@ class RoverWheel(Simulation):
 
     def variants(self) -> Mapping[str, float]:
         """Physics that the model has in it, switched off: candidates switch it on."""
-        return {"stiffness_factor": 1.0, "slip_sinkage": 0.0}
+        return {"stiffness_factor": 1.0, "shear_factor": 1.0, "slip_sinkage": 0.0}
 
     def corrected_tables(self, values: Mapping[str, float]) -> dict[str, Any]:
         """Return the tables with gain, cohesion and friction angle where the recording moved them."""

@@ -15,7 +15,11 @@ if TYPE_CHECKING:
 
 
 class MultiPassCompaction(Candidate):
-    """Resistance that changes from row to row, by number of passes before."""
+    """Resistance that changes from row to row, by number of passes before.
+
+    What a pass does to the soil is one number (the current, or the stiffness, changes by so much), or three: a rut is
+    stiffer, shears sooner, and coheres more.
+    """
 
     name = "multi-pass-compaction"
     covariate = "wheel_row"
@@ -25,7 +29,11 @@ class MultiPassCompaction(Candidate):
     experiment = "drive the same virgin lane forwards, then backwards in the same ruts, then a third time"
     source = "multi-pass tests on sand: most of the compaction in the first pass"
     requires = ("torque",)
-    coefficients: ClassVar = (Coefficient("relative_change_per_pass", "1", 0),)
+    coefficients: ClassVar = (
+        Coefficient("relative_change_per_pass", "1", 0),
+        Coefficient("relative_shear_modulus_per_pass", "1", 0),
+        Coefficient("relative_cohesion_per_pass", "1", 0),
+    )
     sharing: ClassVar = ("all",)
 
     def applies(self, scene: Scene) -> bool:
@@ -35,7 +43,9 @@ class MultiPassCompaction(Candidate):
     def shapes(self, scene: Scene) -> Sequence[Shape]:
         """All at the first pass, or evenly; counted from the front, or from whichever end leads."""
         leads = ("front", "travel") if "direction" in scene.covariates else ("front",)
-        ways = ("current", "stiffness") if "stiffness_factor" in scene.simulation.variants() else ("current",)
+        ways = ["current"]
+        ways += ["stiffness"] if "stiffness_factor" in scene.simulation.variants() else []
+        ways += ["soil"] if {"shear_factor", "cohesion_Pa"} <= {*scene.simulation.variants(), *scene.values} else []
         return [{"kept": kept, "leads": lead, "by": way} for kept in (0.0, 0.5, 1.0) for lead in leads for way in ways]
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
@@ -48,5 +58,10 @@ class MultiPassCompaction(Candidate):
         # 1 + k + k² …: what each further pass adds is the fraction k of what the one before did.
         kept = float(shape["kept"])
         done = np.where(passes > 0, 1.0, 0.0) + np.where(passes > 1, kept * (passes - 1), 0.0)
-        base = scene.filled if shape["by"] == "current" else scene.secant("stiffness_factor", 0.3)
-        return (base * done)[None]
+        if shape["by"] == "current":
+            return (scene.filled * done)[None]
+        stiffer = scene.secant("stiffness_factor", 0.3)
+        if shape["by"] == "stiffness":
+            return (stiffer * done)[None]
+        coheres = scene.values["cohesion_Pa"] * scene.tangent("cohesion_Pa")
+        return np.stack((stiffer * done, scene.secant("shear_factor", -0.3) * done, coheres * done))
