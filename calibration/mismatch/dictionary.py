@@ -51,6 +51,9 @@ class Group:
     evidence: tuple[Array, Array] | None = None
     """For a fault of another channel: for each wheel, what that channel says for it, and how large it is there."""
 
+    alive: NDArray[np.bool_] | None = None
+    """Which column does anything on which wheel (column, wheel); all of them on all where it is not said."""
+
     @property
     def span(self) -> slice:
         """Its columns, which lie side by side."""

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+NOW_AND_THEN = 0.4
+"""What counts of an effect's size at the times when it acts, if at others it does not."""
+
 
 def residual_of(search: Search, fit: Fit) -> Array:
     """Return measured less fitted, shape (time, wheel), 0 outside the mask."""
@@ -38,8 +41,15 @@ def contribution(search: Search, fit: Fit, index: int) -> Array:
 
 
 def size_of(search: Search, fit: Fit, index: int) -> float:
-    """Return a term's root mean square on its wheels, as a share of the channel's mean magnitude."""
-    scene = search.dictionary.scene
-    term = fit.terms[index]
-    values = contribution(search, fit, index)[:, list(term.wheels)][scene.mask[:, list(term.wheels)]]
-    return float(np.sqrt(np.mean(values**2))) / scene.mean_size
+    """Return a term's size on its wheels, as a share of the channel's mean magnitude."""
+    scene, on = search.dictionary.scene, list(fit.terms[index].wheels)
+    return magnitude(contribution(search, fit, index)[:, on][scene.mask[:, on]] ** 2) / scene.mean_size
+
+
+def magnitude(power: Array) -> float:
+    """Return how large an effect with these squares is where it acts.
+
+    Of a constant effect that is its root mean square; of one that acts now and then, two fifths of what it has then.
+    """
+    then = np.sum(power**2) / max(float(np.sum(power)), 1e-300)
+    return float(np.sqrt(max(np.mean(power), NOW_AND_THEN**2 * then)))

@@ -74,9 +74,21 @@ def add_candidate(
         columns += list(found)
         signs = tuple(c.sign for c in candidate.coefficients[: len(found)])
         signs += (0,) * (len(found) - len(signs))
-        evidence = candidate.evidence(scene, shape)
         paid = price + candidate.reluctance(scene, shape)
-        made.append(Group(candidate.name, places, signs, candidate.sharing, paid, candidate, shape, "", less, evidence))
+        made.append(
+            Group(
+                candidate.name,
+                places,
+                signs,
+                candidate.sharing,
+                paid,
+                candidate,
+                shape,
+                quieter=less,
+                evidence=candidate.evidence(scene, shape),
+                alive=np.any(np.where(scene.mask, found, 0.0) != 0, axis=1) if len(found) > 1 else None,
+            )
+        )
     dictionary.append(columns)
     dictionary.groups += made
     return made

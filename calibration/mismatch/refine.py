@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 GOLDEN = (np.sqrt(5) - 1) / 2
+SETTLES = 4
 
 
 class Profile:
@@ -70,8 +71,10 @@ class Profile:
 def refined(search: Search, others: Sequence[Term], term: Term) -> Term:
     """Return the term with its free shape parameters where they gain most; the dictionary gains its columns."""
     candidate = term.group.candidate
-    if candidate is None or not any(name in term.group.shape for name in candidate.free):
+    if candidate is None:
         return term
+    if not any(name in term.group.shape for name in candidate.free):
+        return _settled(search, others, term)
     profile = Profile(search, others, candidate, term.wheels)
     best, gain = dict(term.group.shape), profile(term.group.shape)
     scene = search.dictionary.scene
@@ -82,9 +85,30 @@ def refined(search: Search, others: Sequence[Term], term: Term) -> Term:
         value, found = maximise(profile.along(best, name), *reach)
         if found > gain:
             best, gain = {**best, name: value}, found
-    if best == term.group.shape:
+    return _settled(search, others, _reshaped(search, term, best))
+
+
+def _settled(search: Search, others: Sequence[Term], term: Term) -> Term:
+    """Return the term with a shape that agrees with its coefficients, as far as a few steps lead there."""
+    for _ in range(SETTLES):
+        if (candidate := term.group.candidate) is None:
+            break
+        fit = search.fit((*others, term))
+        scale = search.dictionary.scale[list(term.group.columns)]
+        values = fit.coefficients[fit.of_term(len(others))] / scale
+        settled = candidate.settled(search.dictionary.scene, term.group.shape, values.tolist())
+        if settled == term.group.shape:
+            break
+        term = _reshaped(search, term, settled)
+    return term
+
+
+def _reshaped(search: Search, term: Term, shape: Shape) -> Term:
+    """Return the term in another shape; the dictionary gains its columns."""
+    candidate = term.group.candidate
+    if candidate is None or shape == term.group.shape:
         return term
-    (group,) = add_candidate(search.dictionary, candidate, [best], [term.group.quieter])
+    (group,) = add_candidate(search.dictionary, candidate, [shape], [term.group.quieter])
     search.refresh()
     return Term(group, term.wheels)
 

@@ -44,7 +44,9 @@ class Term:
 
     def price(self, wheel_count: int) -> float:
         """Return what choosing this term costs: its coefficients, its shape, and that it is on these wheels."""
-        paid = PER_COEFFICIENT * len(self.group.columns) + self.group.complexity
+        alive = self.group.alive
+        count = len(self.group.columns) if alive is None else np.sum(alive[:, list(self.wheels)].any(axis=1))
+        paid = PER_COEFFICIENT * float(count) + self.group.complexity
         if len(self.wheels) < wheel_count:
             paid += 2 * float(np.log(2 * wheel_count))
             # One wheel alone is the rule for some faults and the exception for what all wheels are built with.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calibration.mismatch.answer import Sensitivity
+from calibration.mismatch.explained import magnitude
 from calibration.mismatch.named import WORTH_A_NAME
 from calibration.mismatch.search import Term
 
@@ -34,15 +35,17 @@ def sensitivities(search: Search, given: Fit, candidates: Sequence[Candidate]) -
         group = groups[len(groups) // 2]
         wheels = search.all_wheels
         patterns = [wheels] if "all" in candidate.sharing or len(wheels) == 1 else [(w,) for w in wheels]
-        sizes = [_smallest(search, given, Term(group, pattern)) for pattern in patterns]
+        # What was found already is looked for anew, not beside itself.
+        others = [term for term in given.terms if term.name != candidate.name]
+        sizes = [_smallest(search, others, Term(group, pattern)) for pattern in patterns]
         found.append(Sensitivity(candidate.name, float(np.median(sizes)), unit))
     return tuple(sorted(found, key=lambda s: s.name))
 
 
-def _smallest(search: Search, given: Fit, term: Term) -> float:
+def _smallest(search: Search, given: Sequence[Term], term: Term) -> float:
     """Return the effect whose gain passes the threshold nine times in ten."""
     scene, dictionary = search.dictionary.scene, search.dictionary
-    block, reach = search.beside(given.terms, term)
+    block, reach = search.beside(given, term)
     own = np.linalg.eigvalsh(block - reach)
     total = float(np.trace(block)) / len(block)
     price = term.price(len(search.weights)) + term.bonus
@@ -51,7 +54,8 @@ def _smallest(search: Search, given: Fit, term: Term) -> float:
     if outside <= 1e-9 * total:
         return float("inf")
     on = list(term.wheels)
-    own_span = term.group.span
-    energy = float(np.trace(dictionary.gram[:, on, own_span, own_span].sum(axis=(0, 1)))) / len(own)
-    rms = np.sqrt(energy / max(int(scene.mask[:, on].sum()), 1))
-    return float(max(np.sqrt(needed / outside) * rms, WORTH_A_NAME * scene.mean_size))
+    known = scene.mask.T[:, dictionary.order][on]
+    power = np.mean(dictionary.columns[term.group.span][:, on].astype(np.float64) ** 2, axis=0)[known]
+    rms = float(np.sqrt(np.mean(power)))
+    least = WORTH_A_NAME * scene.mean_size / magnitude(power)
+    return rms * max(float(np.sqrt(needed / outside)), least)

@@ -69,6 +69,10 @@ class Candidate:
         """Return what this shape costs where it contradicts what was stated, or says no more than a plainer name."""
         return 0.0
 
+    def settled(self, scene: Scene, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002
+        """Return the shape that agrees with its fitted coefficients, where a law is not linear in them."""
+        return shape
+
     def growths(self, scene: Scene) -> Sequence[Shape]:
         """Return the ways to grow after an onset: every shape but for its onset."""
         found = {tuple(sorted((k, v) for k, v in s.items() if k != "onset_s")) for s in self.shapes(scene)}

@@ -98,15 +98,21 @@ class LoadCellDrift(Candidate):
 
 
 def _without_posture(scene: Scene, values: Array) -> Array:
-    """Return what a constant, pitch and roll leave of each column, fitted where it is known."""
+    """Return each column less its mean and what pitch and roll say, fitted beside a line over time.
+
+    Over half an hour a slope that changes slowly looks like a drift: fitted alone, posture would take the drift along.
+    """
     left = np.full(values.shape, np.nan)
     for k in range(values.shape[1]):
         pitch, roll = (np.nan_to_num(scene.covariates[name][:, k]) for name in ("pitch", "roll"))
-        regressors = np.column_stack((np.ones(len(pitch)), pitch, roll, pitch**2, roll**2, pitch * roll))
+        posture = np.column_stack((pitch, roll, pitch**2, roll**2, pitch * roll))
         known = np.isfinite(values[:, k])
         if known.sum() > 10:
-            fitted = np.linalg.lstsq(regressors[known], values[known, k], rcond=None)[0]
-            left[known, k] = values[known, k] - regressors[known] @ fitted
+            line = broken_lines(scene.time_s[:, 0], known, WANDER_KNOTS) or [np.ones(len(pitch))]
+            beside = np.column_stack((posture, *line))
+            fitted = np.linalg.lstsq(beside[known], values[known, k], rcond=None)[0][: posture.shape[1]]
+            rest = values[known, k] - posture[known] @ fitted
+            left[known, k] = rest - np.mean(rest)
     return left
 
 

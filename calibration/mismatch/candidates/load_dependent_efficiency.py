@@ -33,7 +33,7 @@ class LoadDependentEfficiency(Candidate):
 
     def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002
         """From proportional to strongly curved, and losses at light loads."""
-        curved: list[Shape] = [{"power": p} for p in (0.0, 0.5, 1.0, 2.0)]
+        curved: list[Shape] = [{"power": p} for p in (0.0, 0.5, 1.0, 2.0, 3.5)]
         light: list[Shape] = [{"light": s} for s in (0.5, 1.0)]
         return [*curved, *light]
 

@@ -14,12 +14,16 @@ if TYPE_CHECKING:
     from calibration.mismatch.scene import Scene
 
 
+AGREES = 0.02
+"""Share by which a coefficient and what bends its column may differ."""
+
+
 class TorqueConstantTemperature(Candidate):
     """Remanence falls with temperature; the current rises in proportion to the torque."""
 
     name = "torque-constant-temperature"
     covariate = "temperature"
-    equation = "ΔI = α (T − T_0) I_sim"
+    equation = "ΔI = I_sim (1/(1 − α (T − T_0)) − 1)"
     words = "a torque constant that falls as the motor warms"
     signature = "a residual along the predicted current that grows with temperature, through zero at T_0"
     experiment = (
@@ -32,15 +36,23 @@ class TorqueConstantTemperature(Candidate):
     def shapes(self, scene: Scene) -> Sequence[Shape]:
         """Return the reference temperatures of data sheets, and the recording's mean."""
         middle = float(np.nanmean(scene.covariates["temperature"][scene.mask]))
-        return [{"reference_degC": t} for t in (25.0, 20.0, 0.0, middle)]
+        return [{"reference_degC": t, "bent_per_K": 0.0} for t in (25.0, 20.0, 0.0, middle)]
+
+    def settled(self, scene: Scene, shape: Shape, values: Sequence[float]) -> Shape:
+        """Bend the column by the coefficient that was fitted to it, as far as the magnets keep a third."""
+        warmest = float(np.max(self._warmer(scene, shape)[scene.mask]))
+        most = 2 / 3 / warmest if warmest > 0 else np.inf
+        bent = float(np.clip(values[0], 0.0, most))
+        return shape if abs(bent - float(shape["bent_per_K"])) < AGREES * bent else {**shape, "bent_per_K": bent}
 
     def reluctance(self, scene: Scene, shape: Shape) -> float:
         """Charge a factor that no wheel's own temperature changes: that is a gain that was stated wrongly."""
         return 0.0 if scene.changes_within(self._warmer(scene, shape)) else UNLIKELY
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
-        """Return (T − T_0) times the prediction."""
-        return (self._warmer(scene, shape) * scene.filled)[None]
+        """Return (T − T_0)/(1 − α (T − T_0)) times the prediction, for the α that bends it."""
+        warmer = self._warmer(scene, shape)
+        return (warmer / (1 - float(shape["bent_per_K"]) * warmer) * scene.filled)[None]
 
     def _warmer(self, scene: Scene, shape: Shape) -> Array:
         return np.nan_to_num(scene.covariates["temperature"]) - float(shape["reference_degC"])

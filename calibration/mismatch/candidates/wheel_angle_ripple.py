@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 BINS_PER_TURN = 256
 HIGHEST_ORDER = 64
+LAGS = (0.0, -0.5, 0.5)
 READINGS_PER_CYCLE = 2.5
 """Of fewer, a line is the image of another: at one speed a constant drag can look like a ripple of high order."""
 
@@ -53,12 +54,17 @@ class WheelAngleRipple(Candidate):
         The residual is summed over angle bins, and its spectrum taken.
         """
         kinds = ("drag", "torque", "load") if "direction" in scene.covariates else ("torque",)
-        orders = {kind: self._strongest(scene, residual * self._base(scene, kind)) for kind in kinds}
-        return [{"order": orders[kind], "kind": kind, "sines": sines} for kind in kinds for sines in (1.0, 2.0)]
+        found: list[Shape] = []
+        for kind in kinds:
+            weighted = residual * self._base(scene, kind)
+            order = self._strongest(scene, weighted)
+            line: Shape = {"order": order, "kind": kind, "lag": self._lag(scene, weighted, order)}
+            found += [{**line, "sines": sines} for sines in (1.0, 2.0)]
+        return found
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return cosine and sine for each wheel, then those of the overtone, shape (2 sines wheels, time, wheel)."""
-        phase = float(shape["order"]) * scene.covariates["wheel_angle"]
+        phase = float(shape["order"]) * _angle(scene, float(shape["lag"]))
         base = self._base(scene, str(shape["kind"]))
         wheels, sines = scene.mask.shape[1], int(float(shape["sines"]))
         found = np.zeros((sines, wheels, 2, *scene.mask.shape))
@@ -110,6 +116,11 @@ class WheelAngleRipple(Candidate):
         sought = (order >= self.free["order"][0]) & (order <= _resolved(scene))
         return float(order[np.argmax(np.where(sought, power, 0.0))])
 
+    def _lag(self, scene: Scene, weighted: Array, order: float) -> float:
+        """Return by how many readings the angle lags: a speed may be of the instant, or a mean before or after it."""
+        waves = {lag: np.exp(1j * order * _angle(scene, lag)) for lag in LAGS}
+        return max(waves, key=lambda lag: float(np.sum(np.abs(np.sum(weighted * waves[lag], axis=0)) ** 2)))
+
     def _spectrum(self, scene: Scene, weighted: Array) -> tuple[Array, Array]:
         """Return orders and the power of a residual at each, summed over the wheels; white noise has 1 on each."""
         angle = scene.covariates["wheel_angle"]
@@ -129,3 +140,9 @@ def _resolved(scene: Scene) -> float:
     """Return the highest order that a wheel at its usual speed shows in enough readings a cycle."""
     usual = float(np.median(np.abs(scene.covariates["wheel_speed"][scene.mask])))
     return min(HIGHEST_ORDER, 2 * np.pi / (READINGS_PER_CYCLE * scene.recording.step_s * max(usual, 1e-9)))
+
+
+def _angle(scene: Scene, lag: float) -> Array:
+    """Return the angle turned [rad] by so many readings before each instant, shape (time, wheel)."""
+    speed = np.nan_to_num(scene.covariates["wheel_speed"])
+    return scene.covariates["wheel_angle"] - lag * scene.recording.step_s * speed
