@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calibration.mismatch.answer import Indistinguishable
+from calibration.mismatch.explained import size_of
 from calibration.mismatch.named import acceptable, best_per_family, polished
 from calibration.mismatch.search import PER_COEFFICIENT, Term
 from calibration.mismatch.sensitivity import NINE_IN_TEN
@@ -31,6 +32,8 @@ WORTH_WORRYING = 0.15
 ABSURD = 2.0
 """How many times that size is more than anybody would overlook."""
 FEW = 2
+TAKEN_OVER = 0.2
+"""Share of a named effect's size that another must take from it, and have itself, to stand for a part of it."""
 AS_GOOD = 0.5
 """A gain smaller by less is the same, however many shapes it was chosen from."""
 SLACK = 4.0
@@ -82,10 +85,29 @@ def rivals(search: Search, named: Fit) -> tuple[Indistinguishable, ...]:
             fit = search.fit(rival_terms)
             if acceptable(search, fit) and _survives(search, named, fit, others, term):
                 members.append(rival)
+        told = {member.name for member in (*named.terms, *members)}
+        members += [more for more in _takes_over(search, named, index) if more.name not in told]
         names = (*(member.name for member in members), *_parameters_like(search, others, members))
         if len(names) > 1:
             found.append(Indistinguishable(names, experiment_for(search, others, members)))
     return tuple(found)
+
+
+def _takes_over(search: Search, named: Fit, index: int) -> list[Term]:
+    """Return the effects that may be there as well: beside them the named one is smaller, and the fit as good.
+
+    A law with a free shape can stand for two: drag that falls with warmth holds a drag that does not.
+    """
+    found = []
+    before = size_of(search, named, index)
+    for _, more in best_per_family(search, named.terms)[:3]:
+        fit = search.fit(polished(search, (*named.terms, more)))
+        if not acceptable(search, fit) or search.score(fit) < search.score(named) - SLACK:
+            continue
+        left, taken = size_of(search, fit, index), size_of(search, fit, len(named.terms))
+        if before - left > TAKEN_OVER * before and taken > TAKEN_OVER * before:
+            found.append(fit.terms[-1])
+    return found
 
 
 def collinear(search: Search, given: Fit) -> tuple[Indistinguishable, ...]:
