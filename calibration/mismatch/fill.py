@@ -132,6 +132,7 @@ def add_curves(dictionary: Dictionary) -> None:
             signs = (0,) * len(places)
             sharing = ("all",) if "opposite" in flavour else ("all", "one")
             dictionary.groups.append(Group(name, tuple(places), signs, sharing, 0.0, None, {}, flavour))
+    _add_each_way(dictionary)
     flavour = "drag" if "drag" in flavours else "offset"
     hats = broken_lines(scene.covariates["time"], scene.mask, TIME_KNOTS)
     places = dictionary.append([hat * flavours[flavour] for hat in hats])
@@ -139,6 +140,17 @@ def add_curves(dictionary: Dictionary) -> None:
         dictionary.groups.append(
             Group("time", tuple(places), (0,) * len(places), ("all", "one"), 0.0, None, {}, flavour)
         )
+
+
+def _add_each_way(dictionary: Dictionary) -> None:
+    """Add a line over the speed with its sign: what acts one way only is neither a drag nor an offset."""
+    scene = dictionary.scene
+    values = scene.covariates.get("wheel_speed")
+    if values is None or np.nanmin(values) >= 0 or not (hats := broken_lines(values, scene.mask, CURVE_KNOTS)):
+        return
+    places = dictionary.append(hats)
+    signs = (0,) * len(places)
+    dictionary.groups.append(Group("wheel_speed", tuple(places), signs, ("all", "one"), 0.0, None, {}, "each way"))
 
 
 def _tells_wheels_apart(scene: Scene, values: Array) -> bool:

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from calibration.mismatch.scene import Scene
 
 Array = NDArray[np.float64]
+AGREES = 0.02
+"""Share by which a coefficient and the same number in its column may differ."""
 UNLIKELY = 9.2
 """What a shape costs against which the odds are a hundred to one: twice the logarithm of that."""
 Shape = dict[str, float | str]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from calibration.mismatch.candidates.candidate import UNLIKELY, Array, Candidate, Coefficient, Shape
+from calibration.mismatch.candidates.candidate import AGREES, UNLIKELY, Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,7 +18,8 @@ class LoadDependentEfficiency(Candidate):
     """An efficiency that is not one number: the loss grows as a power of the torque.
 
     With power 0 the loss is proportional to torque: the stated efficiency is wrong by more than its stated
-    uncertainty. A loss that does not grow with torque at all is Coulomb friction.
+    uncertainty. A loss that does not grow with torque at all is Coulomb friction. Or the stated efficiency holds at the
+    mean load and falls to either side in proportion: then the current is bent the more, the more it falls.
     """
 
     name = "load-dependent-efficiency"
@@ -32,10 +33,20 @@ class LoadDependentEfficiency(Candidate):
     coefficients: ClassVar = (Coefficient("relative_loss", "1", 0),)
 
     def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002
-        """From proportional to strongly curved, and losses at light loads."""
+        """From proportional to strongly curved, losses at light loads, and an efficiency that is right on the mean."""
         curved: list[Shape] = [{"power": p} for p in (0.0, 0.5, 1.0, 2.0, 3.5)]
         light: list[Shape] = [{"light": s} for s in (0.5, 1.0)]
-        return [*curved, *light]
+        return [*curved, *light, {"bent": 0.0}]
+
+    def settled(self, scene: Scene, shape: Shape, values: Sequence[float]) -> Shape:
+        """Bend the current by the fitted loss, as far as the gears keep a third of their efficiency."""
+        if "bent" not in shape:
+            return shape
+        above = self._relative(scene)[scene.mask] - 1
+        bent = float(
+            np.clip(values[0], 2 / 3 / min(float(np.min(above)), -1e-9), 2 / 3 / max(float(np.max(above)), 1e-9))
+        )
+        return shape if abs(bent - float(shape["bent"])) <= AGREES * abs(bent) else {"bent": bent}
 
     def reluctance(self, scene: Scene, shape: Shape) -> float:  # noqa: ARG002
         """Charge a loss in proportion: it is the stated gain far outside its own doubt."""
@@ -43,8 +54,15 @@ class LoadDependentEfficiency(Candidate):
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return the loss as a multiple of the prediction."""
-        size = np.abs(scene.filled)
-        relative = size / max(float(np.mean(size[scene.mask])), 1e-30)
+        relative = self._relative(scene)
+        if "bent" in shape:
+            above = relative - 1
+            return (scene.filled * above / (1 - float(shape["bent"]) * above))[None]
         if "light" in shape:
             return (scene.filled * np.exp(-relative / float(shape["light"])))[None]
         return (scene.filled * relative ** float(shape["power"]))[None]
+
+    def _relative(self, scene: Scene) -> Array:
+        """Return the predicted current over its mean magnitude, shape (time, wheel)."""
+        size = np.abs(scene.filled)
+        return size / max(float(np.mean(size[scene.mask])), 1e-30)

@@ -6,16 +6,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from calibration.mismatch.candidates.candidate import UNLIKELY, Array, Candidate, Coefficient, Shape
+from calibration.mismatch.candidates.candidate import AGREES, UNLIKELY, Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from calibration.mismatch.scene import Scene
-
-
-AGREES = 0.02
-"""Share by which a coefficient and what bends its column may differ."""
 
 
 class TorqueConstantTemperature(Candidate):
