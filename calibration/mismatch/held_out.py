@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.mismatch.named import best_per_family, enough
+from calibration.mismatch.named import acceptable, best_per_family, enough
 from calibration.mismatch.search import Fit, Search, Term
 from calibration.mismatch.transfer import squares
 
@@ -78,8 +78,9 @@ def _chosen(train: Search) -> tuple[Term, ...]:
         trials = [(*terms, t) for _, t in found[:3]]
         if len(terms) == 1:
             trials += [(a, b) for _, a in best_per_family(train, ())[:6] for _, b in best_per_family(train, (a,))[:2]]
-        best = max((train.fit(trial) for trial in trials), key=train.score)
-        if not enough(train, best, train.fit(terms)):
+        ranked = sorted((train.fit(trial) for trial in trials), key=train.score, reverse=True)
+        best = next((fit for fit in ranked if acceptable(train, fit)), None)
+        if best is None or not enough(train, best, train.fit(terms)):
             break
         terms = best.terms
     return terms

@@ -100,7 +100,8 @@ def _takes_over(search: Search, named: Fit, index: int) -> list[Term]:
     """
     found = []
     before = size_of(search, named, index)
-    for _, more in best_per_family(search, named.terms)[:3]:
+    likely = [more for _, more in best_per_family(search, named.terms) if more.group.evidence is None]
+    for more in likely[:3]:
         fit = search.fit(polished(search, (*named.terms, more)))
         if not acceptable(search, fit) or search.score(fit) < search.score(named) - SLACK:
             continue

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
     from calibration.mismatch.scene import Scene
 
-WANDER_KNOTS = 24
+WANDER_KNOTS, POSTURE_KNOTS = 24, 4
+"""Of the line that a drift follows; and of the one that is fitted beside what pitch and roll say."""
 OFFSETS = (-3.0, -2.2, -1.6, -1.1, -0.8, -0.55, -0.4, -0.2, 0.0, 0.15, 0.3, 0.4, 0.5, 0.7, 0.85)
 """Mean readings that a drift may have been off by, at which it is simulated."""
 
@@ -98,9 +99,10 @@ class LoadCellDrift(Candidate):
 
 
 def _without_posture(scene: Scene, values: Array) -> Array:
-    """Return each column less its mean and what pitch and roll say, fitted beside a line over time.
+    """Return each column less its mean and what pitch and roll say, fitted beside a line of few pieces over time.
 
     Over half an hour a slope that changes slowly looks like a drift: fitted alone, posture would take the drift along.
+    A line of many pieces, though, would take the posture along.
     """
     left = np.full(values.shape, np.nan)
     for k in range(values.shape[1]):
@@ -108,7 +110,7 @@ def _without_posture(scene: Scene, values: Array) -> Array:
         posture = np.column_stack((pitch, roll, pitch**2, roll**2, pitch * roll))
         known = np.isfinite(values[:, k])
         if known.sum() > 10:
-            line = broken_lines(scene.time_s[:, 0], known, WANDER_KNOTS) or [np.ones(len(pitch))]
+            line = broken_lines(scene.time_s[:, 0], known, POSTURE_KNOTS) or [np.ones(len(pitch))]
             beside = np.column_stack((posture, *line))
             fitted = np.linalg.lstsq(beside[known], values[known, k], rcond=None)[0][: posture.shape[1]]
             rest = values[known, k] - posture[known] @ fitted

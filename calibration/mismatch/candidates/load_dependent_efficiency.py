@@ -43,9 +43,8 @@ class LoadDependentEfficiency(Candidate):
         if "bent" not in shape:
             return shape
         above = self._relative(scene)[scene.mask] - 1
-        bent = float(
-            np.clip(values[0], 2 / 3 / min(float(np.min(above)), -1e-9), 2 / 3 / max(float(np.max(above)), 1e-9))
-        )
+        least, most = 2 / 3 / min(float(np.min(above)), -1e-9), 2 / 3 / max(float(np.max(above)), 1e-9)
+        bent = float(np.clip(values[0], least, most))
         return shape if abs(bent - float(shape["bent"])) <= AGREES * abs(bent) else {"bent": bent}
 
     def reluctance(self, scene: Scene, shape: Shape) -> float:  # noqa: ARG002

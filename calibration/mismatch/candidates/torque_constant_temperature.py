@@ -48,7 +48,7 @@ class TorqueConstantTemperature(Candidate):
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return (T − T_0)/(1 − α (T − T_0)) times the prediction, for the α that bends it."""
         warmer = self._warmer(scene, shape)
-        return (warmer / (1 - float(shape["bent_per_K"]) * warmer) * scene.filled)[None]
+        return (warmer / (1 - float(shape.get("bent_per_K", 0.0)) * warmer) * scene.filled)[None]
 
     def _warmer(self, scene: Scene, shape: Shape) -> Array:
         return np.nan_to_num(scene.covariates["temperature"]) - float(shape["reference_degC"])

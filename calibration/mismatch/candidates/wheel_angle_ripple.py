@@ -64,7 +64,7 @@ class WheelAngleRipple(Candidate):
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return cosine and sine for each wheel, then those of the overtone, shape (2 sines wheels, time, wheel)."""
-        phase = float(shape["order"]) * _angle(scene, float(shape["lag"]))
+        phase = float(shape["order"]) * _angle(scene, float(shape.get("lag", 0.0)))
         base = self._base(scene, str(shape["kind"]))
         wheels, sines = scene.mask.shape[1], int(float(shape["sines"]))
         found = np.zeros((sines, wheels, 2, *scene.mask.shape))

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drives import recording, simulation
+from drives import columns, recording, simulation
 
-from calibration.mismatch.candidates import Candidate, library
+from calibration.mismatch.candidates import Candidate, Shape, library
+from calibration.mismatch.recording import from_columns
 from calibration.mismatch.scene import Scene, build_scene
 
 CONTRACT = {
@@ -78,3 +79,67 @@ def test_a_temperature_that_no_wheel_changes_is_no_reason_to_call_friction_cold(
     assert any(magnets.reluctance(scene, shape) == 0 for shape in magnets.shapes(scene))
     drag = [cold.columns(kept, shape)[0] for shape in cold.shapes(kept) if shape["power"] == 0.0]
     assert min(float(np.min(np.abs(d[kept.mask]))) for d in drag) > 0.5, "no grease loses its drag within a kelvin"
+
+
+@pytest.mark.parametrize("true", [0.002, 0.012])
+def test_a_torque_constant_is_bent_by_its_own_coefficient(scene: Scene, true: float) -> None:
+    """k_t = k_0 (1 − α ΔT) makes the current I/(1 − α ΔT), not I (1 + α ΔT): thirty kelvin away that matters."""
+    candidate = next(c for c in library() if c.name == "torque-constant-temperature")
+    cold = replace(scene, covariates={**scene.covariates, "temperature": scene.covariates["temperature"] - 30})
+    warmer = cold.covariates["temperature"] - 20.0
+    effect = np.where(cold.mask, cold.filled * (1 / (1 - true * warmer) - 1), 0.0)
+    shape: Shape = {"reference_degC": 20.0, "bent_per_K": 0.0}
+    for _ in range(6):
+        column = np.where(cold.mask, candidate.columns(cold, shape)[0], 0.0)
+        fitted = float(np.sum(column * effect) / np.sum(column**2))
+        shape = candidate.settled(cold, shape, [fitted])
+    assert fitted == pytest.approx(true, rel=0.03)
+
+
+def test_an_efficiency_that_falls_with_torque_bends_the_current(scene: Scene) -> None:
+    """η (1 − a x), x the torque above its mean: the current is I/(1 − a x), and a is found."""
+    candidate = next(c for c in library() if c.name == "load-dependent-efficiency")
+    above = np.abs(scene.filled) / np.mean(np.abs(scene.filled[scene.mask])) - 1
+    effect = np.where(scene.mask, scene.filled * (1 / (1 - 0.3 * above) - 1), 0.0)
+    shape: Shape = {"bent": 0.0}
+    for _ in range(8):
+        column = np.where(scene.mask, candidate.columns(scene, shape)[0], 0.0)
+        fitted = float(np.sum(column * effect) / np.sum(column**2))
+        shape = candidate.settled(scene, shape, [fitted])
+    assert fitted == pytest.approx(0.3, rel=0.05)
+
+
+def test_no_ripple_is_sought_that_the_readings_cannot_tell_from_a_drag() -> None:
+    """At one speed a constant drag is the image of every ripple with a whole number of cycles between two readings."""
+    steady = build_scene(recording(length_s=120.0, speed=0.4), simulation())
+    candidate = next(c for c in library() if c.name == "wheel-angle-ripple")
+    cycles = [float(s["order"]) * 0.4 * 0.2 / (2 * np.pi) for s in candidate.seek(steady, 0.003 * steady.mask)]
+    assert max(cycles) <= 1 / 2.5
+
+
+def test_a_ripple_is_found_whether_a_speed_is_of_the_instant_or_of_the_time_before(scene: Scene) -> None:
+    """Angle summed from speeds lags by half a reading; the phase of a high order does not forgive that."""
+    candidate = next(c for c in library() if c.name == "wheel-angle-ripple")
+    summed = np.cumsum(scene.covariates["wheel_speed"], axis=0) * 0.2
+    ripple = np.where(scene.mask, 0.004 * np.cos(16 * summed), 0.0)
+    shapes = [shape for shape in candidate.seek(scene, ripple) if shape["kind"] == "torque"]
+    left = []
+    for shape in shapes:
+        columns = np.where(scene.mask, candidate.columns(scene, shape), 0.0).reshape(-1, ripple.size)
+        fitted = np.linalg.lstsq(columns.T, ripple.ravel(), rcond=None)[0]
+        left.append(float(np.std(ripple.ravel() - fitted @ columns)))
+    assert min(left) < 0.1 * float(np.std(ripple))
+
+
+def test_a_slope_that_changes_slowly_does_not_take_a_drift_along() -> None:
+    """Pitch and drift both rise over the recording; the cell still shows most of what it drifted."""
+    table = columns(length_s=240.0)
+    share = table["t_s"] / 240.0
+    table["pitch_rad"] = 0.08 * share + 0.02 * np.sin(table["t_s"] / 9)
+    table["load_N"] = np.where(table["wheel"] == 2, table["load_N"] - 20 * share, table["load_N"])
+    scene = build_scene(from_columns(table), simulation())
+    candidate = next(c for c in library() if c.name == "load-cell-drift")
+    seen, _ = candidate.evidence(scene, {"relative_offset": 0.0}) or (np.zeros(6), None)
+    assert int(np.argmax(seen)) == 1
+    assert seen[1] > 25
+    assert np.all(np.delete(seen, 1) < 0.2 * seen[1])

@@ -110,6 +110,35 @@ def test_the_corrected_simulation_is_consistent_with_the_recording(coulomb: Comp
     assert again.verdict == "consistent"
 
 
+def test_what_was_found_is_still_told_how_small_it_could_have_been(coulomb: Comparison) -> None:
+    """An effect's sensitivity is measured without itself in the fit."""
+    (effect,) = coulomb.answer.effects
+    (least,) = [one for one in coulomb.answer.sensitivity if one.name == effect.name]
+    assert 0 < least.smallest_detectable < effect.parameters["coulomb_current"].value
+
+
+def test_a_wheel_whose_gain_is_a_little_off_lacks_no_physics() -> None:
+    """Each wheel's gain has an error of its own; the corrected simulation has it too."""
+    table, sim = columns(5), simulation()
+    table["motor_current_A"] = table["motor_current_A"] * np.where(table["wheel"] == 6, 1.05, 1.0)
+    found = compare(from_columns(table), sim)
+    assert found.answer.verdict == "consistent"
+    tables = corrected_tables(TABLES, sim, found.evidence.values, found.evidence.contributions)
+    gains = tables["drivetrain"]["gain_factor"]
+    assert gains[5] < min(gains[:5]) - 0.01
+
+
+def test_a_drag_that_warmth_takes_away_may_hold_one_that_stays() -> None:
+    """Cold grease and dry friction together: both are named, or the one that is says that the other may be there."""
+    table = with_drag(0.15)
+    warm = table["motor_temperature_degC"]
+    falls = np.exp((np.min(warm) - warm) / 8) * np.sign(table["motor_speed_rad_s"])
+    table["motor_current_A"] = table["motor_current_A"] + 0.2 * np.mean(np.abs(table["motor_current_A"])) * falls
+    answer = compare(from_columns(table), simulation()).answer
+    told = {e.name for e in answer.effects} | {name for one in answer.indistinguishable for name in one.effects}
+    assert {"cold-lubricant-friction", "coulomb-friction"} <= told
+
+
 def test_constant_speed_on_flat_ground_cannot_tell_frictions_apart() -> None:
     """Coulomb and viscous friction and cohesion are one there; the answer says so, and what to drive."""
     answer = compare(from_columns(with_drag(0.25, speed=0.25)), simulation()).answer
