@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from calibration.mismatch.candidates import Candidate, Shape
+    from calibration.mismatch.candidates.candidate import Sharing
     from calibration.mismatch.scene import Scene
 
 Array = NDArray[np.float64]
@@ -128,29 +129,29 @@ def add_curves(dictionary: Dictionary) -> None:
         if len(hats) < 3:
             continue
         for flavour, factor in {**flavours, **_opposed(scene, name)}.items():
-            places = dictionary.append([hat * factor for hat in hats])
-            signs = (0,) * len(places)
-            sharing = ("all",) if "opposite" in flavour else ("all", "one")
-            dictionary.groups.append(Group(name, tuple(places), signs, sharing, 0.0, None, {}, flavour))
-    _add_each_way(dictionary)
+            sharing: tuple[Sharing, ...] = ("all",) if "opposite" in flavour else ("all", "one")
+            _add_curve(dictionary, name, [hat * factor for hat in hats], flavour, sharing)
+    speed = scene.covariates.get("wheel_speed")
+    if speed is not None and np.nanmin(speed) < 0:
+        # What acts one way only is neither a drag nor an offset.
+        _add_curve(dictionary, "wheel_speed", broken_lines(speed, scene.mask, CURVE_KNOTS), "each way")
     flavour = "drag" if "drag" in flavours else "offset"
     hats = broken_lines(scene.covariates["time"], scene.mask, TIME_KNOTS)
-    places = dictionary.append([hat * flavours[flavour] for hat in hats])
-    if places:
-        dictionary.groups.append(
-            Group("time", tuple(places), (0,) * len(places), ("all", "one"), 0.0, None, {}, flavour)
-        )
+    _add_curve(dictionary, "time", [hat * flavours[flavour] for hat in hats], flavour)
 
 
-def _add_each_way(dictionary: Dictionary) -> None:
-    """Add a line over the speed with its sign: what acts one way only is neither a drag nor an offset."""
-    scene = dictionary.scene
-    values = scene.covariates.get("wheel_speed")
-    if values is None or np.nanmin(values) >= 0 or not (hats := broken_lines(values, scene.mask, CURVE_KNOTS)):
-        return
-    places = dictionary.append(hats)
-    signs = (0,) * len(places)
-    dictionary.groups.append(Group("wheel_speed", tuple(places), signs, ("all", "one"), 0.0, None, {}, "each way"))
+def _add_curve(
+    dictionary: Dictionary,
+    covariate: str,
+    columns: Sequence[Array],
+    flavour: str,
+    sharing: tuple[Sharing, ...] = ("all", "one"),
+    price: float = 0.0,
+) -> None:
+    """Add columns without a name, of either sign."""
+    if places := dictionary.append(columns):
+        signs = (0,) * len(places)
+        dictionary.groups.append(Group(covariate, tuple(places), signs, sharing, price, None, {}, flavour))
 
 
 def _tells_wheels_apart(scene: Scene, values: Array) -> bool:
@@ -174,8 +175,5 @@ def add_beat(dictionary: Dictionary, residual: Array) -> None:
     for wheels in (power.sum(axis=0), *power):
         sought = np.where((frequency_Hz >= lowest) & (frequency_Hz <= highest), wheels, 0.0)
         phase = 2 * np.pi * frequency_Hz[np.argmax(sought)] * scene.time_s
-        places = dictionary.append([along * np.cos(phase), along * np.sin(phase)])
         price = 2 * float(np.log(scene.length_s * highest))
-        dictionary.groups.append(
-            Group("time", tuple(places), (0, 0), ("all", "one"), price, None, {}, "drag, periodic")
-        )
+        _add_curve(dictionary, "time", [along * np.cos(phase), along * np.sin(phase)], "drag, periodic", price=price)

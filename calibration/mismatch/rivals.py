@@ -1,4 +1,4 @@
-"""Which other effects would explain the recording as well, and what to drive to tell them apart.
+"""Which other effects would explain the recording as well.
 
 A rival leaves the set only if data made *from the rival* would favour the named effect by so much less than one time
 in twenty. With normal noise that needs no simulation: were the rival true, its lead would be normal about μ with
@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from calibration.mismatch.answer import Indistinguishable
+from calibration.mismatch.experiment import experiment_for
 from calibration.mismatch.explained import size_of
 from calibration.mismatch.named import acceptable, best_per_family, polished
-from calibration.mismatch.search import PER_COEFFICIENT, Term
-from calibration.mismatch.sensitivity import NINE_IN_TEN
+from calibration.mismatch.search import Term
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,30 +38,6 @@ AS_GOOD = 0.5
 """A gain smaller by less is the same, however many shapes it was chosen from."""
 SLACK = 4.0
 """A lead that the choice among shapes, and forms that are not nature's, give for nothing."""
-
-SMALLEST = 0.05
-"""Of the mean magnitude of the predicted channel: the least effect that an experiment is to show."""
-REMAINS = 0.1
-"""Of a friction's energy, outside what gain, cohesion and friction angle can imitate once speed and direction vary."""
-MINUTES = (10, 120)
-"""The least and the most to ask for: a rover's battery ends too."""
-
-DRIVES = {
-    "direction": "drive the same stretch forwards and backwards at one speed",
-    "wheel_speed": "drive a staircase of at least four constant speeds, from creeping to full speed, both ways",
-    "temperature": "start cold, warm up, stop until cold again and repeat, so that temperature does not follow time",
-    "torque": "repeat at one speed with and without ballast, and up and down a slope",
-    "wheel_acceleration": "start, stop and reverse sharply, twenty times",
-    "wheel_angle": "drive straight at three constant speeds, sampled at four times the ripple's frequency",
-    "pitch": "drive one slope up and down, forwards and backwards",
-    "yaw_rate": "turn on the spot and along arcs of several radii, both ways",
-    "slip": "pull a sledge of several weights on level ground, so that slip changes at constant load",
-    "wheel_row": "drive one virgin lane, then twice more in the same ruts",
-    "time": "drive back over the same ground, and lift the wheels and spin all six at one speed",
-    "none": "stand still with the motors unpowered, then drive one stretch both ways",
-}
-"""For each covariate, the drive that moves it and nothing else."""
-WHEELS_UP = "lift the wheels and spin all six at several speeds, both ways"
 
 
 def confusions(search: Search, named: Fit, whole: Fit) -> tuple[Indistinguishable, ...]:
@@ -172,7 +148,7 @@ def _parameters_like(search: Search, given: Sequence[Term], members: Sequence[Te
 def _energy_apart(search: Search, given: Sequence[Term], term: Term, size: float) -> float:
     """Return the energy of a term of this size outside the reach of all that is in the fit."""
     counts = search.weights @ search.dictionary.counts.sum(axis=0)
-    return float(_share_outside(search, given, term) * size**2 * counts)
+    return float(search.share_outside(given, term) * size**2 * counts)
 
 
 def _representatives(search: Search) -> dict[str, list[Term]]:
@@ -195,41 +171,6 @@ def _imitates(search: Search, given: Fit, one: list[Term], two: list[Term], size
         return False
     shows = max(2 * CANNOT_LEAD / alone, 1.0)
     return any(shows * _energy_apart(search, (*given.terms, other), term, size) < CANNOT_LEAD for other in two)
-
-
-def minutes_needed(search: Search) -> int:
-    """Return how long a drive must last before an effect of the smallest size shows nine times in ten.
-
-    A drive that moves the right covariates leaves about a tenth of an effect outside the free parameters' reach; each
-    reading then adds to its gain what the noise of this recording lets it.
-    """
-    scene = search.dictionary.scene
-    needed = (sqrt(search.threshold + PER_COEFFICIENT) + NINE_IN_TEN) ** 2
-    readings = 60 / scene.recording.step_s
-    gained = REMAINS * readings * float(search.weights.sum()) * (SMALLEST * scene.mean_size) ** 2
-    return int(np.clip(5 * np.ceil(needed / gained / 5), *MINUTES))
-
-
-def experiment_for(search: Search, given: Sequence[Term], members: Sequence[Term]) -> str:
-    """Return the drives that move each member's covariate alone, and how long they take.
-
-    What gain, cohesion and friction angle may hide shows where there is no soil.
-    """
-    drives = [DRIVES[c] for c in dict.fromkeys(_covariate(member) for member in members) if c in DRIVES]
-    if any(_share_outside(search, given, member) < REMAINS for member in members):
-        drives.append(WHEELS_UP)
-    sentence = "; then ".join(drives)
-    return f"{sentence[:1].upper()}{sentence[1:]}; {minutes_needed(search)} minutes in all."
-
-
-def _share_outside(search: Search, given: Sequence[Term], term: Term) -> float:
-    """Return the share of a term's energy that nothing else in the fit reaches."""
-    block, reach = search.beside(given, term)
-    return float((block - reach)[0, 0] / max(float(block[0, 0]), 1e-300))
-
-
-def _covariate(term: Term) -> str:
-    return term.group.candidate.covariate if term.group.candidate else term.name
 
 
 def _survives(search: Search, named: Fit, rival: Fit, others: Sequence[Term], term: Term) -> bool:

@@ -201,6 +201,11 @@ class Search:
         inverse = np.linalg.pinv(matrix[:size, :size], rcond=1e-10, hermitian=True) if size else np.zeros((0, 0))
         return matrix[size:, size:], cross.T @ inverse @ cross
 
+    def share_outside(self, given: Iterable[Term], term: Term) -> float:
+        """Return the share of a term's energy that nothing else in the fit reaches."""
+        block, reach = self.beside(given, term)
+        return float((block - reach)[0, 0] / max(float(block[0, 0]), 1e-300))
+
     def _columns(self, terms: tuple[Term, ...]) -> tuple[tuple[int, tuple[int, ...]], ...]:
         base = [(column, self.all_wheels) for column in self.nuisance.columns]
         return tuple(base + [(column, term.wheels) for term in terms for column in term.group.columns])
