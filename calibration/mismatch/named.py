@@ -86,9 +86,21 @@ def polished(search: Search, terms: Sequence[Term]) -> tuple[Term, ...]:
             family = [g for g in search.dictionary.groups if g.named and g.name == term.name]
             found = [(g, t) for g, t in search.conditional(others, family) if t.wheels == term.wheels]
             if found:
-                terms[index] = max(found, key=lambda pair: pair[0])[1]
+                terms[index] = _worthwhile(search, others, found)
             terms[index] = refined(search, others, terms[index])
     return tuple(terms)
+
+
+def _worthwhile(search: Search, others: Sequence[Term], found: Sequence[tuple[float, Term]]) -> Term:
+    """Return the shape that gains most, of a kind in which the effect is worth a name, if there is one."""
+    kinds: dict[frozenset[str], Term] = {}
+    for _, term in sorted(found, key=lambda pair: -pair[0]):
+        kinds.setdefault(frozenset(term.group.shape), term)
+    best = list(kinds.values())
+    for term in best if len(best) > 1 else ():
+        if size_of(search, search.fit((*others, term)), len(others)) >= WORTH_A_NAME:
+            return term
+    return best[0]
 
 
 def best_named(search: Search) -> list[Fit]:

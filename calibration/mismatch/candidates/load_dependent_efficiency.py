@@ -36,7 +36,8 @@ class LoadDependentEfficiency(Candidate):
         """From proportional to strongly curved, losses at light loads, and an efficiency that is right on the mean."""
         curved: list[Shape] = [{"power": p} for p in (0.0, 0.5, 1.0, 2.0, 3.5)]
         light: list[Shape] = [{"light": s} for s in (0.5, 1.0)]
-        return [*curved, *light, {"bent": 0.0}]
+        bent: list[Shape] = [{"bent": b} for b in (-0.2, 0.0, 0.3)]
+        return [*curved, *light, *bent]
 
     def settled(self, scene: Scene, shape: Shape, values: Sequence[float]) -> Shape:
         """Bend the current by the fitted loss, as far as the gears keep a third of their efficiency."""
