@@ -19,12 +19,12 @@ class LoadDependentEfficiency(Candidate):
 
     With power 0 the loss is proportional to torque: the stated efficiency is wrong by more than its stated
     uncertainty. A loss that does not grow with torque at all is Coulomb friction. Or the stated efficiency holds at the
-    mean load and falls to either side in proportion: then the current is bent the more, the more it falls.
+    mean torque and falls or rises in proportion to what is above it: then the current is I/(1 − a x).
     """
 
     name = "load-dependent-efficiency"
     covariate = "torque"
-    equation = "ΔI = a I_sim |I_sim/Ī|^p"
+    equation = "ΔI = a I_sim |I_sim/Ī|^p,  or I_sim (1/(1 − a x) − 1) with x = |I_sim|/Ī − 1"
     words = "a loss that depends on the torque carried"
     signature = "a residual along the predicted current, curved against it"
     experiment = "drive one speed with and without ballast, and up and down slopes, at one temperature"
