@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from calibration.mismatch.candidates.candidate import UNLIKELY, Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,6 +47,10 @@ class MultiPassCompaction(Candidate):
         ways += ["stiffness"] if "stiffness_factor" in scene.simulation.variants() else []
         ways += ["soil"] if {"shear_factor", "cohesion_Pa"} <= {*scene.simulation.variants(), *scene.values} else []
         return [{"kept": kept, "leads": lead, "by": way} for kept in (0.0, 0.5, 1.0) for lead in leads for way in ways]
+
+    def reluctance(self, scene: Scene, shape: Shape) -> float:  # noqa: ARG002
+        """Charge three numbers for a rut where mostly one will do."""
+        return UNLIKELY if shape["by"] == "soil" else 0.0
 
     def columns(self, scene: Scene, shape: Shape) -> Array:
         """Return the prediction (or its answer to stiffer soil) times what the passes before have done."""

@@ -9,22 +9,44 @@ import numpy as np
 from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from calibration.mismatch.scene import Scene
 
 
+MOST_READINGS = 4
+"""By which the current may lag."""
+
+
 class RotorInertia(Candidate):
-    """Inertia as seen at the wheel: the rotor's times the gear ratio squared dominates."""
+    """Inertia as seen at the wheel: the rotor's times the gear ratio squared dominates.
+
+    The current may come some readings after the acceleration: drives give way, and controllers filter what they report.
+    """
 
     name = "rotor-inertia"
     covariate = "wheel_acceleration"
-    equation = "ΔI = (J/k) dω/dt"
+    equation = "ΔI(t) = (J/k) dω/dt (t − lag)"
     words = "current that goes into accelerating rotor and wheel"
     signature = "short residuals at each change of speed, with the acceleration's sign"
     experiment = "start, stop and reverse sharply, many times, on level ground"
     source = "RE 25 rotor 10 g cm²; through 1400:1 about 2 kg m² at the wheel"
     requires = ("wheel_acceleration",)
     coefficients: ClassVar = (Coefficient("inertia_current", "{unit} s²/rad"),)
+    free: ClassVar = {"lag_s": (0.0, 1.0)}
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:  # noqa: ARG002
-        """Return dω/dt."""
-        return np.asarray(scene.covariates["wheel_acceleration"])[None]
+    def shapes(self, scene: Scene) -> Sequence[Shape]:
+        """At once, and half a reading and one and a half later."""
+        return [{"lag_s": readings * scene.recording.step_s} for readings in (0.0, 0.5, 1.5)]
+
+    def columns(self, scene: Scene, shape: Shape) -> Array:
+        """Return dω/dt as it was the lag before, between readings on a straight line."""
+        late = float(shape.get("lag_s", 0.0)) / scene.recording.step_s
+        whole = int(late)
+        before = np.pad(scene.covariates["wheel_acceleration"], ((whole + 1, 0), (0, 0)))
+        count = len(scene.mask)
+        return ((1 - late + whole) * before[1 : count + 1] + (late - whole) * before[:count])[None]
+
+    def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
+        """Return a few readings at most."""
+        return {"lag_s": (0.0, min(MOST_READINGS * scene.recording.step_s, self.free["lag_s"][1]))}

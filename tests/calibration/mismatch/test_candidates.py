@@ -143,3 +143,14 @@ def test_a_slope_that_changes_slowly_does_not_take_a_drift_along() -> None:
     assert int(np.argmax(seen)) == 1
     assert seen[1] > 25
     assert np.all(np.delete(seen, 1) < 0.2 * seen[1])
+
+
+def test_inertia_may_come_late(scene: Scene) -> None:
+    """The column a reading and a half late lies halfway between those one and two readings late."""
+    candidate = next(c for c in library() if c.name == "rotor-inertia")
+    step_s = scene.recording.step_s
+    at_once, one, between, two = (candidate.columns(scene, {"lag_s": n * step_s})[0] for n in (0.0, 1.0, 1.5, 2.0))
+    assert np.array_equal(at_once, scene.covariates["wheel_acceleration"])
+    assert np.allclose(one[1:], at_once[:-1])
+    assert np.allclose(two[2:], at_once[:-2])
+    assert np.allclose(between, 0.5 * (one + two))
