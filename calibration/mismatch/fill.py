@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+OWN_SHARE = 1 / 3
+"""Of a parameter's standard deviation: what wheels of one make differ by. More hides what differs by row or by load."""
 CURVE_KNOTS = 8
 TIME_KNOTS = 48
 """Time has no physics of its own that is smooth: spells and beats must show, down to a fortieth of the recording."""
@@ -53,7 +55,7 @@ def add_nuisance(dictionary: Dictionary) -> Nuisance:
     for name in free if len(wheels) > 1 else ():
         if name in simulation.own_to_each_wheel:
             names += [own_name(name, wheel) for wheel in wheels]
-            stds += [free[name]] * len(wheels)
+            stds += [OWN_SHARE * free[name]] * len(wheels)
             tangents += [np.where(np.array(wheels) == wheel, scene.tangent(name), 0.0) for wheel in wheels]
     places = dictionary.append(tangents)
     # A coefficient of a column that was divided by its scale is the parameter's shift times that scale.
