@@ -68,7 +68,7 @@ class Simulation:
     parameters: Mapping[str, Prior] = {}
     """What the simulation knows, and how well."""
     own_to_each_wheel: ClassVar[frozenset[str]] = frozenset()
-    """Parameters that the wheels need not share: each has an error of its own beside the common one, a third as large."""
+    """Parameters in which wheels differ: beside the common error each has one of its own, a third as large."""
     parameter_effects: ClassVar[Mapping[str, str]] = {}
     """Names of parameters as effects, for saying what a wrong parameter could be mistaken for."""
     sensors: Mapping[str, SensorError] = {}
