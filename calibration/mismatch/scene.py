@@ -81,10 +81,10 @@ class Scene:
         return self.variance_within(values) > CHANGES**2 * float(np.mean(values[self.mask] ** 2))
 
     def variance_within(self, values: Array) -> float:
-        """Return the mean over wheels of what a quantity (time, wheel) varies on each."""
-        known = np.where(self.mask, values, np.nan)
-        turning = self.mask.any(axis=0)
-        return float(np.mean(np.nanvar(known[:, turning], axis=0)))
+        """Return the mean, over the wheels of which it is known, of what a quantity (time, wheel) varies on each."""
+        known = self.mask & np.isfinite(values)
+        kept = np.where(known, values, np.nan)[:, known.any(axis=0)]
+        return float(np.mean(np.nanvar(kept, axis=0)))
 
     def changed(self, **changes: float) -> Array:
         """Return the prediction with parameters (or variants) set otherwise."""

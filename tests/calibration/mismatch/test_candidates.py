@@ -81,6 +81,14 @@ def test_a_temperature_that_no_wheel_changes_is_no_reason_to_call_friction_cold(
     assert min(float(np.min(np.abs(d[kept.mask]))) for d in drag) > 0.5, "no grease loses its drag within a kelvin"
 
 
+def test_a_wheel_whose_temperature_nobody_measured_does_not_hide_that_the_others_warm(scene: Scene) -> None:
+    """What varies on a wheel is the mean over the wheels of which it is known."""
+    values = scene.covariates["temperature"].copy()
+    before = scene.variance_within(values)
+    values[:, 2] = np.nan
+    assert scene.variance_within(values) == pytest.approx(before)
+
+
 @pytest.mark.parametrize("true", [0.002, 0.012])
 def test_a_torque_constant_is_bent_by_its_own_coefficient(scene: Scene, true: float) -> None:
     """k_t = k_0 (1 − α ΔT) makes the current I/(1 − α ΔT), not I (1 + α ΔT): thirty kelvin away that matters."""
