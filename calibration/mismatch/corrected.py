@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from calibration.mismatch.answer import Contribution, Effect
 from calibration.mismatch.errors import SimulationError
+from calibration.mismatch.simulation import own_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -62,6 +63,13 @@ def _within_reason(simulation: Simulation, values: Mapping[str, float]) -> dict[
         prior = simulation.parameters.get(name)
         reach = 0.0 if prior is None else FURTHEST_STD * prior.std
         kept[name] = value if prior is None else min(max(value, prior.value - reach), prior.value + reach)
+    for name in simulation.own_to_each_wheel & set(kept):
+        prior = simulation.parameters[name]
+        reach = FURTHEST_STD * prior.std
+        # A wheel's own part goes no further than the whole may.
+        for own in [key for key in kept if key.startswith(own_name(name, ""))]:
+            whole = min(max(values[name] + values[own], prior.value - reach), prior.value + reach)
+            kept[own] = whole - kept[name]
     return kept
 
 

@@ -129,7 +129,7 @@ class Simulation:
         }
 
 
-def own_name(parameter: str, wheel: int) -> str:
+def own_name(parameter: str, wheel: int | str) -> str:
     """Return what a wheel's own part of a parameter is called among the values that a recording gave."""
     return f"{parameter} of {wheel}"
 
