@@ -41,7 +41,7 @@ loop: $(VENV)/dev.ready
 pictures: reproduce
 	test ! -f build/loop/loop.svg || cp build/loop/loop.svg docs/loop.svg
 	$(BIN)/regolithd pictures
-	$(BIN)/python -m daemon.demo.photograph docs/demo.svg
+	$(BIN)/python -m regolithd.daemon.demo.screenshot docs/demo.svg
 
 # The proof of `regolithd mismatch`: 200 recordings with an effect concealed. SEED=… repeats one; interrupted, it goes on.
 prove: $(VENV)/dev.ready
@@ -53,16 +53,16 @@ real: $(VENV)/dev.ready
 
 # How time and memory of a comparison grow with rows and candidates.
 scaling: $(VENV)/dev.ready
-	$(BIN)/python -m calibration.prove.scaling build/figures/scaling.json docs/mismatch-scaling.svg
+	$(BIN)/python -m regolithd.calibration.validation.blind_trials.scaling build/figures/scaling.json docs/mismatch-scaling.svg
 
 # What a frame costs, beside python-can and canopen, on vcan; and docs/bus.md as the code has it.
 frames: $(VENV)/dev.ready
-	tests/bench/with-vcan $(BIN)/python -m drivers.benchmark
-	$(BIN)/python -m drivers.reference > docs/bus.md
+	tests/bench/with-vcan $(BIN)/python -m regolithd.drivers.benchmark
+	$(BIN)/python -m regolithd.drivers.reference > docs/bus.md
 
 # The README's first figure: the head of a real report. Needs chromium.
 picture: $(VENV)/dev.ready
-	$(BIN)/python -m calibration.prove.picture docs/mismatch-report.png build/picture
+	$(BIN)/python -m regolithd.calibration.validation.blind_trials.picture docs/mismatch-report.png build/picture
 
 # On a rover or a bench, as root: docs/install.md.
 install:

@@ -7,7 +7,7 @@ import pkgutil
 
 import typer
 
-from daemon import commands
+from regolithd.daemon import commands
 
 app = typer.Typer(
     name="regolithd",
@@ -24,7 +24,7 @@ def _commands() -> None:
 
 
 for module in pkgutil.iter_modules(commands.__path__):
-    importlib.import_module(f"daemon.commands.{module.name}").register(app)
+    importlib.import_module(f"regolithd.daemon.commands.{module.name}").register(app)
 
 
 def main() -> None:

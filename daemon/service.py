@@ -25,23 +25,23 @@ from dataclasses import asdict
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Protocol
 
-from daemon.notify import READY, STOPPING, WATCHDOG, notify, watchdog_period_s
-from daemon.pulse import Pulses
-from daemon.recording.recorder import FLUSH_S, Recorder
-from daemon.replay import Chain
-from drivers.errors import BusOpenError
-from drivers.network import Network, NetworkSettings
-from drivers.open_bus import open_bus
+from regolithd.daemon.health.liveness import Pulses
+from regolithd.daemon.health.sd_notify import READY, STOPPING, WATCHDOG, notify, watchdog_period_s
+from regolithd.daemon.pipeline.chain import Chain
+from regolithd.daemon.recording.recorder import FLUSH_S, Recorder
+from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.errors import BusOpenError
+from regolithd.drivers.master.network import Network, NetworkSettings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from daemon.config import Configuration
-    from daemon.estimate import Network as TerrainNetwork
-    from daemon.snapshot import Estimate
-    from drivers.bus import Bus
-    from drivers.events import NetworkEvent
-    from drivers.frame import Frame
+    from regolithd.daemon.config.configuration import Configuration
+    from regolithd.daemon.pipeline.snapshot import Estimate
+    from regolithd.daemon.pipeline.terrain_network import Network as TerrainNetwork
+    from regolithd.drivers.can.bus import Bus
+    from regolithd.drivers.can.frame import Frame
+    from regolithd.drivers.master.events import NetworkEvent
 
 _log = logging.getLogger(__name__)
 

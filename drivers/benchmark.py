@@ -1,7 +1,7 @@
 """How dear is a frame? Our reader and decoder beside python-can's asyncio Notifier with canopen's `.raw`, in one run.
 
     make frames                                  on vcan, in User Mode Linux where this kernel has none
-    python -m drivers.benchmark [vcan0]          where there is no such link: the decoders alone
+    python -m regolithd.drivers.benchmark [vcan0]          where there is no such link: the decoders alone
 
 Both get the same motor TPDOs and end at the same three SI values, which is checked.
 
@@ -29,14 +29,14 @@ from typing import TYPE_CHECKING
 import can
 import canopen
 
-from drivers.decode import Decoder
-from drivers.eds import eds_path
-from drivers.errors import BusOpenError
-from drivers.frame import Frame
-from drivers.kernel_batch import CAN_FRAME
-from drivers.open_bus import open_bus
-from drivers.pdo import tpdos
-from drivers.signals import NodeDescription, NodeKind, Reading
+from regolithd.drivers.can.frame import Frame
+from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.can.recvmmsg import CAN_FRAME
+from regolithd.drivers.canopen.decoder import Decoder
+from regolithd.drivers.canopen.pdo import tpdos
+from regolithd.drivers.devices.eds import eds_path
+from regolithd.drivers.errors import BusOpenError
+from regolithd.drivers.signals import NodeDescription, NodeKind, Reading
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
@@ -102,7 +102,7 @@ def their_network(take: Callable[[Values], None]) -> canopen.Network:
 
 @asynccontextmanager
 async def ours(channel: str) -> AsyncIterator[Tally]:
-    """Read with `drivers.socketcan`, decode with `drivers.decode`."""
+    """Read with `drivers.can.socketcan`, decode with `drivers.canopen.decoder`."""
     tally, values = Tally(), our_decoder()
 
     async def read() -> None:

@@ -23,7 +23,7 @@ Every message says the node, the object where there is one, what happened, and t
 
 from __future__ import annotations
 
-from drivers.boot_reason import CURES, BootReason
+from regolithd.drivers.master.boot_reason import CURES, BootReason
 
 
 class DriverError(Exception):

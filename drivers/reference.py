@@ -1,6 +1,6 @@
 """Writes `docs/bus.md`: what is on the bus, as the code has it.
 
-python -m drivers.reference > docs/bus.md
+python -m regolithd.drivers.reference > docs/bus.md
 """
 
 from __future__ import annotations
@@ -8,13 +8,13 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from drivers.boot_reason import CURES
-from drivers.configuration import Write, configuration
-from drivers.dictionary import variable
-from drivers.load import bus_load
-from drivers.pdo import MEANINGS, Meaning, Pdo, rpdos, tpdos
-from drivers.signals import NodeDescription, NodeKind
-from drivers.status import NetworkSettings
+from regolithd.drivers.canopen.object_dictionary import variable
+from regolithd.drivers.canopen.pdo import MEANINGS, Meaning, Pdo, rpdos, tpdos
+from regolithd.drivers.master.boot_reason import CURES
+from regolithd.drivers.master.bus_load import bus_load
+from regolithd.drivers.master.configuration import Write, configuration
+from regolithd.drivers.master.status import NetworkSettings
+from regolithd.drivers.signals import NodeDescription, NodeKind
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 _NODES = {NodeKind.MOTOR: "1–6", NodeKind.LOAD_CELL: "11–16", NodeKind.INCLINOMETER: "21", NodeKind.GROUND_SPEED: "22"}
 _INTRODUCTION = """# The bus
 
-<!-- Written by `python -m drivers.reference`; a test holds it to the code. -->
+<!-- Written by `python -m regolithd.drivers.reference`; a test holds it to the code. -->
 
 1 Mbit/s, 11-bit identifiers, CANopen. The daemon is node 127: it produces SYNC (0x080) and a heartbeat, and boots all
 others. Node-IDs are those of `rover.toml`; below stand its defaults, *id* being the node's own."""
 _ANOTHER_DEVICE = """## Another device
 
 1. Put its own EDS file in place of `drivers/eds/KIND.eds`: identity (0x1000, 0x1018), types and rights are its.
-2. Where its objects are others, change the layout and the meaning in `drivers/pdo.py`. A layout that the EDS does not
+2. Where its objects are others, change the layout and the meaning in `drivers/canopen/pdo.py`. A layout that the EDS does not
    allow – no such object, not mappable, more than 8 bytes – is refused when the daemon starts.
 3. `regolithd check` asks every node who it is, and changes nothing."""
 

@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from drivers.nmt import NmtState
+    from regolithd.drivers.canopen.nmt import NmtState
 
 
 class NodeKind(StrEnum):

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from calibration.mismatch.candidates import Shape
-    from calibration.mismatch.scene import Scene
+    from regolithd.calibration.mismatch.candidates import Shape
+    from regolithd.calibration.mismatch.simulation.problem import Scene
 
 Array = NDArray[np.float64]
 Verdict = Literal["consistent", "missing-physics", "unexplained"]

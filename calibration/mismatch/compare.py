@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.mismatch.answer import (
+from regolithd.calibration.mismatch.answer import (
     Answer,
     Contribution,
     Curve,
@@ -19,25 +19,30 @@ from calibration.mismatch.answer import (
     Unexplained,
     Verdict,
 )
-from calibration.mismatch.corrected import effect_of
-from calibration.mismatch.decide import Decision, decide
-from calibration.mismatch.dictionary import Dictionary
-from calibration.mismatch.explained import contribution, residual_of
-from calibration.mismatch.fill import NOT_FOR_CURVES, add_candidates, add_curves, add_nuisance
-from calibration.mismatch.held_out import HeldOut, hold_out
-from calibration.mismatch.intervals import parameters_of
-from calibration.mismatch.noise import Noise, blocks_of_time, estimate_noise, folds_of_blocks
-from calibration.mismatch.rivals import confusions
-from calibration.mismatch.scene import Scene, build_scene
-from calibration.mismatch.search import Search, Term
-from calibration.mismatch.sensitivity import sensitivities
-from calibration.mismatch.statements import statement
+from regolithd.calibration.mismatch.corrected import effect_of
+from regolithd.calibration.mismatch.inference.held_out import HeldOut, hold_out
+from regolithd.calibration.mismatch.inference.identifiability import confusions
+from regolithd.calibration.mismatch.inference.intervals import parameters_of
+from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
+from regolithd.calibration.mismatch.regression.design_matrix import Dictionary
+from regolithd.calibration.mismatch.regression.noise import Noise, blocks_of_time, estimate_noise, folds_of_blocks
+from regolithd.calibration.mismatch.regression.normal_equations import (
+    NOT_FOR_CURVES,
+    add_candidates,
+    add_curves,
+    add_nuisance,
+)
+from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
+from regolithd.calibration.mismatch.report.statements import statement
+from regolithd.calibration.mismatch.selection.decision import Decision, decide
+from regolithd.calibration.mismatch.selection.subset_selection import Search, Term
+from regolithd.calibration.mismatch.simulation.problem import Scene, build_scene
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from calibration.mismatch.recording import Recording
-    from calibration.mismatch.simulation import Simulation
+    from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]
 

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.mismatch.answer import Contribution, Effect
-from calibration.mismatch.errors import SimulationError
-from calibration.mismatch.simulation import own_name
+from regolithd.calibration.mismatch.answer import Contribution, Effect
+from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.simulation.simulation import own_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from calibration.mismatch.scene import Scene
-    from calibration.mismatch.simulation import Simulation
+    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]
 

@@ -17,10 +17,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.paper.network import OUTPUT_UNIT, OUTPUTS, Network, nguyen_widrow, scale, unpack
+from regolithd.calibration.paper.network import OUTPUT_UNIT, OUTPUTS, Network, nguyen_widrow, scale, unpack
 
 if TYPE_CHECKING:
-    from calibration.paper.training_set import TrainingSet
+    from regolithd.calibration.paper.training_set import TrainingSet
 
 Single = NDArray[np.float32]
 

@@ -4,7 +4,7 @@ Angles are measured from the vertical: the wheel meets the soil at θ_C, carries
 leaves it at θ_2 = 0. Arrays of one shape in, an array of that shape out; radians, metres, pascals, newtons.
 
 Eq. 10 takes the shear displacement at the wheel's bottom although Eq. 1 uses it at θ_m. That is kept here, since this
-folder is the paper; `calibration.wheel_soil` takes it at θ_m.
+folder is the paper; `calibration.terrain.wheel_soil` takes it at θ_m.
 """
 
 from __future__ import annotations

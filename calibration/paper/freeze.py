@@ -9,11 +9,11 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from calibration.model_card import ModelCard, Variable
-from calibration.paper.network import INPUTS, OUTPUT_UNIT, OUTPUTS, Network
+from regolithd.calibration.models.card import ModelCard, Variable
+from regolithd.calibration.paper.network import INPUTS, OUTPUT_UNIT, OUTPUTS, Network
 
 if TYPE_CHECKING:
-    from calibration.paper.training_set import TrainingSet
+    from regolithd.calibration.paper.training_set import TrainingSet
 
 OPSET = 17
 IR_VERSION = 9  # what onnxruntime 1.19, the oldest that the rover may have, reads

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.paper import equations
+from regolithd.calibration.paper import equations
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from calibration.parameters import Wheel
+    from regolithd.calibration.parameters import Wheel
 
 Array = NDArray[np.float64]
 

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calibration.paper.backpropagation import EPOCHS, train
+from regolithd.calibration.paper.backpropagation import EPOCHS, train
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
     from pathlib import Path
 
-    from calibration.paper.training_set import TrainingSet
+    from regolithd.calibration.paper.training_set import TrainingSet
 
 SIZES = tuple(range(59, 85))
 TRAININGS = 100

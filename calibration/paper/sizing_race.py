@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from calibration.paper import sizing
-from calibration.paper.network import OUTPUT_UNIT, scale
+from regolithd.calibration.paper import sizing
+from regolithd.calibration.paper.network import OUTPUT_UNIT, scale
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from calibration.paper.training_set import TrainingSet
+    from regolithd.calibration.paper.training_set import TrainingSet
 
 SLICE_SIZES = (59, 64, 72, 84)
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.paper import equations
-from calibration.parameters import SOILS, Drivetrain, Wheel
+from regolithd.calibration.paper import equations
+from regolithd.calibration.parameters import SOILS, Drivetrain, Wheel
 
 Array = NDArray[np.float64]
 

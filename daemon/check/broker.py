@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 from aiomqtt import Client, MqttError
 
-from daemon.check.finding import Finding, good, wrong
-from daemon.publish.link import tls_context
-from daemon.publish.reasons import reason_of
+from regolithd.daemon.check.finding import Finding, good, wrong
+from regolithd.daemon.publish.connection import tls_context
+from regolithd.daemon.publish.connection_errors import reason_of
 
 if TYPE_CHECKING:
-    from daemon.config import Configuration
+    from regolithd.daemon.config.configuration import Configuration
 
 TIMEOUT_S = 5.0
 

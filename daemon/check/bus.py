@@ -8,16 +8,16 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from daemon.check.finding import Finding, good, unknown, warning, wrong
-from drivers.errors import BusError
-from drivers.load import bus_load
-from drivers.open_bus import open_bus
-from drivers.probe import probe
+from regolithd.daemon.check.finding import Finding, good, unknown, warning, wrong
+from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.errors import BusError
+from regolithd.drivers.master.bus_load import bus_load
+from regolithd.drivers.master.scan import probe
 
 if TYPE_CHECKING:
-    from daemon.config import Bus, Configuration
-    from daemon.control.protocol import Status
-    from drivers.probe import Probe
+    from regolithd.daemon.config.configuration import Bus, Configuration
+    from regolithd.daemon.control.protocol import Status
+    from regolithd.drivers.master.scan import Probe
 
 CAN_LINK = "280"  # ARPHRD_CAN, if_arp.h
 _LINKS = Path("/sys/class/net")

@@ -13,7 +13,7 @@ import time
 from dataclasses import dataclass
 from typing import ClassVar
 
-from daemon.check.finding import Finding, good, unknown, warning, wrong
+from regolithd.daemon.check.finding import Finding, good, unknown, warning, wrong
 
 WATCH_S = 1.0
 SET_BY_HAND_NS = 50_000_000

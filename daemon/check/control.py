@@ -6,13 +6,13 @@ import asyncio
 import os
 from typing import TYPE_CHECKING
 
-from daemon.check.finding import Finding, good, unknown, warning, wrong
-from daemon.control.client import EX_NOPERM, ControlError, conversation
-from daemon.control.protocol import Status, StatusRequest
-from daemon.control.socket import ControlSocketError, group_id
+from regolithd.daemon.check.finding import Finding, good, unknown, warning, wrong
+from regolithd.daemon.control.client import EX_NOPERM, ControlError, conversation
+from regolithd.daemon.control.protocol import Status, StatusRequest
+from regolithd.daemon.control.socket import ControlSocketError, group_id
 
 if TYPE_CHECKING:
-    from daemon.config import Configuration
+    from regolithd.daemon.config.configuration import Configuration
 
 
 async def running_daemon(configuration: Configuration) -> Status | ControlError | None:

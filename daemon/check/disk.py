@@ -6,12 +6,12 @@ import os
 import shutil
 from typing import TYPE_CHECKING
 
-from daemon.check.finding import Finding, good, unknown, warning, wrong
+from regolithd.daemon.check.finding import Finding, good, unknown, warning, wrong
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from daemon.config import Configuration
+    from regolithd.daemon.config.configuration import Configuration
 
 
 async def check_disks(configuration: Configuration) -> list[Finding]:

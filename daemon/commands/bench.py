@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from daemon.scenario import Scenario
-    from drivers.virtual import VirtualRover
+    from regolithd.daemon.simulator.scenario import Scenario
+    from regolithd.drivers.virtual import VirtualRover
 
 _CONTROL = Path(tempfile.gettempdir()) / "regolithd-bench.sock"
 
@@ -42,11 +42,11 @@ def bench(
     import asyncio
     import json
 
-    from daemon.start_up import configuration_or_exit
-    from daemon.virtual_rover import VirtualWorld
-    from drivers.errors import BusError
-    from drivers.virtual import KAPVIK, VirtualRover
-    from drivers.virtual.control import ControlError
+    from regolithd.daemon.setup import configuration_or_exit
+    from regolithd.daemon.simulator.virtual_rover import VirtualWorld
+    from regolithd.drivers.errors import BusError
+    from regolithd.drivers.virtual import KAPVIK, VirtualRover
+    from regolithd.drivers.virtual.control_socket import ControlError
 
     settings = _scenario(scenario, soil or [], seed, even=even)
     nodes = KAPVIK if config is None else configuration_or_exit(config).nodes.described()
@@ -63,7 +63,7 @@ def bench_tell(
     control: Control = _CONTROL,
 ) -> None:
     """Tell the running virtual rover what shall go wrong: `regolithd bench-tell off 3`."""
-    from drivers.virtual.control import ControlError, ask
+    from regolithd.drivers.virtual.control_socket import ControlError, ask
 
     try:
         answer = ask(control, " ".join(words))
@@ -78,7 +78,7 @@ def _scenario(path: Path | None, soils: list[str], seed: int | None, *, even: bo
     """Return the scenario of the file with the options' changes, or exit 78 with everything that is wrong."""
     from pydantic import ValidationError
 
-    from daemon.scenario import Noise, Scenario, read_scenario
+    from regolithd.daemon.simulator.scenario import Noise, Scenario, read_scenario
 
     try:
         scenario = Scenario() if path is None else read_scenario(path)
@@ -106,8 +106,8 @@ async def _run(
     import asyncio
     import signal
 
-    from drivers.open_bus import open_bus
-    from drivers.virtual.control import control_socket
+    from regolithd.drivers.can.open_bus import open_bus
+    from regolithd.drivers.virtual.control_socket import control_socket
 
     ended = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):

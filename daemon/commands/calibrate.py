@@ -10,7 +10,7 @@ import typer
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from calibration.bench.session import Written
+    from regolithd.calibration.drivetrain.bench.session import Written
 
 Recorded = Annotated[
     Path | None, typer.Argument(help="CSV or Parquet of `regolithd export`; without it, what to do at the bench")
@@ -37,7 +37,7 @@ def register(app: typer.Typer) -> None:
 
 def load_cell(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plot = None, write: Write = True) -> None:
     """Fit each wheel that has weights in the recording."""
-    from calibration.bench import procedures, session
+    from regolithd.calibration.drivetrain.bench import procedures, session
 
     if recording is None:
         typer.echo(procedures.LOAD_CELLS)
@@ -47,7 +47,7 @@ def load_cell(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plo
 
 def wheels_up(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plot = None, write: Write = True) -> None:
     """Fit each wheel that turned."""
-    from calibration.bench import procedures, session
+    from regolithd.calibration.drivetrain.bench import procedures, session
 
     if recording is None:
         typer.echo(procedures.WHEELS_UP)
@@ -57,7 +57,7 @@ def wheels_up(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plo
 
 def brake(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plot = None, write: Write = True) -> None:
     """Fit each wheel that has a brake's torque in the recording."""
-    from calibration.bench import procedures, session
+    from regolithd.calibration.drivetrain.bench import procedures, session
 
     if recording is None:
         typer.echo(procedures.BRAKE)
@@ -74,7 +74,7 @@ def radius(
     write: Write = True,
 ) -> None:
     """Divide the distance by what the wheels turned."""
-    from calibration.bench import procedures, session
+    from regolithd.calibration.drivetrain.bench import procedures, session
 
     if recording is None:
         typer.echo(procedures.RADIUS)
@@ -88,15 +88,15 @@ def corrected(
     write: Write = True,
 ) -> None:
     """Copy what the comparison found of the drivetrain."""
-    from calibration.bench.simulation import drivetrain
+    from regolithd.calibration.drivetrain.bench.simulation import drivetrain
 
     _finish(lambda: drivetrain(simulation, config), config, write)
 
 
 def _finish(fit: Callable[[], Written], config: Path, write: bool) -> None:
     """Fit, say what came out, and write it."""
-    from calibration.bench.line import BenchError
-    from calibration.mismatch.errors import RecordingError
+    from regolithd.calibration.drivetrain.bench.line import BenchError
+    from regolithd.calibration.mismatch.errors import RecordingError
 
     try:
         written = fit()

@@ -10,9 +10,9 @@ import typer
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from daemon.check.finding import Finding
-    from daemon.config import Configuration
-    from daemon.config_reader import ConfigurationError
+    from regolithd.daemon.check.finding import Finding
+    from regolithd.daemon.config.configuration import Configuration
+    from regolithd.daemon.config.reader import ConfigurationError
 
 _STYLES = {"good": "green", "warning": "yellow", "wrong": "bold red", "not checked": "dim"}
 _MARKS = {"good": "✓", "warning": "!", "wrong": "✗", "not checked": "–"}
@@ -33,7 +33,7 @@ def check(
 
     The exit status is 78 where the configuration cannot be used, 1 where anything else is wrong, and 0 otherwise.
     """
-    from daemon.config_reader import EXIT_STATUS, ConfigurationError, read_configuration
+    from regolithd.daemon.config.reader import EXIT_STATUS, ConfigurationError, read_configuration
 
     try:
         configuration = read_configuration(config)
@@ -53,7 +53,7 @@ def _look(configuration: Configuration, *, quiet: bool) -> list[Finding]:
 
     from rich.console import Console
 
-    from daemon.check.everything import check_everything
+    from regolithd.daemon.check.all_checks import check_everything
 
     with Console(stderr=True, quiet=quiet).status("Looking at bus, nodes, model, broker, disks and clock …"):
         return asyncio.run(check_everything(configuration))

@@ -27,11 +27,11 @@ def demo(
         typer.echo(f"the demo needs {' and '.join(missing)}: pip install 'regolithd[demo]', or `make demo`", err=True)
         raise typer.Exit(1)
 
-    from daemon.demo.drive import drive
-    from daemon.demo.picture import draw
-    from daemon.demo.screen import screen
-    from daemon.demo.summary import ground_summary, summary
-    from daemon.demo.witness import grounds, stretches
+    from regolithd.daemon.demo.drive import drive
+    from regolithd.daemon.demo.ground_truth_log import grounds, stretches
+    from regolithd.daemon.demo.picture import draw
+    from regolithd.daemon.demo.screen import screen
+    from regolithd.daemon.demo.summary import ground_summary, summary
 
     console = Console()
     out.mkdir(parents=True, exist_ok=True)

@@ -44,8 +44,10 @@ def evaluate(
     import numpy as np
     from rich.progress import Progress
 
-    from calibration.evaluation import bias, detector, drivetrain, estimators
-    from calibration.posterior import Estimator
+    from regolithd.calibration.posterior.estimator import Estimator
+    from regolithd.calibration.validation.estimators import bias, drivetrain
+    from regolithd.calibration.validation.estimators import change_detector as detector
+    from regolithd.calibration.validation.estimators import errors_and_coverage as estimators
 
     found: dict[str, float | None] = json.loads(out.read_text(encoding="utf-8")) if out.is_file() else {}
     kept: dict[str, Array] = dict(np.load(details)) if details.is_file() else {}

@@ -18,9 +18,9 @@ def export(
     to: Annotated[Path, typer.Option(help="out.csv or out.parquet")],
 ) -> None:
     """Write the columns that `regolithd mismatch` reads."""
-    from daemon.export import ExportError
-    from daemon.export import export as write
-    from daemon.progress import open_binary
+    from regolithd.daemon.recording.export import ExportError
+    from regolithd.daemon.recording.export import export as write
+    from regolithd.daemon.recording.progress import open_binary
 
     try:
         count = write(recordings, to, open_binary)

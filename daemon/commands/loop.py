@@ -32,15 +32,16 @@ def loop(
 
     from rich.console import Console
 
-    from daemon.estimate import SHIPPED_MODEL, Network
-    from daemon.loop.case import cases
-    from daemon.loop.close import Lengths, close
-    from daemon.loop.picture import draw
-    from daemon.loop.tell import figures_of, sentence
+    from regolithd.calibration.models import TERRAIN_MODEL
+    from regolithd.daemon.closed_loop.case import cases
+    from regolithd.daemon.closed_loop.close import Lengths, close
+    from regolithd.daemon.closed_loop.picture import draw
+    from regolithd.daemon.closed_loop.summary import figures_of, sentence
+    from regolithd.daemon.pipeline.terrain_network import Network
 
     lengths = Lengths(first_s=400.0, second_s=180.0, stretch_m=1.1) if short else Lengths()
     chosen = [each for each in cases(seed) if not case or each.name in case]
-    network = Network(SHIPPED_MODEL)
+    network = Network(TERRAIN_MODEL)
     console = Console()
     done = []
     with Console(stderr=True).status("") as status:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from calibration.mismatch.answer import Answer
-    from calibration.mismatch.compare import Comparison
-    from calibration.mismatch.recording import Recording
+    from regolithd.calibration.mismatch.answer import Answer
+    from regolithd.calibration.mismatch.compare import Comparison
+    from regolithd.calibration.mismatch.data.recording import Recording
 
 EXIT_DATA = 65
 """EX_DATAERR: what was given cannot be compared."""
@@ -32,7 +32,7 @@ def register(app: typer.Typer) -> None:
         ] = None,
     ) -> None:
         """Locate where simulation and recording differ, name the physics left out, and show the fit improve."""
-        from calibration.mismatch.errors import MismatchError
+        from regolithd.calibration.mismatch.errors import MismatchError
 
         try:
             _run(recording, simulation, json, report, corrected)
@@ -44,9 +44,9 @@ def register(app: typer.Typer) -> None:
 def _run(recording: Path, simulation: Path, json: Path | None, report: Path | None, corrected: Path | None) -> None:
     from rich.console import Console
 
-    from calibration.mismatch.compare import compare
-    from calibration.mismatch.corrected import corrected_tables, stated_effects, to_toml
-    from calibration.mismatch.simulation import load_simulation
+    from regolithd.calibration.mismatch.compare import compare
+    from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects, to_toml
+    from regolithd.calibration.mismatch.simulation.simulation import load_simulation
 
     tables = _tables(simulation)
     simulated = load_simulation(tables, beside=simulation.resolve().parent)
@@ -70,7 +70,7 @@ def _run(recording: Path, simulation: Path, json: Path | None, report: Path | No
 def _tables(path: Path) -> dict[str, Any]:
     import tomllib
 
-    from calibration.mismatch.errors import SimulationError
+    from regolithd.calibration.mismatch.errors import SimulationError
 
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
@@ -79,13 +79,13 @@ def _tables(path: Path) -> dict[str, Any]:
 
 
 def _read(path: Path, unit: str) -> Recording:
-    from calibration.mismatch.recording import from_columns, read_recording
+    from regolithd.calibration.mismatch.data.recording import from_columns, read_recording
 
     if path.suffix != ".mcap":
         return read_recording(path, unit=unit)
     import numpy as np
 
-    from daemon.export import HEADER, recorded_snapshots, rows
+    from regolithd.daemon.recording.export import HEADER, recorded_snapshots, rows
 
     table = np.array(list(rows(recorded_snapshots([path]))), np.float64).reshape(-1, len(HEADER))
     return from_columns(dict(zip(HEADER, table.T, strict=True)), unit=unit)
@@ -100,7 +100,7 @@ def _write_json(path: Path, answer: Answer) -> None:
 def _write_report(path: Path, found: Comparison, recording: Path, simulation: Path) -> None:
     from hashlib import sha256
 
-    from calibration.mismatch.report import Provenance, write_report
+    from regolithd.calibration.mismatch.report.page import Provenance, write_report
 
     first, second = (sha256(file.read_bytes()).hexdigest() for file in (recording, simulation))
     command = f"regolithd mismatch {recording.name} --simulation {simulation.name} --report {path.name}"

@@ -25,8 +25,8 @@ def pictures(
 
     import numpy as np
 
-    from calibration.evaluation import pictures as draw
-    from calibration.posterior import Estimator
+    from regolithd.calibration.posterior.estimator import Estimator
+    from regolithd.calibration.validation.estimators import pictures as draw
 
     if not (figures.is_file() and details.is_file()):
         typer.echo(f"{figures} is not there: run `regolithd evaluate` first", err=True)

@@ -12,8 +12,8 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from calibration.prove.batch import Batch, Outcome
-    from calibration.prove.score import Figures
+    from regolithd.calibration.validation.blind_trials.batch import Batch, Outcome
+    from regolithd.calibration.validation.blind_trials.score import Figures
 
 
 def register(app: typer.Typer) -> None:
@@ -36,9 +36,9 @@ def prove(  # each is an option of the command line
     """Prove what `regolithd mismatch` finds: effects concealed, truths sealed, answers scored, peers beside it."""
     from rich.console import Console
 
-    from calibration.prove.batch import PEERS, SOLVER, Batch
-    from calibration.prove.errors import ProofError
-    from calibration.prove.isolation import describe
+    from regolithd.calibration.validation.blind_trials.batch import PEERS, SOLVER, Batch
+    from regolithd.calibration.validation.blind_trials.errors import ProofError
+    from regolithd.calibration.validation.blind_trials.isolation import describe
 
     console = Console()
     drawn = secrets.randbits(63) if seed is None else seed
@@ -67,8 +67,8 @@ def _run(batch: Batch, console: Console) -> list[Outcome]:
     """Run the batch under a progress bar that shows the running score."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from calibration.prove.batch import run_batch
-    from calibration.prove.score import judge
+    from regolithd.calibration.validation.blind_trials.batch import run_batch
+    from regolithd.calibration.validation.blind_trials.score import judge
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     outcomes: list[Outcome] = []
@@ -87,8 +87,8 @@ def _report(outcomes: list[Outcome], console: Console, paths: list[Path]) -> Fig
     import json
     import math
 
-    from calibration.prove.score import figures_of
-    from calibration.prove.table import peers_table, score_table
+    from regolithd.calibration.validation.blind_trials.score import figures_of
+    from regolithd.calibration.validation.blind_trials.table import peers_table, score_table
 
     figures = figures_of(outcomes)
     console.print(score_table(figures))

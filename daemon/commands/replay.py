@@ -21,9 +21,9 @@ def replay(
     model: Annotated[Path | None, typer.Option(help="estimate with this network instead")] = None,
 ) -> None:
     """Print what came of it; status 1 where a number is not the same as then."""
-    from daemon.progress import open_text
-    from daemon.replay_report import replay_logs
-    from daemon.start_up import configuration_or_exit, network_or_exit, recorded_configuration
+    from regolithd.daemon.recording.progress import open_text
+    from regolithd.daemon.recording.replay import replay_logs
+    from regolithd.daemon.setup import configuration_or_exit, network_or_exit, recorded_configuration
 
     beside = logs[0].with_suffix(".mcap")
     configuration = configuration_or_exit(config) if config else recorded_configuration(beside)

@@ -27,9 +27,10 @@ def reproduce(
     import numpy as np
     from rich.progress import Progress
 
-    from calibration.parameters import Drivetrain, Wheel
-    from calibration.reproduction import again, page, pictures, published
-    from calibration.reproduction.scalings import scalings
+    from regolithd.calibration.parameters import Drivetrain, Wheel
+    from regolithd.calibration.validation.reproduction import page, pictures, published
+    from regolithd.calibration.validation.reproduction import recomputation as again
+    from regolithd.calibration.validation.reproduction.scalings import scalings
 
     sized = json.loads(sizing.read_text(encoding="utf-8")) if sizing.is_file() else None
     with Progress() as progress:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from daemon.config import Configuration
-    from daemon.estimate import Network
+    from regolithd.daemon.config.configuration import Configuration
+    from regolithd.daemon.pipeline.terrain_network import Network
 
 
 def register(app: typer.Typer) -> None:
@@ -25,7 +25,7 @@ def run(
     import asyncio
     import logging
 
-    from daemon.start_up import configuration_or_exit, network_or_exit
+    from regolithd.daemon.setup import configuration_or_exit, network_or_exit
 
     logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     configuration = configuration_or_exit(config)
@@ -36,9 +36,9 @@ async def _run(configuration: Configuration, terrain: Network) -> None:
     import asyncio
     import signal
 
-    from daemon.equipment import equip
-    from daemon.publish.spool import SpoolError
-    from daemon.service import Service
+    from regolithd.daemon.publish.spool import SpoolError
+    from regolithd.daemon.service import Service
+    from regolithd.daemon.wiring import equip
 
     service = Service(configuration, terrain)
     try:

@@ -17,7 +17,7 @@ def schema(
     write: Annotated[Path | None, typer.Option(help="Folder to write JSON Schemas, AsyncAPI and table to.")] = None,
 ) -> None:
     """Print the AsyncAPI document of the MQTT messages, or write it and every JSON Schema to a folder."""
-    from daemon.message_documents import documents
+    from regolithd.daemon.messages.documents import documents
 
     files = documents()
     if write is None:

@@ -34,10 +34,10 @@ def sizing(
         TimeRemainingColumn,
     )
 
-    from calibration.paper import sizing as study_of
-    from calibration.paper.sizing_race import figures, race
-    from calibration.paper.training_set import training_set
-    from calibration.parameters import Drivetrain, Wheel
+    from regolithd.calibration.paper import sizing as study_of
+    from regolithd.calibration.paper.sizing_race import figures, race
+    from regolithd.calibration.paper.training_set import training_set
+    from regolithd.calibration.parameters import Drivetrain, Wheel
 
     study = study_of.Study(trainings=trainings, epochs=epochs)
     pairs = training_set(Drivetrain(), Wheel(), np.random.default_rng(study.seed))

@@ -10,7 +10,7 @@ import typer
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from daemon.control.protocol import Status
+    from regolithd.daemon.control.protocol import Status
 
 
 def register(app: typer.Typer) -> None:
@@ -24,7 +24,7 @@ def status(
     json: Annotated[bool, typer.Option("--json", help="As the daemon says it.")] = False,
 ) -> None:
     """Show the running daemon's nodes, broker and traverse. The exit status is 0 while every node is operational."""
-    from daemon.control.client import converse
+    from regolithd.daemon.control.client import converse
 
     raise typer.Exit(converse(config, lambda path: _status(path, as_json=json)))
 
@@ -32,8 +32,8 @@ def status(
 async def _status(path: Path, *, as_json: bool) -> int:
     from rich.console import Console
 
-    from daemon.control.client import conversation
-    from daemon.control.protocol import Status, StatusRequest
+    from regolithd.daemon.control.client import conversation
+    from regolithd.daemon.control.protocol import Status, StatusRequest
 
     async with conversation(path) as daemon:
         daemon.ask(StatusRequest())

@@ -28,10 +28,10 @@ def train(
     import onnx
     from rich.progress import track
 
-    from calibration.paper import backpropagation
-    from calibration.paper.freeze import card, freeze
-    from calibration.paper.training_set import training_set
-    from calibration.parameters import Drivetrain, Wheel
+    from regolithd.calibration.paper import backpropagation
+    from regolithd.calibration.paper.freeze import card, freeze
+    from regolithd.calibration.paper.training_set import training_set
+    from regolithd.calibration.parameters import Drivetrain, Wheel
 
     tables = tomllib.loads(config.read_text(encoding="utf-8")) if config else {}
     drivetrain, wheel = Drivetrain(**tables.get("drivetrain", {})), Wheel(**tables.get("wheel", {}))

@@ -26,8 +26,8 @@ def train_posterior(
     import onnx
     from rich.progress import Progress
 
-    from calibration.parameters import Wheel
-    from calibration.posterior_training import fit, freeze, simulate
+    from regolithd.calibration.parameters import Wheel
+    from regolithd.calibration.posterior.training import fit, freeze, simulate
 
     with Progress() as progress:
         simulating = progress.add_task("simulating rovers", total=rovers)

@@ -10,8 +10,8 @@ import typer
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
-    from daemon.control.client import Conversation
-    from daemon.control.protocol import Ended, Refused
+    from regolithd.daemon.control.client import Conversation
+    from regolithd.daemon.control.protocol import Ended, Refused
 
 Config = Annotated[Path | None, typer.Option(help="The rover.toml of the running daemon.")]
 INTERRUPTED = 130
@@ -33,7 +33,7 @@ def traverse(
 
     Ctrl-C, a lost node, or the end of this command in any other way quick-stops the wheels.
     """
-    from daemon.control.client import converse
+    from regolithd.daemon.control.client import converse
 
     raise typer.Exit(converse(config, lambda path: _traverse(path, distance, speed)))
 
@@ -42,8 +42,8 @@ async def _traverse(path: Path, distance_m: float, speed_m_s: float) -> int:
     import asyncio
     import signal
 
-    from daemon.control.client import conversation
-    from daemon.control.protocol import Refused, StopRequest, TraverseRequest
+    from regolithd.daemon.control.client import conversation
+    from regolithd.daemon.control.protocol import Refused, StopRequest, TraverseRequest
 
     interrupted = False
 
@@ -72,7 +72,7 @@ async def _follow(daemon: Conversation) -> Ended | Refused:
     """Show how it goes until it ends."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from daemon.control.protocol import Ended, Refused
+    from regolithd.daemon.control.protocol import Ended, Refused
 
     columns = (
         TextColumn("[bold]traverse"),
@@ -94,7 +94,7 @@ async def _follow(daemon: Conversation) -> Ended | Refused:
 
 
 def _show(bar: Bar, reply: object) -> None:
-    from daemon.control.protocol import Accepted, Progress
+    from regolithd.daemon.control.protocol import Accepted, Progress
 
     if isinstance(reply, Accepted):
         bar.add_task("traverse", total=reply.duration_s, turned_m=0.0)
@@ -109,14 +109,14 @@ def stop(
     config: Config = None,
 ) -> None:
     """Stop the wheels, whoever commanded them."""
-    from daemon.control.client import converse
+    from regolithd.daemon.control.client import converse
 
     raise typer.Exit(converse(config, lambda path: _stop(path, quick=quick)))
 
 
 async def _stop(path: Path, *, quick: bool) -> int:
-    from daemon.control.client import conversation
-    from daemon.control.protocol import Done, StopRequest
+    from regolithd.daemon.control.client import conversation
+    from regolithd.daemon.control.protocol import Done, StopRequest
 
     async with conversation(path) as daemon:
         daemon.ask(StopRequest(quick=quick))

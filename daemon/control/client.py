@@ -9,14 +9,14 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from daemon.config import Configuration
-from daemon.config_reader import EXIT_STATUS, ConfigurationError, read_configuration
-from daemon.control.protocol import LINE_LIMIT, REPLY
+from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.config.reader import EXIT_STATUS, ConfigurationError, read_configuration
+from regolithd.daemon.control.protocol import LINE_LIMIT, REPLY
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Coroutine
 
-    from daemon.control.protocol import Accepted, Done, Ended, Progress, Refused, Status, _Line
+    from regolithd.daemon.control.protocol import Accepted, Done, Ended, Progress, Refused, Status, _Line
 
 
 class ControlError(Exception):

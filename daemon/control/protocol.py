@@ -28,7 +28,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
-from daemon.traverse import Ending  # noqa: TC001  # pydantic reads it at run time
+from regolithd.daemon.control.traverse import Ending  # noqa: TC001  # pydantic reads it at run time
 
 LINE_LIMIT = 65_536
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from pydantic import ValidationError
 
-from daemon.control.protocol import (
+from regolithd.daemon.control.protocol import (
     LINE_LIMIT,
     REQUEST,
     Accepted,
@@ -31,19 +31,19 @@ from daemon.control.protocol import (
     StopRequest,
     TraverseRequest,
 )
-from daemon.control.socket import ControlSocketError, open_control_socket
-from daemon.traverse import Clock, Outcome, Plan, Traverse, TraverseError, Wheels, plan_traverse
-from drivers.errors import DriverError
-from drivers.events import MotionStopped
+from regolithd.daemon.control.socket import ControlSocketError, open_control_socket
+from regolithd.daemon.control.traverse import Clock, Outcome, Plan, Traverse, TraverseError, Wheels, plan_traverse
+from regolithd.drivers.errors import DriverError
+from regolithd.drivers.master.events import MotionStopped
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from daemon.config import Configuration
-    from daemon.control.protocol import _Line
-    from daemon.snapshot import Estimate, Snapshot
-    from drivers.events import NetworkEvent
-    from drivers.status import NodeStatus
+    from regolithd.daemon.config.configuration import Configuration
+    from regolithd.daemon.control.protocol import _Line
+    from regolithd.daemon.pipeline.snapshot import Estimate, Snapshot
+    from regolithd.drivers.master.events import NetworkEvent
+    from regolithd.drivers.master.status import NodeStatus
 
 _log = logging.getLogger(__name__)
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid: unix(7), SO_PEERCRED
@@ -51,7 +51,7 @@ RETRY_S = 5.0
 
 
 class Rover(Wheels, Protocol):
-    """What the control socket needs of `drivers.network.Network`."""
+    """What the control socket needs of `drivers.master.network.Network`."""
 
     @property
     def status(self) -> Mapping[int, NodeStatus]:

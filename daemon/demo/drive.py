@@ -13,25 +13,25 @@ from typing import TYPE_CHECKING
 
 import aiomqtt
 
-from calibration.parameters import SOILS
-from daemon.config import Configuration
-from daemon.demo.broker import embedded_broker
-from daemon.demo.viewer import Viewer
-from daemon.demo.witness import Witness
-from daemon.equipment import equip
-from daemon.estimate import SHIPPED_MODEL
-from daemon.estimate import Network as TerrainNetwork
-from daemon.scenario import Ground, Scenario, Stretch
-from daemon.service import Service
-from daemon.virtual_rover import VirtualWorld
-from drivers.network import NodePhase
-from drivers.open_bus import open_bus
-from drivers.virtual import VirtualRover
+from regolithd.calibration.models import TERRAIN_MODEL
+from regolithd.calibration.parameters import SOILS
+from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.demo.broker import embedded_broker
+from regolithd.daemon.demo.ground_truth_log import Witness
+from regolithd.daemon.demo.viewer import Viewer
+from regolithd.daemon.pipeline.terrain_network import Network as TerrainNetwork
+from regolithd.daemon.service import Service
+from regolithd.daemon.simulator.scenario import Ground, Scenario, Stretch
+from regolithd.daemon.simulator.virtual_rover import VirtualWorld
+from regolithd.daemon.wiring import equip
+from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.master.network import NodePhase
+from regolithd.drivers.virtual import VirtualRover
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
 
-    from drivers.network import Network
+    from regolithd.drivers.master.network import Network
 
 CHANNEL = "demo"
 RATE_HZ = 10.0
@@ -85,7 +85,7 @@ async def drive(folder: Path, seconds: float, show: Callable[[Viewer, float], No
         configuration = demo_configuration(folder, passing, port)
         prefix = f"{configuration.mqtt.prefix}/{configuration.rover.name}"
         viewer = Viewer(prefix)
-        service = Service(configuration, TerrainNetwork(SHIPPED_MODEL))
+        service = Service(configuration, TerrainNetwork(TERRAIN_MODEL))
         equip(service)
         service.outlets.append(witness)
         subscribed = asyncio.Event()

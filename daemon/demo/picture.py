@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from calibration.posterior import Interval
-    from daemon.snapshot import Array, Estimate
-    from daemon.virtual_rover import Truth
+    from regolithd.calibration.posterior.estimator import Interval
+    from regolithd.daemon.pipeline.snapshot import Array, Estimate
+    from regolithd.daemon.simulator.virtual_rover import Truth
 
 # Front, middle, rear in three hues; left solid, right dashed.
 COLOURS = ("#0b6e99", "#0b6e99", "#c4622d", "#c4622d", "#4a7c3a", "#4a7c3a")

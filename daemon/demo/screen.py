@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from rich.console import Console, RenderableType
 
-    from daemon.demo.viewer import Viewer
+    from regolithd.daemon.demo.viewer import Viewer
 
 TITLE = "regolithd · a virtual rover on an in-process CAN bus, seen over MQTT"
 PLAIN_EVERY_S = 5.0

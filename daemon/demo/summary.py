@@ -9,7 +9,7 @@ from rich import box
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from daemon.demo.witness import Ground, Stretch
+    from regolithd.daemon.demo.ground_truth_log import Ground, Stretch
 
 
 def summary(stretches: list[Stretch]) -> Table:

@@ -13,8 +13,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from calibration.window import INTERVAL_S
-from daemon.demo.interval import SCALES, interval_line
+from regolithd.calibration.posterior.window import INTERVAL_S
+from regolithd.daemon.demo.interval import SCALES, interval_line
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

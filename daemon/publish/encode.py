@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic_core import to_json
 
-from daemon.messages import SCHEMA_VERSION, iso_time
-from daemon.snapshot import ROW, WHEELS
-from drivers.signals import Quantity
+from regolithd.daemon.messages.models import SCHEMA_VERSION, iso_time
+from regolithd.daemon.pipeline.snapshot import ROW, WHEELS
+from regolithd.drivers.signals import Quantity
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from daemon.snapshot import Array, Estimate
+    from regolithd.daemon.pipeline.snapshot import Array, Estimate
 
 _LIVE = f'{{"schema_version":{SCHEMA_VERSION},"late":false,'.encode()
 _LATE = f'{{"schema_version":{SCHEMA_VERSION},"late":true,'.encode()

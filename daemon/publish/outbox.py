@@ -11,14 +11,14 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from daemon.messages import CHANNELS
-from daemon.publish.encode import as_late
+from regolithd.daemon.messages.models import CHANNELS
+from regolithd.daemon.publish.encode import as_late
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from daemon.publish.segment import Record
-    from daemon.publish.spool import Spool
+    from regolithd.daemon.publish.segment import Record
+    from regolithd.daemon.publish.spool import Spool
 
 LIVE_WITHIN_NS = 1_000_000_000
 """A stored message that is sent within a second of being stored is not late."""

@@ -21,19 +21,19 @@ from typing import TYPE_CHECKING, Any
 
 from aiomqtt import MqttError
 
-from daemon.messages import CHANNELS, Header, Presence, PublishingReport, StateMessage, iso_time
-from daemon.publish.backoff import Backoff
-from daemon.publish.encode import encode
-from daemon.publish.link import Link
-from daemon.publish.outbox import Outbox
-from daemon.publish.reasons import reason_of
+from regolithd.daemon.messages.models import CHANNELS, Header, Presence, PublishingReport, StateMessage, iso_time
+from regolithd.daemon.publish.backoff import Backoff
+from regolithd.daemon.publish.connection import Link
+from regolithd.daemon.publish.connection_errors import reason_of
+from regolithd.daemon.publish.encode import encode
+from regolithd.daemon.publish.outbox import Outbox
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from daemon.config import Configuration
-    from daemon.publish.spool import Spool
-    from daemon.snapshot import Estimate
+    from regolithd.daemon.config.configuration import Configuration
+    from regolithd.daemon.pipeline.snapshot import Estimate
+    from regolithd.daemon.publish.spool import Spool
 
 STOP_WITHIN_S = 4.0
 """How long what waits may take to be delivered at the end, before it is left to the next start."""

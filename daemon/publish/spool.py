@@ -29,7 +29,7 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 from typing import TYPE_CHECKING
 
-from daemon.publish.segment import SUFFIX, Record, Segment, pack
+from regolithd.daemon.publish.segment import SUFFIX, Record, Segment, pack
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from typing import IO, TYPE_CHECKING
 
-from drivers.frame import Frame
+from regolithd.drivers.can.frame import Frame
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

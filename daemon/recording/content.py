@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic_core import to_json
 
-from daemon.snapshot import QUANTITIES, WHEELS, Snapshot
+from regolithd.daemon.pipeline.snapshot import QUANTITIES, WHEELS, Snapshot
 
 if TYPE_CHECKING:
-    from daemon.snapshot import Estimate
+    from regolithd.daemon.pipeline.snapshot import Estimate
 
 SNAPSHOT = "snapshot"
 ESTIMATE = "estimate"

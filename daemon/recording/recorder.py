@@ -12,17 +12,17 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import IO, TYPE_CHECKING
 
-from daemon.recording.candump import frame_line
-from daemon.recording.content import ESTIMATE, EVENT, SNAPSHOT, estimate_json, snapshot_json
-from daemon.recording.mcap_file import McapFile
+from regolithd.daemon.recording.candump import frame_line
+from regolithd.daemon.recording.content import ESTIMATE, EVENT, SNAPSHOT, estimate_json, snapshot_json
+from regolithd.daemon.recording.mcap_file import McapFile
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from daemon.config import Recording
-    from daemon.snapshot import Estimate
-    from drivers.frame import Frame
+    from regolithd.daemon.config.configuration import Recording
+    from regolithd.daemon.pipeline.snapshot import Estimate
+    from regolithd.drivers.can.frame import Frame
 
 FLUSH_S = 0.4
 RETRY_S = 10.0

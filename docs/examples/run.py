@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from calibration.mismatch.recording import read_recording
-from calibration.mismatch.scene import build_scene
-from calibration.mismatch.simulation import load_simulation
+from regolithd.calibration.mismatch.data.recording import read_recording
+from regolithd.calibration.mismatch.simulation.problem import build_scene
+from regolithd.calibration.mismatch.simulation.simulation import load_simulation
 
 HERE = Path(__file__).resolve().parent
 PROJECT = HERE.parent.parent
@@ -30,7 +30,7 @@ Figures = dict[str, float | int | str]
 def mismatch(recording: Path, simulation: Path, report: Path) -> dict[str, Any]:
     """Let the command line answer."""
     answer = report.with_suffix(".json")
-    command = [sys.executable, "-m", "daemon", "mismatch", str(recording), "--simulation", str(simulation)]
+    command = [sys.executable, "-m", "regolithd", "mismatch", str(recording), "--simulation", str(simulation)]
     subprocess.run(  # noqa: S603  # our own command
         [*command, "--json", str(answer), "--report", str(report)], cwd=PROJECT, check=True, stdout=subprocess.DEVNULL
     )

@@ -9,7 +9,7 @@
 Apart from `rover.run` everything is plain code without a clock, a bus or a thread.
 """
 
-from drivers.virtual.plant import Bench, Measurement, Plant
-from drivers.virtual.rover import KAPVIK, VirtualRover
+from regolithd.drivers.virtual.plant import Bench, Measurement, Plant
+from regolithd.drivers.virtual.rover import KAPVIK, VirtualRover
 
 __all__ = ["KAPVIK", "Bench", "Measurement", "Plant", "VirtualRover"]

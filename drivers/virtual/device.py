@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from drivers.virtual.dictionary import Dictionary, Key
-    from drivers.virtual.emergency import EmergencyProducer
-    from drivers.virtual.plant import Measurement
+    from regolithd.drivers.virtual.emcy import EmergencyProducer
+    from regolithd.drivers.virtual.object_dictionary import Dictionary, Key
+    from regolithd.drivers.virtual.plant import Measurement
 
 
 class Device:

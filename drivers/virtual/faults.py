@@ -1,4 +1,4 @@
-"""What can be wrong with a node; `drivers.virtual.tell` makes it so by command."""
+"""What can be wrong with a node; `drivers.virtual.fault_injection` makes it so by command."""
 
 from __future__ import annotations
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from drivers.virtual.abort import Abort, AbortError
-from drivers.virtual.device import Device
-from drivers.virtual.power_state import HALT, STAYS_IN_QUICK_STOP, PowerState, obey
+from regolithd.drivers.virtual.abort import Abort, AbortError
+from regolithd.drivers.virtual.device import Device
+from regolithd.drivers.virtual.power_state import HALT, STAYS_IN_QUICK_STOP, PowerState, obey
 
 if TYPE_CHECKING:
-    from drivers.virtual.dictionary import Dictionary, Key
-    from drivers.virtual.emergency import EmergencyProducer
-    from drivers.virtual.plant import Measurement
+    from regolithd.drivers.virtual.emcy import EmergencyProducer
+    from regolithd.drivers.virtual.object_dictionary import Dictionary, Key
+    from regolithd.drivers.virtual.plant import Measurement
 
 ABORT_CONNECTION_OPTION, ERROR_CODE, CONTROLWORD, STATUSWORD = 0x6007, 0x603F, 0x6040, 0x6041
 QUICK_STOP_OPTION, DISABLE_OPTION, FAULT_REACTION_OPTION = 0x605A, 0x605C, 0x605E

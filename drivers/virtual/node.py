@@ -10,24 +10,23 @@ from collections import Counter
 from enum import IntEnum
 from typing import TYPE_CHECKING
 
-from drivers.eds import eds_path
-from drivers.signals import NodeKind
-from drivers.virtual import emergency as emcy
-from drivers.virtual import pdo
-from drivers.virtual.abort import Abort, AbortError
-from drivers.virtual.device import Device, GroundSpeed, Inclinometer, LoadCell
-from drivers.virtual.dictionary import Dictionary, Key
-from drivers.virtual.emergency import EmergencyProducer
-from drivers.virtual.faults import Faults
-from drivers.virtual.motor_controller import MotorController
-from drivers.virtual.sdo_server import SdoServer
+from regolithd.drivers.devices.eds import eds_path
+from regolithd.drivers.signals import NodeKind
+from regolithd.drivers.virtual import emcy, pdo
+from regolithd.drivers.virtual.abort import Abort, AbortError
+from regolithd.drivers.virtual.device import Device, GroundSpeed, Inclinometer, LoadCell
+from regolithd.drivers.virtual.emcy import EmergencyProducer
+from regolithd.drivers.virtual.faults import Faults
+from regolithd.drivers.virtual.motor_controller import MotorController
+from regolithd.drivers.virtual.object_dictionary import Dictionary, Key
+from regolithd.drivers.virtual.sdo_server import SdoServer
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from drivers.frame import Frame
-    from drivers.signals import NodeDescription
-    from drivers.virtual.plant import Measurement
+    from regolithd.drivers.can.frame import Frame
+    from regolithd.drivers.signals import NodeDescription
+    from regolithd.drivers.virtual.plant import Measurement
 
 BOOT_NS = 20_000_000
 """From reset to boot-up."""

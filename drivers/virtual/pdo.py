@@ -10,10 +10,10 @@ import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from drivers.virtual.abort import Abort, AbortError
+from regolithd.drivers.virtual.abort import Abort, AbortError
 
 if TYPE_CHECKING:
-    from drivers.virtual.dictionary import Dictionary, Key
+    from regolithd.drivers.virtual.object_dictionary import Dictionary, Key
 
 RPDO, RPDO_MAPPING, TPDO, TPDO_MAPPING = 0x1400, 0x1600, 0x1800, 0x1A00
 DISABLED = 0x8000_0000  # COB-ID bit 31

@@ -20,19 +20,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from drivers.errors import BusError
-from drivers.frame import Frame
-from drivers.signals import NodeDescription, NodeKind
-from drivers.virtual.motor_controller import MotorController
-from drivers.virtual.node import VirtualNode
-from drivers.virtual.plant import WHEELS
-from drivers.virtual.tell import tell
+from regolithd.drivers.can.frame import Frame
+from regolithd.drivers.errors import BusError
+from regolithd.drivers.signals import NodeDescription, NodeKind
+from regolithd.drivers.virtual.fault_injection import tell
+from regolithd.drivers.virtual.motor_controller import MotorController
+from regolithd.drivers.virtual.node import VirtualNode
+from regolithd.drivers.virtual.plant import WHEELS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from drivers.bus import Bus
-    from drivers.virtual.plant import Array, Plant
+    from regolithd.drivers.can.bus import Bus
+    from regolithd.drivers.virtual.plant import Array, Plant
 
 KAPVIK = (
     *(NodeDescription(1 + wheel, NodeKind.MOTOR, wheel) for wheel in range(WHEELS)),
@@ -133,7 +133,7 @@ class VirtualRover:
         return frames
 
     def tell(self, line: str) -> str:
-        """Obey a command (`drivers.virtual.tell`) and return its answer; `counts` asks for `counts`, as JSON."""
+        """Obey a command (`drivers.virtual.fault_injection`) and return its answer; `counts` asks for `counts`, as JSON."""
         return json.dumps(self.counts()) if line.split() == ["counts"] else tell(self.nodes, line, self._monotonic_ns())
 
     def counts(self) -> dict[str, dict[str, int]]:

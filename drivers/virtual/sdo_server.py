@@ -16,10 +16,10 @@ import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from drivers.virtual.abort import Abort, AbortError
+from regolithd.drivers.virtual.abort import Abort, AbortError
 
 if TYPE_CHECKING:
-    from drivers.virtual.dictionary import Dictionary, Key
+    from regolithd.drivers.virtual.object_dictionary import Dictionary, Key
 
 _HEADER = struct.Struct("<BHB")
 _ABORT = struct.Struct("<BHBI")

@@ -16,8 +16,8 @@ import sys
 
 import numpy as np
 
-from drivers.open_bus import open_bus
-from drivers.virtual import Measurement, VirtualRover
+from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.virtual import Measurement, VirtualRover
 
 WHEEL = np.arange(1, 7)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from daemon.snapshot import Estimate, SlipSource, Snapshot
+from regolithd.daemon.pipeline.snapshot import Estimate, SlipSource, Snapshot
 
 
 def estimate(sequence: int = 500, missing_wheel: int | None = None) -> Estimate:

@@ -12,15 +12,16 @@ import signal
 import sys
 from pathlib import Path
 
-from daemon.config_reader import read_configuration
-from daemon.equipment import equip
-from daemon.estimate import SHIPPED_MODEL, Network
-from daemon.service import Service
+from regolithd.calibration.models import TERRAIN_MODEL
+from regolithd.daemon.config.reader import read_configuration
+from regolithd.daemon.pipeline.terrain_network import Network
+from regolithd.daemon.service import Service
+from regolithd.daemon.wiring import equip
 
 
 async def main(path: Path) -> None:
     """Run until SIGTERM."""
-    service = Service(read_configuration(path), Network(SHIPPED_MODEL))
+    service = Service(read_configuration(path), Network(TERRAIN_MODEL))
     equip(service)
     task = asyncio.create_task(service.run())
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)

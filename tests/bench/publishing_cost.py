@@ -14,10 +14,10 @@ import tempfile
 import time
 from pathlib import Path
 
-from daemon.config import Configuration, Mqtt
-from daemon.publish.encode import encode
-from daemon.publish.publisher import Publisher
-from daemon.publish.spool import Spool
+from regolithd.daemon.config.configuration import Configuration, Mqtt
+from regolithd.daemon.publish.encode import encode
+from regolithd.daemon.publish.publisher import Publisher
+from regolithd.daemon.publish.spool import Spool
 from tests.bench.broker import Mosquitto
 from tests.bench.estimates import estimate
 

@@ -9,13 +9,14 @@ import asyncio
 import sys
 from pathlib import Path
 
-from daemon.config import Configuration
-from daemon.estimate import SHIPPED_MODEL, Network
-from daemon.service import Service
-from daemon.snapshot import Estimate
-from drivers.events import NetworkEvent
-from drivers.open_bus import open_bus
-from drivers.virtual import Bench, VirtualRover
+from regolithd.calibration.models import TERRAIN_MODEL
+from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.pipeline.snapshot import Estimate
+from regolithd.daemon.pipeline.terrain_network import Network
+from regolithd.daemon.service import Service
+from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.master.events import NetworkEvent
+from regolithd.drivers.virtual import Bench, VirtualRover
 
 
 class Printer:
@@ -43,7 +44,7 @@ async def main(folder: Path, rate_Hz: float) -> None:
         }
     )
     async with open_bus("virtual", "killed") as bus, asyncio.TaskGroup() as tasks:
-        service = Service(configuration, Network(SHIPPED_MODEL))
+        service = Service(configuration, Network(TERRAIN_MODEL))
         service.outlets.append(Printer())
         tasks.create_task(VirtualRover(Bench()).run(bus))
         tasks.create_task(service.run())

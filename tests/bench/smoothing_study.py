@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from daemon.config import Smoothing
-from daemon.ground_noise import Drops, Wander
-from daemon.smooth import Smoother
-from daemon.snapshot import Array
+from regolithd.daemon.config.configuration import Smoothing
+from regolithd.daemon.pipeline.smooth import Smoother
+from regolithd.daemon.pipeline.snapshot import Array
+from regolithd.daemon.simulator.spatial_noise import Drops, Wander
 
 Filter = Callable[[Array, float], Array]
 RELATIVE_STD, CORRELATION_S = 0.31, 0.2

@@ -71,7 +71,7 @@ group = "{os.getgid()}"
 
     def spawn(self, name: str, *arguments: str) -> subprocess.Popen[str]:
         """Start `regolithd` with these arguments under a name."""
-        command = [sys.executable, "-m", "daemon", *arguments]
+        command = [sys.executable, "-m", "regolithd", *arguments]
         if before := self.processes.get(name):
             before.wait(PATIENCE_S)
         environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1", "COLUMNS": "120"}

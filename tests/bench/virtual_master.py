@@ -8,15 +8,15 @@ from __future__ import annotations
 import struct
 from typing import TYPE_CHECKING
 
-from drivers.frame import Frame
-from drivers.virtual import KAPVIK, Bench, VirtualRover
+from regolithd.drivers.can.frame import Frame
+from regolithd.drivers.virtual import KAPVIK, Bench, VirtualRover
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from drivers.signals import NodeDescription
-    from drivers.virtual import Plant
-    from drivers.virtual.node import VirtualNode
+    from regolithd.drivers.signals import NodeDescription
+    from regolithd.drivers.virtual import Plant
+    from regolithd.drivers.virtual.node import VirtualNode
 
 SECOND = 1_000_000_000
 MASTER_ID = 127

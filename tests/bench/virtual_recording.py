@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from daemon.scenario import Scenario, read_scenario
-from daemon.virtual_rover import VirtualWorld
+from regolithd.daemon.simulator.scenario import Scenario, read_scenario
+from regolithd.daemon.simulator.virtual_rover import VirtualWorld
 
 HEADER = (
     *("t_s", "wheel", "motor_current_A", "motor_speed_rad_s", "load_N", "ground_speed_m_s", "pitch_rad", "roll_rad"),

@@ -10,9 +10,9 @@ import onnx
 import pytest
 from onnx import TensorProto, helper, numpy_helper
 
-from calibration.model_card import ModelCard, Variable
-from daemon.config import Configuration
-from drivers.frame import Frame
+from regolithd.calibration.models.card import ModelCard, Variable
+from regolithd.daemon.config.configuration import Configuration
+from regolithd.drivers.can.frame import Frame
 
 START_NS = 1_700_000_000_123_456_000
 

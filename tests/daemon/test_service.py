@@ -12,18 +12,18 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
-from daemon.cli import app
-from daemon.config import Configuration
-from daemon.estimate import Network
-from daemon.export import HEADER, ExportError, export
-from daemon.recording.mcap_file import read_messages
-from daemon.replay import Digest
-from daemon.service import Service, event_json
-from daemon.snapshot import Estimate
-from drivers.events import NetworkEvent, NodeEmergency
-from drivers.open_bus import open_bus
-from drivers.signals import Emergency
-from drivers.virtual import Bench, VirtualRover
+from regolithd.daemon.cli import app
+from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.pipeline.chain import Digest
+from regolithd.daemon.pipeline.snapshot import Estimate
+from regolithd.daemon.pipeline.terrain_network import Network
+from regolithd.daemon.recording.export import HEADER, ExportError, export
+from regolithd.daemon.recording.mcap_file import read_messages
+from regolithd.daemon.service import Service, event_json
+from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.master.events import NetworkEvent, NodeEmergency
+from regolithd.drivers.signals import Emergency
+from regolithd.drivers.virtual import Bench, VirtualRover
 
 
 @dataclass
@@ -161,7 +161,7 @@ async def test_a_log_that_was_changed_is_found_out(running: Callable) -> None:
 async def test_a_slow_task_starves_the_watchdog(running: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
     """The service manager is told who does not answer, and is not fed."""
     told: list[str] = []
-    monkeypatch.setattr("daemon.service.notify", told.append)
+    monkeypatch.setattr("regolithd.daemon.service.notify", told.append)
     monkeypatch.setenv("WATCHDOG_USEC", "200000")
     monkeypatch.delenv("WATCHDOG_PID", raising=False)
     async with running() as (service, listener, _):

@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from drivers.decode import Decoder
-from drivers.network import Network, NetworkSettings
-from drivers.open_bus import open_bus
-from drivers.signals import Reading
-from drivers.virtual.plant import Bench
-from drivers.virtual.rover import KAPVIK, VirtualRover
+from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.canopen.decoder import Decoder
+from regolithd.drivers.master.network import Network, NetworkSettings
+from regolithd.drivers.signals import Reading
+from regolithd.drivers.virtual.plant import Bench
+from regolithd.drivers.virtual.rover import KAPVIK, VirtualRover
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Sequence
 
-    from drivers.bus import Bus
-    from drivers.events import NetworkEvent
-    from drivers.frame import Frame
-    from drivers.signals import NodeDescription, Signal
-    from drivers.virtual.plant import Plant
+    from regolithd.drivers.can.bus import Bus
+    from regolithd.drivers.can.frame import Frame
+    from regolithd.drivers.master.events import NetworkEvent
+    from regolithd.drivers.signals import NodeDescription, Signal
+    from regolithd.drivers.virtual.plant import Plant
 
 _CHANNELS = itertools.count()
 PATIENCE_s = 20.0

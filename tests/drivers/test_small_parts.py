@@ -11,19 +11,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers import errors, pdo, reference
-from drivers.bus import BusState
-from drivers.configuration import configuration
-from drivers.counters import BusCounters
-from drivers.emcy import error_text
-from drivers.error_frame import error_classes, reported_state
-from drivers.errors import BusDownError, DictionaryError, DriverError, SdoTimeoutError
-from drivers.frame import Frame
-from drivers.load import bus_load, frame_bits
-from drivers.signals import NodeDescription, NodeKind
-from drivers.sync import SyncCounters
-from drivers.virtual.rover import KAPVIK
-from drivers.watch import Watch
+from regolithd.drivers import errors, reference
+from regolithd.drivers.can.bus import BusState
+from regolithd.drivers.can.counters import BusCounters
+from regolithd.drivers.can.error_frame import error_classes, reported_state
+from regolithd.drivers.can.frame import Frame
+from regolithd.drivers.canopen import pdo
+from regolithd.drivers.canopen.emcy import error_text
+from regolithd.drivers.canopen.sync import SyncCounters
+from regolithd.drivers.condition import Watch
+from regolithd.drivers.errors import BusDownError, DictionaryError, DriverError, SdoTimeoutError
+from regolithd.drivers.master.bus_load import bus_load, frame_bits
+from regolithd.drivers.master.configuration import configuration
+from regolithd.drivers.signals import NodeDescription, NodeKind
+from regolithd.drivers.virtual.rover import KAPVIK
 
 
 def test_a_message_says_where_what_and_the_cure() -> None:
@@ -187,6 +188,6 @@ def test_every_code_has_words(code: int) -> None:
 
 
 def test_the_document_of_the_bus_is_what_the_code_does() -> None:
-    """`docs/bus.md` is written by `python -m drivers.reference`; write it anew where this fails."""
+    """`docs/bus.md` is written by `python -m regolithd.drivers.reference`; write it anew where this fails."""
     written = Path(__file__).parents[2] / "docs" / "bus.md"
     assert written.read_text() == reference.document()

@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from drivers.events import NodeBooted, NodeLost
-from drivers.network import Network, NetworkSettings, NodePhase
-from drivers.open_bus import open_bus
-from drivers.virtual import KAPVIK
+from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.master.events import NodeBooted, NodeLost
+from regolithd.drivers.master.network import Network, NetworkSettings, NodePhase
+from regolithd.drivers.virtual import KAPVIK
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from drivers.events import NetworkEvent
+    from regolithd.drivers.master.events import NetworkEvent
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 CHANNEL = "vcan1"
@@ -30,7 +30,7 @@ CHANNEL = "vcan1"
 async def regolithd(*words: str) -> asyncio.subprocess.Process:
     """Start a command."""
     return await asyncio.create_subprocess_exec(
-        *(sys.executable, "-m", "daemon", *words),
+        *(sys.executable, "-m", "regolithd", *words),
         stdout=asyncio.subprocess.PIPE,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
     )

@@ -22,19 +22,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from daemon.acquire import MEMORY, SYNCHRONOUS_WINDOW
-from daemon.config import Configuration
-from daemon.estimate import SHIPPED_MODEL
-from daemon.estimate import Network as TerrainNetwork
-from daemon.recording.candump import read_log
-from daemon.service import Service
-from drivers.network import NodePhase
+from regolithd.calibration.models import TERRAIN_MODEL
+from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.pipeline.acquire import MEMORY, SYNCHRONOUS_WINDOW
+from regolithd.daemon.pipeline.terrain_network import Network as TerrainNetwork
+from regolithd.daemon.recording.candump import read_log
+from regolithd.daemon.service import Service
+from regolithd.drivers.master.network import NodePhase
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator
 
-    from daemon.snapshot import Estimate, Snapshot
-    from drivers.events import NetworkEvent
+    from regolithd.daemon.pipeline.snapshot import Estimate, Snapshot
+    from regolithd.drivers.master.events import NetworkEvent
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 FIGURES = ROOT / "build" / "figures"
@@ -114,7 +114,7 @@ async def run_for_a_minute(recording: Path) -> Minute:
     )
     keep, rover = Keep(), dict[str, dict[str, int]]()
     async with counting_rover(rover):
-        service = Service(configuration, TerrainNetwork(SHIPPED_MODEL))
+        service = Service(configuration, TerrainNetwork(TERRAIN_MODEL))
         service.outlets.append(keep)
         running = asyncio.ensure_future(service.run())
         network = await service.opened()

@@ -14,7 +14,7 @@ import pytest
 from broker import Mosquitto
 from listener import Subscriber, listening, until
 
-from daemon.publish.segment import Segment
+from regolithd.daemon.publish.segment import Segment
 
 ROOT = Path(__file__).parents[2]
 RATE_Hz = 20

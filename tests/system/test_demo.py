@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def test_the_demo_runs_ends_and_leaves_a_recording_a_log_and_a_picture(tmp_path: Path) -> None:
     """Without a terminal, as in a pipe; the log replays to the same numbers."""
-    command = [sys.executable, "-m", "daemon", "demo", "--seconds", "8", "--out", str(tmp_path / "demo")]
+    command = [sys.executable, "-m", "regolithd", "demo", "--seconds", "8", "--out", str(tmp_path / "demo")]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=100)
     assert done.returncode == 0, done.stderr
     assert "regolith/kapvik online" in done.stdout
@@ -23,7 +23,7 @@ def test_the_demo_runs_ends_and_leaves_a_recording_a_log_and_a_picture(tmp_path:
     wheels = [line.split() for line in done.stdout.splitlines() if "medium-soil" in line]
     assert [line[0] for line in wheels] == ["1", "2", "3", "4", "5", "6", "medium-soil"]
 
-    replay = [sys.executable, "-m", "daemon", "replay", str(log)]
+    replay = [sys.executable, "-m", "regolithd", "replay", str(log)]
     again = subprocess.run(replay, cwd=ROOT, capture_output=True, text=True, check=False, timeout=100)
     assert again.returncode == 0, again.stderr
     assert "identical  to the last bit" in again.stdout
@@ -32,7 +32,7 @@ def test_the_demo_runs_ends_and_leaves_a_recording_a_log_and_a_picture(tmp_path:
 def test_importing_the_daemon_does_not_load_what_only_the_laptop_has() -> None:
     """The rover starts quickly and needs none of it."""
     code = (
-        "import sys, json, daemon.service, daemon.equipment, daemon.cli;"
+        "import sys, json, regolithd.daemon.service, regolithd.daemon.wiring, regolithd.daemon.cli;"
         "print(json.dumps([name for name in sys.modules if '.' not in name]))"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)

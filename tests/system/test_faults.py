@@ -17,15 +17,15 @@ import pytest
 import pytest_asyncio
 from broker import Mosquitto, mosquitto_program
 
-from daemon.config import Configuration
-from daemon.equipment import equip
-from daemon.estimate import SHIPPED_MODEL
-from daemon.estimate import Network as TerrainNetwork
-from daemon.service import Service
-from daemon.virtual_rover import VirtualWorld
-from drivers.open_bus import open_bus
-from drivers.virtual import VirtualRover
-from drivers.virtual.tell import COMMANDS
+from regolithd.calibration.models import TERRAIN_MODEL
+from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.pipeline.terrain_network import Network as TerrainNetwork
+from regolithd.daemon.service import Service
+from regolithd.daemon.simulator.virtual_rover import VirtualWorld
+from regolithd.daemon.wiring import equip
+from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.virtual import VirtualRover
+from regolithd.drivers.virtual.fault_injection import COMMANDS
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Iterator
@@ -140,7 +140,7 @@ async def daemon(broker: Mosquitto, tmp_path_factory: pytest.TempPathFactory) ->
             "control": {"socket": folder / "control.sock"},
         }
     )
-    service = Service(configuration, TerrainNetwork(SHIPPED_MODEL))
+    service = Service(configuration, TerrainNetwork(TERRAIN_MODEL))
     equip(service)
     rig, ended = Rig(VirtualRover(VirtualWorld()), service), asyncio.Event()
     # One task owns all contexts: pytest begins and ends a fixture in two different ones.

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from daemon.recording.candump import read_log
-from daemon.recording.content import SNAPSHOT
-from daemon.recording.mcap_file import read_messages
-from daemon.replay_report import replay_logs
-from daemon.start_up import network_or_exit, recorded_configuration
+from regolithd.daemon.recording.candump import read_log
+from regolithd.daemon.recording.content import SNAPSHOT
+from regolithd.daemon.recording.mcap_file import read_messages
+from regolithd.daemon.recording.replay import replay_logs
+from regolithd.daemon.setup import network_or_exit, recorded_configuration
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "tests" / "bench" / "recorded_drive.py"

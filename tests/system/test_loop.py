@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 @pytest.mark.timeout(600)
 def test_a_concealed_friction_is_found_and_taken_out(tmp_path: Path) -> None:
     """Named, written into rover.toml, consistent then; and cohesion of unseen soils has at most half the error."""
-    command = [sys.executable, "-m", "daemon", "loop", "--short", "--case", "coulomb", "--seed", "5"]
+    command = [sys.executable, "-m", "regolithd", "loop", "--short", "--case", "coulomb", "--seed", "5"]
     figures = tmp_path / "loop.json"
     done = subprocess.run(
         [*command, "--out", tmp_path / "loop", "--figures", figures],

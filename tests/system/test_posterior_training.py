@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration.evaluation.estimators import Case, answers
-from calibration.posterior import Estimator
+from regolithd.calibration.posterior.estimator import Estimator
+from regolithd.calibration.validation.estimators.errors_and_coverage import Case, answers
 
 
 @pytest.mark.timeout(600)

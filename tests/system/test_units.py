@@ -13,7 +13,7 @@ import aiomqtt
 import pytest
 from broker import Mosquitto, mosquitto_program
 
-from drivers import socketcan
+from regolithd.drivers.can import socketcan
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

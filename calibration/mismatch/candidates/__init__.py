@@ -9,7 +9,7 @@ import importlib
 import pkgutil
 from functools import cache
 
-from calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
 
 __all__ = ["Candidate", "Coefficient", "Shape", "library"]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, onsets, since
+from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, onsets, since
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from calibration.mismatch.scene import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Scene
 
 
 class BearingDrag(Candidate):

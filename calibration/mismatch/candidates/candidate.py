@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from calibration.mismatch.scene import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Scene
 
 Array = NDArray[np.float64]
 AGREES = 0.02

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
-from calibration.mismatch.curves import broken_lines
-from calibration.mismatch.inputs import known_mean
-from calibration.mismatch.noise import estimate_noise
+from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.regression.hat_basis import broken_lines
+from regolithd.calibration.mismatch.regression.noise import estimate_noise
+from regolithd.calibration.mismatch.simulation.errors_in_variables import known_mean
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from calibration.mismatch.scene import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Scene
 
 WANDER_KNOTS, POSTURE_KNOTS = 24, 4
 """Of the line that a drift follows; and of the one that is fitted beside what pitch and roll say."""

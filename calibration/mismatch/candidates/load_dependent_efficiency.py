@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from calibration.mismatch.candidates.candidate import AGREES, UNLIKELY, Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.candidate import AGREES, UNLIKELY, Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from calibration.mismatch.scene import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Scene
 
 
 class LoadDependentEfficiency(Candidate):

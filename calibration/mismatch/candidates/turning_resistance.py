@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from calibration.mismatch.scene import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Scene
 
 HALVES = {"rate": (0.3, 1.0, 100.0), "angle": (0.3, 1.0, 3.0)}
 """Where scrub has reached half of what it can, in multiples of the typical turn's."""

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
-from calibration.mismatch.spectrum import padded_length, power_of_sums
+from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.regression.spectrum import padded_length, power_of_sums
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from calibration.mismatch.scene import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Scene
 
 BINS_PER_TURN = 256
 HIGHEST_ORDER = 64

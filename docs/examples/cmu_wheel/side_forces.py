@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from calibration.mismatch.candidates import Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates import Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
-    from calibration.mismatch.scene import Scene
-    from calibration.mismatch.simulation import Array
+    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.simulation import Array
 
 
 def sideways(travel_mm_s: Array, rim_mm_s: Array, slip_angle_rad: Array) -> Array:

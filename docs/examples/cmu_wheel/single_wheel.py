@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from side_forces import CANDIDATES, sideways
 
-from calibration.mismatch.simulation import Prior, Simulation
+from regolithd.calibration.mismatch.simulation.simulation import Prior, Simulation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from calibration.mismatch.candidates import Candidate
-    from calibration.mismatch.recording import Recording
-    from calibration.mismatch.simulation import Array
+    from regolithd.calibration.mismatch.candidates import Candidate
+    from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.simulation.simulation import Array
 
 LONGITUDINAL = 1
 SLIP = np.array([-1.0, -0.7, -0.5, -0.2, 0.0, 0.23, 0.5, 0.75, 0.9])

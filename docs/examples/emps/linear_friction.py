@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-from calibration.mismatch.candidates.viscous_friction import ViscousFriction
+from regolithd.calibration.mismatch.candidates.viscous_friction import ViscousFriction
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from calibration.mismatch.candidates import Shape
-    from calibration.mismatch.scene import Scene
+    from regolithd.calibration.mismatch.candidates import Shape
+    from regolithd.calibration.mismatch.simulation.problem import Scene
 
 
 class LinearFriction(ViscousFriction):

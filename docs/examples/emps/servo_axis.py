@@ -9,15 +9,15 @@ from asymmetric_friction import AsymmetricFriction
 from linear_friction import LinearFriction
 from scipy.signal import butter, sosfiltfilt
 
-from calibration.mismatch.candidates import library
-from calibration.mismatch.simulation import Prior, Simulation
+from regolithd.calibration.mismatch.candidates import library
+from regolithd.calibration.mismatch.simulation.simulation import Prior, Simulation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from calibration.mismatch.candidates import Candidate
-    from calibration.mismatch.recording import Recording
-    from calibration.mismatch.simulation import Array
+    from regolithd.calibration.mismatch.candidates import Candidate
+    from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.simulation.simulation import Array
 
 FORCE_PER_VOLT = 35.15
 CUTOFF_HZ = 20.0

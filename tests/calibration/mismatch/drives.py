@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from calibration.mismatch.recording import Recording, from_columns
-from calibration.mismatch.rover_wheel import RoverWheel
+from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel
 
 Array = NDArray[np.float64]
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from drives import TABLES, columns, recording, simulation
 
-from calibration.mismatch.answer import Contribution
-from calibration.mismatch.compare import Comparison, compare
-from calibration.mismatch.corrected import corrected_tables, effect_of, stated_effects, to_toml
-from calibration.mismatch.recording import from_columns
-from calibration.mismatch.scene import build_scene
-from calibration.mismatch.simulation import load_simulation
+from regolithd.calibration.mismatch.answer import Contribution
+from regolithd.calibration.mismatch.compare import Comparison, compare
+from regolithd.calibration.mismatch.corrected import corrected_tables, effect_of, stated_effects, to_toml
+from regolithd.calibration.mismatch.data.recording import from_columns
+from regolithd.calibration.mismatch.simulation.problem import build_scene
+from regolithd.calibration.mismatch.simulation.simulation import load_simulation
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

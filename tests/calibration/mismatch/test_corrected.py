@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from drives import TABLES, columns, simulation
 
-from calibration.mismatch.compare import Comparison, compare
-from calibration.mismatch.corrected import corrected_tables, stated_effects, to_toml
-from calibration.mismatch.recording import Recording, from_columns
-from calibration.mismatch.rover_wheel import RoverWheel
+from regolithd.calibration.mismatch.compare import Comparison, compare
+from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects, to_toml
+from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel
 
 CONCEALED_A = 0.037
 

@@ -11,13 +11,13 @@ from drives import columns, simulation
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from calibration.mismatch.compare import compare
-from calibration.mismatch.recording import from_columns
+from regolithd.calibration.mismatch.compare import compare
+from regolithd.calibration.mismatch.data.recording import from_columns
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from calibration.mismatch.answer import Answer
+    from regolithd.calibration.mismatch.answer import Answer
 
 LENGTH_S = 240.0
 ONE_SIDE_IS_THE_OTHER = {1: 2, 2: 1, 3: 4, 4: 3, 5: 6, 6: 5}

@@ -1,0 +1,1 @@
+"""Recordings as arrays: read, checked, resampled."""

@@ -1,0 +1,227 @@
+"""A recording as arrays (time × wheel), and everything that is wrong with it, said.
+
+The long table of the contract (one row per instant and wheel) becomes one array per channel. What is not measured is
+NaN. Order of rows, origin of time and names of wheels carry no meaning: rows are sorted by run, time and wheel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.errors import RecordingError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+TIME = "t_s"
+UNIT = "wheel"
+RUN = "run"
+MOST_CLOCK_JUMPS = 3
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recording, or several runs put one after the other.
+
+    Attributes
+    ----------
+    time_s: seconds since the run's first instant, shape (time,)
+    run: number of the run that each instant belongs to, shape (time,)
+    wheels: the wheels' (axes', bodies') names as recorded, in ascending order
+    channels: one array (time × wheel) for each column
+    notes: what was wrong with the table and what was done about it
+    """
+
+    time_s: Array
+    run: NDArray[np.int64]
+    wheels: tuple[int, ...]
+    channels: Mapping[str, Array]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(time, wheel)."""
+        return len(self.time_s), len(self.wheels)
+
+    @property
+    def step_s(self) -> float:
+        """The usual time from one instant to the next [s]."""
+        steps = np.diff(self.time_s)[np.diff(self.run) == 0]
+        return float(np.median(steps)) if steps.size else 1.0
+
+    def channel(self, name: str) -> Array:
+        """Return a channel, or NaN everywhere where it was not recorded."""
+        found = self.channels.get(name)
+        return np.full(self.shape, np.nan) if found is None else found
+
+    def with_notes(self, *notes: str) -> Recording:
+        """Return the recording with more said about it."""
+        return replace(self, notes=(*self.notes, *notes))
+
+    def with_channels(self, **channels: Array) -> Recording:
+        """Return the recording with channels added or replaced (derived ones, say)."""
+        return replace(self, channels={**self.channels, **channels})
+
+
+def read_recording(path: Path, *, unit: str = UNIT) -> Recording:
+    """Read CSV (also .gz) or Parquet.
+
+    Raises
+    ------
+    RecordingError
+        When the file is none of these, or has no time.
+    """
+    columns = _read_parquet(path) if path.suffix == ".parquet" else _read_csv(path)
+    return from_columns(columns, unit=unit)
+
+
+def _read_csv(path: Path) -> dict[str, Array]:
+    import pyarrow.csv  # noqa: PLC0415  # only files need it; arrays do not
+    from pyarrow import ArrowException  # noqa: PLC0415
+
+    try:
+        table = pyarrow.csv.read_csv(path)
+    except (ArrowException, OSError) as error:
+        raise RecordingError(f"{path} is not a table that can be read: {error}") from error
+    return _as_columns(table, path)
+
+
+def _read_parquet(path: Path) -> dict[str, Array]:
+    import pyarrow.parquet  # noqa: PLC0415
+    from pyarrow import ArrowException  # noqa: PLC0415
+
+    try:
+        table = pyarrow.parquet.read_table(path)
+    except (ArrowException, OSError) as error:
+        raise RecordingError(f"{path} is not a Parquet file that can be read: {error}") from error
+    return _as_columns(table, path)
+
+
+def _as_columns(table: object, path: Path) -> dict[str, Array]:
+    import pyarrow as pa  # noqa: PLC0415
+
+    columns = {}
+    for name in table.column_names:  # type: ignore[attr-defined]
+        column = table.column(name)  # type: ignore[attr-defined]
+        if pa.types.is_null(column.type):
+            columns[name] = np.full(len(column), np.nan)
+        elif pa.types.is_integer(column.type) or pa.types.is_floating(column.type) or pa.types.is_decimal(column.type):
+            columns[name] = column.cast(pa.float64()).to_numpy(zero_copy_only=False).astype(np.float64)
+        elif name in {TIME, UNIT, RUN}:
+            text = next((v for v in column.to_pylist() if not isinstance(v, float | int)), "")
+            raise RecordingError(f"{path}: column {name} must be numbers, but holds {text!r}")
+    return columns
+
+
+def from_columns(columns: Mapping[str, Array], *, unit: str = UNIT) -> Recording:
+    """Arrange a long table's columns as arrays (time × wheel).
+
+    Raises
+    ------
+    RecordingError
+        When there is no time, or fewer than two instants.
+    """
+    if TIME not in columns:
+        raise RecordingError(f"there is no column {TIME}; found {', '.join(columns) or 'nothing'}")
+    notes: list[str] = []
+    table = {name: np.asarray(values, np.float64) for name, values in columns.items()}
+    rows = len(table[TIME])
+    table.setdefault(unit, np.ones(rows))
+    table.setdefault(RUN, np.zeros(rows))
+    table[RUN] = _split_where_the_clock_jumps_back(table, unit, notes)
+    known = np.isfinite(table[TIME]) & np.isfinite(table[unit]) & np.isfinite(table[RUN])
+    if not known.all():
+        notes.append(f"{np.sum(~known)} rows have no time or no {unit}; they are left out.")
+        table = {name: values[known] for name, values in table.items()}
+    if not len(table[TIME]):
+        raise RecordingError("the recording has no rows")
+    keys, row, wheels, column = _places(table, unit)
+    shape = (len(keys), len(wheels))
+    if shape[0] < 2:
+        raise RecordingError("the recording has only one instant")
+    channels = {
+        name: _arranged(values, row, column, shape) for name, values in table.items() if name not in {TIME, unit, RUN}
+    }
+    _note_duplicates(row, column, shape, notes)
+    run, time_s = keys[:, 0].astype(np.int64), keys[:, 1]
+    for number in np.unique(run):
+        time_s[run == number] -= time_s[run == number][0]
+    _note_gaps(time_s, run, notes)
+    _note_channels(channels, wheels, unit, notes)
+    return Recording(time_s, run, wheels, channels, tuple(notes))
+
+
+def _places(table: Mapping[str, Array], unit: str) -> tuple[Array, Index, tuple[int, ...], Index]:
+    """Return the instants in order (run, time), each row's instant, the wheels, and each row's wheel."""
+    # A nanosecond decides whether two rows are of one instant: less is rounding of the text, not time.
+    stamps = np.column_stack((table[RUN], np.round(table[TIME], 9)))
+    keys, row = np.unique(stamps, axis=0, return_inverse=True)
+    names, column = np.unique(table[unit], return_inverse=True)
+    return keys, row.ravel().astype(np.int64), tuple(int(name) for name in names), column.ravel().astype(np.int64)
+
+
+def _arranged(values: Array, row: Index, column: Index, shape: tuple[int, int]) -> Array:
+    """Put values where they belong; rows that claim one place are averaged, so that their order cannot matter."""
+    place = row * shape[1] + column
+    known = np.isfinite(values)
+    total = np.bincount(place[known], values[known], minlength=shape[0] * shape[1])
+    count = np.bincount(place[known], minlength=shape[0] * shape[1])
+    return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0).reshape(shape)
+
+
+def _split_where_the_clock_jumps_back(table: Mapping[str, Array], unit: str, notes: list[str]) -> Array:
+    """Return each row's run: a clock that jumps back once or twice begins a new one; more is no clock but disorder."""
+    run = table[RUN].copy()
+    jumps, at = 0, 0.0
+    shift = np.zeros(len(run))
+    for name in np.unique(table[unit][np.isfinite(table[unit])]):
+        here = np.flatnonzero(table[unit] == name)
+        back = (np.diff(table[TIME][here]) < 0) & (np.diff(run[here]) == 0)
+        if np.any(back):
+            jumps, at = max(jumps, int(back.sum())), float(table[TIME][here][:-1][back][0])
+            shift[here[1:]] = np.cumsum(back)
+    if jumps == 0:
+        return run
+    if jumps > MOST_CLOCK_JUMPS:
+        notes.append("Rows are not in the order of time; they are sorted.")
+        return run
+    notes.append(f"The clock jumps back {jumps} time(s), first at {at:.1f} s; what follows is taken as another run.")
+    return run * (MOST_CLOCK_JUMPS + 1) + shift
+
+
+def _note_duplicates(row: Index, column: Index, shape: tuple[int, int], notes: list[str]) -> None:
+    taken = np.bincount(row * shape[1] + column, minlength=shape[0] * shape[1])
+    if (extra := int(np.sum(taken[taken > 1] - 1))) > 0:
+        notes.append(f"{extra} rows repeat an instant and wheel; their mean is taken.")
+    if (absent := int(np.sum(taken == 0))) > 0:
+        notes.append(f"{absent} of {taken.size} instants of single wheels are absent.")
+
+
+def _note_gaps(time_s: Array, run: Index, notes: list[str]) -> None:
+    steps = np.where(np.diff(run) == 0, np.diff(time_s), np.nan)
+    usual = np.nanmedian(steps) if np.isfinite(steps).any() else np.nan
+    gaps = np.flatnonzero(steps > 5 * usual)
+    if gaps.size:
+        lost = float(np.sum(steps[gaps]))
+        notes.append(f"{gaps.size} gaps, {lost:.1f} s in all; nothing is assumed about what happened in them.")
+
+
+def _note_channels(channels: Mapping[str, Array], wheels: tuple[int, ...], unit: str, notes: list[str]) -> None:
+    for name, values in channels.items():
+        known = np.isfinite(values)
+        if not known.any():
+            notes.append(f"{name} was never measured.")
+            continue
+        silent = [wheel for k, wheel in enumerate(wheels) if not known[:, k].any()]
+        if silent:
+            notes.append(f"{name} was never measured at {unit} {', '.join(map(str, silent))}.")
+        if np.nanmax(values) == np.nanmin(values):
+            notes.append(f"{name} is constant ({np.nanmax(values):g}): nothing that depends on it can show.")

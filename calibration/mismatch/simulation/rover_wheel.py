@@ -1,0 +1,222 @@
+"""The built-in simulation: six driven wheels on soil, current from load, slip and soil (Eqs 1, 6, 7 and 11)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ValidationError
+
+from regolithd.calibration.drivetrain.torque import motor_current
+from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.simulation.errors_in_variables import known_mean
+from regolithd.calibration.mismatch.simulation.open_circuit_voltage import open_circuit_voltage
+from regolithd.calibration.mismatch.simulation.simulation import Prior, SensorError, Simulation, own_name
+from regolithd.calibration.parameters import Drivetrain, Rover, Sensors, Soil, Table, Wheel
+from regolithd.calibration.terrain.wheel_soil import LARGEST_CONTACT_ANGLE_RAD, contact_angle, wheel_torque
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from regolithd.calibration.mismatch.data.recording import Recording
+
+Array = NDArray[np.float64]
+
+GRAVITY_M_S2 = 9.81
+SLOWEST_RAD_S = 0.05
+"""Below this speed at the wheel the model says nothing: slip is a quotient of two small numbers there."""
+
+LIFTED_N = 1.0
+"""What a cell may read under a wheel that hangs in its suspension."""
+
+
+class SimulationTable(Table):
+    """SIM.toml's `[simulation]`."""
+
+    model: str = "rover-wheel"
+    slip_without_ground_speed: float = Field(default=0.025, gt=-1, lt=1)
+
+
+class RoverWheelTables(Table):
+    """SIM.toml for `rover-wheel`; effects found earlier are read elsewhere."""
+
+    simulation: SimulationTable
+    drivetrain: Drivetrain = Drivetrain()
+    wheel: Wheel = Wheel()
+    rover: Rover = Rover()
+    soil: Soil
+    sensors: Sensors = Sensors()
+
+
+class RoverWheel(Simulation):
+    """Motor currents of a six-wheel rover; odd wheels left, even right, 1 and 2 in front."""
+
+    channel = "motor_current_A"
+    unit = "A"
+    inputs = ("motor_speed_rad_s",)
+    own_to_each_wheel: ClassVar = frozenset({"gain_factor"})
+    parameter_effects: ClassVar = {
+        "gain_factor": "drivetrain-gain",
+        "cohesion_Pa": "soil-cohesion",
+        "friction_angle_deg": "soil-friction-angle",
+    }
+
+    def __init__(self, tables: RoverWheelTables) -> None:
+        self.tables = tables
+        self.parameters = _priors(tables)
+        self.sensors = _sensors(tables.sensors)
+
+    @classmethod
+    def from_tables(cls, tables: Mapping[str, Any]) -> Self:
+        """Read the tables of the contract; every mistake is told at once."""
+        try:
+            return cls(RoverWheelTables(**{name: table for name, table in tables.items() if name != "effects"}))
+        except ValidationError as error:
+            told = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
+            raise SimulationError(f"the simulation's tables are wrong: {told}") from error
+
+    def prepare(self, recording: Recording) -> Recording:
+        """Add `slip`, and the load where no cell measured it; take the motors' sag out of the voltage."""
+        speed = self._wheel_speed(recording.channels)
+        turning = np.abs(speed) > SLOWEST_RAD_S
+        rim = np.where(turning, self.tables.wheel.radius_m * speed, np.nan)
+        ground = recording.channel("ground_speed_m_s")
+        slip = np.where(np.isfinite(ground), 1 - ground / rim, self.tables.simulation.slip_without_ground_speed)
+        load = recording.channel("load_N")
+        lifted = _lifted(load)
+        slip = np.where(turning & ~lifted, slip, np.nan)
+        never = ~np.isfinite(load).any(axis=0)
+        share = self.tables.rover.mass_kg * GRAVITY_M_S2 / recording.shape[1]
+        assumed = self.tables.simulation.slip_without_ground_speed
+        notes = []
+        if never.any():
+            notes.append(f"Where load_N was never measured, the wheel is taken to carry {share:.1f} N.")
+        if lifted.any():
+            notes.append(f"No cell carries {LIFTED_N:g} N in {int(lifted.sum())} instants: the wheels turn in the air.")
+        if blank := int(np.sum(turning & ~np.isfinite(ground) & ~lifted)):
+            notes.append(
+                f"ground_speed_m_s is blank at {blank} turning wheels' readings; slip is taken as {assumed:g}."
+            )
+        on_ground = np.where(never, share, np.where(lifted, np.nan, load))
+        channels = {"slip": slip, "load_N": on_ground, "lifted": np.broadcast_to(lifted.astype(np.float64), load.shape)}
+        if "bus_voltage_V" in recording.channels and "motor_current_A" in recording.channels:
+            voltage, current = recording.channels["bus_voltage_V"], recording.channels["motor_current_A"]
+            channels["bus_voltage_V"] = open_circuit_voltage(voltage, current)
+        return recording.with_channels(**channels).with_notes(*notes)
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the motor currents [A], shape (time, wheel)."""
+        tables = self.tables
+        soil = tables.soil.model_copy(
+            update={
+                "cohesion_Pa": values["cohesion_Pa"],
+                "friction_angle_deg": values["friction_angle_deg"],
+                "shear_modulus_m": tables.soil.shear_modulus_m * values.get("shear_factor", 1.0),
+                "k_phi_kN": tables.soil.k_phi_kN * values.get("stiffness_factor", 1.0),
+                "k_c_kN": tables.soil.k_c_kN * values.get("stiffness_factor", 1.0),
+            }
+        )
+        slip = inputs["slip"]
+        speed = self._wheel_speed(inputs)
+        angle = contact_angle(inputs["load_N"], slip, tables.wheel, soil)
+        if sinking := values.get("slip_sinkage", 0.0):
+            angle = slip_sunk(angle, slip, sinking)
+        torque = np.sign(speed) * wheel_torque(angle, slip, tables.wheel, soil) / values["gain_factor"]
+        torque = np.where(inputs["lifted"] > 0, 0.0, torque)
+        torque = np.where(np.abs(speed) > SLOWEST_RAD_S, torque, np.nan)
+        if torque.shape[-1] != 6:
+            return torque / tables.drivetrain.gain_Nm_per_A
+        return motor_current(torque, inputs["motor_speed_rad_s"], tables.drivetrain)
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return everything measured that a left-out effect may follow."""
+        named = {
+            "temperature": "motor_temperature_degC",
+            "voltage": "bus_voltage_V",
+            "pitch": "pitch_rad",
+            "roll": "roll_rad",
+            "yaw_rate": "yaw_rate_rad_s",
+            "load": "load_N",
+            "slip": "slip",
+        }
+        found = {name: inputs[column] for name, column in named.items() if column in inputs}
+        speed = self._wheel_speed(inputs)
+        return {**found, "wheel_speed": speed, "time": inputs["t_s"], "place": self._place_m(inputs, speed)}
+
+    def side(self, wheels: Sequence[int]) -> Array | None:
+        """Odd wheels are on the left."""
+        return np.array([-1.0 if wheel % 2 else 1.0 for wheel in wheels])
+
+    def row(self, wheels: Sequence[int]) -> Array | None:
+        """1, 2 in front; 3, 4 in the middle; 5, 6 behind."""
+        return np.array([(wheel - 1) // 2 for wheel in wheels], np.float64)
+
+    def variants(self) -> Mapping[str, float]:
+        """Physics that the model has in it, switched off: candidates switch it on."""
+        return {"stiffness_factor": 1.0, "shear_factor": 1.0, "slip_sinkage": 0.0}
+
+    def corrected_tables(self, values: Mapping[str, float]) -> dict[str, Any]:
+        """Return the tables with gain, cohesion and friction angle where the recording moved them."""
+        tables = self.tables.model_dump()
+        drivetrain, soil = tables["drivetrain"], tables["soil"]
+        drivetrain["gain_factor"] = [
+            before * (values["gain_factor"] + values.get(own_name("gain_factor", wheel), 0.0))
+            for wheel, before in enumerate(drivetrain["gain_factor"], 1)
+        ]
+        soil["cohesion_Pa"] = float(values["cohesion_Pa"])
+        soil["friction_angle_deg"] = float(values["friction_angle_deg"])
+        return tables
+
+    def _place_m(self, inputs: Mapping[str, Array], speed: Array) -> Array:
+        """Return how far along the way each wheel is [m]: what the middle has driven, and where the axle stands.
+
+        Ways back count as ways on: whether a rover that reverses meets its own tracks is not recorded.
+        """
+        hub = np.abs(self.tables.wheel.radius_m * speed * (1 - inputs["slip"]))
+        steps = np.clip(np.diff(inputs["t_s"][:, 0], prepend=inputs["t_s"][0, 0]), 0, None)
+        driven = np.cumsum(known_mean(hub, axis=1) * np.nan_to_num(steps))
+        rows = np.array([0.5, 0.5, 0.0, 0.0, -0.5, -0.5]) if speed.shape[1] == 6 else np.zeros(speed.shape[1])
+        return driven[:, None] + rows * self.tables.rover.wheelbase_m
+
+    def _wheel_speed(self, inputs: Mapping[str, Array]) -> Array:
+        return inputs["motor_speed_rad_s"] / self.tables.drivetrain.ratio
+
+
+def slip_sunk(contact_angle_rad: Array, slip: Array, strength: float) -> Array:
+    """Return the contact angle of a wheel that slip has sunk deeper [rad] (Eqs 8 and 9).
+
+    `strength` 1 is Lyasko's z_SS = z (1 + i)/(1 − 0.5 i); 0 leaves the sinkage as it is.
+    """
+    deeper = 1 + strength * ((1 + slip) / (1 - 0.5 * slip) - 1)
+    cosine = 1 - deeper * (1 - np.cos(contact_angle_rad))
+    return np.minimum(np.arccos(np.clip(cosine, -1, 1)), LARGEST_CONTACT_ANGLE_RAD)
+
+
+def _lifted(load_N: Array) -> NDArray[np.bool_]:
+    """Return the instants in which no wheel carries anything, shape (time, 1): the rover stands on a block."""
+    known = np.isfinite(load_N)
+    return np.asarray(known.any(axis=1) & ~np.any(known & (np.abs(load_N) >= LIFTED_N), axis=1))[:, None]
+
+
+def _priors(tables: RoverWheelTables) -> dict[str, Prior]:
+    soil = tables.soil
+    return {
+        "gain_factor": Prior(1.0, tables.drivetrain.gain_relative_std),
+        "cohesion_Pa": Prior(soil.cohesion_Pa, soil.cohesion_relative_std * soil.cohesion_Pa, "Pa"),
+        "friction_angle_deg": Prior(
+            soil.friction_angle_deg, soil.friction_angle_relative_std * soil.friction_angle_deg, "deg"
+        ),
+    }
+
+
+def _sensors(errors: Sensors) -> dict[str, SensorError]:
+    return {
+        "load_N": SensorError(relative=errors.load_relative_std),
+        # Slip is 1 − V/(r ω): the ground speed's relative error is slip's absolute one, within a factor (1 − i).
+        "slip": SensorError(absolute=errors.ground_speed_relative_std),
+        "pitch_rad": SensorError(absolute=errors.pitch_std_rad),
+        "roll_rad": SensorError(absolute=errors.roll_std_rad),
+        "yaw_rate_rad_s": SensorError(absolute=errors.yaw_rate_std_rad_s),
+        "motor_temperature_degC": SensorError(absolute=errors.temperature_std_degC),
+    }

@@ -1,0 +1,171 @@
+"""What a simulation must say about itself, so that a recording can be held against it.
+
+A simulation predicts one channel from others. Everything else is optional. The shortest one:
+
+    class ServoAxis(Simulation):
+        channel, unit = "force_N", "N"
+        parameters = {"mass_kg": Prior(95.0, 5.0, "kg")}
+
+        def predict(self, inputs, values):
+            return values["mass_kg"] * inputs["acceleration_m_s2"]
+
+        def covariates(self, inputs):
+            return {"wheel_speed": inputs["speed_m_s"], "time": inputs["t_s"]}
+
+`python -c`-importable as `package.module`, it is named in SIM.toml as `model = "package.module:ServoAxis"`. The other
+tables of SIM.toml arrive in `from_tables`, whose default lets `[parameters]` replace priors.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.errors import SimulationError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from regolithd.calibration.mismatch.candidates import Candidate
+    from regolithd.calibration.mismatch.data.recording import Recording
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """How well a parameter is known before the recording: a normal density; a `std` of 0 means exactly."""
+
+    value: float
+    std: float = 0.0
+    unit: str = "1"
+
+
+@dataclass(frozen=True)
+class SensorError:
+    """A recorded input's standard error: a fraction of the reading plus a constant, new with each reading."""
+
+    relative: float = 0.0
+    absolute: float = 0.0
+
+
+class Simulation:
+    """One simulation: subclass it, and say what yours predicts."""
+
+    channel: ClassVar[str]
+    """The recorded column that is predicted."""
+    unit: ClassVar[str] = "1"
+    wheel_column: ClassVar[str] = "wheel"
+    """The column that tells wheels (axes, sides, bodies) apart. A recording without it has one."""
+    inputs: ClassVar[tuple[str, ...]] = ()
+    """Columns without which nothing can be predicted."""
+    parameters: Mapping[str, Prior] = {}
+    """What the simulation knows, and how well."""
+    own_to_each_wheel: ClassVar[frozenset[str]] = frozenset()
+    """Parameters in which wheels differ: beside the common error each has one of its own, a third as large."""
+    parameter_effects: ClassVar[Mapping[str, str]] = {}
+    """Names of parameters as effects, for saying what a wrong parameter could be mistaken for."""
+    sensors: Mapping[str, SensorError] = {}
+    """The errors of the recorded inputs, by column."""
+
+    @classmethod
+    def from_tables(cls, tables: Mapping[str, Any]) -> Self:
+        """Build from SIM.toml's tables. `[parameters.NAME] value, std` replaces a prior; nothing else is known."""
+        made = cls()
+        unknown = sorted(set(tables) - {"simulation", "parameters", "effects"})
+        if unknown:
+            raise SimulationError(f"{cls.__name__} knows no table [{unknown[0]}]")
+        stated = tables.get("parameters", {})
+        if strange := sorted(set(stated) - set(cls.parameters)):
+            raise SimulationError(f"{cls.__name__} has no parameter {strange[0]}; it has {', '.join(cls.parameters)}")
+        made.parameters = {name: replace(prior, **stated.get(name, {})) for name, prior in cls.parameters.items()}
+        return made
+
+    def prepare(self, recording: Recording) -> Recording:
+        """Derive the channels that the prediction needs (an acceleration from a position, say)."""
+        return recording
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the channel, shape (time, wheel); NaN where the simulation says nothing.
+
+        `inputs` holds every recorded channel, and `t_s` of the same shape.
+        """
+        raise NotImplementedError
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return what a residual may be ordered by, by the contract's names (`wheel_speed`, `temperature`, …)."""
+        return {"time": inputs["t_s"]}
+
+    def side(self, wheels: Sequence[int]) -> Array | None:  # noqa: ARG002  # subclasses look
+        """Return −1 for wheels on the left, +1 on the right; None where the machine has no sides."""
+        return None
+
+    def row(self, wheels: Sequence[int]) -> Array | None:  # noqa: ARG002
+        """Return each wheel's place along the machine, front 0; None where it has no rows."""
+        return None
+
+    def variants(self) -> Mapping[str, float]:
+        """Return parameters outside the priors that candidates may move, with their neutral values."""
+        return {}
+
+    def candidates(self) -> Sequence[Candidate]:
+        """Return the physics to look for: by default the whole library, of which what fits the covariates is used."""
+        from regolithd.calibration.mismatch.candidates import library  # noqa: PLC0415  # the library knows simulations
+
+        return library()
+
+    def corrected_tables(self, values: Mapping[str, float]) -> dict[str, Any]:
+        """Return SIM.toml's tables with the parameters at the values that the recording gave them."""
+        return {
+            "parameters": {
+                name: {"value": float(values[name]), "std": prior.std} for name, prior in self.parameters.items()
+            }
+        }
+
+
+def own_name(parameter: str, wheel: int | str) -> str:
+    """Return what a wheel's own part of a parameter is called among the values that a recording gave."""
+    return f"{parameter} of {wheel}"
+
+
+def load_simulation(tables: Mapping[str, Any], *, beside: Path | None = None) -> Simulation:
+    """Return the simulation that SIM.toml's tables name.
+
+    A user's module is looked for beside the TOML file too.
+
+    Raises
+    ------
+    SimulationError
+        When the model is unknown, or its tables are wrong.
+    """
+    model = tables.get("simulation", {}).get("model")
+    if model == "rover-wheel":
+        from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel  # noqa: PLC0415  # a user's own needs none of it
+
+        return RoverWheel.from_tables(tables)
+    if not isinstance(model, str) or ":" not in model:
+        raise SimulationError(f'[simulation] model must be "rover-wheel" or "package.module:ClassName", not {model!r}')
+    module_name, class_name = model.split(":", 1)
+    if beside is not None and str(beside) not in sys.path:
+        sys.path.insert(0, str(beside))
+    try:
+        found = getattr(importlib.import_module(module_name), class_name)
+    except (ImportError, AttributeError) as error:
+        raise SimulationError(f"the simulation {model} cannot be imported: {error}") from error
+    if not (isinstance(found, type) and issubclass(found, Simulation)):
+        raise SimulationError(
+            f"{model} is not a subclass of regolithd.calibration.mismatch.simulation.simulation.Simulation"
+        )
+    return found.from_tables(tables)
+
+
+def complete_inputs(recording: Recording) -> dict[str, Array]:
+    """Return every channel and `t_s`, all of shape (time, wheel)."""
+    time_s = np.broadcast_to(recording.time_s[:, None], recording.shape)
+    return {**recording.channels, "t_s": time_s}

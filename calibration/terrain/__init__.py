@@ -1,0 +1,1 @@
+"""Wheel and soil: stresses under a rigid wheel, soils, wheel loads, drawbar pull."""

@@ -1,0 +1,1 @@
+"""Measured quality: blind trials of the mismatch tool, estimators against baselines, the paper's figures reproduced."""

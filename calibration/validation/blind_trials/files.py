@@ -1,0 +1,71 @@
+"""A trial as the files that a solver may see: the recording in the contract's columns, and the simulation's TOML."""
+
+from __future__ import annotations
+
+import gzip
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from regolithd.calibration.validation.blind_trials.generator import Tables, Trial
+
+COLUMNS = (
+    "t_s",
+    "wheel",
+    "motor_current_A",
+    "motor_speed_rad_s",
+    "load_N",
+    "ground_speed_m_s",
+    "pitch_rad",
+    "roll_rad",
+    "yaw_rate_rad_s",
+    "motor_temperature_degC",
+    "bus_voltage_V",
+)
+"""The recording's columns, in the contract's order and units."""
+
+
+def toml_text(tables: Tables) -> str:
+    """Return the tables as TOML."""
+    return "\n".join(
+        f"[{name}]\n" + "".join(f"{k} = {_value(v)}\n" for k, v in table.items()) for name, table in tables.items()
+    )
+
+
+def _value(value: float | str) -> str:
+    return f'"{value}"' if isinstance(value, str) else repr(value)
+
+
+def recording_text(trial: Trial) -> str:
+    """Return the recording as CSV: one row per instant and wheel, seven digits."""
+    drive = trial.drive
+    gears = float(trial.tables["drivetrain"]["planetary_ratio"]) * float(trial.tables["drivetrain"]["harmonic_ratio"])
+    rows, wheels = drive.load_N.shape
+    spread = [np.repeat(each, wheels) for each in (trial.pitch_rad, trial.roll_rad, trial.yaw_rate_rad_s)]
+    table = np.column_stack(
+        [
+            np.repeat(drive.t_s, wheels),
+            np.tile(np.arange(1, wheels + 1), rows),
+            trial.current_A.ravel(),
+            (drive.wheel_speed_rad_s * gears).ravel(),
+            trial.load_N.ravel(),
+            trial.ground_speed_m_s.ravel(),
+            *spread,
+            trial.temperature_degC.ravel(),
+            np.repeat(drive.voltage_V, wheels),
+        ]
+    )
+    line = ",".join(["%.6g", "%d", *["%.7g"] * (len(COLUMNS) - 2)])
+    return ",".join(COLUMNS) + "\n" + "\n".join(line % tuple(row) for row in table) + "\n"
+
+
+def write_trial(trial: Trial, folder: Path) -> tuple[Path, Path]:
+    """Write `recording.csv.gz` and `SIM.toml` into the folder and return their paths; nothing else is said there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    recording, simulation = folder / "recording.csv.gz", folder / "SIM.toml"
+    recording.write_bytes(gzip.compress(recording_text(trial).encode(), compresslevel=3, mtime=0))
+    simulation.write_text(toml_text(trial.tables))
+    return recording, simulation

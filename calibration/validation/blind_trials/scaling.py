@@ -1,0 +1,159 @@
+"""How time and memory of a comparison grow with the recording's rows and with the candidates that are looked for.
+
+    python -m regolithd.calibration.validation.blind_trials.scaling FIGURES.json PICTURE.svg
+
+Each point is the command line in a process of its own, on a generated recording that conceals one effect: what a user
+would wait for, reading and writing included.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+import regolithd
+from regolithd.calibration.mismatch.candidates import library
+from regolithd.calibration.mismatch.report.axes import Panel, axes, box, line, svg, text
+from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel
+from regolithd.calibration.validation.blind_trials.errors import ProofError
+from regolithd.calibration.validation.blind_trials.files import toml_text, write_trial
+from regolithd.calibration.validation.blind_trials.generator import Plan, make_trial
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.candidates import Candidate
+
+DURATIONS_S = (300.0, 600.0, 1200.0, 1800.0, 3600.0)
+COUNTS = (2, 4, 8, 16)
+FULL = 1800.0
+GOAL_CPU_S, GOAL_MIB = 40.0, 1024.0
+GOALS = {GOAL_CPU_S: "20 s on two cores", GOAL_MIB: "1 GiB"}
+"""What a comparison of half an hour may take. Processor time is drawn, as it does not depend on who else computes."""
+STYLE = """<style>text{font:12px sans-serif;fill:#5c6570}.ground{fill:#f5f6f8}.axis{stroke:#d9dde2;fill:none}
+.after{fill:none;stroke:#23679b;stroke-width:1.6}.dot{fill:#23679b}.zero{stroke:#b5482a;stroke-dasharray:3 3;fill:none}
+.paper{fill:#fff}</style><rect class="paper" width="850" height="220"/>"""
+
+
+class Fewer(RoverWheel):
+    """The rover's simulation with only the first few candidates of the library."""
+
+    count: ClassVar[int] = 16
+
+    def candidates(self) -> Sequence[Candidate]:
+        """Return the first `count`."""
+        return library()[: self.count]
+
+
+class Two(Fewer):
+    """Two candidates."""
+
+    count = 2
+
+
+class Four(Fewer):
+    """Four candidates."""
+
+    count = 4
+
+
+class Eight(Fewer):
+    """Eight candidates."""
+
+    count = 8
+
+
+class Sixteen(Fewer):
+    """All sixteen."""
+
+
+WITH = {2: Two, 4: Four, 8: Eight, 16: Sixteen}
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What one comparison took."""
+
+    rows: int
+    candidates: int
+    wall_s: float
+    cpu_s: float
+    memory_MiB: float
+
+
+def measure(folder: Path, rows: int, candidates: int) -> Cost:
+    """Run one comparison in the folder and return what it took."""
+    command = [sys.executable, "-m", "regolithd", "mismatch", "recording.csv.gz", "--simulation", "SIM.toml"]
+    environment = {**os.environ, "PYTHONPATH": str(Path(regolithd.__file__).parent.parent)}
+    started = time.perf_counter()
+    child = subprocess.Popen(  # noqa: S603  # our own command; waited for below, with what it used
+        [*command, "--json", "answer.json"], cwd=folder, env=environment, stdout=subprocess.DEVNULL
+    )
+    _, status, usage = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)
+    if child.returncode != 0:
+        raise ProofError(f"the comparison of {rows} rows failed with status {child.returncode}")
+    wall = time.perf_counter() - started
+    return Cost(rows, candidates, wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
+
+
+def costs(scratch: Path) -> list[Cost]:
+    """Return the cost of every length with all candidates, and of the full length with fewer."""
+    found = []
+    for duration_s, counts in [(d, COUNTS if d == FULL else COUNTS[-1:]) for d in DURATIONS_S]:
+        trial = make_trial(Plan(1, 3, "single", ("viscous-friction",)), duration_s=duration_s)
+        write_trial(trial, scratch)
+        for count in counts:
+            model = f"regolithd.calibration.validation.blind_trials.scaling:{WITH[count].__name__}"
+            tables = {**trial.tables, "simulation": {**trial.tables["simulation"], "model": model}}
+            (scratch / "SIM.toml").write_text(toml_text(tables))
+            found.append(measure(scratch, trial.load_N.size, count))
+    return found
+
+
+def picture(found: list[Cost]) -> str:
+    """Draw seconds and MiB over rows, and seconds over candidates."""
+    most = max(cost.candidates for cost in found)
+    by_rows = [(cost.rows / 1000, cost.cpu_s, cost.memory_MiB) for cost in found if cost.candidates == most]
+    full = max(cost.rows for cost in found if cost.candidates < most)
+    by_count = sorted((float(cost.candidates), cost.cpu_s) for cost in found if cost.rows == full)
+    panels = (
+        ("rows (thousands)", "processor time (s)", [(x, y) for x, y, _ in by_rows], GOAL_CPU_S),
+        ("rows (thousands)", "memory (MiB)", [(x, y) for x, _, y in by_rows], GOAL_MIB),
+        (f"candidates, at {full // 1000} 000 rows", "processor time (s)", by_count, GOAL_CPU_S),
+    )
+    parts = [STYLE]
+    for at, (across, up, points, limit) in enumerate(panels):
+        wide = 1.1 * max(x for x, _ in points)
+        panel = Panel(62 + 280 * at, 24, 200, 150, (0, wide), (0, 1.15 * max(limit, *(y for _, y in points))))
+        parts += [box(panel), axes(panel, across, "", x_about=4), text(panel.left, 15, up)]
+        parts.append(line([(panel.at_x(x), panel.at_y(limit)) for x in (0, wide)], "zero"))
+        parts.append(text(panel.left + 196, panel.at_y(limit) - 4, GOALS[limit], anchor="end"))
+        parts.append(line([(panel.at_x(x), panel.at_y(y)) for x, y in points], "after"))
+        for x, y in points:
+            parts.append(f'<circle class="dot" cx="{panel.at_x(x):.1f}" cy="{panel.at_y(y):.1f}" r="3"/>')
+    return svg(850, 220, parts, "Time and memory against rows and candidates")
+
+
+def main(figures: Path, drawing: Path) -> None:
+    """Measure, write the flat figures and the picture."""
+    with tempfile.TemporaryDirectory() as scratch:
+        found = costs(Path(scratch))
+    flat: dict[str, float] = {}
+    for cost in found:
+        key = f"rows_{cost.rows}_candidates_{cost.candidates}"
+        flat |= {f"{key}_wall_s": cost.wall_s, f"{key}_cpu_s": cost.cpu_s, f"{key}_memory_MiB": cost.memory_MiB}
+    for path, content in ((figures, json.dumps(flat, indent=1) + "\n"), (drawing, picture(found) + "\n")):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(content)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -1,0 +1,64 @@
+"""The score as people read it: one table for the solver, one for the peers beside it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from regolithd.calibration.validation.blind_trials.score import Figures
+
+ROWS = (
+    ("exact_set", "exact set of names", "≥ 95 %", 0.95, None),
+    ("false_name_on_nothing", "a name where nothing is concealed", "≤ 2 %", None, 0.02),
+    ("outside_unexplained_and_located", "outside the list: unexplained, and where", "≥ 90 %", 0.90, None),
+    ("wheels_right", "the right wheels", "≥ 98 %", 0.98, None),
+    ("onset_within_tenth", "onset within 10 % of the length", "all", 1.0, None),
+    ("intervals_hold", "90 % intervals that hold the truth", "88–92 %", 0.88, 0.92),
+    ("held_out_within_2_percent", "held-out error within 2 % of the true model's", "all", 1.0, None),
+    ("constant_speed_undecided", "constant speed: what cannot be told apart, and the experiment", "≥ 95 %", 0.95, None),
+    (
+        "constant_speed_decided_by_experiment",
+        "that experiment, driven, leads to the right name",
+        "≥ 95 %",
+        0.95,
+        None,
+    ),
+)
+"""Figure, words, goal in words, least and most."""
+
+
+def score_table(figures: Figures) -> Table:
+    """Return the solver's score beside its goals."""
+    table = Table(title=f"{figures['recordings']} recordings, envelopes opened", title_justify="left")
+    table.add_column("what")
+    table.add_column("reached", justify="right")
+    table.add_column("goal", justify="right", style="dim")
+    for key, words, goal, least, most in ROWS:
+        value = float(figures.get(key, math.nan))
+        if math.isnan(value):
+            table.add_row(words, "–", goal)
+            continue
+        good = (least is None or value >= least) and (most is None or value <= most)
+        table.add_row(words, f"[{'green' if good else 'red'}]{100 * value:.1f} %[/]", goal)
+    table.add_row("seconds a recording, median", f"{float(figures['seconds_median']):.1f}", "20")
+    return table
+
+
+def peers_table(figures: Figures) -> Table:
+    """Return solver and peers side by side."""
+    table = Table(title="the same recordings, other tools", title_justify="left")
+    for heading in ("tool", "exact set", "names something on nothing", "names the unknown", "s"):
+        table.add_column(heading, justify="left" if heading == "tool" else "right")
+    rows = [("regolithd mismatch", "")] + [
+        (key.removeprefix("peer_").removesuffix("_exact_set").replace("_", " "), key.removesuffix("exact_set"))
+        for key in figures
+        if key.startswith("peer_") and key.endswith("_exact_set")
+    ]
+    for name, prefix in rows:
+        shares = [float(figures[prefix + key]) for key in ("exact_set", "false_name_on_nothing", "outside_named")]
+        seconds = float(figures[f"{prefix}seconds_median"])
+        table.add_row(name, *("–" if math.isnan(s) else f"{100 * s:.0f} %" for s in shares), f"{seconds:.2f}")
+    return table

@@ -1,0 +1,194 @@
+"""The posterior against the paper's network and least squares: errors, coverage, ranks, and the bias of φ under noise.
+
+The rovers are new ones from `rovers`; noise is that of the paper's Table 4. Each method gets what it asks for, and the
+classical ones more than a rover has:
+
+- the paper's network: load, slip and recorded current at each instant and wheel; its answers are averaged. As the paper
+  does it, the no-load current stays in; `…_corrected` takes it out. The better of the two is what the posterior must
+  beat.
+- least squares: the true sinkage of each wheel at each instant and the true shear modulus.
+- the posterior: load, slip and torque, and how well the rover is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+
+from regolithd.calibration.models import TERRAIN_MODEL
+from regolithd.calibration.paper.least_squares import least_squares
+from regolithd.calibration.parameters import SOILS, Drivetrain, Wheel
+from regolithd.calibration.posterior import simulated_rovers as simulation
+from regolithd.calibration.posterior.window import Knowledge, reduce_windows
+from regolithd.calibration.terrain.soils import ANGLE_SPREAD_DEG, SPREAD
+from regolithd.calibration.terrain.wheel_soil import contact_angle, shear_displacement
+
+if TYPE_CHECKING:
+    from regolithd.calibration.posterior.estimator import Estimator
+
+Array = NDArray[np.float64]
+
+NO_LOAD_A = 0.037
+BINS = 20
+CHUNK = 1000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answers:
+    """What each method says of N windows: cohesion [Pa], φ [rad] and, of the posterior, the margin; and the truth."""
+
+    truth: Array
+    nearest: NDArray[np.intp]
+    slip: Array
+    methods: dict[str, Array]
+    ranks: Array
+    intervals: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """What the estimators get: half seconds, wheels, the noise of Table 4 or none, and whether the class of soil."""
+
+    instants: int = 20
+    wheels: int = 6
+    noise: bool = True
+    told: bool = False
+
+
+CASES = {
+    "window": Case(),
+    "instant": Case(instants=1, wheels=1),
+    "noiseless_window": Case(noise=False),
+    "told_window": Case(told=True),
+}
+"""The cases of the evaluation: ten seconds of six wheels, one instant of one, and what becomes of the first."""
+
+
+def answers(count: int, case: Case, seed: int, estimator: Estimator) -> Answers:
+    """Ask all methods about `count` rovers."""
+    rng = np.random.default_rng(seed)
+    parts = [_chunk(min(CHUNK, count - start), case, rng, estimator) for start in range(0, count, CHUNK)]
+    return Answers(
+        truth=np.concatenate([part.truth for part in parts]),
+        nearest=np.concatenate([part.nearest for part in parts]),
+        slip=np.concatenate([part.slip for part in parts]),
+        methods={name: np.concatenate([part.methods[name] for part in parts]) for name in parts[0].methods},
+        ranks=np.concatenate([part.ranks for part in parts]),
+        intervals=np.concatenate([part.intervals for part in parts]),
+    )
+
+
+def _chunk(count: int, case: Case, rng: np.random.Generator, estimator: Estimator) -> Answers:
+    wheel, drivetrain = Wheel(), Drivetrain()
+    knowledge = Knowledge() if case.noise else Knowledge(torque_noise_Nm=0.0)
+    known = np.tile(knowledge.deviations(), (count, 1))
+    rovers = simulation.draw_rovers(count, rng, known, no_load_A=NO_LOAD_A)
+    noise = simulation.table_4_noise(count) if case.noise else simulation.no_noise(count)
+    measured = simulation.drive(rovers, noise, case.instants, rng, drivetrain, wheel)
+    truth = np.column_stack(
+        [
+            rovers.soils.cohesion_Pa,
+            np.radians(rovers.soils.friction_angle_deg),
+            simulation.margins(rovers, wheel),
+        ]
+    )
+    load, slip, torque = (x.copy() for x in (measured.load_N, measured.slip, measured.torque_Nm))
+    load[:, :, case.wheels :] = np.nan
+    told = rovers.nearest if case.told else None
+    mixture = estimator.mixtures(reduce_windows(load, slip, torque, known, wheel.radius_m, told))
+    chosen = np.s_[:, :, : case.wheels]
+    methods = {
+        "paper": _paper(measured.load_N[chosen], slip[chosen], measured.current_A[chosen]),
+        "paper_corrected": _paper(measured.load_N[chosen], slip[chosen], torque[chosen] / drivetrain.gain_Nm_per_A),
+        "posterior": mixture.means(),
+    }
+    if case.instants * case.wheels > 2:
+        methods["least_squares"] = _least_squares(rovers, measured, case.wheels, wheel)
+    levels = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
+    return Answers(
+        truth, rovers.nearest, rovers.slip.mean(axis=1), methods, mixture.ranks(truth), mixture.quantiles(levels)
+    )
+
+
+def _paper(load_N: Array, slip: Array, current_A: Array) -> Array:
+    session = onnxruntime.InferenceSession(TERRAIN_MODEL)
+    inputs = np.stack([load_N, slip, current_A], axis=-1).reshape(-1, 3).astype(np.float32)
+    (raw,) = session.run(None, {"inputs": inputs})
+    cohesion, tangent = raw.reshape(*load_N.shape, 2).astype(np.float64).transpose(3, 0, 1, 2)
+    return np.column_stack([cohesion.mean(axis=(1, 2)), np.arctan(tangent).mean(axis=(1, 2))])
+
+
+def _least_squares(rovers: simulation.Rovers, measured: simulation.Measured, wheels: int, wheel: Wheel) -> Array:
+    soils = rovers.soils.per_wheel()
+    angle = contact_angle(rovers.load_N, rovers.slip, wheel, soils)
+    displacement = shear_displacement(angle, rovers.slip, wheel)
+    shape = measured.load_N[:, :, :wheels].shape
+    flat = (len(angle), -1)
+    cohesion, tangent = least_squares(
+        measured.load_N[:, :, :wheels].reshape(flat),
+        measured.torque_Nm[:, :, :wheels].reshape(flat),
+        np.broadcast_to(angle[:, None, :wheels], shape).reshape(flat),
+        np.broadcast_to(displacement[:, None, :wheels], shape).reshape(flat),
+        soils.shear_modulus_m,
+        wheel,
+    )
+    return np.column_stack([cohesion, np.arctan(tangent)])
+
+
+def figures(found: Answers, prefix: str) -> dict[str, float]:
+    """Return root-mean-square errors, biases and coverage, overall and in each soil class."""
+    out: dict[str, float] = {}
+    truth = found.truth
+    methods = found.methods | {"prior_mean": np.broadcast_to(truth[:, :2].mean(axis=0), (len(truth), 2))}
+    for name, answer in methods.items():
+        error = answer[:, :2] - truth[:, :2]
+        rmse = np.sqrt(np.mean(error**2, axis=0))
+        out[f"{prefix}{name}_rmse_cohesion_Pa"] = float(rmse[0])
+        out[f"{prefix}{name}_rmse_friction_angle_deg"] = float(np.degrees(rmse[1]))
+        out[f"{prefix}{name}_bias_cohesion_Pa"] = float(error[:, 0].mean())
+        out[f"{prefix}{name}_bias_friction_angle_deg"] = float(np.degrees(error[:, 1].mean()))
+    for unit in ("cohesion_Pa", "friction_angle_deg"):
+        best = min(out[f"{prefix}{name}_rmse_{unit}"] for name in ("paper", "paper_corrected"))
+        out[f"{prefix}ratio_to_paper_{unit}"] = out[f"{prefix}posterior_rmse_{unit}"] / best
+    margin_error = found.methods["posterior"][:, 2] - truth[:, 2]
+    out[f"{prefix}posterior_rmse_margin"] = float(np.sqrt(np.mean(margin_error**2)))
+    out[f"{prefix}prior_mean_rmse_margin"] = float(truth[:, 2].std())
+    return out | coverage(found, prefix)
+
+
+def coverage(found: Answers, prefix: str) -> dict[str, float]:
+    """Return how often the 50 % and 90 % intervals hold the truth: overall, and in each class of soil.
+
+    Classes are told apart in two ways: by the truth, and by what the posterior believes. A posterior covers as it says
+    on average over soils that look alike to it – so overall, and in each class that it believes in, and in each true
+    class once it is told the class. In a true class that the data cannot tell from others it need not, and does not.
+    """
+    out: dict[str, float] = {}
+    groups = {"": np.full(len(found.truth), True)}
+    groups |= {f"_{name}": found.nearest == index for index, name in enumerate(SOILS)}
+    believed = _believed_class(found)
+    groups |= {f"_believed_{name}": believed == index for index, name in enumerate(SOILS)}
+    for column, target in enumerate(("cohesion", "friction_angle", "margin")):
+        value, quantile = found.truth[:, column], found.intervals[:, column]
+        for level, (low, high) in {50: (1, 3), 90: (0, 4)}.items():
+            inside = (quantile[:, low] <= value) & (value <= quantile[:, high])
+            for group, rows in groups.items():
+                if rows.any():
+                    out[f"{prefix}coverage_{level}_{target}{group}"] = float(inside[rows].mean())
+        counts, _ = np.histogram(found.ranks[:, column], BINS, (0, 1))
+        expected = len(value) / BINS
+        # Under calibration this is χ² with BINS − 1 degrees of freedom: 19 ± 6.
+        out[f"{prefix}rank_chi_squared_{target}"] = float(np.sum((counts - expected) ** 2 / expected))
+    return out
+
+
+def _believed_class(found: Answers) -> NDArray[np.intp]:
+    """Return the class of Table 1 that the posterior's mean is nearest to, in its classes' own spread."""
+    soils = list(SOILS.values())
+    cohesion = np.log(found.methods["posterior"][:, :1] / [soil.cohesion_Pa for soil in soils]) / SPREAD
+    angle = np.degrees(found.methods["posterior"][:, 1:2]) - [soil.friction_angle_deg for soil in soils]
+    return np.argmin(cohesion**2 + (angle / ANGLE_SPREAD_DEG) ** 2, axis=1)

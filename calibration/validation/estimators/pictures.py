@@ -1,0 +1,210 @@
+"""Pictures of the evaluation for `docs/`: errors, coverage, one sample and ten seconds, the alarm, the drivetrain."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+
+from regolithd.calibration.parameters import SOILS, Drivetrain, Wheel
+from regolithd.calibration.posterior import simulated_rovers as simulation
+from regolithd.calibration.posterior.window import Knowledge, reduce_windows
+from regolithd.calibration.terrain.soils import draw_soils, soils_from
+from regolithd.calibration.validation.estimators.errors_and_coverage import NO_LOAD_A
+from regolithd.calibration.validation.reproduction.pictures import OURS, PAPER, SOIL_COLOURS, STYLE, figure, save
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from regolithd.calibration.posterior.estimator import Estimator
+
+    Array = NDArray[np.float64]
+
+CLASSICAL, SINGLE, TOLD = "#b08d57", "#e59866", "#922b21"
+
+
+def errors(found: Mapping[str, float], path: Path) -> None:
+    """Draw the root-mean-square errors of c and φ, method by method."""
+    bars = [
+        ("the prior's mean, no data", "window_prior_mean", "#d5d8dc"),
+        ("paper's network, 10 s × 6 wheels", "window_paper", PAPER),
+        ("least squares, z and K given, 10 s × 6", "window_least_squares", CLASSICAL),
+        ("posterior, one instant of one wheel", "instant_posterior", SINGLE),
+        ("posterior, 10 s × 6 wheels", "window_posterior", OURS),
+        ("the same, told the class of soil", "told_window_posterior", TOLD),
+    ]
+    with mpl.rc_context(STYLE):
+        made = figure(11, 3.6)
+        panels = made.subplots(1, 2, sharey=True)
+        for panel, key, unit, scale in (
+            (panels[0], "rmse_cohesion_Pa", "error of c (kPa, r.m.s.)", 1e-3),
+            (panels[1], "rmse_friction_angle_deg", "error of φ (°, r.m.s.)", 1.0),
+        ):
+            values = [scale * found[f"{name}_{key}"] for _, name, _ in bars]
+            drawn = panel.barh([label for label, _, _ in bars], values, color=[colour for _, _, colour in bars])
+            panel.bar_label(drawn, fmt="%.2f" if scale < 1 else "%.1f", padding=3)
+            panel.set_xlabel(unit)
+        panels[0].invert_yaxis()
+        made.suptitle(
+            f"{found['rovers']:.0f} rovers on held-out soils, noise of the paper's Table 4", x=0.01, ha="left"
+        )
+        save(made, path)
+
+
+def calibration(found: Mapping[str, float], ranks: Array, path: Path) -> None:
+    """Draw the rank histograms, and coverage in the classes that the posterior believes in and those that are true."""
+    targets = ("cohesion", "friction_angle", "margin")
+    with mpl.rc_context(STYLE):
+        made = figure(11, 6)
+        panels = made.subplots(2, 3)
+        for column, (target, label) in enumerate(zip(targets, ("c", "φ", "drawbar margin"), strict=True)):
+            _ranks(panels[0, column], ranks[:, column], label)
+            _coverage(panels[1, column], found, target)
+        panels[0, 0].set_ylabel("rovers")
+        panels[1, 0].set_ylabel("truth inside (%)")
+        panels[1, 2].legend(fontsize=8, loc="lower right")
+        save(made, path)
+
+
+def _ranks(panel: Axes, ranks: Array, label: str) -> None:
+    panel.hist(ranks, bins=20, range=(0, 1), color=OURS, alpha=0.8)
+    expected = len(ranks) / 20
+    panel.axhspan(expected - 2 * expected**0.5, expected + 2 * expected**0.5, color="black", alpha=0.15)
+    panel.set(title=label, xlabel="rank of the truth in the posterior")
+
+
+def _coverage(panel: Axes, found: Mapping[str, float], target: str) -> None:
+    names = ["", *SOILS]
+    for name, colour, label in (("window", PAPER, "true class"), ("told_window", OURS, "true class, told")):
+        for level, marker in ((50, "o"), (90, "s")):
+            values = [100 * found[f"{name}_coverage_{level}_{target}{'_' + each if each else ''}"] for each in names]
+            told = f"{label}, {level} %"
+            panel.plot(range(len(names)), values, marker, color=colour, label=told, markersize=6)
+    for level in (50, 90):
+        panel.axhspan(level - 2, level + 2, color="black", alpha=0.15)
+    panel.set_xticks(range(len(names)), ["all", *(each.replace("-", "\n") for each in SOILS)], fontsize=8)
+    panel.set_ylim(0, 102)
+
+
+def one_sample(estimator: Estimator, path: Path, seed: int = 3) -> None:
+    """Draw what one instant of one wheel says of sandy loam, and what ten seconds of six wheels say."""
+    rng = np.random.default_rng(seed)
+    wheel, drivetrain = Wheel(), Drivetrain()
+    known = Knowledge().deviations()
+    rovers = simulation.draw_rovers(1, rng, known, no_load_A=NO_LOAD_A)
+    soils = soils_from([SOILS["sandy-loam"]], wheel.width_m)
+    rovers = simulation.Rovers(
+        soils=soils,
+        nearest=np.array([1]),
+        load_N=np.array([[47.0, 52, 49, 46, 51, 48]]),
+        slip=np.full((1, 6), 0.025),
+        no_load_A=rovers.no_load_A,
+        gain_error=rovers.gain_error,
+        no_load_error_A=rovers.no_load_error_A,
+        slip_error=0 * rovers.slip_error,
+        known=known,
+    )
+    measured = simulation.drive(rovers, simulation.table_4_noise(1), 20, rng, drivetrain, wheel)
+    single = measured.load_N[:, :1].copy()
+    single[..., [0, 1, 2, 3, 5]] = np.nan
+    one = reduce_windows(single, measured.slip[:, :1], measured.torque_Nm[:, :1], known, wheel.radius_m)
+    many = reduce_windows(measured.load_N, measured.slip, measured.torque_Nm, known, wheel.radius_m)
+    prior, _ = draw_soils(4000, rng)
+    with mpl.rc_context(STYLE):
+        made = figure(11, 4.4)
+        panels = made.subplots(1, 2, sharex=True, sharey=True)
+        for panel, windows, colour, title in (
+            (panels[0], one, SINGLE, "one instant of one wheel: hardly more than the prior"),
+            (panels[1], many, OURS, "ten seconds of six wheels"),
+        ):
+            samples = estimator.mixtures(windows).sample(3000, rng)[0]
+            panel.plot(
+                prior.cohesion_Pa / 1e3, prior.friction_angle_deg, ".", color="#d5d8dc", markersize=2, label="prior"
+            )
+            panel.plot(
+                samples[:, 0] / 1e3,
+                np.degrees(samples[:, 1]),
+                ".",
+                color=colour,
+                markersize=3,
+                alpha=0.5,
+                label="posterior",
+            )
+            for (name, soil), shade in zip(SOILS.items(), SOIL_COLOURS, strict=True):
+                panel.plot(
+                    soil.cohesion_Pa / 1e3,
+                    soil.friction_angle_deg,
+                    "D",
+                    color=shade,
+                    markeredgecolor="white",
+                    label=name,
+                )
+            panel.plot(3.15, 30.0, "*", color="black", markersize=16, label="the truth")
+            panel.set(title=title, xlabel="c (kPa)", xlim=(0, 11), ylim=(4, 43))
+        panels[0].set_ylabel("φ (°)")
+        panels[1].legend(loc="upper left", bbox_to_anchor=(1, 1))
+        save(made, path)
+
+
+def alarm(delays: Mapping[str, Array], path: Path) -> None:
+    """Draw how many rovers have been warned after how long."""
+    lines: list[tuple[str, str, dict[str, Any]]] = [
+        ("cusum_delay", "CUSUM, white noise", {"color": OURS}),
+        ("cusum_delay_correlated", "CUSUM, noise with 0.5 s memory", {"color": OURS, "linestyle": "--"}),
+        ("paper_instant_delay", "paper's network: fall of c", {"color": "#bdc3c7"}),
+        ("paper_10_s_delay", "paper's network: fall of 10 s mean", {"color": PAPER}),
+        ("paper_shift_delay", "paper's network: shift of 10 s mean", {"color": PAPER, "linestyle": "--"}),
+        ("paper_shift_delay_flat", "the same, on flat ground", {"color": "#2c3e50", "linestyle": "--"}),
+    ]
+    with mpl.rc_context(STYLE):
+        made = figure(11, 4.2)
+        panels = made.subplots(1, 2, sharey=True)
+        for panel, suffix, title in (
+            (panels[0], "", "all six wheels at once"),
+            (panels[1], "_by_axle", "axle after axle, at 2.2 cm/s"),
+        ):
+            for key, label, style in lines:
+                name = key.replace("_delay", f"_delay{suffix}")
+                values = np.sort(delays[f"alarm_{name}"])
+                share = 100 * np.arange(1, len(values) + 1) / len(values)
+                reached = np.isfinite(values)
+                panel.step(
+                    [0, *values[reached], 120],
+                    [0, *share[reached], share[reached].max(initial=0.0)],
+                    where="post",
+                    label=label if reached.any() else f"{label}: never",
+                    **style,
+                )
+            panel.axvline(15, color="black", linewidth=0.8, linestyle=":")
+            panel.set(title=title, xlabel="seconds since the front axle met LETE sand", xlim=(0, 90), ylim=(0, 102))
+        panels[0].set_ylabel("rovers warned (%)")
+        panels[1].legend(loc="lower right", fontsize=9)
+        made.suptitle("Sandy loam to LETE sand, 35 % current noise, 2 Hz, one false alarm in 8 h", x=0.01, ha="left")
+        save(made, path)
+
+
+def drivetrain(found: Mapping[str, float], path: Path) -> None:
+    """Draw the error of c with 37 mA of no-load current, calibrated and not."""
+    names = {
+        "calibrated": "wheels-up calibration",
+        "uncalibrated": "none: Eq. 11 reads it as soil",
+        "uncalibrated_and_doubted": "none, and told to doubt it",
+    }
+    with mpl.rc_context(STYLE):
+        made = figure(9, 2.6)
+        panels = made.subplots(1, 2, sharey=True)
+        for panel, key, label, scale in (
+            (panels[0], "rmse_cohesion_Pa", "error of c (kPa, r.m.s.)", 1e-3),
+            (panels[1], "coverage_90", "truth inside the 90 % interval (%)", 100.0),
+        ):
+            values = [scale * found[f"drivetrain_{name}_{key}"] for name in names]
+            drawn = panel.barh(list(names.values()), values, color=[OURS, PAPER, CLASSICAL])
+            panel.bar_label(drawn, fmt="%.2f" if scale < 1 else "%.0f", padding=3)
+            panel.set_xlabel(label)
+        panels[0].invert_yaxis()
+        save(made, path)

@@ -1,0 +1,117 @@
+"""Pictures for `docs/`, of the reproduction and of what goes beyond it: functions of numbers that were computed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from regolithd.calibration.paper.sizing import PAPER_MSE, PAPER_SIZE
+from regolithd.calibration.parameters import SOILS
+from regolithd.calibration.validation.reproduction import published
+from regolithd.calibration.validation.reproduction.recomputation import ROVER_LOADS_N
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from regolithd.calibration.paper.training_set import TrainingSet
+    from regolithd.calibration.validation.reproduction.recomputation import Traverse
+
+    Array = NDArray[np.float64]
+
+PAPER, OURS, SOIL_COLOURS = "#7f8c8d", "#c0392b", ("#e0a030", "#8e5a2b", "#4a7ba6", "#5b8a4a")
+STYLE: Any = {
+    "font.size": 11,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlelocation": "left",
+    "axes.titlesize": 12,
+    "legend.frameon": False,
+    "svg.hashsalt": "regolithd",
+    "figure.facecolor": "white",
+}
+
+
+EVERY = 3
+"""Of a traverse's records one in so many is drawn, and all are in the mean: more do not show at this width."""
+
+
+def figure(width: float, height: float) -> Figure:
+    """Return an empty figure."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def save(made: Figure, path: Path) -> None:
+    """Write a picture; the same numbers give the same bytes."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    metadata = {"Date": None} if path.suffix == ".svg" else {}
+    made.savefig(path, dpi=150, metadata=metadata)
+
+
+def sizing(figures: Mapping[str, float], path: Path) -> None:
+    """Draw the mean MSE of each size with its standard error, beside the paper's."""
+    sizes = sorted(int(key.removeprefix("mean_mse_")) for key in figures if key.startswith("mean_mse_"))
+    mean = [figures[f"mean_mse_{size}"] for size in sizes]
+    error = [2 * figures[f"standard_error_{size}"] for size in sizes]
+    with mpl.rc_context(STYLE):
+        made = figure(9, 4)
+        panel = made.subplots()
+        panel.errorbar(
+            sizes, mean, error, fmt="o", color=OURS, capsize=2, label="ours: mean of 100 trainings, ± 2 s.e."
+        )
+        panel.plot([PAPER_SIZE], [PAPER_MSE], "D", color=PAPER, markersize=9, label="the paper's best: 64, 0.0251")
+        panel.set(
+            xlabel="hidden neurons", ylabel="MSE (10 kPa, 1)", title="26 sizes, 26 million epochs: size does not matter"
+        )
+        panel.legend()
+        save(made, path)
+
+
+def training_set(pairs: TrainingSet, path: Path) -> None:
+    """Draw the pairs' loads by current, and which of them a rover can have."""
+    with mpl.rc_context(STYLE):
+        made = figure(9, 4.2)
+        panel = made.subplots()
+        panel.axhspan(*ROVER_LOADS_N, color="#27ae60", alpha=0.15, label="what a wheel of 30 kg can carry")
+        for index, (name, colour) in enumerate(zip(SOILS, SOIL_COLOURS, strict=True)):
+            mine = pairs.soil == index
+            aside = (index - 1.5) * 1.6
+            panel.plot(1e3 * pairs.inputs[mine, 2] + aside, pairs.inputs[mine, 0], ".", color=colour, label=name)
+        panel.set(yscale="log", xlabel="motor current (mA)", ylabel="load by Step 14 (N)")
+        panel.set_title("Most of the 504 pairs have loads that no 30 kg rover has")
+        panel.legend(loc="upper left", bbox_to_anchor=(1, 1))
+        save(made, path)
+
+
+def traverse(traverses: Sequence[Traverse], path: Path, wheel: int = 5) -> None:
+    """Draw c and φ of one wheel along the synthetic traverse: what Figs 6–9 show."""
+    time = np.arange(published.RECORDS) / 2
+    with mpl.rc_context(STYLE):
+        made = figure(11, 6)
+        panels = made.subplots(2, 2, sharex=True, sharey="row")
+        for column, each in enumerate(traverses):
+            for row, (values, said, label) in enumerate(
+                (
+                    (each.cohesion_Pa / 1e3, published.COHESION_PA[each.ground][wheel - 1] / 1e3, "c (kPa)"),
+                    (each.angle_deg, published.ANGLE_DEG[each.ground][wheel - 1], "φ (°)"),
+                )
+            ):
+                _trace(panels[row, column], time, values[:, wheel - 1], said, label if column == 0 else "")
+            panels[0, column].set_title(f"{each.ground} ground, wheel {wheel}")
+            panels[1, column].set_xlabel("time (s)")
+        panels[0, 0].legend(loc="lower left", ncols=3, fontsize=9)
+        save(made, path)
+
+
+def _trace(panel: Axes, time: Array, values: Array, said: float, label: str) -> None:
+    shown = np.s_[::EVERY]
+    panel.plot(time[shown], values[shown], color=OURS, linewidth=0.7, label="paper's network, synthetic traverse")
+    panel.axhline(values.mean(), color=OURS, linestyle="--", label="its mean")
+    panel.axhline(said, color=PAPER, linewidth=2, label="the paper's mean")
+    panel.set_ylabel(label)

@@ -1,6 +1,0 @@
-"""`python -m daemon` is `regolithd`."""
-
-from daemon.cli import main
-
-if __name__ == "__main__":
-    main()

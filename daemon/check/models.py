@@ -1,0 +1,52 @@
+"""The terrain network: whether it loads, fits and runs."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+from regolithd.calibration.models import TERRAIN_MODEL
+from regolithd.calibration.models.onnx_session import NetworkError
+from regolithd.daemon.check.finding import Finding, good, warning, wrong
+from regolithd.daemon.pipeline.posterior import belief_stage
+from regolithd.daemon.pipeline.terrain_network import Network
+
+if TYPE_CHECKING:
+    from regolithd.calibration.models.card import ModelCard
+    from regolithd.daemon.config.configuration import Configuration
+
+
+async def check_network(configuration: Configuration) -> list[Finding]:
+    """Load it, run it once, and compare it with the rover."""
+    path = configuration.estimator.model or TERRAIN_MODEL
+    try:
+        network = await asyncio.to_thread(Network, path)  # it reads a file and runs the network
+    except NetworkError as error:
+        return [wrong("model", str(error), "")]
+    try:
+        stage = await asyncio.to_thread(belief_stage, configuration)
+    except NetworkError as error:
+        return [judge_card(network.card, configuration), wrong("posterior", str(error), "")]
+    return [judge_card(network.card, configuration), judge_posterior(configuration, there=stage is not None)]
+
+
+def judge_posterior(configuration: Configuration, *, there: bool) -> Finding:
+    """Return whether there will be intervals, and alarms of a changed soil."""
+    if there:
+        return good("posterior", f"intervals from the last {configuration.posterior.window_s:g} s of all wheels")
+    if not configuration.posterior.enabled:
+        return good("posterior", "switched off: no intervals, and no alarm when the soil changes")
+    text = "[drivetrain] no_load_current_A is not known: no intervals, and no alarm when the soil changes"
+    return warning("posterior", text, "`regolithd calibrate wheels-up` measures it.")
+
+
+def judge_card(card: ModelCard, configuration: Configuration) -> Finding:
+    """Return whether the network suits this rover."""
+    inputs = ", ".join(f"{each.name} {each.low:.4g} to {each.high:.4g} {each.unit}" for each in card.inputs)
+    share = configuration.rover.mass_kg * 9.81 / 6
+    for each in card.inputs:
+        if each.name == "load_N" and not each.low <= share <= each.high:
+            trained = f"{each.low:.3g} to {each.high:.3g} N"
+            text = f"{card.version}: a sixth of the rover weighs {share:.0f} N, it was trained for {trained}"
+            return warning("model", text, "Every estimate will be marked as outside: train one for this rover.")
+    return good("model", f"{card.version}; {inputs}")

@@ -1,0 +1,1 @@
+"""`rover.toml`: the model of every key, and the reader that reports every problem at once."""

@@ -1,0 +1,172 @@
+"""`rover.toml`: everything that can differ from rover to rover, as one frozen model.
+
+The tables that a simulation's TOML has too come from `calibration.parameters`; the others are here. Reading finds every
+problem at once: `ConfigurationError.problems` names file, key, what was expected and the cure.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path  # pydantic reads it at run time
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from regolithd.calibration.parameters import Drivetrain, LoadCells, Positive, Rover, Table, Wheel
+from regolithd.drivers.signals import NodeDescription, NodeKind
+
+NodeId = Annotated[int, Field(ge=1, le=126, strict=True)]
+WheelNumber = Annotated[int, Field(ge=1, le=6, strict=True)]
+SixNodes = Annotated[tuple[NodeId, ...], Field(min_length=6, max_length=6)]
+MASTER_NODE = 127
+"""The daemon's own node number: its heartbeat is what keeps the drives alive."""
+
+
+class Identity(Table):
+    """`[rover]`: its name and its body."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")] = "kapvik"
+    mass_kg: Positive = 30.0
+    wheelbase_m: Positive = 0.65
+    track_m: Positive = 0.55
+
+    @property
+    def body(self) -> Rover:
+        """The body alone, as the simulation knows it."""
+        return Rover(mass_kg=self.mass_kg, wheelbase_m=self.wheelbase_m, track_m=self.track_m)
+
+
+class Bus(Table):
+    """`[bus]`: the CAN interface, in python-can's words."""
+
+    interface: Literal["socketcan", "virtual", "slcan", "kvaser", "pcan", "udp_multicast"] = "socketcan"
+    channel: Annotated[str, Field(min_length=1)] = "can0"
+    bitrate: Literal[10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000] = 1_000_000
+
+
+class SyncTiming(Table):
+    """`[sync]`: how often everything is sampled."""
+
+    rate_Hz: Annotated[float, Field(ge=1, le=200)] = 2.0
+
+
+class Nodes(Table):
+    """`[nodes]`: who is on the bus; the k-th number of a list of six belongs to wheel k."""
+
+    motors: SixNodes = (1, 2, 3, 4, 5, 6)
+    load_cells: SixNodes = (11, 12, 13, 14, 15, 16)
+    inclinometer: NodeId | None = None
+    ground_speed: NodeId | None = None
+    mirrored_wheels: tuple[WheelNumber, ...] = ()
+    motor_diagnostics: bool = False
+    heartbeat_ms: Annotated[int, Field(ge=20, le=10_000)] = 200
+    heartbeat_timeout_ms: Annotated[int, Field(ge=50, le=30_000)] = 600
+
+    def described(self) -> tuple[NodeDescription, ...]:
+        """Return every node in the vocabulary of the drivers."""
+        wheels = [
+            NodeDescription(
+                node,
+                kind,
+                wheel,
+                diagnostics=self.motor_diagnostics and kind is NodeKind.MOTOR,
+                mirrored=wheel + 1 in self.mirrored_wheels and kind is NodeKind.MOTOR,
+            )
+            for kind, nodes in ((NodeKind.MOTOR, self.motors), (NodeKind.LOAD_CELL, self.load_cells))
+            for wheel, node in enumerate(nodes)
+        ]
+        body = [
+            NodeDescription(node, kind, None, required=False)
+            for kind, node in ((NodeKind.INCLINOMETER, self.inclinometer), (NodeKind.GROUND_SPEED, self.ground_speed))
+            if node is not None
+        ]
+        return tuple(wheels + body)
+
+
+class Slip(Table):
+    """`[slip]`: what to take where nobody measures the ground speed."""
+
+    constant: Annotated[float, Field(gt=-1, lt=1)] = 0.025
+    standstill_rad_s: Positive = 0.05
+
+
+class Smoothing(Table):
+    """`[smoothing]`: the filter that removes momentary current drops (docs/decisions/016-smoothing.md)."""
+
+    window_s: Annotated[float, Field(ge=0, le=60)] = 3.5
+    threshold: Annotated[float, Field(ge=0, le=10)] = 2.5
+    time_constant_s: Annotated[float, Field(ge=0, le=60)] = 1.5
+
+
+class Estimator(Table):
+    """`[estimator]`: which network."""
+
+    model: Path | None = None
+
+
+class Posterior(Table):
+    """`[posterior]`: intervals of the soil under the rover; needs a calibrated drivetrain."""
+
+    enabled: bool = True
+    model: Path | None = None
+    window_s: Annotated[float, Field(ge=0.5, le=20)] = 10.0
+    soil: Literal["lete-sand", "sandy-loam", "clayey-soil", "medium-soil"] | None = None
+
+
+class Change(Table):
+    """`[change]`: the alarm when the soil changes; needs a calibrated drivetrain, and `[posterior]`."""
+
+    enabled: bool = True
+    threshold: Annotated[float, Field(ge=3, le=100)] = 10.8
+
+
+class Recording(Table):
+    """`[recording]`: where everything that was acquired is kept, and how much of it."""
+
+    directory: Path = Path("/var/lib/regolithd/recordings")
+    limit_MB: Annotated[float, Field(ge=1)] = 4000.0
+    file_minutes: Annotated[float, Field(ge=0.1, le=1440)] = 60.0
+    enabled: bool = True
+
+
+class Mqtt(Table):
+    """`[mqtt]`: the broker, and what is kept for it while it is away."""
+
+    host: Annotated[str, Field(min_length=1)] = "localhost"
+    port: Annotated[int, Field(ge=1, le=65_535)] = 1883
+    prefix: Annotated[str, Field(pattern=r"^[^#+\s]*[^#+/\s]$")] = "regolith"
+    username: str | None = None
+    password_file: Path | None = None
+    tls: bool = False
+    ca_file: Path | None = None
+    keepalive_s: Annotated[int, Field(ge=2, le=3600)] = 10
+    spool_directory: Path = Path("/var/lib/regolithd/spool")
+    spool_limit_MB: Positive = 200.0
+
+
+class Control(Table):
+    """`[control]`: the local socket over which the rover is commanded."""
+
+    socket: Path = Path("/run/regolithd/control.sock")
+    group: str = "regolithd"
+    speed_limit_m_s: Positive = 0.05
+    distance_limit_m: Positive = 1000.0
+
+
+class Configuration(Table):
+    """The whole of `rover.toml`; every table may be left out, and has Kapvik's values then."""
+
+    rover: Identity = Identity()
+    bus: Bus = Bus()
+    sync: SyncTiming = SyncTiming()
+    nodes: Nodes = Nodes()
+    wheel: Wheel = Wheel()
+    load_cells: LoadCells = LoadCells()
+    drivetrain: Drivetrain = Drivetrain()
+    slip: Slip = Slip()
+    smoothing: Smoothing = Smoothing()
+    estimator: Estimator = Estimator()
+    posterior: Posterior = Posterior()
+    change: Change = Change()
+    recording: Recording = Recording()
+    mqtt: Mqtt = Mqtt()
+    control: Control = Control()

@@ -1,0 +1,208 @@
+"""Reads `rover.toml` and says everything that is wrong with it at once.
+
+    configuration = read_configuration(Path("rover.toml"))
+
+raises `ConfigurationError`, which holds one `Problem` for each mistake: a table that does not parse, an unknown key, a
+value out of range, and what only shows when tables are looked at together.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel, ValidationError
+
+from regolithd.daemon.config.configuration import Configuration, Nodes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+    from pydantic_core import ErrorDetails
+
+EXIT_STATUS = 78
+"""EX_CONFIG of sysexits.h: systemd does not restart a service that ends with it, when told so."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing that is wrong: where, what was expected, what stands there, and how to mend it."""
+
+    file: str
+    line: int | None
+    key: str
+    expected: str
+    found: str
+    cure: str
+
+    def __str__(self) -> str:
+        """Return the problem as one line that an editor can jump to."""
+        place = self.file if self.line is None else f"{self.file}:{self.line}"
+        return f"{place}: {self.key}: expected {self.expected}, found {self.found}. {self.cure}"
+
+
+class ConfigurationError(Exception):
+    """The configuration cannot be used; `problems` holds every reason."""
+
+    def __init__(self, problems: list[Problem]) -> None:
+        super().__init__("\n".join(str(problem) for problem in problems))
+        self.problems = problems
+
+
+def read_configuration(path: Path) -> Configuration:
+    """Read a `rover.toml`; relative paths in it are relative to the file's folder."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not UTF-8"
+        raise ConfigurationError([_whole_file(path, reason)]) from error
+    return parse_configuration(text, path)
+
+
+def parse_configuration(text: str, path: Path) -> Configuration:
+    """Return what the TOML text says, or raise with all its problems. `path` is for messages and relative paths."""
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigurationError([_syntax_problem(path, error)]) from error
+    try:
+        configuration = Configuration.model_validate(tables)
+    except ValidationError as error:
+        found = [_problem(details, text, path) for details in error.errors()]
+        # The other tables may hold mistakes that only show together: look at those that are sound on their own.
+        raise ConfigurationError(found + _problems_together(_sound_part(tables), text, path)) from error
+    if problems := _problems_together(configuration, text, path):
+        raise ConfigurationError(problems)
+    return _with_absolute_paths(configuration, path.parent)
+
+
+def _whole_file(path: Path, reason: str) -> Problem:
+    return Problem(str(path), None, "file", "a readable TOML file", reason, "Give its path with --config.")
+
+
+def _syntax_problem(path: Path, error: tomllib.TOMLDecodeError) -> Problem:
+    place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
+    line = int(place[1]) if place else None
+    what = re.sub(r"\s*\(at .*\)$", "", str(error))
+    return Problem(str(path), line, "syntax", "valid TOML", f'"{what}"', "Mend this line; the rest was not read.")
+
+
+def _sound_part(tables: Mapping[str, Any]) -> Configuration:
+    sound: dict[str, BaseModel] = {}
+    for name, field in Configuration.model_fields.items():
+        table = field.annotation
+        if name in tables and isinstance(table, type) and issubclass(table, BaseModel):
+            try:
+                sound[name] = table.model_validate(tables[name])
+            except ValidationError:
+                continue  # its own problems are told already
+    return Configuration.model_validate(sound)
+
+
+def _problem(details: ErrorDetails, text: str, path: Path) -> Problem:
+    location = [part for part in details["loc"] if isinstance(part, str)]
+    index = "".join(f"[{part}]" for part in details["loc"] if isinstance(part, int))
+    key = ".".join(location) + index
+    if details["type"] == "extra_forbidden":
+        return _unknown_key(location, key, text, path)
+    expected = re.sub(r"^(Input|Value|String|Tuple) should (be |have |match )?", "", details["msg"])
+    found = "a table" if isinstance(details["input"], dict) else repr(details["input"])
+    default = _default(location)
+    cure = f"Change it, or leave it out for {default}." if default is not None else "Change it."
+    return Problem(str(path), line_of(text, location), key, expected, found, cure)
+
+
+def _unknown_key(location: list[str], key: str, text: str, path: Path) -> Problem:
+    model = _model_at(location[:-1])
+    known = list(model.model_fields) if model else []
+    near = difflib.get_close_matches(location[-1], known, n=1)
+    cure = f"Did you mean {near[0]}?" if near else "Remove it."
+    where = f"[{'.'.join(location[:-1])}]" if location[:-1] else "the file"
+    return Problem(
+        str(path), line_of(text, location), key, f"a key that {where} has ({', '.join(known)})", location[-1], cure
+    )
+
+
+def _model_at(location: list[str]) -> type[BaseModel] | None:
+    model: type[BaseModel] = Configuration
+    for name in location:
+        field = model.model_fields.get(name)
+        if field is None or not isinstance(field.annotation, type) or not issubclass(field.annotation, BaseModel):
+            return None
+        model = field.annotation
+    return model
+
+
+def _default(location: list[str]) -> str | None:
+    model = _model_at(location[:-1])
+    field = model.model_fields.get(location[-1]) if model else None
+    if field is None or field.is_required() or isinstance(field.default, BaseModel):
+        return None
+    return "none" if field.default is None else str(field.default)
+
+
+def _problems_together(configuration: Configuration, text: str, path: Path) -> list[Problem]:
+    return [
+        Problem(str(path), line_of(text, key.split(".")), key, expected, found, cure)
+        for key, expected, found, cure in _checks_together(configuration)
+    ]
+
+
+def _checks_together(configuration: Configuration) -> Iterator[tuple[str, str, str, str]]:
+    nodes = configuration.nodes
+    yield from _shared_node_ids(nodes)
+    if nodes.heartbeat_timeout_ms < 2 * nodes.heartbeat_ms:
+        yield (
+            "nodes.heartbeat_timeout_ms",
+            f"at least twice heartbeat_ms ({2 * nodes.heartbeat_ms})",
+            str(nodes.heartbeat_timeout_ms),
+            "One late heartbeat would count as a lost node: raise it.",
+        )
+    mqtt = configuration.mqtt
+    if mqtt.password_file is not None and mqtt.username is None:
+        yield ("mqtt.username", "a name beside password_file", "nothing", "Set it, or remove password_file.")
+
+
+def _shared_node_ids(nodes: Nodes) -> Iterator[tuple[str, str, str, str]]:
+    taken: dict[int, str] = {}
+    lists = [(f"motors[{k}]", n) for k, n in enumerate(nodes.motors)]
+    lists += [(f"load_cells[{k}]", n) for k, n in enumerate(nodes.load_cells)]
+    lists += [("inclinometer", nodes.inclinometer)] if nodes.inclinometer is not None else []
+    lists += [("ground_speed", nodes.ground_speed)] if nodes.ground_speed is not None else []
+    for name, node in lists:
+        if node in taken:
+            yield (
+                f"nodes.{name}",
+                "a node id of its own",
+                f"{node}, which is {taken[node]}'s",
+                "Give every node its own id.",
+            )
+        taken.setdefault(node, name)
+
+
+def _with_absolute_paths(configuration: Configuration, folder: Path) -> Configuration:
+    changed: dict[str, BaseModel] = {}
+    for name in ("estimator", "posterior"):
+        table = getattr(configuration, name)
+        if table.model is not None:
+            changed[name] = table.model_copy(update={"model": folder / table.model})
+    return configuration.model_copy(update=changed)
+
+
+def line_of(text: str, location: list[str]) -> int | None:
+    """Return the line (from 1) where a key stands in a TOML text, or its table's, or None."""
+    table, key = (location[:-1], re.sub(r"\[.*", "", location[-1])) if location else ([], "")
+    here: list[str] = []
+    table_line = None
+    for number, line in enumerate(text.splitlines(), start=1):
+        if header := re.match(r"\s*\[\s*([^\[\]]+?)\s*\]", line):
+            here = header[1].split(".")
+            if here in (table, location):
+                table_line = number
+        elif here == table and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*=", line):
+            return number
+    return table_line

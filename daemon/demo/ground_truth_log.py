@@ -1,0 +1,108 @@
+"""Writes down, for each estimate, what really was: possible only because the rover is virtual."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from regolithd.calibration.posterior.estimator import Belief
+    from regolithd.daemon.pipeline.snapshot import Array, Estimate
+    from regolithd.daemon.simulator.virtual_rover import Truth, VirtualWorld
+    from regolithd.drivers.master.events import NetworkEvent
+
+
+class Witness:
+    """An outlet that keeps estimates beside the truth."""
+
+    def __init__(self, world: VirtualWorld) -> None:
+        self._world = world
+        self.seen: list[tuple[Estimate, Truth]] = []
+        self.events: list[NetworkEvent] = []
+
+    def estimate(self, estimate: Estimate) -> None:
+        """Keep it with what is true now."""
+        if self._world.truth is not None:
+            self.seen.append((estimate, self._world.truth))
+
+    def event(self, event: NetworkEvent) -> None:
+        """Keep it."""
+        self.events.append(event)
+
+    async def run(self) -> None:
+        """Wait for the end: there is nothing to do."""
+        await asyncio.Event().wait()
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """One wheel on one soil: means over the time that it was on it, after the filter had settled."""
+
+    wheel: int
+    soil: str
+    records: int
+    torque_Nm: float
+    true_torque_Nm: float
+    cohesion_Pa: float
+    true_cohesion_Pa: float
+    friction_angle_rad: float
+    true_friction_angle_rad: float
+    outside: float  # share of the records with an input outside the training range
+
+
+def stretches(seen: list[tuple[Estimate, Truth]], settle_s: float) -> list[Stretch]:
+    """Return the means for each wheel on each soil, in the order driven, leaving out `settle_s` after each change."""
+    found = []
+    for wheel in range(6):
+        driven = [(estimate, truth) for estimate, truth in seen if estimate.valid[wheel]]
+        soils = list(dict.fromkeys(truth.soils[wheel] for _, truth in driven))
+        for soil in soils:
+            on_it = [(estimate, truth) for estimate, truth in driven if truth.soils[wheel] == soil]
+            begun = on_it[0][1].time_s
+            settled = [pair for pair in on_it if pair[1].time_s - begun >= settle_s]
+            if settled:
+                found.append(_stretch(wheel, soil, settled))
+    return found
+
+
+def _stretch(wheel: int, soil: str, pairs: list[tuple[Estimate, Truth]]) -> Stretch:
+    def mean(values: list[Array]) -> float:
+        return float(np.mean([value[wheel] for value in values]))
+
+    estimates, truths = [estimate for estimate, _ in pairs], [truth for _, truth in pairs]
+    return Stretch(
+        wheel=wheel + 1,
+        soil=soil,
+        records=len(pairs),
+        torque_Nm=mean([estimate.smoothed_torque_Nm for estimate in estimates]),
+        true_torque_Nm=mean([truth.torque_Nm for truth in truths]),
+        cohesion_Pa=mean([estimate.cohesion_Pa for estimate in estimates]),
+        true_cohesion_Pa=mean([truth.cohesion_Pa for truth in truths]),
+        friction_angle_rad=mean([estimate.friction_angle_rad for estimate in estimates]),
+        true_friction_angle_rad=mean([truth.friction_angle_rad for truth in truths]),
+        outside=float(np.mean([estimate.outside[:, wheel].any() for estimate in estimates])),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """What all wheels together came to believe while all were on one soil: the last of it."""
+
+    soil: str
+    belief: Belief
+    true_cohesion_Pa: float
+    true_friction_angle_rad: float
+
+
+def grounds(seen: list[tuple[Estimate, Truth]]) -> list[Ground]:
+    """Return the last belief on each soil that was under all six wheels, in the order driven."""
+    last: dict[str, Ground] = {}
+    for estimate, truth in seen:
+        if estimate.belief is not None and len(set(truth.soils)) == 1:
+            soil = truth.soils[0]
+            angle = float(truth.friction_angle_rad[0])
+            last[soil] = Ground(soil, estimate.belief, float(truth.cohesion_Pa[0]), angle)
+    return list(last.values())

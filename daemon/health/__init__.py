@@ -1,0 +1,1 @@
+"""Alarms, task liveness, stuck sensors, and systemd's notification protocol."""

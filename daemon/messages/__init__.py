@@ -1,0 +1,1 @@
+"""Every MQTT message and topic, their examples, and the documents made from them."""

@@ -1,0 +1,175 @@
+"""What is written down about the messages for those who read them, made from `daemon.messages.models`.
+
+`documents()` returns file name → text: a JSON Schema for each message, an AsyncAPI 3 document, and a table in Markdown.
+`regolithd schema --write docs/messages` puts them there; a test holds that they are fresh.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+from pydantic.json_schema import models_json_schema
+
+from regolithd.daemon.messages.examples import example
+from regolithd.daemon.messages.models import CHANNELS, SCHEMA_VERSION, QoS
+
+if TYPE_CHECKING:
+    from regolithd.daemon.messages.models import Channel
+
+_PARAMETERS = {
+    "wheel": {
+        "description": "1 to 6: odd left, even right; 1, 2 front, 3, 4 middle, 5, 6 rear.",
+        "enum": list("123456"),
+    },
+    "node_id": {"description": "The CANopen node-ID, 1 to 127."},
+    "name": {"description": "What the alarm is about."},
+    "rover": {"description": "[rover] name in rover.toml."},
+}
+_QOS_WORDS = {QoS.AT_MOST_ONCE: "0, at most once", QoS.AT_LEAST_ONCE: "1, acknowledged"}
+
+
+def _title(channel: Channel) -> str:
+    return channel.message.__name__
+
+
+def _summary(channel: Channel) -> str:
+    return (channel.message.__doc__ or "").strip().splitlines()[0]
+
+
+def json_schemas() -> dict[str, dict[str, Any]]:
+    """Return channel name → JSON Schema (2020-12) of its message."""
+    schemas = {}
+    for channel in CHANNELS:
+        schema = channel.message.model_json_schema(mode="serialization")
+        schemas[channel.name] = {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    return schemas
+
+
+def asyncapi() -> dict[str, Any]:
+    """Return the AsyncAPI 3.0 document: topics, qualities of service, messages."""
+    _, definitions = models_json_schema(
+        [(channel.message, "serialization") for channel in CHANNELS], ref_template="#/components/schemas/{model}"
+    )
+    return {
+        "asyncapi": "3.0.0",
+        "info": {
+            "title": "regolithd",
+            "version": f"{SCHEMA_VERSION}",
+            "description": "What the daemon publishes. It subscribes to nothing: nothing can be commanded over MQTT.",
+        },
+        "defaultContentType": "application/json",
+        "servers": {
+            "broker": {
+                "host": "localhost:1883",
+                "protocol": "mqtt",
+                "protocolVersion": "3.1.1",
+                "description": "[mqtt] host and port in rover.toml.",
+                "bindings": {"mqtt": _server_binding()},
+            }
+        },
+        "channels": {channel.name: _channel(channel) for channel in CHANNELS},
+        "operations": {f"publish-{channel.name}": _operation(channel) for channel in CHANNELS},
+        "components": {
+            "messages": {_title(channel): _message(channel) for channel in CHANNELS},
+            "schemas": definitions["$defs"],
+        },
+    }
+
+
+def _server_binding() -> dict[str, Any]:
+    will = {"topic": "regolith/{rover}/state", "qos": 1, "retain": True, "message": "offline, connection-lost"}
+    return {"clientId": "regolithd-regolith-{rover}", "cleanSession": True, "keepAlive": 10, "lastWill": will}
+
+
+def _channel(channel: Channel) -> dict[str, Any]:
+    names = ["rover", *re.findall(r"\{(\w+)\}", channel.address)]
+    return {
+        "address": f"regolith/{{rover}}/{channel.address}",
+        "description": f"{_summary(channel)} Published {channel.when}.",
+        "parameters": {name: _PARAMETERS[name] for name in names},
+        "messages": {_title(channel): {"$ref": f"#/components/messages/{_title(channel)}"}},
+    }
+
+
+def _operation(channel: Channel) -> dict[str, Any]:
+    return {
+        "action": "send",
+        "channel": {"$ref": f"#/channels/{channel.name}"},
+        "summary": _summary(channel),
+        "messages": [{"$ref": f"#/channels/{channel.name}/messages/{_title(channel)}"}],
+        "bindings": {"mqtt": {"qos": int(channel.qos), "retain": channel.retain}},
+    }
+
+
+def _message(channel: Channel) -> dict[str, Any]:
+    return {
+        "name": channel.name,
+        "title": _title(channel),
+        "summary": _summary(channel),
+        "payload": {"$ref": f"#/components/schemas/{_title(channel)}"},
+        "examples": [{"payload": example(channel)}],
+    }
+
+
+def table() -> str:
+    """Return the message table in Markdown."""
+    rows = [
+        "| topic `regolith/<rover>/…` | what | when | QoS | retained | broker away |",
+        "|---|---|---|---|---|---|",
+    ]
+    for channel in CHANNELS:
+        away = "kept, sent late" if channel.stored else "the current one at birth" if channel.retain else "not sent"
+        rows.append(
+            f"| [`{channel.address.replace('{', '<').replace('}', '>')}`]({channel.name}.schema.json) "
+            f"| {_summary(channel)} | {channel.when} | {_QOS_WORDS[channel.qos]} "
+            f"| {'yes' if channel.retain else 'no'} | {away} |"
+        )
+    return "\n".join(rows)
+
+
+def _readme() -> str:
+    return f"""\
+# Messages
+
+Made from `daemon/messages/models.py` by `regolithd schema --write docs/messages`; do not edit. The same as an AsyncAPI 3
+document: [asyncapi.json](asyncapi.json).
+
+{table()}
+
+Every message is one JSON object and begins with `schema_version`, `late`, `session`, `sequence` and `time`. Names end
+in their unit; `null` means that it was not measured or could not be estimated. Lists of six belong to wheels 1 to 6.
+
+- `session` is one run of the daemon; `(session, sequence)` is unique on a topic. A message with `late: true` comes from
+  the store, after the broker had been away, and may repeat one that was received before: compare the two.
+- `state` is `online` from birth to death. An `offline` ends the `online` of the same `session` and `sequence`, and no
+  other. While `state` is `offline`, every retained message tells of the past.
+- `snapshot` is complete and in order; `wheel/…` shows the newest without waiting, and is not kept
+  while the broker is away.
+
+## Examples
+
+{_example_lines()}
+"""
+
+
+def _example_lines() -> str:
+    """Return an example of each message, in the order of the table."""
+    parts = []
+    for channel in CHANNELS:
+        text = json.dumps(example(channel), ensure_ascii=False)
+        wrapped = textwrap.fill(text, 118, break_long_words=False, break_on_hyphens=False)
+        parts.append(f"### {channel.name}\n\n```json\n{wrapped}\n```")
+    return "\n\n".join(parts)
+
+
+def documents() -> dict[str, str]:
+    """Return file name → text of everything in docs/messages."""
+    files = {f"{name}.schema.json": _json(schema) for name, schema in json_schemas().items()}
+    return files | {"asyncapi.json": _json(asyncapi()), "README.md": _readme()}
+
+
+def _json(document: dict[str, Any]) -> str:
+    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"

@@ -1,0 +1,89 @@
+"""torque ▸ smooth ▸ slip ▸ estimate ▸ believe: from one snapshot to one estimate.
+
+The stages are the modules of those names; this one only joins them. Everything depends on the snapshots that came
+before and on nothing else, so a replay gives the same numbers to the last bit.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from regolithd.calibration.drivetrain.torque import wheel_torque
+from regolithd.daemon.pipeline.posterior import belief_stage
+from regolithd.daemon.pipeline.slip import choose_slip, wheel_slip
+from regolithd.daemon.pipeline.smooth import Smoother
+from regolithd.daemon.pipeline.snapshot import WHEELS, Estimate
+
+if TYPE_CHECKING:
+    from regolithd.daemon.config.configuration import Configuration
+    from regolithd.daemon.pipeline.snapshot import Array, Snapshot
+    from regolithd.daemon.pipeline.terrain_network import Network
+
+
+class Pipeline:
+    """The stages after acquisition, for one rover."""
+
+    def __init__(self, configuration: Configuration, network: Network) -> None:
+        self._drivetrain = configuration.drivetrain
+        self._load_zero_N = np.array(configuration.load_cells.zero_N)
+        self._load_span = np.array(configuration.load_cells.span)
+        self._radius_m = configuration.wheel.radius_m
+        self._slip = configuration.slip
+        self._network = network
+        smoothing = configuration.smoothing
+        rate = configuration.sync.rate_Hz
+        self._smoother = Smoother(rate, smoothing.window_s, smoothing.threshold, smoothing.time_constant_s)
+        self._direction = np.zeros(WHEELS)
+        self._belief = belief_stage(configuration)
+
+    def step(self, snapshot: Snapshot) -> Estimate:
+        """Return what the stages make of the next snapshot."""
+        speed = snapshot.motor_speed_rad_s / self._drivetrain.ratio
+        direction = np.where(np.abs(speed) < self._slip.standstill_rad_s, 0.0, np.sign(speed))  # NaN stays NaN
+        self._forget_reversed(direction)
+        torque = wheel_torque(snapshot.motor_current_A, snapshot.motor_speed_rad_s, self._drivetrain)
+        turning = np.abs(direction) == 1
+        measured = wheel_slip(speed, snapshot.ground_speed_m_s, self._radius_m, turning)
+        load = self._load_span * (snapshot.load_N - self._load_zero_N)
+        driving = np.where(turning, torque * direction, np.nan)
+        smoothed = self._smoother.step(snapshot.time_ns, driving, load, measured)
+        slip, source = choose_slip(smoothed.slip, self._slip.constant, turning)
+        raw_slip, sources = choose_slip(measured, self._slip.constant, turning)
+        belief, alarm = None, None
+        if self._belief:
+            belief, alarm = self._belief.step(snapshot.time_ns, load, raw_slip, driving, sources)
+        terrain = self._network.estimate(self._inputs(smoothed.torque, smoothed.load, slip, np.abs(speed)))
+        return Estimate(
+            snapshot=snapshot,
+            wheel_torque_Nm=torque,
+            smoothed_torque_Nm=smoothed.torque * direction,
+            smoothed_load_N=smoothed.load,
+            slip=slip,
+            slip_source=source,
+            cohesion_Pa=terrain.cohesion_Pa,
+            friction_angle_rad=terrain.friction_angle_rad,
+            valid=np.isfinite(terrain.cohesion_Pa) & np.isfinite(terrain.friction_angle_rad),
+            input_names=self._network.input_names,
+            outside=terrain.outside,
+            model_version=self._network.card.version,
+            belief=belief,
+            soil_change=alarm,
+        )
+
+    def _forget_reversed(self, direction: Array) -> None:
+        """Begin anew for a wheel that stopped or turned round: what it felt before says nothing about now."""
+        known = ~np.isnan(direction)
+        if (changed := known & (direction != self._direction)).any():
+            self._smoother.reset(changed)
+            self._direction = np.where(known, direction, self._direction)
+
+    def _inputs(self, driving_torque_Nm: Array, load_N: Array, slip: Array, speed: Array) -> dict[str, Array]:
+        return {
+            "load_N": load_N,
+            "slip": slip,
+            "motor_current_A": driving_torque_Nm / self._network.card.gain_Nm_per_A,
+            "wheel_torque_Nm": driving_torque_Nm,
+            "wheel_speed_rad_s": speed,
+        }

@@ -1,0 +1,119 @@
+"""The last stage: how sure the rover can be of the ground under it, from the last seconds of all six wheels.
+
+The terrain network before it is the paper's: a point for each wheel and instant, mostly its training prior. This one
+(`calibration.posterior.estimator`) gives intervals, twice a second. It says nothing while the drivetrain has not been calibrated:
+an unknown no-load current would be taken for soil.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from regolithd.calibration.models import POSTERIOR_MODEL
+from regolithd.calibration.posterior.estimator import Belief, Buffer, Estimator, PosteriorError
+from regolithd.calibration.posterior.window import INTERVAL_S, LONGEST, Knowledge, USUAL_TORQUE_Nm
+from regolithd.daemon.pipeline.snapshot import ChangeOfSoil, SlipSource
+from regolithd.daemon.pipeline.soil_change import SoilChange
+
+if TYPE_CHECKING:
+    from regolithd.calibration.parameters import Drivetrain
+    from regolithd.daemon.config.configuration import Configuration
+    from regolithd.daemon.pipeline.snapshot import Array
+
+SLIP_STD_MEASURED = 0.005
+SLIP_STD_GUESSED = 0.03
+RADIUS_WITHIN = 0.02
+"""Relative: a wheel that differs by more from the one that the posterior was trained for needs its own."""
+
+HISTORY = 400
+"""Half seconds that are kept to compare before and after a change."""
+
+
+class BeliefStage:
+    """Collects half-second means and asks the posterior; no clock but the snapshots'."""
+
+    def __init__(self, estimator: Estimator, configuration: Configuration) -> None:
+        settings, drivetrain = configuration.posterior, configuration.drivetrain
+        self._estimator = estimator
+        self._buffer = Buffer(settings.window_s)
+        self._gain_std = gain_doubt(drivetrain)
+        self._no_load_std_A = float(np.mean(drivetrain.no_load_current_std_A))
+        self._no_load_A = float(np.mean(drivetrain.no_load_current_A))
+        self._soil = settings.soil
+        self._history: deque[Array] = deque(maxlen=HISTORY)
+        self._change = SoilChange(configuration) if configuration.change.enabled else None
+
+    def step(
+        self, time_ns: int, load_N: Array, slip: Array, driving_torque_Nm: Array, sources: tuple[SlipSource, ...]
+    ) -> tuple[Belief | None, ChangeOfSoil | None]:
+        """Return a belief when a half second has closed, and an alarm when the soil has changed.
+
+        Arrays have shape (6,), unsmoothed, NaN where a wheel stands.
+        """
+        if not self._buffer.add(time_ns, load_N, slip, driving_torque_Nm):
+            return None, None
+        window = self._buffer.window()
+        if not window.size:
+            return None, None
+        knowledge = self._knowledge(sources)
+        return self._estimator.believe(window, knowledge), self._watch(time_ns, window[:, -1], knowledge)
+
+    def _watch(self, time_ns: int, means: Array, knowledge: Knowledge) -> ChangeOfSoil | None:
+        """Return the alarm, if any, with how likely each quantity fell between before its onset and since."""
+        if self._change is None:
+            return None
+        self._history.append(means)
+        alarm = self._change.step(time_ns, *means)
+        if alarm is None:
+            return None
+        past = np.stack(self._history, axis=1)
+        since = max(1, round((alarm.time_ns - alarm.onset_ns) / (INTERVAL_S * 1e9)))
+        before, after = past[:, :-since][:, -LONGEST:], past[:, -since:][:, -LONGEST:]
+        fall = self._estimator.fall(before, after, knowledge) if before.size else None
+        return ChangeOfSoil(alarm, fall)
+
+    def _knowledge(self, sources: tuple[SlipSource, ...]) -> Knowledge:
+        guessed = SlipSource.CONFIGURED in sources
+        return Knowledge(
+            gain_relative_std=self._gain_std,
+            no_load_current_std_A=self._no_load_std_A,
+            slip_std=SLIP_STD_GUESSED if guessed else SLIP_STD_MEASURED,
+            no_load_current_A=self._no_load_A,
+            soil=self._soil,
+        )
+
+
+def gain_doubt(drivetrain: Drivetrain) -> float:
+    """Return how well the gain is known at a usual torque, relative: from the brake where a wheel had one, mean of all.
+
+    A brake measures the whole gain, so that how well Eq. 11's constants are known no longer counts at its wheels.
+    """
+    factor, std = np.array(drivetrain.gain_factor), np.array(drivetrain.gain_factor_std)
+    braked = np.hypot(std / factor, USUAL_TORQUE_Nm * np.array(drivetrain.load_loss_std_per_Nm))
+    return float(np.mean(np.where(braked > 0, braked, drivetrain.gain_relative_std)))
+
+
+def belief_stage(configuration: Configuration) -> BeliefStage | None:
+    """Return the stage, or None where it is switched off or the drivetrain's no-load current is not known.
+
+    Raises
+    ------
+    NetworkError
+        The posterior network cannot be used, or (`PosteriorError`) was trained for another wheel.
+    """
+    settings, drivetrain = configuration.posterior, configuration.drivetrain
+    if not settings.enabled or not any(drivetrain.no_load_current_A):
+        return None
+    path = settings.model or Path(POSTERIOR_MODEL)
+    estimator = Estimator(path)
+    radius_m = configuration.wheel.radius_m
+    if abs(radius_m / estimator.radius_m - 1) > RADIUS_WITHIN:
+        raise PosteriorError(
+            f"{path}: trained for wheels of {estimator.radius_m} m radius, not {radius_m} m. "
+            "Train one for this rover (`regolithd train-posterior`), or set [posterior] enabled = false."
+        )
+    return BeliefStage(estimator, configuration)

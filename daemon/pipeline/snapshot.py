@@ -1,0 +1,187 @@
+"""One SYNC, one `Snapshot`; and what the stages make of it, one `Estimate`.
+
+All arrays are float64 (or bool for masks) of shape (6,), read-only, SI; wheel k of the paper is index k − 1. NaN means
+"not measured": a value that did not arrive is never repeated and never invented.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.drivers.signals import Quantity
+
+if TYPE_CHECKING:
+    from regolithd.calibration.posterior.change_detection import Alarm
+    from regolithd.calibration.posterior.estimator import Belief, Fall
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+WHEELS = 6
+QUANTITIES = tuple(Quantity)
+ROW = {quantity: row for row, quantity in enumerate(QUANTITIES)}
+NEEDED = (Quantity.MOTOR_CURRENT, Quantity.MOTOR_SPEED, Quantity.LOAD)
+"""Without these three, nothing can be said about a wheel."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Snapshot:
+    """What was measured at one SYNC.
+
+    Attributes
+    ----------
+    sequence
+        Counts the SYNCs since the daemon's start (or the log's), from 0.
+    time_ns
+        The SYNC's kernel time, CLOCK_REALTIME.
+    values
+        Shape (10, 6): one row for each `Quantity` in its order of declaration. What one node measures for the whole
+        body stands in all six columns.
+    """
+
+    sequence: int
+    time_ns: int
+    values: Array
+
+    def __getitem__(self, quantity: Quantity) -> Array:
+        """Return one quantity, shape (6,)."""
+        return self.values[ROW[quantity]]
+
+    @property
+    def motor_current_A(self) -> Array:
+        """Motor current, signed [A]."""
+        return self.values[0]
+
+    @property
+    def motor_speed_rad_s(self) -> Array:
+        """Motor speed before the gears, signed [rad/s]."""
+        return self.values[1]
+
+    @property
+    def load_N(self) -> Array:
+        """Load on the wheel [N]."""
+        return self.values[2]
+
+    @property
+    def ground_speed_m_s(self) -> Array:
+        """Speed of the hub over ground [m/s]."""
+        return self.values[3]
+
+    @property
+    def pitch_rad(self) -> Array:
+        """Pitch of the body, positive nose up [rad]."""
+        return self.values[4]
+
+    @property
+    def roll_rad(self) -> Array:
+        """Roll of the body, positive right side down [rad]."""
+        return self.values[5]
+
+    @property
+    def yaw_rate_rad_s(self) -> Array:
+        """Yaw rate of the body, positive to the left [rad/s]."""
+        return self.values[6]
+
+    @property
+    def motor_temperature_degC(self) -> Array:
+        """Temperature of the motor [°C]."""
+        return self.values[7]
+
+    @property
+    def bus_voltage_V(self) -> Array:
+        """Supply voltage at the motor controller [V]."""
+        return self.values[8]
+
+    @property
+    def statusword(self) -> Array:
+        """Statusword of the motor controller (0x6041), as a number."""
+        return self.values[9]
+
+    @property
+    def valid(self) -> Mask:
+        """Where current, speed and load all arrived in this SYNC's window."""
+        needed: Mask = np.isfinite(self.values[: len(NEEDED)])
+        return np.logical_and.reduce(needed, axis=0)
+
+
+@dataclass(frozen=True, slots=True)
+class AcquisitionCounters:
+    """What became of the readings, since the start. Taken together they account for every one."""
+
+    snapshots: int = 0
+    accepted: int = 0  # readings that went into a snapshot
+    late: int = 0  # readings that came before the first SYNC, after their snapshot had been closed, or in doubt
+    duplicate: int = 0  # a second reading of the same PDO in one window; the first is kept
+    unexpected: int = 0  # readings from nodes that the configuration does not know
+    missing: int = 0  # PDOs that were expected in a window and did not come, or not in time
+
+
+class SlipSource(StrEnum):
+    """Where a slip comes from."""
+
+    MEASURED = "ground-speed"
+    CONFIGURED = "configured"
+    NONE = "none"  # the wheel stands still: there is no slip to speak of
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeOfSoil:
+    """An alarm, and how likely it is that each quantity fell; `fall` is None where too little was measured before."""
+
+    alarm: Alarm
+    fall: Fall | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """What the stages made of one snapshot: the last thing before it is recorded and published.
+
+    Attributes
+    ----------
+    snapshot
+        What was measured.
+    wheel_torque_Nm
+        Torque at the wheel by Eq. 11, unsmoothed; positive where it drives forward.
+    smoothed_torque_Nm, smoothed_load_N
+        The same, and the load, after the filter that removes momentary drops.
+    slip
+        i = 1 − V/(r ω); NaN while the wheel stands still. `slip_source` says where it comes from, for each wheel.
+    cohesion_Pa, friction_angle_rad
+        The network's estimate; NaN where `valid` is false.
+    valid
+        Where an estimate could be made.
+    input_names
+        The network's inputs, as its model card names them.
+    outside
+        Shape (inputs, 6): where an input lies outside the range that the network was trained on.
+    model_version
+        The network's version.
+    belief
+        What the last seconds of all wheels say about the ground, as intervals; where a half second has just ended.
+    soil_change
+        The alarm that the soil has changed, where it has just been noticed.
+    """
+
+    snapshot: Snapshot
+    wheel_torque_Nm: Array
+    smoothed_torque_Nm: Array
+    smoothed_load_N: Array
+    slip: Array
+    slip_source: tuple[SlipSource, ...]
+    cohesion_Pa: Array
+    friction_angle_rad: Array
+    valid: Mask
+    input_names: tuple[str, ...]
+    outside: Mask
+    model_version: str
+    belief: Belief | None = None
+    soil_change: ChangeOfSoil | None = None
+
+    def outside_inputs(self, wheel: int) -> tuple[str, ...]:
+        """Return the names of the inputs of one wheel (0–5) that lie outside the training range."""
+        return tuple(name for name, out in zip(self.input_names, self.outside[:, wheel], strict=True) if out)

@@ -1,0 +1,104 @@
+"""The terrain network: an ONNX model with a card (`calibration.models.card`), run for six wheels in one batch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from regolithd.calibration.models.card import ModelCard, ModelCardError, read_card
+from regolithd.calibration.models.onnx_session import NetworkError, open_session
+from regolithd.daemon.pipeline.snapshot import WHEELS, Array, Mask
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import onnxruntime
+
+"""The network that comes with regolithd."""
+
+
+CURE = "Train one (`regolithd train`), or mend [estimator] model."
+
+
+class ModelError(NetworkError):
+    """A file's network is not a terrain network as the daemon needs it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Terrain:
+    """The network's answer for six wheels: NaN where an input was missing. `outside` has shape (inputs, 6)."""
+
+    cohesion_Pa: Array
+    friction_angle_rad: Array
+    outside: Mask
+
+
+class Network:
+    """A terrain network, ready to run."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._session = open_session(path, CURE)
+        self.card = _card(path, self._session)
+        self._low = np.array([[variable.low] for variable in self.card.inputs])
+        self._high = np.array([[variable.high] for variable in self.card.inputs])
+        self._name = self._session.get_inputs()[0].name
+        self._try()
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Return what the network takes, in its order."""
+        return tuple(variable.name for variable in self.card.inputs)
+
+    def estimate(self, known: Mapping[str, Array]) -> Terrain:
+        """Return the terrain under six wheels; `known` has an array of shape (6,) for each of `input_names`."""
+        inputs = np.stack([known[name] for name in self.input_names])
+        answer = self._run(inputs)
+        missing = np.isnan(inputs).any(axis=0)
+        cohesion, tangent = np.where(missing, np.nan, answer)
+        with np.errstate(invalid="ignore"):
+            outside = (inputs < self._low) | (inputs > self._high)
+        return Terrain(cohesion, np.arctan(tangent), outside)
+
+    def _run(self, inputs: Array) -> Array:
+        batch = np.ascontiguousarray(np.nan_to_num(inputs).T, dtype=np.float32)
+        (answer,) = self._session.run(None, {self._name: batch})
+        return np.asarray(answer, np.float64).T
+
+    def _try(self) -> None:
+        """Run it once: whatever does not fit shows now, and not on the way."""
+        middle = np.repeat((self._low + self._high) / 2, WHEELS, axis=1)
+        try:
+            answer = self._run(middle)
+        except Exception as error:  # onnxruntime's errors have no common class
+            raise ModelError(f"{self.path}: does not run on a batch of six: {error}") from error
+        if not np.isfinite(answer).all():
+            raise ModelError(f"{self.path}: gives no finite numbers in the middle of its own training range")
+
+
+def _card(path: Path, session: onnxruntime.InferenceSession) -> ModelCard:
+    try:
+        card = read_card(session.get_modelmeta().custom_metadata_map)
+    except ModelCardError as error:
+        raise ModelError(f"{path}: its metadata do not fit: {error}. Train it with `regolithd train`.") from error
+    wrong = [
+        f"its {what} has shape {tensors[0].shape} and type {tensors[0].type}, expected (N, {len(variables)}) of floats"
+        for what, tensors, variables in (
+            ("input", session.get_inputs(), card.inputs),
+            ("output", session.get_outputs(), card.outputs),
+        )
+        if len(tensors) != 1 or not _fits(tensors[0], len(variables))
+    ]
+    if wrong:
+        raise ModelError(f"{path}: {'; '.join(wrong)}. Its metadata and its layers disagree: train it anew.")
+    return card
+
+
+def _fits(tensor: onnxruntime.NodeArg, columns: int) -> bool:
+    if tensor.type != "tensor(float)" or len(tensor.shape) != 2:
+        return False
+    rows, width = tensor.shape
+    return width == columns and (rows == WHEELS or not isinstance(rows, int))  # a free axis has a name, or None

@@ -1,0 +1,259 @@
+"""What the service tells its publisher: estimates and events as they come, and once a second how everything is."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+import resource
+import shutil
+import time
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from regolithd.daemon.health.alarms import Alarm, Facts, current_alarms, known_names
+from regolithd.daemon.health.stuck_sensor import StuckWatch
+from regolithd.daemon.messages.models import (
+    AcquisitionReport,
+    AlarmMessage,
+    BeliefMessage,
+    EmergencyMessage,
+    EventMessage,
+    HealthMessage,
+    IdentityReport,
+    NodeMessage,
+    RecordingReport,
+    Severity,
+    SyncReport,
+    iso_time,
+)
+from regolithd.daemon.pipeline.soil_change import change_text
+from regolithd.drivers.can.bus import BusState
+from regolithd.drivers.canopen.emcy import register_bits
+from regolithd.drivers.master.events import NodeEmergency
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from regolithd.daemon.pipeline.snapshot import Estimate
+    from regolithd.daemon.publish.publisher import Publisher
+    from regolithd.daemon.service import Service
+    from regolithd.drivers.master.events import NetworkEvent
+    from regolithd.drivers.master.status import NodeStatus
+
+HEALTH_EVERY_S = 1.0
+JUMP_NS = 500_000_000
+"""A clock that is off by this much against the monotonic one has been set, not slewed."""
+JUMP_SHOWN_S = 60.0
+SOIL_CHANGE_SHOWN_S = 120.0
+PUBLISHING = "publishing"
+PATIENCE_S = 10.0
+_PAGE_MB = resource.getpagesize() / 1e6
+
+
+class MqttOutlet:
+    """An outlet of the service, over MQTT.
+
+    Parameters
+    ----------
+    service
+        Whose state is told.
+    publisher
+        Who tells it.
+    control_trouble
+        Returns why no commands can be taken, or nothing.
+    """
+
+    def __init__(
+        self, service: Service, publisher: Publisher, *, control_trouble: Callable[[], str] = lambda: ""
+    ) -> None:
+        self.publisher = publisher
+        self._service = service
+        self._control_trouble = control_trouble
+        self._started_ns = time.monotonic_ns()
+        self._told_nodes: dict[int, tuple[object, ...]] = {}
+        self._told_alarms: dict[str, Alarm | None] = {}
+        self._offset_ns = time.time_ns() - time.monotonic_ns()
+        self._jump_s = 0.0
+        self._jump_until_ns = 0
+        self._soil_change = ""
+        self._soil_change_until_ns = 0
+        self._stuck = StuckWatch()
+
+    def estimate(self, estimate: Estimate) -> None:
+        """Publish one SYNC."""
+        self._stuck.step(estimate.snapshot)
+        self.publisher.estimate(estimate)
+        if estimate.soil_change is not None:
+            self._soil_change = change_text(estimate.soil_change)
+            self._soil_change_until_ns = time.monotonic_ns() + int(SOIL_CHANGE_SHOWN_S * 1e9)
+            say = self.publisher.say
+            time_ns = estimate.snapshot.time_ns
+            say("event", EventMessage, time_ns=time_ns, kind="soil-change", node_id=None, text=self._soil_change)
+        if estimate.belief is not None:
+            self.publisher.say("belief", BeliefMessage, time_ns=estimate.snapshot.time_ns, **asdict(estimate.belief))
+
+    def event(self, event: NetworkEvent) -> None:
+        """Publish what happened, and soon after, when its consequences have been drawn, how the nodes are."""
+        say = self.publisher.say
+        say("event", EventMessage, time_ns=event.time_ns, **event_fields(event))
+        if isinstance(event, NodeEmergency):
+            say("emcy", EmergencyMessage, time_ns=event.time_ns, **self._emergency_fields(event))
+        asyncio.get_running_loop().call_soon(self._tell_changes)
+
+    async def run(self) -> None:
+        """Deliver until cancelled, and tell health meanwhile."""
+        self._service.pulses.expect(PUBLISHING, PATIENCE_S)
+        async with asyncio.TaskGroup() as tasks:
+            telling = tasks.create_task(self._tell())
+            try:
+                await self.publisher.run()
+            finally:
+                telling.cancel()
+
+    async def _tell(self) -> None:
+        while True:
+            self._watch_clock()
+            self._tell_changes()
+            self.publisher.say("health", HealthMessage, **self._health())
+            await asyncio.sleep(HEALTH_EVERY_S)
+
+    def _tell_changes(self) -> None:
+        """Publish each node and each alarm that is not as it was told last."""
+        network = self._service.network
+        for node_id, status in (network.status if network is not None else {}).items():
+            fields = node_fields(status)
+            told = tuple(value for name, value in fields.items() if name != "heard")
+            if self._told_nodes.get(node_id) != told:
+                self._told_nodes[node_id] = told
+                self.publisher.say(f"node/{node_id}", NodeMessage, **fields)
+        active = current_alarms(self._facts())
+        for name in known_names(node.node_id for node in self._service.configuration.nodes.described()):
+            alarm = active.get(name)
+            if name not in self._told_alarms or self._told_alarms[name] != alarm:
+                self._tell_alarm(name, alarm)
+
+    def _tell_alarm(self, name: str, alarm: Alarm | None) -> None:
+        """Tell an alarm; once at the start also that there is none, as the broker may hold that of an earlier run."""
+        self._told_alarms[name] = alarm
+        now = time.time_ns()
+        fields = asdict(alarm or Alarm(name, Severity.WARNING, "", ""))
+        fields |= {"active": alarm is not None, "since": iso_time(now)}
+        self.publisher.say(f"alarm/{name}", AlarmMessage, time_ns=now, **fields)
+
+    def _watch_clock(self) -> None:
+        now = time.monotonic_ns()
+        offset = time.time_ns() - now
+        if abs(offset - self._offset_ns) > JUMP_NS:
+            self._jump_s = (offset - self._offset_ns) / 1e9
+            self._jump_until_ns = now + int(JUMP_SHOWN_S * 1e9)
+        elif now > self._jump_until_ns:
+            self._jump_s = 0.0
+        self._offset_ns = offset
+
+    def _facts(self) -> Facts:
+        service = self._service
+        network, recorder, report = service.network, service.recorder, self.publisher.report
+        return Facts(
+            nodes=network.status if network is not None else {},
+            bus_trouble=service.bus_trouble,
+            bus_state=network.bus.state if network is not None else BusState.ACTIVE,
+            kernel_drops=network.bus.counters.kernel_drops if network is not None else 0,
+            store_dropped=report.dropped,
+            store_unstored=report.unstored,
+            recording_trouble=(recorder.trouble or "") if recorder is not None else "",
+            control_trouble=self._control_trouble(),
+            clock_jump_s=self._jump_s,
+            soil_change=self._soil_change if time.monotonic_ns() < self._soil_change_until_ns else "",
+            stuck=self._stuck.stuck,
+        )
+
+    def _health(self) -> dict[str, Any]:
+        service = self._service
+        network = service.network
+        return {
+            "uptime_s": (time.monotonic_ns() - self._started_ns) / 1e9,
+            "cpu_s": time.process_time(),
+            "memory_MB": _resident_MB(),
+            "bus_state": service.bus_trouble or (network.bus.state.value if network is not None else None),
+            "bus": network.bus.counters.as_dict() if network is not None else {},
+            "sync": _sync_report(service),
+            "acquisition": AcquisitionReport(**asdict(service.chain.acquisition.counters)),
+            "publishing": self.publisher.report,
+            "recording": _recording_report(service),
+            "tasks": service.pulses.ages_s(),
+        }
+
+    def _emergency_fields(self, event: NodeEmergency) -> dict[str, Any]:
+        nodes = {node.node_id: node for node in self._service.configuration.nodes.described()}
+        node = nodes.get(event.node_id)
+        emergency = event.emergency
+        return {
+            "node_id": event.node_id,
+            "kind": node.kind if node else None,
+            "wheel": node.wheel + 1 if node and node.wheel is not None else None,
+            "code": f"0x{emergency.code:04X}",
+            "register_bits": register_bits(emergency.register),
+            "vendor_bytes": emergency.vendor.hex(),
+            "cleared": emergency.cleared,
+            "text": emergency.text,
+        }
+
+
+def event_fields(event: NetworkEvent) -> dict[str, Any]:
+    """Return the fields of an `event` message."""
+    kind = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", type(event).__name__).lower()
+    return {"kind": kind, "node_id": getattr(event, "node_id", None) or None, "text": event.text}
+
+
+def node_fields(status: NodeStatus) -> dict[str, Any]:
+    """Return the fields of a `node/…` message."""
+    node = status.node
+    identity = status.identity
+    return {
+        "node_id": node.node_id,
+        "kind": node.kind,
+        "wheel": None if node.wheel is None else node.wheel + 1,
+        "required": node.required,
+        "phase": status.phase,
+        "nmt_state": None if status.nmt_state is None else status.nmt_state.words,
+        "drive_state": None if status.drive_state is None else status.drive_state.value,
+        "heard": None if status.heard_ns is None else iso_time(status.heard_ns),
+        "identity": None if identity is None else IdentityReport(**asdict(identity)),
+        "reason": None if status.reason is None else status.reason.value,
+        "text": status.text,
+        "boots": status.boots,
+        "emergencies": status.emergencies,
+    }
+
+
+def _sync_report(service: Service) -> SyncReport | None:
+    if service.network is None:
+        return None
+    sync = service.network.counters.sync
+    return SyncReport(
+        produced=sync.produced,
+        skipped=sync.skipped,
+        failed=sync.failed,
+        worst_late_ms=sync.worst_late_ns / 1e6,
+        mean_late_ms=sync.mean_late_ns / 1e6,
+    )
+
+
+def _recording_report(service: Service) -> RecordingReport | None:
+    recorder = service.recorder
+    if recorder is None:
+        return None
+    paths = recorder.paths
+    try:
+        free = shutil.disk_usage(service.configuration.recording.directory).free / 1e6
+    except OSError:
+        free = None
+    return RecordingReport(file=str(paths[0]) if paths else None, free_MB=free, trouble=recorder.trouble)
+
+
+def _resident_MB() -> float:
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:  # noqa: PTH123  # once a second, as cheap as can be
+            return int(file.read().split()[1]) * _PAGE_MB
+    except OSError:
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3

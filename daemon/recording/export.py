@@ -1,0 +1,107 @@
+"""A recording as the long table of the comparison tool: one row per instant and wheel, blank where not measured."""
+
+from __future__ import annotations
+
+import csv
+from typing import IO, TYPE_CHECKING
+
+from regolithd.daemon.pipeline.snapshot import WHEELS
+from regolithd.daemon.recording.content import SNAPSHOT, snapshot_from_json
+from regolithd.daemon.recording.mcap_file import open_mcap, read_messages
+from regolithd.drivers.signals import Quantity
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+    from contextlib import AbstractContextManager
+    from pathlib import Path
+
+    from regolithd.daemon.pipeline.snapshot import Snapshot
+
+COLUMNS = (
+    Quantity.MOTOR_CURRENT,
+    Quantity.MOTOR_SPEED,
+    Quantity.LOAD,
+    Quantity.GROUND_SPEED,
+    Quantity.PITCH,
+    Quantity.ROLL,
+    Quantity.YAW_RATE,
+    Quantity.MOTOR_TEMPERATURE,
+    Quantity.BUS_VOLTAGE,
+)
+HEADER = ("t_s", "wheel", *(str(column) for column in COLUMNS))
+
+Row = tuple[float | int | None, ...]
+
+
+class ExportError(Exception):
+    """The table cannot be written; the message says why and what to do."""
+
+
+def recorded_snapshots(
+    recordings: Iterable[Path], opening: Callable[[Path], AbstractContextManager[IO[bytes]]] = open_mcap
+) -> Iterator[Snapshot]:
+    """Yield the snapshots of MCAP files, in their order."""
+    for recording in recordings:
+        for message in read_messages(recording, opening):
+            if message.topic == SNAPSHOT:
+                yield snapshot_from_json(message.content)
+
+
+def rows(snapshots: Iterable[Snapshot]) -> Iterator[Row]:
+    """Yield the rows: seconds from the first snapshot, wheel 1–6, then `COLUMNS`; None where not measured."""
+    start: int | None = None
+    for snapshot in snapshots:
+        start = snapshot.time_ns if start is None else start
+        t_s = (snapshot.time_ns - start) / 1e9
+        columns = [snapshot[quantity].tolist() for quantity in COLUMNS]
+        for wheel in range(WHEELS):
+            values = (column[wheel] for column in columns)
+            yield (t_s, wheel + 1, *(None if value != value else value for value in values))  # noqa: PLR0124  # NaN
+
+
+def export(
+    recordings: Iterable[Path],
+    out: Path,
+    opening: Callable[[Path], AbstractContextManager[IO[bytes]]] = open_mcap,
+) -> int:
+    """Write `out`, CSV or Parquet by its name; return the number of rows. `opening` may show how far it is.
+
+    Raises
+    ------
+    ExportError
+        It is neither, or nothing can write it.
+    """
+    table = rows(recorded_snapshots(recordings, opening))
+    if out.suffix == ".csv":
+        return _write_csv(table, out)
+    if out.suffix == ".parquet":
+        return _write_parquet(table, out)
+    raise ExportError(f"{out}: what is {out.suffix or 'no ending'}? Name it .csv or .parquet.")
+
+
+def _write_csv(table: Iterator[Row], out: Path) -> int:
+    count = 0
+    with out.open("w", newline="", encoding="ascii") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(HEADER)
+        for row in table:
+            writer.writerow(row)
+            count += 1
+    return count
+
+
+def _write_parquet(table: Iterator[Row], out: Path) -> int:
+    try:
+        import pyarrow as pa  # noqa: PLC0415  # the rover does not have it
+        import pyarrow.parquet as pq  # noqa: PLC0415  # likewise
+    except ImportError as error:
+        raise ExportError(
+            f"{out}: Parquet needs pyarrow, which the rover does not have. "
+            "`pip install 'regolithd[calibration]'`, or export to .csv."
+        ) from error
+    content = list(table)
+    types = [pa.float64(), pa.int8(), *[pa.float64()] * len(COLUMNS)]
+    columns = zip(*content, strict=True) if content else [()] * len(HEADER)
+    arrays = [pa.array(column, kind) for column, kind in zip(columns, types, strict=True)]
+    pq.write_table(pa.Table.from_arrays(arrays, names=list(HEADER)), str(out))
+    return len(content)

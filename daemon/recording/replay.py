@@ -1,0 +1,94 @@
+"""Replays logs and says whether the numbers are those of then."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import IO, TYPE_CHECKING, Any
+
+from regolithd.daemon.pipeline.chain import Chain, Digest
+from regolithd.daemon.recording.candump import open_log, read_log
+from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, estimate_json, snapshot_json
+from regolithd.daemon.recording.mcap_file import read_messages
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+    from contextlib import AbstractContextManager
+    from pathlib import Path
+
+    from regolithd.daemon.config.configuration import Configuration
+    from regolithd.daemon.pipeline.snapshot import AcquisitionCounters, Estimate
+    from regolithd.daemon.pipeline.terrain_network import Network
+    from regolithd.drivers.can.frame import Frame
+
+BATCH = 256
+"""Frames at a time; the numbers do not depend on it."""
+
+
+@dataclass(slots=True)
+class Replayed:
+    """What came of a replay. `compared` counts the recorded messages, `different` names those that are not the same."""
+
+    frames: int = 0
+    digest: Digest = field(default_factory=Digest)
+    counters: AcquisitionCounters | None = None
+    undecodable: dict[str, int] = field(default_factory=dict)
+    compared: int = 0
+    different: list[str] = field(default_factory=list)
+
+
+def replay_logs(
+    logs: Iterable[Path],
+    configuration: Configuration,
+    network: Network,
+    opening: Callable[[Path], AbstractContextManager[IO[str]]] = open_log,
+) -> Replayed:
+    """Feed the logs through the pipeline, in their order; compare with the recordings beside them, where there are any.
+
+    `opening` opens a log; it may show how far the reading is.
+    """
+    result = Replayed()
+    chain = Chain(configuration, network)
+    recorded: dict[tuple[str, int], dict[str, Any]] = {}
+    for log in logs:
+        recorded |= _recorded(log.with_suffix(".mcap"))
+        for batch in _batches(read_log(log, opening)):
+            result.frames += len(batch)
+            for estimate in chain.feed(batch):
+                result.digest.add(estimate)
+                _compare(estimate, recorded, result)
+    result.counters = chain.acquisition.counters
+    result.undecodable = {str(reason): count for reason, count in chain.decoder.undecodable.items()}
+    result.different += [f"{topic} {sequence} was recorded, and is not in the log" for topic, sequence in recorded]
+    return result
+
+
+def _recorded(mcap: Path) -> dict[tuple[str, int], dict[str, Any]]:
+    if not mcap.is_file():
+        return {}
+    return {
+        (message.topic, message.content["sequence"]): message.content
+        for message in read_messages(mcap)
+        if message.topic in {SNAPSHOT, ESTIMATE}
+    }
+
+
+def _compare(estimate: Estimate, recorded: dict[tuple[str, int], dict[str, Any]], result: Replayed) -> None:
+    for topic, made in ((SNAPSHOT, snapshot_json(estimate.snapshot)), (ESTIMATE, estimate_json(estimate))):
+        then = recorded.pop((topic, estimate.snapshot.sequence), None)
+        if then is None:
+            continue
+        result.compared += 1
+        now = json.loads(made)
+        if names := [name for name in then.keys() | now.keys() if then.get(name) != now.get(name)]:
+            result.different.append(f"{topic} {estimate.snapshot.sequence}: {', '.join(sorted(names))}")
+
+
+def _batches(frames: Iterator[Frame]) -> Iterator[list[Frame]]:
+    batch: list[Frame] = []
+    for frame in frames:
+        batch.append(frame)
+        if len(batch) == BATCH:
+            yield batch
+            batch = []
+    yield batch

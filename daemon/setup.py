@@ -1,0 +1,50 @@
+"""What a command does first: read the configuration, load the network – or say what is wrong; status 78."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NoReturn
+
+import typer
+
+from regolithd.calibration.models import TERRAIN_MODEL
+from regolithd.calibration.models.onnx_session import NetworkError
+from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.config.reader import EXIT_STATUS, ConfigurationError, read_configuration
+from regolithd.daemon.pipeline.posterior import belief_stage
+from regolithd.daemon.pipeline.terrain_network import Network
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def configuration_or_exit(path: Path | None) -> Configuration:
+    """Return the configuration of a file, or the defaults; end with all its problems where there are any."""
+    if path is None:
+        return Configuration()
+    try:
+        return read_configuration(path)
+    except ConfigurationError as error:
+        _end([str(problem) for problem in error.problems])
+
+
+def network_or_exit(configuration: Configuration) -> Network:
+    """Return the terrain network that the configuration names; end with what does not fit, the posterior's included."""
+    try:
+        belief_stage(configuration)  # not kept: the pipeline makes its own, but what does not fit shall show now
+        return Network(configuration.estimator.model or TERRAIN_MODEL)
+    except NetworkError as error:
+        _end([str(error)])
+
+
+def recorded_configuration(recording: Path) -> Configuration:
+    """Return the configuration that a recording was made with; the defaults where it holds none."""
+    from regolithd.daemon.recording.mcap_file import read_metadata  # noqa: PLC0415  # only few commands read recordings
+
+    content = read_metadata(recording).get("configuration") if recording.is_file() else None
+    return Configuration.model_validate_json(content) if content else Configuration()
+
+
+def _end(problems: list[str]) -> NoReturn:
+    for problem in problems:
+        typer.echo(problem, err=True)
+    raise typer.Exit(EXIT_STATUS)

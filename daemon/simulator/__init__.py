@@ -1,0 +1,1 @@
+"""The virtual rover's world: scenario, wheels on soil, sensor noise."""

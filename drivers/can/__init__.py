@@ -1,0 +1,1 @@
+"""The CAN bus: frames, SocketCAN and python-can buses, error frames, counters."""

@@ -1,0 +1,177 @@
+"""SocketCAN by its own socket: one asyncio reader that drains it, kernel times, error frames, and the drop counter.
+
+    CAN_RAW_RECV_OWN_MSGS   our own frames come back with the kernel's time (the SYNC's is the snapshot's)
+    CAN_RAW_ERR_FILTER      the controller's error frames come as well
+    SO_TIMESTAMPNS          kernel receive time, CLOCK_REALTIME in ns
+    SO_RXQ_OVFL             how many frames the kernel threw away because nobody read
+    SO_RCVBUF               as large as the kernel allows; SO_RCVBUFFORCE where we may
+
+The socket survives its link: down and up again is a state, and an adapter that is unplugged is waited for.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import socket
+import struct
+from typing import TYPE_CHECKING
+
+from regolithd.drivers.can.bus import Bus, BusState
+from regolithd.drivers.can.error_frame import error_classes, reported_state
+from regolithd.drivers.can.recvmmsg import BATCH, CAN_FRAME, SO_RXQ_OVFL, SO_TIMESTAMPNS, KernelBatch
+from regolithd.drivers.errors import BusDownError, BusFullError, BusOpenError
+
+if TYPE_CHECKING:
+    from regolithd.drivers.can.frame import Frame
+
+_EXTENDED = 0x80000000
+_REMOTE = 0x40000000
+_CAN_RAW_ERR_FILTER = 2  # linux/can/raw.h; Python's socket module has not it everywhere
+_ALL_ERRORS = 0x1FFFFFFF
+_SO_RCVBUFFORCE = 33
+_RECEIVE_BUFFER_BYTES = 4 << 20
+_ROUNDS = 8  # batches per wake-up, so that a flood does not starve the rest of the program
+_FULL = (errno.ENOBUFS, errno.EAGAIN)
+_GONE = (errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.ENETUNREACH)
+_RETRY_FIRST_S = 0.0005
+_RETRY_TOTAL_S = 0.1  # longer than any frame waits for a bus that works
+_REOPEN_S = 1.0
+
+
+class SocketCanBus(Bus):
+    """A SocketCAN link."""
+
+    def __init__(self, channel: str) -> None:
+        super().__init__("socketcan", channel)
+        self._loop = asyncio.get_running_loop()
+        self._batch = KernelBatch()
+        self._socket = _open_socket(channel)
+        self._reopening: asyncio.TimerHandle | None = None
+        self._loop.add_reader(self._socket, self._drain)
+
+    async def send(self, frame: Frame) -> None:
+        """See `Bus.send`."""
+        can_id = frame.can_id | (_EXTENDED if frame.extended else 0) | (_REMOTE if frame.remote else 0)
+        data = CAN_FRAME.pack(can_id, len(frame.data), frame.data)
+        wait_s, waited_s = _RETRY_FIRST_S, 0.0
+        while True:
+            try:
+                self._socket.send(data)
+            except OSError as error:
+                if error.errno not in _FULL:
+                    raise self._not_sent(error) from error
+                if waited_s >= _RETRY_TOTAL_S:
+                    self.counters.transmit_failures += 1
+                    raise BusFullError(
+                        f"{self.channel}: the transmit queue stayed full for {_RETRY_TOTAL_S:g} s",
+                        cure=f"Does any other node acknowledge? Then: ip link set {self.channel} txqueuelen 1000",
+                    ) from error
+                self.counters.transmit_retries += 1
+                await asyncio.sleep(wait_s)
+                waited_s += wait_s
+                wait_s *= 2.0
+            else:
+                self.counters.sent += 1
+                return
+
+    def close(self) -> None:
+        """Give the socket back."""
+        if self._reopening is not None:
+            self._reopening.cancel()
+        self._loop.remove_reader(self._socket)
+        self._socket.close()
+
+    def resume_reading(self) -> None:
+        """Read on after the consumer has caught up; what the kernel had to drop meanwhile it has counted."""
+        self._loop.add_reader(self._socket, self._drain)
+
+    def pause_reading(self) -> None:
+        """Leave frames to the kernel, which counts what it drops."""
+        self._loop.remove_reader(self._socket)
+
+    def _drain(self) -> None:
+        """Take what waits at the socket, batch by batch."""
+        try:
+            for _ in range(_ROUNDS):
+                frames = self._batch.receive(self._socket.fileno(), self.counters)
+                if frames:
+                    self._take(frames)
+                if len(frames) < BATCH:
+                    break
+        except OSError as error:
+            self._lost(error)
+
+    def _take(self, frames: list[Frame]) -> None:
+        for frame in frames:
+            if frame.error:
+                self._take_error(frame)
+            elif self.state is BusState.DOWN or (self.state is BusState.OFF and not frame.sent):
+                self.change_state(BusState.ACTIVE)
+        self.deliver(frames)
+
+    def _take_error(self, frame: Frame) -> None:
+        self.counters.errors.update(error_classes(frame))
+        state = reported_state(frame)
+        if state is not None:
+            self.change_state(state)
+
+    def _not_sent(self, error: OSError) -> BusDownError:
+        self.counters.transmit_failures += 1
+        if error.errno in _GONE:
+            self._lost(error)
+        return BusDownError(
+            f"{self.channel}: cannot send: {error.strerror}", cure=f"Bring it up: ip link set {self.channel} up"
+        )
+
+    def _lost(self, error: OSError) -> None:
+        """Note that the link is down; where the device itself is gone, look for it again."""
+        self.change_state(BusState.DOWN)
+        if error.errno in (errno.ENODEV, errno.ENXIO) and self._reopening is None:
+            self._loop.remove_reader(self._socket)
+            self._reopening = self._loop.call_later(_REOPEN_S, self._reopen)
+
+    def _reopen(self) -> None:
+        try:
+            fresh = _open_socket(self.channel)
+        except BusOpenError:
+            self._reopening = self._loop.call_later(_REOPEN_S, self._reopen)
+            return
+        self._reopening = None
+        self._socket.close()
+        self._socket = fresh
+        self._batch = KernelBatch()
+        self._loop.add_reader(fresh, self._drain)
+
+
+def _open_socket(channel: str) -> socket.socket:
+    try:
+        opened = socket.socket(socket.AF_CAN, socket.SOCK_RAW | socket.SOCK_NONBLOCK, socket.CAN_RAW)
+    except OSError as error:
+        raise BusOpenError(
+            f"this kernel has no SocketCAN: {error.strerror}",
+            cure="modprobe can_raw; or use another interface (`virtual` needs nothing)",
+        ) from error
+    try:
+        opened.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+        opened.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
+        opened.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, 1)
+        opened.setsockopt(socket.SOL_CAN_RAW, _CAN_RAW_ERR_FILTER, struct.pack("=I", _ALL_ERRORS))
+        _enlarge(opened)
+        opened.bind((channel,))
+    except OSError as error:
+        opened.close()
+        raise BusOpenError(
+            f"cannot open {channel}: {error.strerror}",
+            cure=f"`ip link show {channel}` must list it; a real one: ip link set {channel} up type can bitrate "
+            f"1000000 restart-ms 100; one for tests: ip link add dev {channel} type vcan && ip link set up {channel}",
+        ) from error
+    return opened
+
+
+def _enlarge(opened: socket.socket) -> None:
+    """Ask for a receive buffer of some thousand frames; the usual limit (net.core.rmem_max) gives a few hundred."""
+    try:
+        opened.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, _RECEIVE_BUFFER_BYTES)
+    except PermissionError:
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _RECEIVE_BUFFER_BYTES)

@@ -1,0 +1,1 @@
+"""Device profiles: what each kind of node measures and how it is configured."""

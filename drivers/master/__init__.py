@@ -1,0 +1,1 @@
+"""The CANopen master: boots, supervises and commands the nodes of one bus."""

@@ -1,0 +1,219 @@
+"""Booting a node: reset, identify, configure, start (the boot-slave process of CiA 302-2, for one master and no files).
+
+    NMT reset ─▶ boot-up ─▶ 0x1000, 0x1018 ─▶ each write, read back ─▶ heartbeat ─▶ NMT start ─▶ operational
+
+Each way to fail has a `BootReason` and a cure. Beside the letters of CiA 302-2:
+
+    B, C, D, M, N, O, J, K      the same, one reason each (see `BootReason`)
+    E, F                        no boot-up: every node is reset, so its state need not be asked for
+    A                           cannot be: only configured nodes are booted
+    G, H, I                     software download: not done here
+    L                           cannot be: the reset ends whatever the node was at
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from regolithd.drivers.canopen.nmt import NmtCommand, NmtState
+from regolithd.drivers.canopen.object_dictionary import object_dictionary
+from regolithd.drivers.errors import (
+    BootError,
+    BusError,
+    DictionaryError,
+    DriverError,
+    SdoAbortError,
+    SdoInterruptedError,
+    SdoProtocolError,
+    SdoTimeoutError,
+)
+from regolithd.drivers.master.boot_reason import BootReason
+from regolithd.drivers.master.configuration import Write, configuration
+from regolithd.drivers.master.events import Identity
+
+if TYPE_CHECKING:
+    from regolithd.drivers.master.remote_node import Link
+    from regolithd.drivers.signals import NodeDescription
+
+DEVICE_TYPE = 0x1000
+IDENTITY = 0x1018
+_MAJOR = 0xFFFF0000  # of a revision: the CANopen behaviour; the minor number may be newer
+_HEARTBEATS = 5  # how many may pass before the node must have said the state that was asked for
+
+
+@dataclass(frozen=True, slots=True)
+class BootSettings:
+    """What every node is booted with; times in seconds."""
+
+    heartbeat_s: float
+    master_id: int
+    master_lost_after_s: float
+    boot_up_timeout_s: float
+
+
+async def boot(link: Link, settings: BootSettings) -> Identity:
+    """Boot one node into operational and return who it is.
+
+    Raises
+    ------
+    BootError
+        With its reason; the node is left as it is, not operational.
+    """
+    try:
+        return await _Boot(link, settings).run()
+    except DictionaryError as error:
+        raise BootError(
+            BootReason.UNUSABLE_EDS,
+            error.what,
+            node_id=link.node.node_id,
+            index=error.index,
+            subindex=error.subindex,
+        ) from error
+    except BusError as error:
+        raise BootError(BootReason.BUS_DOWN, error.what, node_id=link.node.node_id) from error
+
+
+async def read_identity(link: Link) -> Identity:
+    """Return a node's device type (0x1000) and identity (0x1018); an optional entry that it has not is 0."""
+    device_type = await link.sdo.read_number(DEVICE_TYPE)
+    vendor = await link.sdo.read_number(IDENTITY, 1)
+    rest = []
+    for subindex in (2, 3, 4):
+        try:
+            rest.append(await link.sdo.read_number(IDENTITY, subindex))
+        except SdoAbortError:
+            rest.append(0)
+    return Identity(device_type, vendor, *rest)
+
+
+def compare_identity(node: NodeDescription, found: Identity) -> tuple[BootReason, str] | None:
+    """Return in what a node is not the one that its EDS and description say, or None."""
+    all_bits = 0xFFFFFFFF
+    checks = (
+        (BootReason.WRONG_DEVICE_TYPE, "device type", found.device_type, _expected(node, DEVICE_TYPE), all_bits),
+        (BootReason.WRONG_VENDOR, "vendor", found.vendor, _expected(node, IDENTITY, 1), all_bits),
+        (BootReason.WRONG_PRODUCT, "product code", found.product, _expected(node, IDENTITY, 2), all_bits),
+        (BootReason.WRONG_REVISION, "major revision", found.revision, _expected(node, IDENTITY, 3), _MAJOR),
+        (BootReason.WRONG_SERIAL, "serial number", found.serial, node.serial, all_bits),
+    )
+    for reason, name, value, wanted, mask in checks:
+        if wanted is not None and (value ^ wanted) & mask:
+            return reason, f"its {name} is 0x{value & mask:08X}, expected 0x{wanted & mask:08X} ({node.kind.value})"
+    return None
+
+
+def _expected(node: NodeDescription, index: int, subindex: int = 0) -> int | None:
+    """Return what the EDS says, or None where it says nothing."""
+    entry = object_dictionary(node.kind).get_variable(index, subindex)
+    return None if entry is None else entry.default
+
+
+class _Boot:
+    """One run through the process."""
+
+    def __init__(self, link: Link, settings: BootSettings) -> None:
+        self._link = link
+        self._settings = settings
+        self._boot_ups = link.boot_ups
+
+    async def run(self) -> Identity:
+        await self._reset()
+        try:
+            identity = await self._identify_restarted()
+            await self._configure()
+        except SdoInterruptedError as error:
+            raise self._error(BootReason.RESTARTED, "booted up again while it was being configured") from error
+        except SdoTimeoutError as error:
+            raise self._error(BootReason.FELL_SILENT, error.what, error) from error
+        except SdoProtocolError as error:
+            raise self._error(BootReason.MALFORMED_ANSWER, error.what, error) from error
+        await self._start()
+        return identity
+
+    async def _reset(self) -> None:
+        link, timeout_s = self._link, self._settings.boot_up_timeout_s
+        before = link.boot_ups
+        await link.tell(NmtCommand.RESET_NODE)
+        if not await link.news.until(lambda: link.boot_ups > before, timeout_s):
+            raise self._error(BootReason.NO_BOOT_UP, f"no boot-up message within {timeout_s:g} s of the NMT reset")
+        self._boot_ups = link.boot_ups
+
+    async def _identify_restarted(self) -> Identity:
+        """Identify the node; a boot-up meanwhile does no harm, as nothing has been written yet.
+
+        It happens when the node has just got its power: the boot-up that was taken for the reset's was of before.
+        """
+        try:
+            return await self._identify()
+        except SdoInterruptedError:
+            return await self._identify()
+        finally:
+            self._boot_ups = self._link.boot_ups
+
+    async def _identify(self) -> Identity:
+        try:
+            identity = await read_identity(self._link)
+        except SdoTimeoutError as error:
+            raise self._error(BootReason.NO_SDO_ANSWER, error.what, error) from error
+        except SdoAbortError as error:
+            raise self._error(BootReason.WRONG_DEVICE_TYPE, error.what, error) from error
+        difference = compare_identity(self._link.node, identity)
+        if difference is not None:
+            raise self._error(*difference)
+        return identity
+
+    async def _configure(self) -> None:
+        settings = self._settings
+        writes = configuration(
+            self._link.node,
+            heartbeat_s=settings.heartbeat_s,
+            master_id=settings.master_id,
+            master_lost_after_s=settings.master_lost_after_s,
+        )
+        for write in writes:
+            try:
+                await self._write(write)
+            except SdoAbortError as error:
+                raise self._error(BootReason.CONFIGURATION_REFUSED, error.what, error) from error
+            self._check_restart()
+
+    async def _write(self, write: Write) -> None:
+        sdo = self._link.sdo
+        index, subindex = write.index, write.subindex
+        look_first = write.keep or write.read_only
+        present = await sdo.read_number(index, subindex) if look_first else 0
+        if not write.read_only and not (look_first and present & write.mask == write.value & write.mask):
+            await sdo.write(index, subindex, write.data(present))
+            present = await sdo.read_number(index, subindex, signed=write.signed)
+        if present & write.mask != write.value & write.mask:
+            done = "must be" if write.read_only else "was set to"
+            what = f"{done} 0x{write.value:X}, and reads 0x{present & write.mask:X}"
+            raise BootError(
+                BootReason.CONFIGURATION_NOT_KEPT,
+                what,
+                node_id=self._link.node.node_id,
+                index=index,
+                subindex=subindex,
+            )
+
+    async def _start(self) -> None:
+        link = self._link
+        patience_s = _HEARTBEATS * self._settings.heartbeat_s
+        before = link.heard
+        if not await link.news.until(lambda: link.heard > before, patience_s):
+            raise self._error(BootReason.NO_HEARTBEAT, f"no heartbeat within {patience_s:g} s")
+        self._check_restart()
+        await link.tell(NmtCommand.START)
+        if not await link.news.until(lambda: link.state is NmtState.OPERATIONAL, patience_s):
+            self._check_restart()
+            said = link.state.words if link.state else "nothing"
+            raise self._error(BootReason.NOT_OPERATIONAL, f"still says {said} {patience_s:g} s after the NMT start")
+
+    def _check_restart(self) -> None:
+        if self._link.boot_ups != self._boot_ups:
+            raise self._error(BootReason.RESTARTED, "booted up again while it was being configured")
+
+    def _error(self, reason: BootReason, what: str, cause: DriverError | None = None) -> BootError:
+        place = cause or DriverError("")
+        return BootError(reason, what, node_id=self._link.node.node_id, index=place.index, subindex=place.subindex)

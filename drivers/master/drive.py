@@ -1,0 +1,150 @@
+"""One motor controller under command (CiA 402, profile velocity mode).
+
+States are changed by SDO, which is confirmed and does not wait for a SYNC; speeds and stops go by RPDO 1, one frame
+with the controlword and the target velocity, so that no drive ever sees one without the other.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from typing import TYPE_CHECKING
+
+from regolithd.drivers.can.frame import Frame
+from regolithd.drivers.canopen.pdo import rpdos
+from regolithd.drivers.devices.cia402 import (
+    PROFILE_VELOCITY,
+    Controlword,
+    DriveState,
+    enabling_step,
+    standing,
+    state_of,
+)
+from regolithd.drivers.errors import DriveError
+from regolithd.drivers.signals import NodeKind
+
+if TYPE_CHECKING:
+    from regolithd.drivers.can.bus import Bus
+    from regolithd.drivers.master.remote_node import Link
+
+CONTROLWORD = 0x6040
+STATUSWORD = 0x6041
+MODE_DISPLAY = 0x6061
+TARGET_VELOCITY = 0x60FF
+ERROR_CODE = 0x603F
+_RPM_PER_RAD_S = 60.0 / (2.0 * math.pi)
+_ENABLE_TIMEOUT_S = 3.0
+_STOP_TIMEOUT_S = 3.0
+_HEED_S = 0.2  # a drive that is still enabled this long after the quick stop has not got it
+_POLL_S = 0.02
+_STOPPED = (DriveState.SWITCH_ON_DISABLED, DriveState.READY, DriveState.SWITCHED_ON, DriveState.FAULT)
+
+
+class Drive:
+    """The master's end of one motor controller. `statusword` is the last that came, by TPDO or SDO."""
+
+    def __init__(self, bus: Bus, link: Link) -> None:
+        self.link = link
+        self.node_id = link.node.node_id
+        self.statusword: int | None = None
+        self.reported = DriveState.UNKNOWN  # as last told to whoever listens to changes
+        self._bus = bus
+        self._rpdo = rpdos(NodeKind.MOTOR)[0]
+
+    @property
+    def state(self) -> DriveState:
+        """Where the drive last said it is."""
+        return DriveState.UNKNOWN if self.statusword is None else state_of(self.statusword)
+
+    async def enable(self) -> None:
+        """Bring the drive to operation enabled with target velocity 0; a fault is reset first.
+
+        Raises
+        ------
+        DriveError
+            It does not get there in time.
+        SdoError, BusError
+            It could not be asked.
+        """
+        sdo = self.link.sdo
+        mode = await sdo.read_number(MODE_DISPLAY, signed=True)
+        if mode != PROFILE_VELOCITY:
+            raise self._error(f"is in mode {mode} instead of profile velocity mode (3)", "Boot the node again")
+        await sdo.write(TARGET_VELOCITY, 0, bytes(4))
+        deadline = asyncio.get_running_loop().time() + _ENABLE_TIMEOUT_S
+        last = Controlword.DISABLE_VOLTAGE
+        await self._write_controlword(last)  # bit 7 at 0: a fault reset after it is a rising edge
+        while await self.ask() is not DriveState.ENABLED:
+            word = enabling_step(self.state, last)
+            if word is not None:
+                await self._write_controlword(word)
+                last = word
+            if asyncio.get_running_loop().time() > deadline:
+                raise await self._not_enabled()
+            await asyncio.sleep(_POLL_S)
+
+    async def ask(self) -> DriveState:
+        """Read the statusword by SDO and return the state."""
+        self.statusword = await self.link.sdo.read_number(STATUSWORD)
+        return self.state
+
+    def take_statusword(self, statusword: int) -> DriveState:
+        """Take a statusword that came by TPDO, and return the state it says."""
+        self.statusword = statusword
+        self.reported = self.state
+        return self.reported
+
+    def forget(self) -> None:
+        """Forget the statusword of a drive that is no longer heard."""
+        self.statusword = None
+        self.reported = DriveState.UNKNOWN
+
+    async def turn(self, motor_speed_rad_s: float) -> None:
+        """Send the target velocity [rad/s at the motor, forward positive]; the drive must be in operation enabled."""
+        direction = -1 if self.link.node.mirrored else 1
+        await self._command(Controlword.ENABLE_OPERATION, direction * round(motor_speed_rad_s * _RPM_PER_RAD_S))
+
+    async def send_quick_stop(self) -> None:
+        """Send the quick stop and do not wait."""
+        await self._command(Controlword.QUICK_STOP, 0)
+
+    async def until_stopped(self) -> None:
+        """Wait until the drive has stopped after a quick stop; one that does not heed the PDO is told by SDO as well.
+
+        Raises
+        ------
+        DriveError
+            It has not, in time.
+        """
+        begun = asyncio.get_running_loop().time()
+        while await self.ask() not in _STOPPED and not (self.state is DriveState.QUICK_STOP and self._standing()):
+            waited_s = asyncio.get_running_loop().time() - begun
+            if self.state is DriveState.ENABLED and waited_s > _HEED_S:
+                await self._write_controlword(Controlword.QUICK_STOP)
+            if waited_s > _STOP_TIMEOUT_S:
+                raise self._error(f"does not stop: it is in {self.state}", "Cut the motors' supply")
+            await asyncio.sleep(_POLL_S)
+
+    async def disable(self) -> None:
+        """Take the power off the motor; it must stand."""
+        await self._write_controlword(Controlword.DISABLE_VOLTAGE)
+
+    def _standing(self) -> bool:
+        return self.statusword is not None and standing(self.statusword)
+
+    async def _command(self, word: Controlword, velocity_rpm: int) -> None:
+        data = self._rpdo.pack(word, velocity_rpm)
+        await self._bus.send(Frame(0, self._rpdo.cob_id(self.node_id), data))
+
+    async def _write_controlword(self, word: Controlword) -> None:
+        await self.link.sdo.write(CONTROLWORD, 0, word.to_bytes(2, "little"))
+
+    async def _not_enabled(self) -> DriveError:
+        cure = "See its emergency messages; cut its supply and switch it on again"
+        if self.state is DriveState.FAULT:
+            code = await self.link.sdo.read_number(ERROR_CODE)
+            return self._error(f"stays in fault, error code 0x{code:04X}", cure)
+        return self._error(f"is still in {self.state} after {_ENABLE_TIMEOUT_S:g} s", cure)
+
+    def _error(self, what: str, cure: str) -> DriveError:
+        return DriveError(what, node_id=self.node_id, cure=cure)

@@ -1,0 +1,113 @@
+"""What happens to the nodes and the bus, as `drivers.master.network` tells it while it happens.
+
+Each event is a frozen dataclass with a time (ns, CLOCK_REALTIME) and a `text` for the person who reads it at night.
+A consumer matches on the class:
+
+    match event:
+        case NodeBooted(node_id=node_id, identity=identity): …
+        case NodeBootFailed(reason=reason, text=text, cure=cure): …
+        case NodeLost(): …
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from regolithd.drivers.can.bus import BusState
+    from regolithd.drivers.devices.cia402 import DriveState
+    from regolithd.drivers.master.boot_reason import BootReason
+    from regolithd.drivers.signals import Emergency
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Who a node says it is: 0x1000 and 0x1018."""
+
+    device_type: int
+    vendor: int
+    product: int
+    revision: int
+    serial: int
+
+
+@dataclass(frozen=True, slots=True)
+class NodeBooted:
+    """The node is configured and operational."""
+
+    time_ns: int
+    node_id: int
+    identity: Identity
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class NodeBootFailed:
+    """The node could not be booted; it is tried again when it is heard, and from time to time."""
+
+    time_ns: int
+    node_id: int
+    reason: BootReason
+    text: str
+    cure: str
+
+
+@dataclass(frozen=True, slots=True)
+class NodeLost:
+    """An operational node is so no more: its heartbeat stopped, it restarted, or it left operational."""
+
+    time_ns: int
+    node_id: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class NodeReturned:
+    """A node that was lost, or had failed to boot, is heard again; it is now booted anew."""
+
+    time_ns: int
+    node_id: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class NodeEmergency:
+    """A node sent an EMCY message."""
+
+    time_ns: int
+    node_id: int
+    emergency: Emergency
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class DriveStateChanged:
+    """A drive's statusword says another state of CiA 402 than before."""
+
+    time_ns: int
+    node_id: int
+    state: DriveState
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class MotionStopped:
+    """The wheels were turning, and the network stopped them by itself, because a node was lost or a drive faulted."""
+
+    time_ns: int
+    node_id: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class BusStateChanged:
+    """The link or the controller's error state changed."""
+
+    time_ns: int
+    state: BusState
+    text: str
+
+
+NodeEvent = NodeBooted | NodeBootFailed | NodeLost | NodeReturned | NodeEmergency | DriveStateChanged
+NetworkEvent = NodeEvent | MotionStopped | BusStateChanged

@@ -1,0 +1,272 @@
+"""The nodes of one bus: booted, supervised and commanded.
+
+    async with open_bus("socketcan", "can0") as bus, asyncio.TaskGroup() as tasks:
+        network = Network(bus, settings, on_frames=pipeline.feed, on_event=publish)
+        tasks.create_task(network.run())
+        await network.settled()
+        await network.enable()
+        await network.set_speed((0.29,) * 6)
+
+`run` is the bus's only reader. Each batch of frames goes to `on_frames` first – recording and snapshots – and then to
+the nodes' own conversations. Cancelling `run` is the way to stop: the drives are stopped and disabled, then every node
+is put back into pre-operational.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from regolithd.drivers.can.bus import Bus, BusState
+from regolithd.drivers.canopen.emcy import EMCY_COB_ID, parse
+from regolithd.drivers.canopen.heartbeat import produce_heartbeat
+from regolithd.drivers.canopen.nmt import NmtCommand
+from regolithd.drivers.canopen.pdo import tpdos
+from regolithd.drivers.canopen.sync import produce_sync
+from regolithd.drivers.devices.cia402 import DriveState
+from regolithd.drivers.errors import DriverError
+from regolithd.drivers.master.configuration import CONSUMER_HEARTBEAT
+from regolithd.drivers.master.drive import Drive
+from regolithd.drivers.master.events import (
+    BusStateChanged,
+    DriveStateChanged,
+    MotionStopped,
+    NetworkEvent,
+    NodeEmergency,
+    NodeLost,
+)
+from regolithd.drivers.master.motion import Motion, each
+from regolithd.drivers.master.remote_node import Link
+from regolithd.drivers.master.status import NetworkCounters, NetworkSettings, NodePhase, NodeStatus
+from regolithd.drivers.master.supervisor import Supervisor
+from regolithd.drivers.signals import NodeKind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from regolithd.drivers.can.frame import Frame
+    from regolithd.drivers.canopen.pdo import Pdo
+    from regolithd.drivers.signals import NodeDescription
+
+__all__ = ["Network", "NetworkCounters", "NetworkSettings", "NodePhase", "NodeStatus"]
+
+_LEAVE_TIMEOUT_S = 5.0  # a stop that cannot be confirmed must not keep the program from ending
+_BUS_STATES = {
+    BusState.ACTIVE: "the bus works",
+    BusState.WARNING: "many errors on the bus: check terminators (60 Ω between the wires), length and plugs",
+    BusState.PASSIVE: "the controller is error passive: is any other node powered, and is the bit rate right?",
+    BusState.OFF: "bus-off: the controller left the bus. `ip link set {channel} type can restart-ms 100` mends that",
+    BusState.DOWN: "the link is down or the adapter is gone: `ip link set {channel} up`, or plug it in",
+}
+
+
+class Network:
+    """Boots, supervises and commands the nodes of one bus. One task runs `run`; commands may come from any task.
+
+    Parameters
+    ----------
+    bus
+        An open bus, which `run` alone reads.
+    on_frames
+        Called with each batch of frames, in order, before anything else is done with them. Must not block.
+    on_event
+        Called with each event as it happens. Must not block.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        settings: NetworkSettings,
+        *,
+        on_frames: Callable[[Sequence[Frame]], None] = lambda _batch: None,
+        on_event: Callable[[NetworkEvent], None] = lambda _event: None,
+    ) -> None:
+        self.bus = bus
+        self.settings = settings
+        self._counters = NetworkCounters()
+        self._on_frames = on_frames
+        self._on_event = on_event
+        self._handlers: dict[int, Callable[[Frame], None]] = {}
+        self._supervisors: dict[int, Supervisor] = {}
+        self._drives: dict[int, Drive] = {}
+        self._bus_state = bus.state
+        self._must_stop: NetworkEvent | None = None
+        self._stop_wanted = asyncio.Event()
+        for node in settings.nodes:
+            self._add(node)
+        self._motion = Motion(self._drives, self._status, gear_ratio=settings.gear_ratio)
+
+    @property
+    def status(self) -> Mapping[int, NodeStatus]:
+        """What is known of each node, by node-ID."""
+        return {node_id: self._status(node_id) for node_id in self._supervisors}
+
+    @property
+    def counters(self) -> NetworkCounters:
+        """What the network counts of itself."""
+        clients = [supervisor.link.sdo for supervisor in self._supervisors.values()]
+        self._counters.sdo_transfers = sum(client.transfers for client in clients)
+        self._counters.sdo_failures = sum(client.failures for client in clients)
+        return self._counters
+
+    async def run(self) -> None:
+        """Read the bus, boot and supervise the nodes, produce SYNC and heartbeat; until cancelled."""
+        settings = self.settings
+        async with asyncio.TaskGroup() as lasting:
+            reader = lasting.create_task(self._read())
+            beat = lasting.create_task(
+                produce_heartbeat(self.bus, settings.master_id, settings.master_heartbeat_s, self._count_heartbeat)
+            )
+            try:
+                async with asyncio.TaskGroup() as tasks:
+                    tasks.create_task(produce_sync(self.bus, settings.sync_rate_Hz, self._counters.sync))
+                    tasks.create_task(self._stop_when_wanted())
+                    for supervisor in self._supervisors.values():
+                        tasks.create_task(supervisor.run())
+            finally:
+                await self._leave()
+                reader.cancel()
+                beat.cancel()
+
+    async def settled(self) -> None:
+        """Wait until each node is operational or has failed its first boot."""
+        for supervisor in self._supervisors.values():
+            await supervisor.link.news.until(lambda supervisor=supervisor: supervisor.attempts > 0)  # type: ignore[misc]
+
+    async def enable(self) -> None:
+        """Bring all drives to operation enabled, standing still; a fault is reset first.
+
+        Raises
+        ------
+        DriveError
+            A drive is not on the bus, or does not get there; the message names it and its state. None stays enabled.
+        """
+        await self._motion.enable()
+
+    async def set_speed(self, wheel_speed_rad_s: Sequence[float]) -> None:
+        """Turn the wheels at these speeds [rad/s at the wheel, index k − 1 for wheel k]; one RPDO per drive.
+
+        Raises
+        ------
+        DriveError
+            A drive is not in operation enabled, or the wheels were stopped since; nothing has been sent then.
+        BusError
+            The bus does not take it; all are stopped, or stop by themselves when no heartbeat arrives either.
+        """
+        await self._motion.set_speed(wheel_speed_rad_s)
+
+    async def quick_stop(self) -> None:
+        """Stop all wheels with the quick-stop ramp, now, and wait until they stand; then they are locked.
+
+        Raises
+        ------
+        DriveError
+            A drive that is on the bus does not stop. One that is lost does not keep the others from stopping.
+        """
+        await self._motion.quick_stop()
+
+    async def disable(self) -> None:
+        """Take the power off the motors; wheels that turn are stopped first. Raises as `quick_stop` does."""
+        await self._motion.disable()
+
+    def _add(self, node: NodeDescription) -> None:
+        node_id = node.node_id
+        link = Link(self.bus, node, sdo_timeout_s=self.settings.sdo_timeout_s)
+        supervisor = Supervisor(link, self.settings, self._emit)
+        self._supervisors[node_id] = supervisor
+        self._handlers |= link.handlers
+        self._handlers[EMCY_COB_ID + node_id] = lambda frame: self._take_emergency(supervisor, frame)
+        if node.kind is NodeKind.MOTOR:
+            drive = self._drives[node_id] = Drive(self.bus, link)
+            tpdo = tpdos(node.kind)[0]
+            self._handlers[tpdo.cob_id(node_id)] = lambda frame: self._take_statusword(drive, tpdo, frame)
+
+    def _status(self, node_id: int) -> NodeStatus:
+        status = self._supervisors[node_id].status
+        drive = self._drives.get(node_id)
+        return status if drive is None else replace(status, drive_state=drive.state)
+
+    async def _read(self) -> None:
+        handlers = self._handlers
+        async for batch in self.bus:
+            if batch:
+                self._on_frames(batch)
+            for frame in batch:
+                handler = handlers.get(frame.can_id)
+                if handler is not None and frame.ordinary and not frame.sent:
+                    handler(frame)
+            if self.bus.state is not self._bus_state:
+                self._bus_state = self.bus.state
+                text = _BUS_STATES[self._bus_state].format(channel=self.bus.channel)
+                self._emit(BusStateChanged(time.time_ns(), self._bus_state, f"{self.bus.channel}: {text}"))
+
+    def _take_emergency(self, supervisor: Supervisor, frame: Frame) -> None:
+        node = supervisor.link.node
+        emergency = parse(frame, node.node_id, node.kind)
+        if emergency is None:
+            return
+        supervisor.count_emergency()
+        said = "error gone" if emergency.cleared else f"error 0x{emergency.code:04X}: {emergency.text}"
+        text = f"node {node.node_id} ({node.kind.value}): {said}"
+        self._emit(NodeEmergency(frame.time_ns, node.node_id, emergency, text))
+
+    def _take_statusword(self, drive: Drive, tpdo: Pdo, frame: Frame) -> None:
+        if len(frame.data) != tpdo.layout.size:
+            return  # the decoder counts it
+        before = drive.reported
+        state = drive.take_statusword(tpdo.layout.unpack(frame.data)[0])
+        if state is not before:
+            text = f"drive {drive.node_id}: {before} → {state}"
+            self._emit(DriveStateChanged(frame.time_ns, drive.node_id, state, text))
+
+    def _count_heartbeat(self, sent: bool) -> None:  # a plain yes or no from its producer
+        self._counters.heartbeats_sent += sent
+        self._counters.heartbeats_failed += not sent
+
+    def _emit(self, event: NetworkEvent) -> None:
+        if isinstance(event, NodeLost) and event.node_id in self._drives:
+            self._drives[event.node_id].forget()
+        if self._motion.moving and self._ends_motion(event):
+            self._must_stop = event
+            self._stop_wanted.set()
+        self._on_event(event)
+
+    def _ends_motion(self, event: NetworkEvent) -> bool:
+        match event:
+            case NodeLost(node_id=node_id):
+                return self._supervisors[node_id].link.node.required
+            case DriveStateChanged(state=state):
+                return state is not DriveState.ENABLED
+            case _:
+                return False
+
+    async def _stop_when_wanted(self) -> None:
+        """Stop all wheels when one is lost: a rover that drags a dead wheel digs itself in."""
+        while True:
+            await self._stop_wanted.wait()
+            self._stop_wanted.clear()
+            event = self._must_stop
+            if event is None or not self._motion.moving:
+                continue
+            outcome = "all others are stopped"
+            try:
+                await self._motion.quick_stop(event.text)
+            except DriverError as error:
+                outcome = str(error)
+            node_id = getattr(event, "node_id", 0)
+            self._on_event(MotionStopped(time.time_ns(), node_id, f"motion stopped: {event.text}; {outcome}"))
+
+    async def _leave(self) -> None:
+        """Stop and disable the drives, let them forget their master, and put every node into pre-operational."""
+        with suppress(DriverError, TimeoutError):
+            async with asyncio.timeout(_LEAVE_TIMEOUT_S):
+                try:
+                    await self.disable()
+                finally:
+                    await each(drive.link.sdo.write(CONSUMER_HEARTBEAT, 1, bytes(4)) for drive in self._motion.live())
+        for supervisor in self._supervisors.values():
+            with suppress(DriverError):
+                await supervisor.link.tell(NmtCommand.ENTER_PRE_OPERATIONAL)

@@ -1,0 +1,132 @@
+"""One node's life under its master: boot it, watch it, and boot it again when it comes back.
+
+    booting ──▶ operational ──▶ lost
+       │  ▲          ▲           │ heard again, or tried again after a while
+       ▼  │          └── booting ◀
+      failed
+
+Nothing else on the bus is touched when one node comes or goes.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from regolithd.drivers.canopen.heartbeat import until_lost
+from regolithd.drivers.errors import BootError
+from regolithd.drivers.master.boot import BootSettings, boot
+from regolithd.drivers.master.boot_reason import BootReason
+from regolithd.drivers.master.events import NetworkEvent, NodeBooted, NodeBootFailed, NodeLost, NodeReturned
+from regolithd.drivers.master.status import NetworkSettings, NodePhase, NodeStatus
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from regolithd.drivers.master.remote_node import Link
+
+_SILENT = (BootReason.NO_BOOT_UP, BootReason.NO_SDO_ANSWER, BootReason.FELL_SILENT, BootReason.BUS_DOWN)
+_PAUSE_S = 0.1  # before a node that is heard again is booted: it may be restarting in a row
+
+
+class Supervisor:
+    """Runs one node's life; `status` is what is known of it."""
+
+    def __init__(self, link: Link, settings: NetworkSettings, emit: Callable[[NetworkEvent], None]) -> None:
+        self.link = link
+        self.attempts = 0
+        self._settings = settings
+        self._boot_settings = BootSettings(
+            heartbeat_s=settings.node_heartbeat_s,
+            master_id=settings.master_id,
+            master_lost_after_s=settings.master_lost_after_s,
+            boot_up_timeout_s=settings.boot_up_timeout_s,
+        )
+        self._emit = emit
+        self._status = NodeStatus(link.node)
+        self._patience_s = settings.retry_after_s
+        self._away = False  # told as lost or failed, and not heard since
+
+    @property
+    def status(self) -> NodeStatus:
+        """What is known of the node at this moment."""
+        return replace(self._status, nmt_state=self.link.state, heard_ns=self.link.heard_ns)
+
+    @property
+    def phase(self) -> NodePhase:
+        """Where the node is in its life."""
+        return self._status.phase
+
+    def count_emergency(self) -> None:
+        """Count an EMCY of this node."""
+        self._status = replace(self._status, emergencies=self._status.emergencies + 1)
+
+    async def run(self) -> None:
+        """Boot the node and keep it operational, until cancelled."""
+        while True:
+            if await self._boot():
+                silent = await self._watch()
+            else:
+                silent = self._status.reason is not BootReason.RESTARTED
+            if silent and not await self._heard_again():
+                continue  # tried once more in silence: still lost, or failed, until it says something
+            await asyncio.sleep(_PAUSE_S)
+            self._status = replace(self._status, phase=NodePhase.BOOTING)
+
+    async def _boot(self) -> bool:
+        node_id = self.link.node.node_id
+        try:
+            identity = await boot(self.link, self._boot_settings)
+        except BootError as error:
+            text = str(error)
+            said_before = text == self._status.text
+            self._status = replace(self._status, phase=NodePhase.FAILED, reason=error.reason, text=text)
+            self._away = True
+            if not said_before:  # once, however often it is tried
+                self._emit(NodeBootFailed(time.time_ns(), node_id, error.reason, text, error.cure))
+        else:
+            self._note_return()
+            boots = self._status.boots + 1
+            text = f"node {node_id} ({self.link.node.kind.value}) is operational"
+            self._status = replace(
+                self._status, phase=NodePhase.OPERATIONAL, identity=identity, reason=None, text=text, boots=boots
+            )
+            self._emit(NodeBooted(time.time_ns(), node_id, identity, text))
+        self.attempts += 1
+        self.link.news.notify()
+        return self.phase is NodePhase.OPERATIONAL
+
+    async def _watch(self) -> bool:
+        """Return, once the node is lost, whether it is silent."""
+        self._patience_s = self._settings.retry_after_s
+        loss = await until_lost(self.link, self._settings.node_lost_after_s)
+        node_id = self.link.node.node_id
+        text = f"node {node_id} ({self.link.node.kind.value}) lost: {loss.text}"
+        self._status = replace(self._status, phase=NodePhase.LOST, text=text)
+        self._emit(NodeLost(time.time_ns(), node_id, text))
+        self._away = True
+        return loss.silent
+
+    def _note_return(self) -> None:
+        if self._away:
+            self._away = False
+            node = self.link.node
+            text = f"node {node.node_id} ({node.kind.value}) is heard again"
+            self._emit(NodeReturned(time.time_ns(), node.node_id, text))
+
+    async def _heard_again(self) -> bool:
+        """Wait until the node is heard (where silence was the trouble) or boots up; False: some time has passed."""
+        link = self.link
+        heard, boot_ups = link.heard, link.boot_ups
+        any_sign = self.phase is NodePhase.LOST or self._status.reason in _SILENT
+        returned = await link.news.until(
+            lambda: link.boot_ups > boot_ups or (any_sign and link.heard > heard), self._patience_s
+        )
+        if returned:
+            self._patience_s = self._settings.retry_after_s
+            self._note_return()
+        else:
+            self._patience_s = min(2.0 * self._patience_s, self._settings.retry_at_most_s)
+        return returned

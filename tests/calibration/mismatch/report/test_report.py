@@ -1,0 +1,194 @@
+"""The report: self-contained, faithful to the answer, and the same for the same answer."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch.answer import (
+    Answer,
+    Curve,
+    Effect,
+    Evidence,
+    FitImprovement,
+    Indistinguishable,
+    Parameter,
+    Sensitivity,
+    Unexplained,
+)
+from regolithd.calibration.mismatch.report.axes import number, ticks
+from regolithd.calibration.mismatch.report.curves import curve_of
+from regolithd.calibration.mismatch.report.page import Provenance, render_report, verdict_sentence, words
+
+FROM = Provenance("drive.csv", "SIM.toml", "ab" * 32, "cd" * 32, "regolithd mismatch drive.csv --simulation SIM.toml")
+WORN = Effect(
+    name="bearing-drag",
+    channel="motor_current_A",
+    wheels=(4,),
+    covariate="time",
+    onset_s=612.0,
+    equation="ΔI = I_b g(t − t_0) sign(ω)",
+    statement="drag on wheel 4 <from> 612 s on",
+    parameters={"drag_current": Parameter(0.0077, 0.0071, 0.0083, "A")},
+    rmse_before=0.0069,
+    rmse_after=0.0048,
+)
+VOID = {"img", "meta", "link", "br", "path", "rect", "circle"}
+
+
+class Balanced(HTMLParser):
+    """Collects tags that were opened and not closed, and everything that the page would fetch."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.fetched: list[str] = []
+        self.text: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Remember what is opened and what would be fetched."""
+        self.fetched += [value or "" for name, value in attrs if name in {"src", "href"}]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Ignore: it is closed."""
+
+    def handle_endtag(self, tag: str) -> None:
+        """Close what was opened last, or fail."""
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        """Keep what people read."""
+        self.text.append(data)
+
+
+@pytest.fixture
+def evidence() -> Evidence:
+    """Half an hour of six wheels, with a map and two curves."""
+    rng = np.random.default_rng(0)
+    residual = rng.normal(size=(900, 6))
+    residual[0, 0] = np.nan
+    grid = np.linspace(0, 1800, 12)
+    curve = Curve("time", "drag", grid, grid * 1e-5, grid * 0, grid * 0 + 2e-4, (4,))
+    blocks = np.arange(30) * 60 + 30.0
+    stood_out = rng.normal(size=(30, 6))
+    stood_out[3, 2] = np.nan
+    return Evidence(
+        channel="motor_current_A",
+        unit="A",
+        time_s=np.arange(900) * 2.0,
+        wheels=(1, 2, 3, 4, 5, 6),
+        measured=residual,
+        before=residual,
+        after=residual,
+        map_time_s=blocks,
+        map_before=stood_out,
+        map_after=stood_out,
+        curves=(curve, replace(curve, covariate="temperature")),
+        values={},
+        contributions=(),
+    )
+
+
+def answer(**said: object) -> Answer:
+    """Return a consistent answer, changed as told."""
+    fit = FitImprovement("motor_current_A", 0.0061, 0.0049, 0.0048)
+    plain = Answer("consistent", (), (), (), (Sensitivity("coulomb-friction", float("inf"), "A"),), fit)
+    return replace(plain, **said)  # type: ignore[arg-type]
+
+
+ANSWERS = {
+    "consistent": answer(),
+    "missing-physics": answer(verdict="missing-physics", effects=(WORN,)),
+    "unexplained": answer(
+        verdict="unexplained",
+        unexplained=(Unexplained("motor_current_A", (1, 2), "voltage", 0.0, 1800.0, 0.1),),
+        indistinguishable=(Indistinguishable(("coulomb-friction", "viscous-friction"), "drive a staircase"),),
+        notes=("bus_voltage_V was never measured.",),
+    ),
+}
+
+
+@pytest.mark.parametrize("verdict", ANSWERS)
+def test_the_page_is_whole_and_fetches_nothing(verdict: str, evidence: Evidence) -> None:
+    """Every tag is closed, nothing comes from elsewhere, no number is left unsaid as nan or inf."""
+    page = render_report(ANSWERS[verdict], evidence, FROM)
+    parser = Balanced()
+    parser.feed(page)
+    assert parser.open == []
+    assert parser.fetched == []
+    assert "url(" not in page
+    assert "<script" not in page
+    said = " ".join(parser.text)
+    assert verdict_sentence(ANSWERS[verdict]) in said
+    assert not re.search(r"\b(nan|inf)\b", page)
+    assert FROM.recording_sha256 in said
+
+
+def test_the_same_answer_gives_the_same_bytes(evidence: Evidence) -> None:
+    """No clock and no chance in the page."""
+    assert render_report(ANSWERS["missing-physics"], evidence, FROM) == render_report(
+        ANSWERS["missing-physics"], evidence, FROM
+    )
+
+
+def test_an_effect_is_told_with_its_interval_and_its_words_are_escaped(evidence: Evidence) -> None:
+    """Current is told in milliamperes; what a statement holds is text, never markup."""
+    page = render_report(ANSWERS["missing-physics"], evidence, FROM)
+    assert "7.1 … 8.3" in page
+    assert "&lt;from&gt;" in page
+    assert "wheel 4" in page
+    assert "onset 10.2 min" in page
+
+
+def test_the_verdict_never_names_what_is_unexplained() -> None:
+    """One sentence for each verdict; the unknown keeps its place and gets no name."""
+    assert verdict_sentence(ANSWERS["missing-physics"]) == "The simulation leaves out bearing drag."
+    told = verdict_sentence(ANSWERS["unexplained"])
+    assert "bus voltage" in told
+    assert "no known effect explains" in told
+
+
+def test_an_effect_s_curve_shows_its_own_wheels(evidence: Evidence) -> None:
+    """The curve of a drag on one wheel is that wheel's residual along its rotation, before and after."""
+    rng = np.random.default_rng(1)
+    direction = np.where(rng.uniform(size=(900, 6)) > 0.5, 1.0, -1.0)
+    drag = np.zeros((900, 6))
+    drag[:, 3] = 0.5 * direction[:, 3]
+    time_s = np.broadcast_to(evidence.time_s[:, None], (900, 6))
+    scene = SimpleNamespace(covariates={"time": time_s, "direction": direction}, row=None, mask=np.ones((900, 6), bool))
+    noise = 0.01 * rng.normal(size=(900, 6))
+    seen = replace(evidence, measured=drag + noise, before=0 * drag, after=drag, scene=scene)  # type: ignore[arg-type]
+    curve = curve_of(seen, "time", (4,))
+    assert curve is not None
+    np.testing.assert_allclose(curve.before, 0.5, atol=0.02)
+    np.testing.assert_allclose(curve.after, 0.0, atol=0.02)
+    assert curve_of(seen, "wheel_angle", (4,)) is None
+    assert curve_of(replace(seen, scene=None), "time", (4,)) is None
+
+
+def test_names_are_spoken_as_people_speak() -> None:
+    """The last hyphen parts what it is from what it does; names of people are capital."""
+    assert words("multi-pass-compaction") == "multi-pass compaction"
+    assert words("coulomb-friction") == "Coulomb friction"
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-0.02, 0.033), (5.0, 5.0), (-1800.0, 3600.0)])
+def test_ticks_are_round_and_inside(low: float, high: float) -> None:
+    """An axis shows round numbers between its ends."""
+    found = ticks(low, high)
+    assert 1 <= len(found) <= 12
+    assert all(low - 1e-9 <= tick <= high + 1e-9 for tick in found)
+
+
+def test_numbers_are_written_with_a_true_minus() -> None:
+    """No hyphen for a minus, no exponent for what a person can read."""
+    assert number(-0.00012) == "−0.00012"
+    assert number(float("nan")) == "–"
+    assert number(61200.0) == "61200"

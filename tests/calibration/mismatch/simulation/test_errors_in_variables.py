@@ -1,0 +1,35 @@
+"""Noisy inputs are replaced by what they really were on average, and nothing else happens to them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from regolithd.calibration.mismatch.simulation.errors_in_variables import conditional_expectation
+
+START = np.array([0])
+
+
+def test_a_slow_signal_is_cleaned_and_its_slope_is_not_attenuated() -> None:
+    """Regressing the truth on the estimate gives 1: what regression calibration must do."""
+    rng = np.random.default_rng(1)
+    truth = np.sin(np.arange(6000) / 200)[:, None]
+    noisy = truth + rng.normal(0, 0.3, truth.shape)
+    estimate = conditional_expectation(noisy, np.array([0.09]), START)
+    assert np.std(estimate - truth) < 0.35 * 0.3
+    slope = float(np.sum(truth * estimate) / np.sum(estimate**2))
+    assert abs(slope - 1) < 0.01
+    assert float(np.sum(truth * noisy) / np.sum(noisy**2)) < 0.9
+
+
+def test_without_a_stated_error_nothing_is_touched() -> None:
+    """A reading that is exact is the truth."""
+    values = np.random.default_rng(2).normal(0, 1, (500, 2)).cumsum(axis=0)
+    np.testing.assert_allclose(conditional_expectation(values, np.zeros(2), START), values, atol=1e-6)
+
+
+def test_what_is_unknown_stays_unknown_and_does_not_spread() -> None:
+    """NaN stays where it was."""
+    values = np.random.default_rng(3).normal(0, 1, (500, 1)).cumsum(axis=0)
+    values[100:200] = np.nan
+    estimate = conditional_expectation(values, np.array([0.01]), START)
+    np.testing.assert_array_equal(np.isnan(estimate), np.isnan(values))

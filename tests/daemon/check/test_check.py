@@ -1,0 +1,295 @@
+"""`regolithd check` says what is wrong, all of it, and how to mend it – also where hardly anything is there."""
+
+import asyncio
+import grp
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from broker import Mosquitto, unused_port
+
+from regolithd.calibration.models.card import ModelCard, Variable
+from regolithd.daemon.check.broker import check_broker
+from regolithd.daemon.check.bus import check_bus, check_link, check_load, judge_link, judge_nodes, nodes_of_daemon
+from regolithd.daemon.check.clock import Discipline, check_clock, judge_clock, kernel_discipline
+from regolithd.daemon.check.control import check_control, running_daemon
+from regolithd.daemon.check.disk import check_folder
+from regolithd.daemon.check.finding import Verdict
+from regolithd.daemon.check.models import check_network, judge_card
+from regolithd.daemon.config.configuration import Bus, Configuration, Control, Estimator, Mqtt
+from regolithd.daemon.control.client import ControlError
+from regolithd.daemon.control.protocol import NodeLine, Status
+from regolithd.drivers.master.scan import Probe
+from regolithd.drivers.signals import NodeDescription, NodeKind
+
+ROOT = Path(__file__).resolve().parents[3]
+NOW_S = 1_790_000_000.0
+GROUP = grp.getgrgid(os.getgid()).gr_name
+
+
+def check(*options: str) -> subprocess.CompletedProcess[str]:
+    """Run the command as a person does."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+    command = [sys.executable, "-m", "regolithd", "check", *options]
+    return subprocess.run(command, capture_output=True, text=True, env=environment, check=False, timeout=60)
+
+
+def test_five_mistakes_are_five_lines_and_status_78(tmp_path: Path) -> None:
+    """Each with file, line, key, what was expected, what was found and what to do."""
+    config = tmp_path / "rover.toml"
+    config.write_text(
+        """\
+[sync]
+rate_Hz = 500
+[nodes]
+motors = [1, 2, 3, 4, 5, 5]
+[wheel]
+radius_m = -0.075
+[mqtt]
+prot = 1883
+host = ""
+"""
+    )
+    run = check("--config", str(config))
+    assert run.returncode == 78
+    lines = run.stderr.splitlines()
+    assert len(lines) == 6
+    keys = ("sync.rate_Hz", "nodes.motors[5]", "wheel.radius_m", "mqtt.prot", "mqtt.host")
+    for key in keys:
+        assert sum(f": {key}: expected " in line for line in lines) == 1, key
+    assert lines[-1].startswith("5 problems")
+    assert run.stdout == ""
+    told = json.loads(check("--config", str(config), "--json").stdout)
+    assert len(told) == 5
+
+
+def test_syntax_alone_touches_nothing(tmp_path: Path) -> None:
+    """For the installer, before anything is there."""
+    run = check("--syntax", "--config", str(ROOT / "rover.toml"))
+    assert (run.returncode, run.stdout) == (0, f"{ROOT / 'rover.toml'}: good\n")
+    assert check("--syntax", "--config", str(tmp_path / "absent.toml")).returncode == 78
+
+
+def test_where_hardly_anything_is_there_everything_is_told_at_once(tmp_path: Path) -> None:
+    """No link, no broker, no model, no group, no folder: five things wrong, and status 1."""
+    config = tmp_path / "rover.toml"
+    (tmp_path / "file").touch()
+    config.write_text(
+        f"""\
+[bus]
+channel = "can77"
+[estimator]
+model = "absent.onnx"
+[recording]
+directory = "{tmp_path}/file/recordings"
+[mqtt]
+host = "127.0.0.1"
+port = {unused_port()}
+spool_directory = "{tmp_path}/spool"
+[control]
+group = "no-such-group"
+socket = "{tmp_path}/control.sock"
+"""
+    )
+    run = check("--config", str(config), "--json")
+    assert run.returncode == 1, run.stderr
+    found = {line["subject"]: line for line in json.loads(run.stdout)}
+    wrong = {subject for subject, line in found.items() if line["verdict"] == "wrong"}
+    assert wrong == {"bus", "model", "broker", "recording", "control"}
+    assert "there is no link 'can77'" in found["bus"]["text"]
+    assert found["nodes"]["verdict"] == "not checked"
+    assert found["store"]["verdict"] == "good"
+    assert "clock" in found
+    shown = check("--config", str(config)).stdout
+    assert "5 wrong" in shown
+    assert "groupadd --system no-such-group" in shown
+
+
+async def test_a_broker_that_lets_us_in_and_one_that_does_not(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """With the keys to mend."""
+    settings = Mqtt(host="127.0.0.1", port=mosquitto.port)
+    (finding,) = await check_broker(Configuration(mqtt=settings))
+    assert finding.verdict is Verdict.GOOD
+    mosquitto.stop()
+    mosquitto.settings = "allow_anonymous false\n"
+    mosquitto.start()
+    (finding,) = await check_broker(Configuration(mqtt=settings))
+    assert (finding.verdict, "refused" in finding.text) == (Verdict.WRONG, True)
+    assert "password_file" in finding.cure
+    absent = settings.model_copy(update={"username": "me", "password_file": tmp_path / "absent"})
+    (finding,) = await check_broker(Configuration(mqtt=absent))
+    assert "absent" in finding.text
+
+
+@pytest.mark.parametrize(
+    ("details", "verdict", "said"),
+    [
+        ({"linkinfo": {"info_data": {"bittiming": {"bitrate": 500_000}}}}, Verdict.WRONG, "500000 bit/s"),
+        ({"linkinfo": {"info_data": {"bittiming": {"bitrate": 1_000_000}, "state": "BUS-OFF"}}}, Verdict.WRONG, "off"),
+        (
+            {"linkinfo": {"info_data": {"bittiming": {"bitrate": 1_000_000}, "state": "ERROR-PASSIVE"}}},
+            Verdict.WARNING,
+            "error-passive",
+        ),
+        (
+            {"linkinfo": {"info_data": {"bittiming": {"bitrate": 1_000_000}, "state": "ERROR-ACTIVE"}}},
+            Verdict.GOOD,
+            "1000000 bit/s",
+        ),
+        ({"linkinfo": {"info_kind": "vcan"}}, Verdict.GOOD, "vcan"),
+        ({}, Verdict.GOOD, "is up"),
+    ],
+)
+def test_a_link_is_judged_by_what_iproute2_says(details: dict, verdict: Verdict, said: str) -> None:
+    """And where that is not installed, by being up."""
+    finding = judge_link(Bus(), details)
+    assert (finding.verdict, said in finding.text) == (verdict, True)
+    assert bool(finding.cure) == (verdict is not Verdict.GOOD)
+
+
+def test_a_link_that_is_no_can_link_is_told() -> None:
+    """The loopback interface is there everywhere."""
+    (finding,) = check_link(Bus(channel="lo"), {})
+    assert (finding.verdict, "no CAN link" in finding.text) == (Verdict.WRONG, True)
+
+
+@pytest.mark.parametrize(
+    ("rate_Hz", "bitrate", "verdicts"),
+    [
+        (2, 125_000, []),
+        (200, 1_000_000, []),
+        (100, 250_000, []),
+        (200, 250_000, ["wrong"]),
+        (150, 250_000, ["warning"]),
+    ],
+)
+def test_a_bus_that_will_be_too_full_is_told(rate_Hz: int, bitrate: int, verdicts: list[str]) -> None:
+    """By the worst case of every frame that the configured nodes send."""
+    configuration = Configuration(sync={"rate_Hz": rate_Hz}, bus={"bitrate": bitrate})
+    assert [finding.verdict for finding in check_load(configuration)] == verdicts
+
+
+async def test_an_in_process_bus_has_nobody_to_ask() -> None:
+    """The demo's configuration is not wrong for it."""
+    (finding,) = await check_bus(Configuration(bus=Bus(interface="virtual")), None)
+    assert finding.verdict is Verdict.UNKNOWN
+
+
+def test_each_node_that_is_not_right_has_its_line() -> None:
+    """One that may be absent is a warning."""
+    motor = NodeDescription(1, NodeKind.MOTOR, 0)
+    cell = NodeDescription(11, NodeKind.LOAD_CELL, 0)
+    speed = NodeDescription(22, NodeKind.GROUND_SPEED, None, required=False)
+    found = judge_nodes(
+        [
+            Probe(motor, answers=True, identity=None, nmt_state=None),
+            Probe(cell, answers=False, identity=None, nmt_state=None, problem="no answer", cure="power it"),
+            Probe(speed, answers=False, identity=None, nmt_state=None, problem="no answer", cure="power it"),
+        ]
+    )
+    assert [(finding.subject, finding.verdict) for finding in found] == [
+        ("nodes", Verdict.GOOD),
+        ("node 11", Verdict.WRONG),
+        ("node 22", Verdict.WARNING),
+    ]
+    assert "1 of 3 answer" in found[0].text
+
+
+def status(*phases: str) -> Status:
+    """Return what a running daemon says."""
+    nodes = tuple(
+        NodeLine(node_id=n, kind="motor", wheel=n, phase=phase, drive_state=None, text="")
+        for n, phase in enumerate(phases, start=1)
+    )
+    return Status(rover="kapvik", bus="open", broker="", rate_Hz=2, snapshots=0, traverse=None, nodes=nodes)
+
+
+def test_a_running_daemon_is_asked_instead_of_the_bus() -> None:
+    """Two masters would disturb each other."""
+    found = nodes_of_daemon(status("operational", "lost"))
+    assert [(finding.subject, finding.verdict) for finding in found] == [
+        ("nodes", Verdict.GOOD),
+        ("node 2", Verdict.WRONG),
+    ]
+    assert nodes_of_daemon(status())[0].verdict is Verdict.WRONG
+
+
+@pytest.mark.parametrize(
+    ("discipline", "jump_ns", "now_s", "verdict", "said"),
+    [
+        (Discipline(synchronised=True, largest_error_s=0.004), 0, NOW_S, Verdict.GOOD, "4.0 ms"),
+        (Discipline(synchronised=False, largest_error_s=16.0), 0, NOW_S, Verdict.WARNING, "not synchronised"),
+        (Discipline(synchronised=True, largest_error_s=0.5), 0, NOW_S, Verdict.WARNING, "0.500 s"),
+        (Discipline(synchronised=True, largest_error_s=0.004), -80_000_000, NOW_S, Verdict.WRONG, "-0.080 s"),
+        (None, 0, NOW_S, Verdict.UNKNOWN, "does not say"),
+        (Discipline(synchronised=True, largest_error_s=0.004), 0, 86_400.0, Verdict.WRONG, "1970-01-02"),
+    ],
+)
+def test_the_clock_is_judged(
+    discipline: Discipline | None, jump_ns: int, now_s: float, verdict: Verdict, said: str
+) -> None:
+    """By the kernel's word, by what was watched, and by common sense."""
+    finding = judge_clock(discipline, jump_ns, now_s)
+    assert (finding.verdict, said in finding.text) == (verdict, True)
+
+
+async def test_this_computers_clock_can_be_asked() -> None:
+    """Linux always says; whether it is synchronised is this computer's affair."""
+    said = kernel_discipline()
+    assert said is not None
+    assert 0 <= said.largest_error_s < 1e4
+    (finding,) = await check_clock()
+    assert finding.verdict in {Verdict.GOOD, Verdict.WARNING}
+
+
+def test_a_folder_that_may_grow_beyond_its_disk_is_told(tmp_path: Path) -> None:
+    """A warning as long as there is room for a while."""
+    assert check_folder("store", tmp_path, 1.0, "[mqtt] spool_directory").verdict is Verdict.GOOD
+    assert check_folder("store", tmp_path / "new", 1.0, "[mqtt] spool_directory").text.count("to be made") == 1
+    finding = check_folder("store", tmp_path, 1e12, "[mqtt] spool_directory")
+    assert finding.verdict is Verdict.WARNING
+    assert "the disk has" in finding.text
+    (tmp_path / "file").touch()
+    assert check_folder("store", tmp_path / "file", 1.0, "[mqtt] spool_directory").verdict is Verdict.WRONG
+
+
+async def test_a_network_that_does_not_suit_the_rover_is_told(tmp_path: Path) -> None:
+    """Or is no network at all."""
+    card = ModelCard("small-1", (Variable("load_N", "N", 1.0, 10.0),), (), 1.0)
+    assert judge_card(card, Configuration()).verdict is Verdict.WARNING
+    (tmp_path / "broken.onnx").write_bytes(b"no network")
+    (finding,) = await check_network(Configuration(estimator=Estimator(model=tmp_path / "broken.onnx")))
+    assert finding.verdict is Verdict.WRONG
+    finding, _ = await check_network(Configuration())
+    assert finding.verdict is Verdict.GOOD
+
+
+async def test_who_may_command_is_told(tmp_path: Path) -> None:
+    """And whether there is anything to command."""
+    configuration = Configuration(control=Control(group=GROUP, socket=tmp_path / "control.sock"))
+    assert await running_daemon(configuration) is None
+    (finding,) = check_control(configuration, None)
+    assert (finding.verdict, "no daemon is running" in finding.text) == (Verdict.UNKNOWN, True)
+    assert check_control(configuration, status("operational"))[0].verdict is Verdict.GOOD
+    (finding,) = check_control(configuration, ControlError("No permission to open it. Join the group.", 77))
+    assert (finding.verdict, finding.cure) == (Verdict.WARNING, "Join the group.")
+
+    silent = await asyncio.start_unix_server(lambda _, writer: writer.close(), configuration.control.socket)
+    async with silent:
+        assert await running_daemon(configuration) is None
+
+
+async def test_a_drivetrain_that_nobody_calibrated_means_no_intervals_and_a_known_one_does() -> None:
+    """And a posterior that was trained for another wheel is wrong."""
+    known = {"no_load_current_A": 0.037}
+    cases = {
+        Verdict.WARNING: Configuration(),
+        Verdict.GOOD: Configuration.model_validate({"drivetrain": known}),
+        Verdict.WRONG: Configuration.model_validate({"drivetrain": known, "wheel": {"radius_m": 0.2}}),
+    }
+    for verdict, configuration in cases.items():
+        _, finding = await check_network(configuration)
+        assert (finding.subject, finding.verdict) == ("posterior", verdict)

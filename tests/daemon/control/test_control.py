@@ -1,0 +1,381 @@
+"""The control socket: who may open it, what it understands, and what happens when somebody disappears."""
+
+import asyncio
+import grp
+import json
+import os
+import socket
+import stat
+import subprocess
+import tempfile
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from estimates import estimate
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from listener import until
+
+from regolithd.daemon.config.configuration import Configuration, Control
+from regolithd.daemon.control.client import ControlError, conversation
+from regolithd.daemon.control.protocol import LINE_LIMIT, REPLY, Accepted, Ended, Progress, Refused, StatusRequest
+from regolithd.daemon.control.server import ControlOutlet
+from regolithd.daemon.control.socket import ControlSocketError, open_control_socket
+from regolithd.daemon.pipeline.snapshot import Snapshot
+from regolithd.drivers.errors import DriveError
+from regolithd.drivers.master.events import MotionStopped
+from regolithd.drivers.master.status import NodePhase, NodeStatus
+from regolithd.drivers.signals import NodeDescription, NodeKind
+
+GROUP = grp.getgrgid(os.getgid()).gr_name
+
+
+@dataclass
+class Rover:
+    """Six drives that do what they are told, and remember it."""
+
+    told: list[str] = field(default_factory=list)
+    phase: NodePhase = NodePhase.OPERATIONAL
+    trouble: str = ""
+
+    @property
+    def status(self) -> Mapping[int, NodeStatus]:
+        """Its nodes; the third is in `phase`."""
+        return {
+            n: NodeStatus(
+                NodeDescription(n, NodeKind.MOTOR, n - 1), self.phase if n == 3 else NodePhase.OPERATIONAL, text="said"
+            )
+            for n in range(1, 7)
+        }
+
+    async def enable(self) -> None:
+        """Enable."""
+        self.told.append("enable")
+
+    async def set_speed(self, wheel_speed_rad_s: Sequence[float]) -> None:
+        """Turn."""
+        self.told.append(f"speed {wheel_speed_rad_s[0]:.3f}")
+
+    async def quick_stop(self) -> None:
+        """Stop."""
+        self.told.append("quick stop")
+
+    async def disable(self) -> None:
+        """Disable."""
+        self.told.append("disable")
+        if self.trouble:
+            raise DriveError(self.trouble, node_id=3)
+
+
+@asynccontextmanager
+async def serving(folder: Path, rover: Rover | None, **control: Any) -> AsyncIterator[tuple[ControlOutlet, Path]]:
+    """Serve a rover whose wheels stand still."""
+    path = folder / "control.sock"
+    configuration = Configuration(control=Control.model_validate({"socket": path, "group": GROUP} | control))
+    outlet = ControlOutlet(configuration, lambda: rover)
+    task = asyncio.create_task(outlet.run())
+
+    async def measure() -> None:
+        while True:
+            still = np.zeros((10, 6))
+            outlet.estimate(estimate_of(Snapshot(0, 0, still)))
+            await asyncio.sleep(0.01)
+
+    measuring = asyncio.create_task(measure())
+    try:
+        await until(path.exists)
+        yield outlet, path
+    finally:
+        for each in (measuring, task):
+            each.cancel()
+            with suppress(asyncio.CancelledError):
+                await each
+        while Client.opened:
+            writer = Client.opened.pop().writer
+            writer.close()
+            with suppress(ConnectionError):
+                await writer.wait_closed()
+
+
+def estimate_of(snapshot: Snapshot) -> Any:
+    """Return any estimate, of this snapshot."""
+    whole = estimate()
+    object.__setattr__(whole, "snapshot", snapshot)
+    return whole
+
+
+class Client:
+    """Says lines, and reads them. `serving` closes them all at its end."""
+
+    opened: ClassVar[list["Client"]] = []
+
+    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        self.reader = reader
+        self.writer = writer
+
+    @classmethod
+    async def to(cls, path: Path) -> "Client":
+        """Connect."""
+        client = cls(*await asyncio.open_unix_connection(path))
+        cls.opened.append(client)
+        return client
+
+    def say(self, request: object) -> None:
+        """Send a line."""
+        self.writer.write((request if isinstance(request, bytes) else json.dumps(request).encode()) + b"\n")
+
+    async def hear(self) -> Any:
+        """Return the next line, as one of the protocol's replies."""
+        async with asyncio.timeout(20):
+            return REPLY.validate_json(await self.reader.readline())
+
+    async def ask(self, request: object) -> Any:
+        """Say and hear."""
+        self.say(request)
+        return await self.hear()
+
+    async def hear_end(self) -> Ended:
+        """Return the end of a traverse; only progress may come before."""
+        while isinstance(reply := await self.hear(), Progress):
+            pass
+        assert isinstance(reply, Ended)
+        return reply
+
+
+SHORT = {"command": "traverse", "distance_m": 0.01, "speed_m_s": 0.05}
+LONG = {"command": "traverse", "distance_m": 10.0, "speed_m_s": 0.022}
+
+
+async def test_only_the_group_may_open_it(tmp_path: Path) -> None:
+    """Mode 0660, the group that is configured, and gone when the daemon is."""
+    async with serving(tmp_path, Rover()) as (_, path):
+        found = path.stat()
+        assert stat.S_IMODE(found.st_mode) == 0o660
+        assert found.st_gid == os.getgid()
+    assert not path.exists()
+
+
+_CONNECT = "import socket, sys; socket.socket(socket.AF_UNIX).connect(sys.argv[1])"
+NOBODY = 65534
+
+
+@pytest.mark.parametrize(("group", "error"), [(NOBODY, ""), (NOBODY - 1, "PermissionError")])
+async def test_the_kernel_lets_the_groups_members_in_and_nobody_else(group: int, error: str) -> None:
+    """Another user, once in the group and once not; nothing but the group decides."""
+    if os.geteuid() != 0:
+        group, error = os.getegid(), ""  # only root can become somebody else: at least we get in
+    with tempfile.TemporaryDirectory(dir="/tmp") as folder:  # every user may pass through
+        os.chmod(folder, 0o755)  # noqa: PTH101  # at once: nothing else runs yet
+        control = {"group": str(NOBODY)} if os.geteuid() == 0 else {}
+        who = {"user": NOBODY, "group": group, "extra_groups": []} if os.geteuid() == 0 else {}
+        async with serving(Path(folder), Rover(), **control) as (_, path):
+            command = ["python3", "-c", _CONNECT, path]
+            done = await asyncio.to_thread(
+                lambda: subprocess.run(command, capture_output=True, text=True, check=False, **who)
+            )
+    assert done.stderr.strip().splitlines()[-1:] == ([] if not error else [f"{error}: [Errno 13] Permission denied"])
+
+
+async def test_a_traverse_is_driven_and_its_end_is_told(tmp_path: Path) -> None:
+    """With its time beforehand, and how far it is on the way."""
+    rover = Rover()
+    async with serving(tmp_path, rover) as (_, path):
+        client = await Client.to(path)
+        accepted = await client.ask(SHORT | {"distance_m": 0.04})
+        assert isinstance(accepted, Accepted)
+        assert accepted.duration_s == pytest.approx(0.8)
+        assert isinstance(await client.hear(), Progress)
+        end = await client.hear_end()
+        assert (end.ending, end.turned_m) == ("finished", pytest.approx(0.04))
+    assert rover.told == ["enable", "speed 0.667", "speed 0.000", "disable"]
+
+
+async def test_the_client_that_commanded_it_disappears(tmp_path: Path) -> None:
+    """The wheels are stopped at once."""
+    rover = Rover()
+    async with serving(tmp_path, rover) as (_, path):
+        client = await Client.to(path)
+        await client.ask(LONG)
+        await until(lambda: "speed 0.293" in rover.told)
+        client.writer.transport.abort()
+        await until(lambda: rover.told[-2:] == ["quick stop", "disable"])
+        again = await Client.to(path)
+        assert isinstance(await again.ask(SHORT), Accepted)
+
+
+async def test_another_client_that_disappears_changes_nothing(tmp_path: Path) -> None:
+    """Looking is free."""
+    rover = Rover()
+    async with serving(tmp_path, rover) as (_, path):
+        client = await Client.to(path)
+        await client.ask(LONG)
+        onlooker = await Client.to(path)
+        assert (await onlooker.ask({"command": "status"})).nodes[2].text == "said"
+        onlooker.writer.close()
+        refused = await (await Client.to(path)).ask(SHORT)
+        assert isinstance(refused, Refused)
+        assert refused.code == "busy"
+        assert "quick stop" not in rover.told
+        client.say({"command": "stop"})
+        while not isinstance(end := await client.hear(), Ended):
+            pass
+        assert end.ending == "stopped"
+
+
+@pytest.mark.parametrize(("quick", "ending"), [(True, "quick-stopped"), (False, "stopped")])
+async def test_anybody_in_the_group_may_stop_it(tmp_path: Path, quick: bool, ending: str) -> None:
+    """Whoever commanded it is told."""
+    async with serving(tmp_path, Rover()) as (_, path):
+        client = await Client.to(path)
+        await client.ask(LONG)
+        other = await Client.to(path)
+        assert (await other.ask({"command": "stop", "quick": quick})).event == "done"
+        end = await client.hear_end()
+        assert end.ending == ending
+        assert f"stopped by user {os.getuid()}" in end.text
+
+
+async def test_a_lost_node_ends_it(tmp_path: Path) -> None:
+    """The network has stopped the wheels already; the client learns why."""
+    async with serving(tmp_path, Rover()) as (outlet, path):
+        client = await Client.to(path)
+        await client.ask(LONG)
+        outlet.event(MotionStopped(0, 3, "motion stopped: node 3 is silent"))
+        end = await client.hear_end()
+        assert (end.ending, end.text) == ("quick-stopped", "motion stopped: node 3 is silent")
+
+
+async def test_stop_without_a_traverse_takes_the_power_off_all_the_same(tmp_path: Path) -> None:
+    """Whoever says stop means it."""
+    rover = Rover()
+    async with serving(tmp_path, rover) as (_, path):
+        client = await Client.to(path)
+        assert "without power" in (await client.ask({"command": "stop"})).text
+        assert rover.told == ["disable"]
+        rover.trouble = "does not stop"
+        assert (await client.ask({"command": "stop"})).cure == "Cut the motors' power."
+
+
+@pytest.mark.parametrize(
+    ("rover", "said"),
+    [(None, "bus is not open"), (Rover(phase=NodePhase.LOST), "motor 3 is lost"), (Rover(), "at most 0.05 m/s")],
+)
+async def test_a_traverse_that_cannot_be_is_refused_with_the_reason(
+    tmp_path: Path, rover: Rover | None, said: str
+) -> None:
+    """Nothing has been told to the drives then."""
+    async with serving(tmp_path, rover) as (_, path):
+        refused = await (await Client.to(path)).ask(LONG | ({"speed_m_s": 9} if said.endswith("m/s") else {}))
+        assert isinstance(refused, Refused)
+        assert said in refused.text
+    assert rover is None or rover.told == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"",
+        b"{",
+        b"\xff\xfe",
+        b"[]",
+        b"null",
+        b'{"command": "dance"}',
+        b'{"command": "traverse"}',
+        b'{"command": "traverse", "distance_m": "far", "speed_m_s": 1}',
+        b'{"command": "traverse", "distance_m": 1, "speed_m_s": NaN}',
+        b'{"command": "traverse", "distance_m": 1, "speed_m_s": 0.01, "over": "mqtt"}',
+    ],
+)
+async def test_nonsense_is_refused_and_the_connection_goes_on(tmp_path: Path, line: bytes) -> None:
+    """With what the commands are."""
+    rover = Rover()
+    async with serving(tmp_path, rover) as (_, path):
+        client = await Client.to(path)
+        refused = await client.ask(line)
+        assert isinstance(refused, Refused)
+        assert refused.code == "bad-request"
+        assert (await client.ask({"command": "status"})).event == "status"
+    assert rover.told == []
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.binary(max_size=200))
+def test_no_line_ever_raises_anything(line: bytes) -> None:
+    """Whatever is sent, the answer is one of the protocol's."""
+    outlet = ControlOutlet(Configuration(), lambda: None)
+    reply = asyncio.run(outlet._answer(line, None))  # type: ignore[arg-type]
+    assert REPLY.validate_json(reply.line()) == reply
+
+
+async def test_a_line_without_end_is_cut_off_and_the_daemon_goes_on(tmp_path: Path) -> None:
+    """No client can fill the daemon's memory."""
+    async with serving(tmp_path, Rover()) as (_, path):
+        client = await Client.to(path)
+        client.writer.write(b"x" * (2 * LINE_LIMIT))
+        with suppress(ConnectionError):
+            assert await client.reader.read() == b""
+        assert (await (await Client.to(path)).ask({"command": "status"})).event == "status"
+
+
+async def test_the_socket_of_a_killed_daemon_is_taken_over(tmp_path: Path) -> None:
+    """And that of a living one is not."""
+    path = tmp_path / "control.sock"
+    dead = socket.socket(socket.AF_UNIX)
+    dead.bind(str(path))
+    dead.close()
+    with open_control_socket(path, GROUP), pytest.raises(ControlSocketError, match="another regolithd answers"):
+        open_control_socket(path, GROUP)
+    path.unlink()
+    path.write_text("a file")
+    with pytest.raises(ControlSocketError, match="is not a socket"):
+        open_control_socket(path, GROUP)
+    with pytest.raises(ControlSocketError, match=r"groupadd --system rovers"):
+        open_control_socket(tmp_path / "other.sock", "rovers")
+
+
+async def test_a_socket_that_cannot_be_made_is_told_and_the_rest_goes_on(tmp_path: Path) -> None:
+    """It is tried again."""
+    configuration = Configuration(control=Control(socket=tmp_path / "control.sock", group="no-such-group"))
+    outlet = ControlOutlet(configuration, lambda: None)
+    task = asyncio.create_task(outlet.run())
+    await until(lambda: "no-such-group" in outlet.problem)
+    assert not task.done()
+    task.cancel()
+    with suppress(asyncio.CancelledError):
+        await task
+
+
+async def test_clients_are_told_why_they_cannot_speak_to_the_daemon(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not running, no permission, or gone in the middle: each with its cure and its exit status."""
+    path = tmp_path / "control.sock"
+
+    async def failure(prepare: Callable[[], object] = lambda: None) -> ControlError:
+        prepare()
+        with pytest.raises(ControlError) as caught:
+            async with conversation(path):
+                pass
+        return caught.value
+
+    assert "No daemon is running" in str(error := await failure())
+    assert error.exit_status == 69
+
+    async def forbidden(*_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(asyncio, "open_unix_connection", forbidden)
+        assert "usermod -aG regolithd" in str(error := await failure())
+        assert error.exit_status == 77
+
+    gone = await asyncio.start_unix_server(lambda _, writer: writer.close(), path)
+    async with gone, conversation(path) as daemon:
+        daemon.ask(StatusRequest())
+        with pytest.raises(ControlError, match="it was stopped, or it died"):
+            await daemon.reply()

@@ -1,0 +1,213 @@
+"""A traverse takes the time that follows from distance and speed, and always ends with the wheels told to stop."""
+
+import asyncio
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import pytest
+from listener import until
+
+from regolithd.daemon.control.traverse import Clock, Ending, Outcome, Plan, Traverse, TraverseError, plan_traverse
+from regolithd.drivers.errors import DriveError
+
+KAPVIK = {"radius_m": 0.075, "speed_limit_m_s": 0.05, "distance_limit_m": 1000.0}
+
+
+class QuickClock(Clock):
+    """Time passes as soon as somebody waits for it; `at` runs something when its time has come."""
+
+    def __init__(self, at: Sequence[tuple[float, Callable[[], None]]] = ()) -> None:
+        self.now = 100.0
+        self.at = [(100.0 + seconds, action) for seconds, action in at]
+
+    def now_s(self) -> float:
+        """Return the time as it is now."""
+        return self.now
+
+    async def wait(self, event: asyncio.Event, seconds: float) -> None:
+        """Let the time pass at once."""
+        await asyncio.sleep(0)
+        until = self.now + seconds
+        while self.at and self.at[0][0] <= until and not event.is_set():
+            self.now, action = self.at.pop(0)
+            action()
+        if not event.is_set():
+            self.now = until
+
+
+@dataclass
+class Rover:
+    """Remembers what it was told; may refuse."""
+
+    told: list[object] = field(default_factory=list)
+    refuses: dict[str, str] = field(default_factory=dict)
+    stands: bool = True
+
+    async def _do(self, what: str, value: object = None) -> None:
+        self.told.append(what if value is None else (what, value))
+        if what in self.refuses:
+            raise DriveError(self.refuses[what], node_id=3)
+
+    async def enable(self) -> None:
+        """Enable."""
+        await self._do("enable")
+
+    async def set_speed(self, wheel_speed_rad_s: Sequence[float]) -> None:
+        """Turn."""
+        assert len(wheel_speed_rad_s) == 6
+        await self._do("speed", wheel_speed_rad_s[0])
+
+    async def quick_stop(self) -> None:
+        """Stop."""
+        await self._do("quick stop")
+
+    async def disable(self) -> None:
+        """Disable."""
+        await self._do("disable")
+
+    def watch(self) -> Callable[[], bool]:
+        """Say whether it stands."""
+        return lambda: self.stands
+
+
+def traverse(rover: Rover, clock: Clock, reports: list[float] | None = None) -> Traverse:
+    """Return Kapvik's traverse."""
+    return Traverse(plan(), rover, rover.watch, (reports if reports is not None else []).append, clock)
+
+
+def plan() -> Plan:
+    """Return 10 m at 2.2 cm/s."""
+    return plan_traverse(10.0, 0.022, **KAPVIK)
+
+
+def test_ten_metres_at_kapviks_speed_take_454_54_seconds() -> None:
+    """As in the paper."""
+    assert plan().duration_s == pytest.approx(454.545454, abs=1e-6)
+    assert plan().wheel_speed_rad_s == pytest.approx(0.293333, abs=1e-6)
+    assert plan_traverse(1.0, -0.02, **KAPVIK).wheel_speed_rad_s < 0
+    assert plan_traverse(1.0, -0.02, **KAPVIK).duration_s == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize(
+    ("distance", "speed", "problems"),
+    [
+        (0.0, 0.022, ["distance"]),
+        (-1.0, 0.022, ["distance"]),
+        (1001.0, 0.022, ["at most 1000 m"]),
+        (float("nan"), float("nan"), ["distance", "speed"]),
+        (10.0, 0.0, ["speed"]),
+        (10.0, 0.051, ["at most 0.05 m/s"]),
+        (10.0, -0.051, ["at most 0.05 m/s"]),
+        (float("inf"), 9.0, ["distance", "speed"]),
+    ],
+)
+def test_what_must_not_be_driven_is_refused_with_every_reason(
+    distance: float, speed: float, problems: list[str]
+) -> None:
+    """At once, and with the place where the limits are."""
+    with pytest.raises(TraverseError) as caught:
+        plan_traverse(distance, speed, **KAPVIK)
+    assert len(caught.value.problems) == len(problems) + 1
+    for problem in problems:
+        assert problem in str(caught.value)
+    assert "[control]" in str(caught.value)
+
+
+async def test_it_turns_constantly_for_its_time_and_stops_clean() -> None:
+    """Then the power is taken off, and no quick stop was needed."""
+    rover, clock, reports = Rover(), QuickClock(), []
+    outcome = await traverse(rover, clock, reports).run()
+    assert outcome.ending is Ending.FINISHED
+    assert outcome.elapsed_s == pytest.approx(plan().duration_s)
+    assert rover.told == ["enable", ("speed", plan().wheel_speed_rad_s), ("speed", 0.0), "disable"]
+    assert clock.now - 100.0 == pytest.approx(454.545454, abs=1e-6)
+    assert len(reports) == pytest.approx(910, abs=1)
+    assert reports == sorted(reports)
+
+
+async def interrupted(rover: Rover, *, quick: bool) -> Outcome:
+    """Drive, and stop it after 100 s."""
+    clock = QuickClock()
+    driven = traverse(rover, clock)
+    clock.at = [(200.0, lambda: driven.stop("wanted", quick=quick))]
+    return await driven.run()
+
+
+async def test_it_can_be_stopped_clean() -> None:
+    """With the drives' own ramp."""
+    rover = Rover()
+    assert await interrupted(rover, quick=False) == Outcome(Ending.STOPPED, 100.0, "wanted")
+    assert rover.told[-2:] == [("speed", 0.0), "disable"]
+
+
+async def test_it_can_be_stopped_at_once() -> None:
+    """Without waiting for anything."""
+    rover = Rover()
+    assert await interrupted(rover, quick=True) == Outcome(Ending.QUICK_STOPPED, 100.0, "wanted")
+    assert rover.told[2:] == ["quick stop", "disable"]
+
+
+async def test_a_clean_stop_that_does_not_come_becomes_a_quick_one() -> None:
+    """The wheels are measured, not believed."""
+    rover = Rover(stands=False)
+    outcome = await traverse(rover, QuickClock()).run()
+    assert outcome.ending is Ending.QUICK_STOPPED
+    assert "still turned" in outcome.text
+    assert rover.told[-2:] == ["quick stop", "disable"]
+
+
+async def test_a_quick_stop_overrides_a_clean_one_under_way() -> None:
+    """And not the other way round."""
+    rover, clock = Rover(stands=False), QuickClock()
+    driven = traverse(rover, clock)
+    clock.at = [(100.0, lambda: driven.stop("gently", quick=False)), (100.0, lambda: driven.stop("now", quick=True))]
+    driven.stop("gently", quick=False)
+    driven.stop("now", quick=True)
+    driven.stop("gently again", quick=False)
+    assert (await driven.run()).text == "now"
+    assert rover.told[-2:] == ["quick stop", "disable"]
+
+
+async def test_drives_that_cannot_be_enabled_are_told_and_nothing_turns() -> None:
+    """The network has disabled them again."""
+    rover = Rover(refuses={"enable": "stays in fault"})
+    outcome = await traverse(rover, QuickClock()).run()
+    assert outcome.ending is Ending.FAILED
+    assert "node 3: stays in fault" in outcome.text
+    assert rover.told == ["enable"]
+
+
+@pytest.mark.parametrize("quick", [True, False])
+async def test_one_that_is_stopped_while_the_drives_are_enabled_never_turns(quick: bool) -> None:
+    """Whoever wanted it may be gone before it has begun."""
+    rover = Rover()
+    driven = traverse(rover, QuickClock())
+    driven.stop("gone", quick=quick)
+    assert (await driven.run()).text == "gone"
+    assert rover.told == ["enable", "quick stop" if quick else ("speed", 0.0), "disable"]
+
+
+async def test_a_drive_that_refuses_ends_in_a_quick_stop() -> None:
+    """In the middle of the traverse."""
+    rover = Rover(refuses={"speed": "the drive is in fault"})
+    outcome = await traverse(rover, QuickClock()).run()
+    assert outcome.ending is Ending.QUICK_STOPPED
+    assert rover.told[-2:] == ["quick stop", "disable"]
+
+
+async def test_a_stop_that_is_not_confirmed_is_said_so() -> None:
+    """That is when a person has to act."""
+    outcome = await interrupted(Rover(refuses={"quick stop": "does not stop"}), quick=True)
+    assert outcome.ending is Ending.FAILED
+    assert "does not stop" in outcome.text
+
+
+async def test_cancelling_it_stops_the_wheels() -> None:
+    """The daemon is being stopped."""
+    rover = Rover()
+    task = asyncio.create_task(traverse(rover, Clock()).run())
+    await until(lambda: ("speed", plan().wheel_speed_rad_s) in rover.told)
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await task
+    assert rover.told[-2:] == ["quick stop", "disable"]

@@ -1,0 +1,58 @@
+"""The same facts, the same alarms; and every alarm can be told off again."""
+
+import dataclasses
+
+import pytest
+
+from regolithd.daemon.health.alarms import Facts, current_alarms, known_names
+from regolithd.daemon.messages.models import Severity
+from regolithd.drivers.can.bus import BusState
+from regolithd.drivers.master.status import NodePhase, NodeStatus
+from regolithd.drivers.signals import NodeDescription, NodeKind
+
+CELL = NodeDescription(13, NodeKind.LOAD_CELL, 2)
+SPEED = NodeDescription(22, NodeKind.GROUND_SPEED, None, required=False)
+
+TROUBLES = [
+    ("bus_trouble", "no such link", "bus", Severity.CRITICAL),
+    ("bus_state", BusState.WARNING, "bus", Severity.WARNING),
+    ("bus_state", BusState.PASSIVE, "bus", Severity.ERROR),
+    ("bus_state", BusState.OFF, "bus", Severity.CRITICAL),
+    ("bus_state", BusState.DOWN, "bus", Severity.CRITICAL),
+    ("kernel_drops", 3, "kernel", Severity.ERROR),
+    ("store_dropped", 3, "store", Severity.ERROR),
+    ("store_unstored", 3, "store", Severity.WARNING),
+    ("recording_trouble", "no room", "recording", Severity.ERROR),
+    ("control_trouble", "no such group", "control", Severity.WARNING),
+    ("clock_jump_s", -3.0, "clock", Severity.WARNING),
+]
+
+
+def test_all_is_well() -> None:
+    """Then nothing is said; a node that boots is no alarm yet."""
+    nodes = {13: NodeStatus(CELL, NodePhase.BOOTING), 22: NodeStatus(SPEED, NodePhase.OPERATIONAL)}
+    assert current_alarms(Facts(nodes=nodes)) == {}
+
+
+@pytest.mark.parametrize(("fact", "value", "name", "severity"), TROUBLES)
+def test_each_trouble_is_one_alarm_with_its_cure(fact: str, value: object, name: str, severity: Severity) -> None:
+    """Under a name that is known, so that it can be ended."""
+    alarms = current_alarms(dataclasses.replace(Facts(), **{fact: value}))
+    assert list(alarms) == [name]
+    assert alarms[name].severity is severity
+    assert alarms[name].text
+    assert alarms[name].cure
+    assert name in known_names([])
+
+
+@pytest.mark.parametrize("phase", [NodePhase.LOST, NodePhase.FAILED])
+def test_a_node_that_is_missing_is_an_alarm_of_its_own(phase: NodePhase) -> None:
+    """One that need not be there is a warning."""
+    nodes = {13: NodeStatus(CELL, phase, text="silent"), 22: NodeStatus(SPEED, phase)}
+    alarms = current_alarms(Facts(nodes=nodes))
+    assert {name: alarm.severity for name, alarm in alarms.items()} == {
+        "node-13": Severity.ERROR,
+        "node-22": Severity.WARNING,
+    }
+    assert alarms["node-13"].text == "silent"
+    assert set(alarms) <= set(known_names(nodes))

@@ -1,0 +1,70 @@
+"""A sensor that repeats itself is noticed, and nothing else is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from regolithd.daemon.health.stuck_sensor import StuckWatch
+from regolithd.daemon.pipeline.snapshot import QUANTITIES, ROW, Snapshot
+from regolithd.drivers.signals import Quantity
+
+RANDOM = np.random.default_rng(5)
+
+
+def snapshots(
+    rate_Hz: float, seconds: float, *, frozen: tuple[int, ...] = (), speed: float = 400.0, noise: float = 0.3
+) -> list[Snapshot]:
+    """Return a drive on which some load cells (1–6) stay at what they say."""
+    made = []
+    for k in range(int(rate_Hz * seconds)):
+        values = np.full((len(QUANTITIES), 6), np.nan)
+        values[ROW[Quantity.MOTOR_SPEED]] = speed
+        values[ROW[Quantity.MOTOR_CURRENT]] = np.round(0.07 * (1 + noise * RANDOM.standard_normal(6)), 3)
+        values[ROW[Quantity.LOAD]] = np.round(49 * (1 + noise / 3 * RANDOM.standard_normal(6)), 2)
+        values[ROW[Quantity.LOAD], [wheel - 1 for wheel in frozen]] = 48.23
+        made.append(Snapshot(k, round(k * 1e9 / rate_Hz), values))
+    return made
+
+
+def watch(*drives: list[Snapshot]) -> tuple[tuple[Quantity, int], ...]:
+    """Return what is found stuck at the end."""
+    watching = StuckWatch()
+    for drive in drives:
+        for snapshot in drive:
+            watching.step(snapshot)
+    return watching.stuck
+
+
+@pytest.mark.parametrize("rate_Hz", [2.0, 10.0, 100.0])
+def test_a_load_that_stays_the_same_is_stuck(rate_Hz: float) -> None:
+    """After twenty snapshots and five seconds, whichever is longer; one or two of them."""
+    assert watch(snapshots(rate_Hz, 12, frozen=(3,))) == ((Quantity.LOAD, 3),)
+    assert watch(snapshots(rate_Hz, 12, frozen=(2, 6))) == ((Quantity.LOAD, 2), (Quantity.LOAD, 6))
+    assert watch(snapshots(rate_Hz, 4.9, frozen=(3,))) == ()
+
+
+def test_it_is_over_with_the_first_reading_that_differs() -> None:
+    """A sensor that is exchanged is believed at once."""
+    assert watch(snapshots(10, 12, frozen=(3,)), snapshots(10, 0.3)) == ()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_an_ordinary_drive_has_no_stuck_sensor(seed: int) -> None:
+    """Ten minutes at 10 Hz with only the last digit trembling."""
+    del seed
+    assert watch(snapshots(10, 30, noise=0.0005)) == ()
+
+
+def test_who_stands_or_has_no_noise_at_all_is_not_stuck() -> None:
+    """Then a value that stays says nothing."""
+    assert watch(snapshots(10, 12, frozen=(3,), speed=0.0)) == ()
+    assert watch(snapshots(10, 12, noise=0.0)) == ()
+
+
+def test_what_is_not_measured_is_not_stuck() -> None:
+    """NaN is never the same as NaN, and a gap begins the count anew."""
+    drive = snapshots(10, 12, frozen=(3,))
+    for snapshot in drive[::40]:
+        snapshot.values[ROW[Quantity.LOAD], 2] = np.nan
+    assert watch(drive) == ()

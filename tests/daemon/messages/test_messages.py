@@ -1,0 +1,136 @@
+"""What is published is what the models and the documents say."""
+
+import json
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from estimates import estimate
+from pydantic import ValidationError
+
+from regolithd.daemon.messages.documents import documents
+from regolithd.daemon.messages.models import CHANNELS, SnapshotMessage, StateMessage, WheelMessage, iso_time
+from regolithd.daemon.publish.encode import as_late, encode, write
+
+DOCS = Path(__file__).resolve().parents[3] / "docs" / "messages"
+SESSION = "20130611T140312Z-5f1c"
+
+
+@pytest.mark.parametrize("missing_wheel", [None, 0, 3])
+def test_what_is_written_is_what_the_models_would_write(missing_wheel: int | None) -> None:
+    """To the byte: the fast way must not drift from the models."""
+    snapshot, wheels = encode(estimate(missing_wheel=missing_wheel), SESSION)
+    assert SnapshotMessage.model_validate_json(snapshot).model_dump_json().encode() == snapshot
+    for wheel in wheels:
+        assert WheelMessage.model_validate_json(wheel).model_dump_json().encode() == wheel
+
+
+def test_numbers_arrive_to_the_last_bit() -> None:
+    """A subscriber may repeat every calculation."""
+    sent = estimate()
+    snapshot, wheels = encode(sent, SESSION)
+    received = SnapshotMessage.model_validate_json(snapshot)
+    np.testing.assert_array_equal(np.array(received.motor_current_A), sent.snapshot.motor_current_A)
+    np.testing.assert_array_equal(np.array(received.cohesion_Pa), sent.cohesion_Pa)
+    for k, payload in enumerate(wheels):
+        wheel = WheelMessage.model_validate_json(payload)
+        assert (wheel.wheel, wheel.friction_angle_rad) == (k + 1, sent.friction_angle_rad[k])
+
+
+def test_what_was_not_measured_is_null_and_not_valid() -> None:
+    """Never NaN, which is no JSON, and never the value of before."""
+    snapshot, wheels = encode(estimate(missing_wheel=3), SESSION)
+    received = json.loads(snapshot)
+    assert received["load_N"][3] is None
+    assert received["statusword"] == [0x1237, 0x1237, 0x1237, None, 0x1237, 0x1237]
+    assert received["measured"] == received["valid"] == [True, True, True, False, True, True]
+    assert json.loads(wheels[3])["cohesion_Pa"] is None
+
+
+def test_an_input_outside_the_training_range_is_marked_by_name() -> None:
+    """For the wheel that it concerns."""
+    snapshot, wheels = encode(estimate(), SESSION)
+    assert json.loads(snapshot)["outside_training_range"] == [[], [], [], [], ["slip"], []]
+    assert json.loads(wheels[4])["outside_training_range"] == ["slip"]
+
+
+def test_a_late_message_differs_in_its_mark_alone() -> None:
+    """And can be marked twice."""
+    snapshot, _ = encode(estimate(), SESSION)
+    late = as_late(snapshot)
+    assert json.loads(late) == json.loads(snapshot) | {"late": True}
+    assert as_late(late) == late
+    with pytest.raises(ValueError, match="not a message"):
+        as_late(b'{"schema_version":9}')
+
+
+def test_every_model_written_live_can_be_marked_late() -> None:
+    """The mark stands at the same place in every message."""
+    state = StateMessage(
+        session=SESSION, sequence=1, time=iso_time(0), state="online", reason="connected", software_version="0"
+    )
+    assert json.loads(as_late(write(state.model_dump())))["late"] is True
+    assert as_late(state.model_dump_json().encode()) == as_late(write(state.model_dump()))
+
+
+def test_times_keep_their_nanoseconds() -> None:
+    """Also below a second and before a round one."""
+    assert iso_time(1_370_959_642_018_291_001) == "2013-06-11T14:07:22.018291001Z"
+    assert iso_time(1_000_000_007) == "1970-01-01T00:00:01.000000007Z"
+
+
+def test_documents_are_fresh() -> None:
+    """`regolithd schema --write docs/messages` was run after the last change of a model."""
+    written = {path.name: path.read_text(encoding="utf-8") for path in DOCS.iterdir()}
+    assert written == documents(), "run: regolithd schema --write docs/messages"
+
+
+def test_schemas_accept_what_is_sent_and_refuse_what_is_not() -> None:
+    """Each schema is itself valid JSON Schema 2020-12."""
+    snapshot, wheels = encode(estimate(missing_wheel=2), SESSION)
+    for channel in CHANNELS:
+        jsonschema.Draft202012Validator.check_schema(json.loads((DOCS / f"{channel.name}.schema.json").read_text()))
+    validator = jsonschema.Draft202012Validator(json.loads((DOCS / "snapshot.schema.json").read_text()))
+    validator.validate(json.loads(snapshot))
+    wrong = json.loads(snapshot) | {"load_N": [1.0] * 5}
+    assert [error.json_path for error in validator.iter_errors(wrong)] == ["$.load_N"]
+    wheel = jsonschema.Draft202012Validator(json.loads((DOCS / "wheel.schema.json").read_text()))
+    wheel.validate(json.loads(wheels[2]))
+
+
+def test_every_message_has_an_example_that_its_schema_accepts() -> None:
+    """As a reader would check it: from the documents alone."""
+    document = json.loads((DOCS / "asyncapi.json").read_text())
+    for channel in CHANNELS:
+        (shown,) = document["components"]["messages"][channel.message.__name__]["examples"]
+        schema = json.loads((DOCS / f"{channel.name}.schema.json").read_text())
+        jsonschema.Draft202012Validator(schema).validate(shown["payload"])
+
+
+def test_every_reference_in_the_asyncapi_document_leads_somewhere() -> None:
+    """And every channel has its operation, with QoS and retain."""
+    document = json.loads((DOCS / "asyncapi.json").read_text())
+
+    def references(node: object) -> list[str]:
+        if isinstance(node, dict):
+            return [v for k, v in node.items() if k == "$ref"] + [r for v in node.values() for r in references(v)]
+        return [r for v in node for r in references(v)] if isinstance(node, list) else []
+
+    found = references(document)
+    assert len(found) > 3 * len(CHANNELS)
+    for reference in found:
+        node = document
+        for part in reference.removeprefix("#/").split("/"):
+            node = node[part]
+    for channel in CHANNELS:
+        operation = document["operations"][f"publish-{channel.name}"]
+        assert operation["action"] == "send"
+        assert operation["bindings"]["mqtt"] == {"qos": int(channel.qos), "retain": channel.retain}
+
+
+def test_no_message_is_taken_with_a_field_too_many() -> None:
+    """A reader of version 1 knows what it gets."""
+    snapshot, _ = encode(estimate(), SESSION)
+    with pytest.raises(ValidationError):
+        SnapshotMessage.model_validate(json.loads(snapshot) | {"extra": 1})

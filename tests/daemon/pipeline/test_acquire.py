@@ -1,0 +1,167 @@
+"""One SYNC, one snapshot: what did not come is NaN, and every reading is accounted for."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from regolithd.daemon.pipeline.acquire import Acquisition
+from regolithd.daemon.pipeline.snapshot import Snapshot
+from regolithd.drivers.signals import NodeDescription, NodeKind, Quantity, Reading, Sync
+
+PERIOD_NS = 500_000_000
+MOTORS = tuple(NodeDescription(k + 1, NodeKind.MOTOR, k) for k in range(6))
+PDOS = tuple(0x181 + k for k in range(6))
+MS = 1_000_000
+
+
+def acquisition() -> Acquisition:
+    """Return one that knows six motor controllers."""
+    return Acquisition(MOTORS, PDOS, PERIOD_NS)
+
+
+def reading(node: int, time_ns: int, current: float = 0.08) -> Reading:
+    """Return one motor's TPDO."""
+    return Reading(time_ns, node, 0x180 + node, ((Quantity.MOTOR_CURRENT, current), (Quantity.MOTOR_SPEED, 400.0)))
+
+
+def window(taken: Acquisition, k: int, nodes: range | tuple[int, ...] = range(1, 7)) -> list[Snapshot]:
+    """Feed one SYNC and its answers; return what closed."""
+    start = k * PERIOD_NS
+    items = [Sync(start), *(reading(node, start + node * MS, current=k + node / 10) for node in nodes)]
+    return [snapshot for item in items if (snapshot := taken.accept(item))]
+
+
+def test_the_first_window_closes_at_the_next_sync_and_later_ones_when_everybody_has_answered() -> None:
+    """Who will answer is learned from the bus, not assumed."""
+    taken = acquisition()
+    assert window(taken, 0) == []
+    first, second = window(taken, 1)
+    assert (first.sequence, second.sequence) == (0, 1)
+    np.testing.assert_allclose(second.motor_current_A, 1 + np.arange(1, 7) / 10)
+    assert np.isnan(second.load_N).all()
+    assert not second.valid.any()
+
+
+def test_a_value_that_did_not_come_is_nan_and_counted_never_repeated() -> None:
+    """Node 3 is silent in the third window."""
+    taken = acquisition()
+    for k in range(2):
+        window(taken, k)
+    assert window(taken, 2, nodes=(1, 2, 4, 5, 6)) == []
+    (third, *_) = window(taken, 3)
+    assert np.isnan(third.motor_current_A).tolist() == [False, False, True, False, False, False]
+    assert taken.counters.missing == 1
+
+
+def test_a_lost_node_delays_three_snapshots_and_no_more_and_is_taken_up_again_when_it_returns() -> None:
+    """Whoever stopped answering is not waited for for ever."""
+    taken = acquisition()
+    for k in range(3):
+        window(taken, k)
+    closed = [len(window(taken, k, nodes=(1, 2, 4, 5, 6))) for k in range(3, 9)]
+    assert closed == [0, 1, 1, 2, 1, 1]  # from the fourth on, each closes in its own window again
+    window(taken, 9)
+    again = [snapshot for k in range(10, 14) for snapshot in window(taken, k)]
+    assert not np.isnan(again[-1].motor_current_A).any()
+
+
+def test_an_answer_that_comes_after_the_next_sync_is_never_taken_for_a_fresh_one() -> None:
+    """Node 6 answers SYNC 2 only after SYNC 3, and then SYNC 3: the second is the right one."""
+    taken = acquisition()
+    for k in range(2):
+        window(taken, k)
+    window(taken, 2, nodes=range(1, 6))
+    taken.accept(Sync(3 * PERIOD_NS))
+    taken.accept(reading(6, 3 * PERIOD_NS + MS, current=2.6))  # of SYNC 2
+    closed = [taken.accept(reading(node, 3 * PERIOD_NS + 9 * MS, current=3 + node / 10)) for node in range(1, 7)]
+    assert closed[:-1] == [None] * 5
+    third = closed[-1]
+    assert third is not None
+    assert third.motor_current_A[5] == pytest.approx(3.6)
+    assert taken.counters.late == 1
+
+
+def test_answers_that_came_in_a_burst_across_a_sync_are_told_apart() -> None:
+    """Node 6 was held up for two SYNCs; its answers come around the third, and only the third's own counts."""
+    taken = acquisition()
+    for k in range(2):
+        window(taken, k)
+    for k in (2, 3):
+        window(taken, k, nodes=range(1, 6))
+    taken.accept(reading(6, 3 * PERIOD_NS + 9 * MS, current=2.6))  # of SYNC 2, and those of 3 and 4 follow
+    fourth = taken.accept(Sync(4 * PERIOD_NS))
+    assert fourth is not None
+    assert np.isnan(fourth.motor_current_A[5])
+    for node in range(1, 6):
+        taken.accept(reading(node, 4 * PERIOD_NS + MS))
+    taken.accept(reading(6, 4 * PERIOD_NS + 2 * MS, current=3.6))
+    closed = taken.accept(reading(6, 4 * PERIOD_NS + 3 * MS, current=4.6))
+    assert closed is not None
+    assert closed.motor_current_A[5] == pytest.approx(4.6)
+
+
+def test_a_single_answer_after_a_missing_one_is_in_doubt_for_three_windows() -> None:
+    """It may be the missing one; after three windows with one answer each, that one is taken for lost."""
+    taken = acquisition()
+    for k in range(2):
+        window(taken, k)
+    window(taken, 2, nodes=range(1, 6))
+    closed = [snapshot for k in range(3, 8) for snapshot in window(taken, k)]
+    known = {snapshot.sequence: bool(np.isfinite(snapshot.motor_current_A[5])) for snapshot in closed}
+    assert known == {2: False, 3: False, 4: False, 5: False, 6: True, 7: True}
+
+
+def test_an_answer_outside_the_synchronous_window_is_late() -> None:
+    """Its node would sample the next SYNC before this answer counts."""
+    taken = acquisition()
+    taken.accept(Sync(0))
+    taken.accept(reading(1, int(0.95 * PERIOD_NS)))
+    snapshot = taken.accept(Sync(PERIOD_NS))
+    assert snapshot is not None
+    assert np.isnan(snapshot.motor_current_A).all()
+    assert (taken.counters.late, taken.counters.missing) == (1, 6)
+
+
+def test_foreign_duplicate_and_early_readings_are_counted_and_not_taken() -> None:
+    """The first of two is kept."""
+    taken = acquisition()
+    taken.accept(reading(1, 0))
+    taken.accept(Sync(PERIOD_NS))
+    taken.accept(reading(1, PERIOD_NS + MS, current=0.1))
+    taken.accept(reading(1, PERIOD_NS + 2 * MS, current=0.2))
+    taken.accept(Reading(PERIOD_NS + 3 * MS, 99, 0x1E3, ((Quantity.LOAD, 1.0),)))
+    snapshot = taken.accept(Sync(2 * PERIOD_NS))
+    assert snapshot is not None
+    assert snapshot.motor_current_A[0] == pytest.approx(0.1)
+    counters = taken.counters
+    assert (counters.late, counters.duplicate, counters.unexpected) == (1, 1, 1)
+
+
+def test_what_one_node_measures_for_the_body_stands_at_all_wheels_and_nothing_can_be_changed_later() -> None:
+    """A snapshot is frozen."""
+    taken = Acquisition((NodeDescription(22, NodeKind.GROUND_SPEED, None),), (0x196,), PERIOD_NS)
+    taken.accept(Sync(1_234_567_891))
+    taken.accept(Reading(1_235_000_000, 22, 0x196, ((Quantity.GROUND_SPEED, 0.0215),)))
+    snapshot = taken.accept(Sync(1_734_567_891))
+    assert snapshot is not None
+    assert snapshot.time_ns == 1_234_567_000  # whole microseconds, as the log has it
+    assert snapshot.ground_speed_m_s.tolist() == [0.0215] * 6
+    with pytest.raises(ValueError, match="read-only"):
+        snapshot.load_N[0] = 1.0
+
+
+@given(st.lists(st.tuples(st.integers(0, 7), st.integers(0, 20 * PERIOD_NS)), max_size=200))
+def test_every_reading_is_accounted_for_whatever_the_order(events: list[tuple[int, int]]) -> None:
+    """Node 0 stands for a SYNC, 7 for a stranger; times may go backwards."""
+    taken = acquisition()
+    snapshots = [
+        snapshot
+        for node, time_ns in events
+        if (snapshot := taken.accept(Sync(time_ns) if node == 0 else reading(node, time_ns)))
+    ]
+    counters = taken.counters
+    readings = sum(node != 0 for node, _ in events)
+    assert counters.accepted + counters.late + counters.duplicate + counters.unexpected == readings
+    assert counters.snapshots == len(snapshots)
+    assert [snapshot.sequence for snapshot in snapshots] == list(range(len(snapshots)))

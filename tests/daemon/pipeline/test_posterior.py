@@ -1,0 +1,72 @@
+"""Intervals twice a second – once the drivetrain is known, and for the wheel that the posterior was trained for."""
+
+from collections.abc import Callable
+
+import pytest
+
+from regolithd.calibration.parameters import Drivetrain
+from regolithd.calibration.posterior.estimator import PosteriorError
+from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.pipeline.chain import Chain
+from regolithd.daemon.pipeline.posterior import belief_stage, gain_doubt
+from regolithd.daemon.pipeline.snapshot import Estimate
+from regolithd.daemon.pipeline.terrain_network import Network
+
+CALIBRATED = {"no_load_current_A": 0.037, "no_load_current_std_A": 0.001, "gain_relative_std": 0.03}
+
+
+def changed(configuration: Configuration, **tables: dict[str, object]) -> Configuration:
+    """Return a configuration with some tables changed."""
+    return Configuration.model_validate(configuration.model_dump() | tables)
+
+
+def estimates(configuration: Configuration, drive: Callable, rate_Hz: float, snapshots: int) -> list[Estimate]:
+    """Return what the chain makes of a straight drive."""
+    network = Network(configuration.estimator.model)  # type: ignore[arg-type]
+    return Chain(configuration, network).feed(drive(rate_Hz=rate_Hz).frames(snapshots))
+
+
+@pytest.mark.parametrize("rate_Hz", [2.0, 20.0])
+def test_a_calibrated_rover_believes_twice_a_second(
+    configuration: Configuration, drive: Callable, rate_Hz: float
+) -> None:
+    """At any rate, and its intervals are in order and around something."""
+    settings = changed(configuration, drivetrain=CALIBRATED, sync={"rate_Hz": rate_Hz})
+    made = estimates(settings, drive, rate_Hz, int(15 * rate_Hz))
+    beliefs = [estimate.belief for estimate in made if estimate.belief is not None]
+    assert 27 <= len(beliefs) <= 30
+    last = beliefs[-1]
+    assert (last.wheels, last.instants) == (6, 20)
+    for interval in (last.cohesion_Pa, last.friction_angle_rad, last.drawbar_margin):
+        assert interval.low_90 < interval.low_50 < interval.median < interval.high_50 < interval.high_90
+    assert last.cohesion_Pa.low_90 > 0
+    width = [belief.cohesion_Pa.high_90 - belief.cohesion_Pa.low_90 for belief in (beliefs[0], last)]
+    assert width[1] < width[0]  # ten seconds say more than half a one
+
+
+def test_a_rover_that_does_not_know_its_friction_believes_nothing(
+    configuration: Configuration, drive: Callable
+) -> None:
+    """It would take the drivetrain for soil."""
+    assert belief_stage(configuration) is None
+    assert all(estimate.belief is None for estimate in estimates(configuration, drive, 2.0, 20))
+
+
+def test_it_can_be_switched_off(configuration: Configuration) -> None:
+    """Though everything is known."""
+    assert belief_stage(changed(configuration, drivetrain=CALIBRATED, posterior={"enabled": False})) is None
+
+
+def test_a_posterior_for_another_wheel_is_refused(configuration: Configuration) -> None:
+    """With the cure."""
+    with pytest.raises(PosteriorError, match=r"trained for wheels of 0\.075 m radius, not 0\.1 m\. Train one"):
+        belief_stage(changed(configuration, drivetrain=CALIBRATED, wheel={"radius_m": 0.1}))
+
+
+def test_a_brake_says_how_well_the_gain_is_known() -> None:
+    """Where a wheel had one; elsewhere, and without any, it is what was stated of Eq. 11's constants."""
+    assert gain_doubt(Drivetrain(gain_relative_std=0.05)) == pytest.approx(0.05)
+    one = Drivetrain(gain_relative_std=0.05, gain_factor=0.8, gain_factor_std=(0.008, 0, 0, 0, 0, 0))  # type: ignore[arg-type]
+    assert gain_doubt(one) == pytest.approx((0.01 + 5 * 0.05) / 6)
+    bent = Drivetrain(gain_factor_std=0.03, load_loss_std_per_Nm=0.1)  # type: ignore[arg-type]  # one value for six
+    assert gain_doubt(bent) == pytest.approx(0.03 * 2**0.5)

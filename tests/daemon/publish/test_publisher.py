@@ -1,0 +1,330 @@
+"""What was published arrives: in order, late ones marked, whatever happens to the broker."""
+
+import asyncio
+import gc
+import logging
+import shutil
+import subprocess
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from broker import Mosquitto, unused_port
+from estimates import estimate
+from listener import Subscriber, assert_complete, listening, until
+
+from regolithd.daemon.config.configuration import Configuration, Mqtt
+from regolithd.daemon.messages.models import EventMessage, NodeMessage
+from regolithd.daemon.publish.backoff import Backoff
+from regolithd.daemon.publish.publisher import Publisher
+from regolithd.daemon.publish.spool import Spool
+
+QUICK = {"first": 0.05, "longest": 0.2}
+
+
+def configuration(folder: Path, port: int, **mqtt: Any) -> Configuration:
+    """Return a rover whose broker is here."""
+    settings: dict[str, Any] = {"host": "127.0.0.1", "port": port, "keepalive_s": 2} | mqtt
+    return Configuration(mqtt=Mqtt(spool_directory=folder, **settings))
+
+
+@asynccontextmanager
+async def running(publisher: Publisher) -> AsyncIterator[asyncio.Task[None]]:
+    """Run a publisher, and stop it as the daemon does."""
+    task = asyncio.create_task(publisher.run())
+    try:
+        yield task
+    finally:
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+
+
+def new_publisher(folder: Path, port: int, **mqtt: Any) -> Publisher:
+    """Return a publisher that tries again quickly."""
+    settings = configuration(folder, port, **mqtt)
+    return Publisher(settings, Spool(folder, 10_000_000), backoff=Backoff(**QUICK))
+
+
+async def test_every_snapshot_and_every_wheel_arrives_live(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """In order, not marked, and the store is empty afterwards."""
+    publisher = new_publisher(tmp_path, mosquitto.port)
+    async with listening(Subscriber(mosquitto.port)) as subscriber, running(publisher):
+        await until(lambda: publisher.connected)
+        for sequence in range(50):
+            publisher.estimate(estimate(sequence))
+            await asyncio.sleep(0.01)
+        await until(lambda: len(subscriber.of("snapshot")) == 50)
+        await until(lambda: subscriber.of("wheel/6") and subscriber.of("wheel/6")[-1]["sequence"] == 49)
+        await until(lambda: publisher.report.queued == 0)
+    assert subscriber.sequences() == list(range(50))
+    assert not any(message["late"] for _, message, _ in subscriber.messages)
+    assert publisher.report.repeated == 0
+    assert not any(retained for _, _, retained in subscriber.messages)
+
+
+async def test_birth_and_clean_death_pair_up(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """`offline` is published by ourselves, retained, before the connection is closed."""
+    publisher = new_publisher(tmp_path, mosquitto.port)
+    async with listening(Subscriber(mosquitto.port)) as subscriber:
+        async with running(publisher):
+            await until(lambda: publisher.connected)
+        await until(lambda: len(subscriber.of("state")) == 2)
+    birth, death = subscriber.of("state")
+    assert (birth["state"], death["state"], death["reason"]) == ("online", "offline", "stopped")
+    assert (birth["session"], birth["sequence"]) == (death["session"], death["sequence"])
+    async with listening(Subscriber(mosquitto.port, name="latecomer")) as latecomer:
+        await until(lambda: latecomer.of("state"))
+    assert latecomer.messages == [("state", death, True)]
+
+
+async def test_while_the_broker_is_away_nothing_is_lost_and_late_ones_are_marked(
+    mosquitto: Mosquitto, tmp_path: Path
+) -> None:
+    """Acquisition goes on at its pace; afterwards every snapshot has come once or is marked, in order."""
+    keep_sessions(mosquitto)
+    publisher = new_publisher(tmp_path, mosquitto.port)
+    async with listening(Subscriber(mosquitto.port)) as subscriber:
+        await through_an_outage(publisher, subscriber, mosquitto)
+    assert_complete(subscriber, 150)
+    late = {message["sequence"] for message in subscriber.of("snapshot") if message["late"]}
+    assert set(range(31, 110)) <= late
+    assert not late & set(range(25))
+    states = [(message["state"], message["reason"]) for message in subscriber.of("state")]
+    assert states[0] == ("online", "connected")
+    assert states[-2:] == [("online", "connected"), ("offline", "stopped")]
+
+
+def keep_sessions(mosquitto: Mosquitto) -> None:
+    """Let the broker remember its subscribers through a restart, as the rover's does (systemd/mosquitto)."""
+    mosquitto.stop()
+    mosquitto.settings += f"persistence true\npersistence_location {mosquitto.folder}/\n"
+    mosquitto.start()
+
+
+async def through_an_outage(publisher: Publisher, subscriber: Subscriber, mosquitto: Mosquitto) -> None:
+    """Publish 150 snapshots, from the 30th to the 110th without a broker, and wait for all to arrive."""
+    async with running(publisher):
+        await until(lambda: publisher.connected)
+        for sequence in range(150):
+            if sequence == 30:
+                await asyncio.to_thread(mosquitto.stop)
+            if sequence == 110:
+                await asyncio.to_thread(mosquitto.start)
+                await until(lambda: publisher.connected and subscriber.ready.is_set())
+            publisher.estimate(estimate(sequence))
+            await asyncio.sleep(0.01)
+        await until(lambda: publisher.report.queued == 0)
+        await until(lambda: 149 in subscriber.sequences())
+    await until(lambda: subscriber.of("state")[-1]["state"] == "offline")
+
+
+async def test_a_frozen_broker_is_noticed_and_nothing_is_lost(
+    mosquitto: Mosquitto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its connections stay open and nothing answers: QoS 0 would call that a success."""
+    monkeypatch.setattr("regolithd.daemon.publish.connection.ACKNOWLEDGE_WITHIN_S", 0.5)
+    publisher = new_publisher(tmp_path, mosquitto.port)
+    async with listening(Subscriber(mosquitto.port)) as subscriber, running(publisher):
+        await until(lambda: publisher.connected)
+        for sequence in range(20):
+            publisher.estimate(estimate(sequence))
+        await until(lambda: publisher.report.queued == 0)
+        mosquitto.freeze()
+        for sequence in range(20, 220):
+            publisher.estimate(estimate(sequence))
+            await asyncio.sleep(0.005)
+        await until(lambda: not publisher.connected)
+        assert publisher.report.queued == 200
+        await until(lambda: "no answer" in publisher.problem)
+        mosquitto.thaw()
+        await until(lambda: publisher.connected)
+        await until(lambda: publisher.report.queued == 0)
+        await until(lambda: 219 in subscriber.sequences())
+        await until(lambda: subscriber.of("state")[-1]["state"] == "online")
+    assert_complete(subscriber, 220)
+
+
+async def test_an_estimate_is_taken_at_once_whatever_the_broker_does(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """More than the window and the socket hold, with no turn of the loop in between."""
+    publisher = new_publisher(tmp_path, mosquitto.port)
+    async with running(publisher):
+        await until(lambda: publisher.connected)
+        mosquitto.freeze()
+        for sequence in range(500):
+            publisher.estimate(estimate(sequence))
+        assert publisher.report.queued == 500
+        mosquitto.thaw()
+        await until(lambda: publisher.report.queued == 0)
+
+
+async def test_the_next_start_delivers_what_the_last_one_could_not(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """Marked late, under the session that measured it."""
+    first = new_publisher(tmp_path / "spool", unused_port())
+    async with running(first):
+        for sequence in range(10):
+            first.estimate(estimate(sequence))
+        first.say("event", EventMessage, kind="node-lost", node_id=3, text="node 3 is silent")
+    first._spool.close()
+    second = new_publisher(tmp_path / "spool", mosquitto.port)
+    async with listening(Subscriber(mosquitto.port)) as subscriber, running(second):
+        await until(lambda: subscriber.of("event"))
+    assert subscriber.sequences() == list(range(10))
+    assert {(message["late"], message["session"]) for message in subscriber.of("snapshot")} == {(True, first.session)}
+    assert subscriber.of("event")[0]["text"] == "node 3 is silent"
+
+
+def node_fields(phase: str, text: str) -> dict[str, Any]:
+    """Return the fields of a node's message."""
+    return {
+        "node_id": 3,
+        "kind": "motor",
+        "wheel": 3,
+        "required": True,
+        "phase": phase,
+        "nmt_state": None,
+        "drive_state": None,
+        "heard": None,
+        "identity": None,
+        "reason": None,
+        "text": text,
+        "boots": 1,
+        "emergencies": 0,
+    }
+
+
+async def test_the_retained_state_of_a_node_is_its_newest_also_after_an_outage(
+    mosquitto: Mosquitto, tmp_path: Path
+) -> None:
+    """A broker that forgot everything is told again; what is old never overwrites what is new."""
+    publisher = new_publisher(tmp_path, mosquitto.port)
+    async with running(publisher):
+        await until(lambda: publisher.connected)
+        publisher.say("node/3", NodeMessage, **node_fields("operational", "first"))
+        publisher.say("node/4", NodeMessage, **node_fields("operational", "untouched"))
+        await until(lambda: publisher.report.queued == 0)
+        await asyncio.to_thread(mosquitto.kill)  # no persistence: it forgets
+        await until(lambda: not publisher.connected)
+        publisher.say("node/3", NodeMessage, **node_fields("lost", "second"))
+        publisher.say("node/3", NodeMessage, **node_fields("operational", "third"))
+        await asyncio.to_thread(mosquitto.start)
+        await until(lambda: publisher.connected and publisher.report.queued == 0)
+        async with listening(Subscriber(mosquitto.port)) as latecomer:
+            await until(lambda: len(latecomer.messages) >= 3)
+    retained = {
+        topic: (message["text"], message["late"]) for topic, message, _ in latecomer.messages if "node" in topic
+    }
+    assert retained == {"node/3": ("third", True), "node/4": ("untouched", True)}
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"host": "broker.invalid"}, "the name cannot be resolved. Mend [mqtt] host"),
+        ({}, "nobody listens there"),
+        ({"password_file": Path("/nowhere/password"), "username": "me"}, "/nowhere/password"),
+    ],
+)
+async def test_a_broker_that_cannot_be_reached_is_told_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, settings: dict[str, Any], said: str
+) -> None:
+    """With the cure, and tried again all the while."""
+    caplog.set_level(logging.INFO, "regolithd.daemon.publish")
+    publisher = new_publisher(tmp_path, unused_port(), **settings)
+    async with running(publisher):
+        await until(lambda: publisher.report.connections >= 4)
+        assert said in publisher.problem
+    told = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
+    assert len(told) == 1
+    assert said in told[0]
+
+
+async def test_a_refused_password_is_told_and_tried_again_until_it_is_mended(
+    mosquitto: Mosquitto, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The broker's operator may mend it without touching the daemon."""
+    mosquitto.stop()
+    open_to_all, mosquitto.settings = mosquitto.settings, "allow_anonymous false\n"
+    mosquitto.start()
+    publisher = new_publisher(tmp_path / "spool", mosquitto.port)
+    async with running(publisher):
+        await until(lambda: "user name or password refused" in publisher.problem)
+        await until(lambda: publisher.report.connections >= 3)
+        await asyncio.to_thread(mosquitto.stop)
+        mosquitto.settings = open_to_all
+        await asyncio.to_thread(mosquitto.start)
+        await until(lambda: publisher.connected)
+    assert sum("refused. Mend" in record.getMessage() for record in caplog.records) == 1
+
+
+@pytest.fixture
+def secured(mosquitto: Mosquitto) -> Mosquitto:
+    """A broker that speaks TLS alone, with a certificate that it has signed itself."""
+    if shutil.which("openssl") is None:
+        pytest.skip("no openssl here: apt-get install openssl")
+    key, certificate = mosquitto.folder / "key.pem", mosquitto.folder / "certificate.pem"
+    request = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=localhost"]
+    request += ["-addext", "subjectAltName=DNS:localhost,IP:127.0.0.1", "-keyout", key, "-out", certificate]
+    subprocess.run(request, check=True, capture_output=True)
+    mosquitto.stop()
+    mosquitto.settings += f"certfile {certificate}\nkeyfile {key}\n"
+    mosquitto.start()
+    return mosquitto
+
+
+async def test_messages_go_over_tls_to_a_broker_that_proves_itself(secured: Mosquitto, tmp_path: Path) -> None:
+    """By an authority that the configuration names."""
+    publisher = new_publisher(tmp_path, secured.port, tls=True, ca_file=secured.folder / "certificate.pem")
+    async with running(publisher):
+        await until(lambda: publisher.connected)
+        publisher.estimate(estimate())
+        await until(lambda: publisher.report.acknowledged == 1)
+
+
+# paho leaves the socket of a failed handshake to the garbage collector.
+@pytest.mark.filterwarnings("ignore:Exception ignored in. <ssl.SSLSocket:pytest.PytestUnraisableExceptionWarning")
+async def test_a_broker_that_does_not_prove_itself_gets_nothing(secured: Mosquitto, tmp_path: Path) -> None:
+    """The system's authorities do not know it."""
+    publisher = new_publisher(tmp_path, secured.port, tls=True)
+    async with running(publisher):
+        await until(lambda: "TLS failed" in publisher.problem)
+        assert "ca_file" in publisher.problem
+        assert not publisher.connected
+    gc.collect()  # here, where the warning is expected
+
+
+async def test_two_of_the_same_name_are_told_so(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """The broker throws out the one for the other; neither floods it with attempts, and nothing is lost."""
+    rivals = [new_publisher(tmp_path / name, mosquitto.port) for name in "ab"]
+    async with running(rivals[0]), running(rivals[1]):
+        await until(lambda: all(rival.report.connections >= 3 for rival in rivals))
+        assert any("another client has the same [rover] name" in rival.problem for rival in rivals)
+
+
+async def test_the_daemon_subscribes_to_nothing(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """So nothing can be commanded over MQTT: the broker's own log has no subscription of ours."""
+    mosquitto.stop()
+    mosquitto.settings += "log_type all\n"
+    mosquitto.start()
+    publisher = new_publisher(tmp_path / "spool", mosquitto.port)
+    async with listening(Subscriber(mosquitto.port, name="the-only-one")), running(publisher):
+        await until(lambda: publisher.connected)
+        publisher.estimate(estimate())
+        await until(lambda: publisher.report.queued == 0)
+    subscriptions = [line for line in mosquitto.log.splitlines() if "SUBSCRIBE" in line and "Received" in line]
+    assert subscriptions
+    assert all("the-only-one" in line for line in subscriptions)
+    assert "regolithd-regolith-kapvik" in mosquitto.log
+
+
+def test_waiting_doubles_is_bounded_and_differs_from_rover_to_rover() -> None:
+    """And begins anew after a success."""
+    backoff = Backoff(first=1.0, longest=20.0)
+    delays = [backoff.next() for _ in range(8)]
+    for delay, whole in zip(delays, (1, 2, 4, 8, 16, 20, 20, 20), strict=True):
+        assert whole / 2 <= delay <= whole
+    assert delays != [Backoff(first=1.0, longest=20.0).next() for _ in range(8)]
+    backoff.reset()
+    assert backoff.next() <= 1.0

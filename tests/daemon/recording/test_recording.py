@@ -1,0 +1,216 @@
+"""What was recorded reads back the same to the last bit, whole or cut off anywhere."""
+
+import math
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from regolithd.daemon.config.configuration import Configuration, Recording
+from regolithd.daemon.pipeline.chain import Chain, Digest
+from regolithd.daemon.pipeline.terrain_network import Network
+from regolithd.daemon.recording.candump import frame_line, parse_line, read_log
+from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, snapshot_from_json
+from regolithd.daemon.recording.mcap_file import read_messages, read_metadata
+from regolithd.daemon.recording.recorder import Recorder
+from regolithd.drivers.can.frame import Frame
+
+FRAMES = st.builds(
+    Frame,
+    time_ns=st.integers(0, 4_000_000_000_000_000).map(lambda us: us * 1000),
+    can_id=st.integers(0, 0x7FF),
+    data=st.binary(max_size=8),
+    extended=st.just(False),
+    remote=st.just(False),
+    error=st.just(False),
+    sent=st.booleans(),
+)
+
+
+@given(FRAMES)
+def test_a_frame_survives_its_line(frame: Frame) -> None:
+    """Times are whole microseconds."""
+    assert parse_line(frame_line(frame, "can0")) == frame
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        Frame(1_000_000, 0x12345678, b"\x01", extended=True),
+        Frame(1_000_000, 0x181, b"", remote=True),
+        Frame(1_000_000, 0x4, bytes(8), error=True),
+    ],
+)
+def test_extended_remote_and_error_frames_survive_too(frame: Frame) -> None:
+    """As can-utils write them."""
+    assert parse_line(frame_line(frame, "can0")) == frame
+
+
+def test_nonsense_is_no_frame() -> None:
+    """Nor is a line that was cut off."""
+    whole = frame_line(Frame(1_000_000, 0x181, b"\x01\x02"), "can0")
+    assert all(parse_line(whole[:cut]) is None for cut in range(len(whole)))
+    assert parse_line("(1.5) can0 181#00\n") is None
+
+
+@pytest.mark.skipif(shutil.which("log2asc") is None, reason="can-utils are not installed: apt-get install can-utils")
+def test_can_utils_read_the_log(tmp_path: Path, drive: Callable) -> None:
+    """`log2asc` shows every frame with its time."""
+    frames = list(drive().frames(20))
+    log = tmp_path / "can.log"
+    log.write_text("".join(frame_line(frame, "can0") for frame in frames))
+    shown = subprocess.run(["log2asc", "-I", log, "can0"], capture_output=True, text=True, check=True).stdout
+    lines = [line.split() for line in shown.splitlines() if "d " in line and line.lstrip()[0].isdigit()]
+    assert len(lines) == len(frames)
+    first = frames[0].time_ns // 1000
+    assert [round(float(line[0]) * 1e6) for line in lines] == [frame.time_ns // 1000 - first for frame in frames]
+
+
+def recorded(folder: Path, frames: list[Frame], configuration: Configuration) -> tuple[Path, Path, Digest]:
+    """Record frames as the daemon does; return both files and the digest of what was estimated."""
+    recorder = Recorder(Recording(directory=folder), "can0", {"configuration": configuration.model_dump_json()})
+    paths = recorder.paths
+    assert paths is not None
+    chain, digest = Chain(configuration, Network(configuration.estimator.model)), Digest()  # type: ignore[arg-type]
+    for start in range(0, len(frames), 64):
+        batch = frames[start : start + 64]
+        recorder.frames(batch)
+        for estimate in chain.feed(batch):
+            digest.add(estimate)
+            recorder.estimate(estimate)
+        recorder.flush()
+    recorder.close()
+    return *paths, digest
+
+
+def test_a_replayed_log_gives_the_same_numbers_to_the_last_bit(
+    tmp_path: Path, drive: Callable, configuration: Configuration
+) -> None:
+    """Live and replayed differ only in where the frames come from."""
+    _, log, live = recorded(tmp_path, list(drive(nodes_silent=frozenset({3})).frames(50)), configuration)
+    chain, replayed = Chain(configuration, Network(configuration.estimator.model)), Digest()  # type: ignore[arg-type]
+    for estimate in chain.feed(read_log(log)):
+        replayed.add(estimate)
+    assert live.count == replayed.count == 50
+    assert str(live) == str(replayed)
+
+
+def test_the_digest_sees_a_change_of_one_bit(drive: Callable, configuration: Configuration) -> None:
+    """Else equal digests would prove nothing."""
+    network = Network(configuration.estimator.model)  # type: ignore[arg-type]
+    digests = []
+    for seed in (1, 1, 2):
+        digest = Digest()
+        for estimate in Chain(configuration, network).feed(drive(seed=seed).frames(5)):
+            digest.add(estimate)
+        digests.append(str(digest))
+    assert digests[0] == digests[1] != digests[2]
+
+
+def test_snapshots_read_back_to_the_last_bit(tmp_path: Path, drive: Callable, configuration: Configuration) -> None:
+    """JSON keeps every digit, and null stays NaN."""
+    frames = list(drive(nodes_silent=frozenset({2})).frames(10))
+    mcap, _, _ = recorded(tmp_path, frames, configuration)
+    chain = Chain(configuration, Network(configuration.estimator.model))  # type: ignore[arg-type]
+    expected = [estimate.snapshot.values for estimate in chain.feed(frames)]
+    found = [snapshot_from_json(each.content).values for each in read_messages(mcap) if each.topic == SNAPSHOT]
+    np.testing.assert_array_equal(np.stack(found), np.stack(expected))
+    assert Configuration.model_validate_json(read_metadata(mcap)["configuration"]) == configuration
+
+
+def test_a_file_cut_off_anywhere_reads_as_far_as_it_goes(
+    tmp_path: Path, drive: Callable, configuration: Configuration
+) -> None:
+    """Each flush is safe; nothing raises, whatever the cut."""
+    mcap, _, _ = recorded(tmp_path, list(drive(rate_Hz=100).frames(60)), configuration)
+    whole = mcap.read_bytes()
+    cut_file = tmp_path / "cut.mcap"
+    counts = []
+    for cut in np.linspace(0, len(whole), 200).astype(int):
+        cut_file.write_bytes(whole[:cut])
+        counts.append(sum(message.topic == ESTIMATE for message in read_messages(cut_file)))
+    assert counts == sorted(counts)
+    assert counts[0] == 0
+    assert counts[-1] == 60
+    assert len(set(counts)) > 5  # many small chunks, not one
+
+
+def test_the_oldest_files_go_when_the_limit_is_reached(tmp_path: Path, drive: Callable) -> None:
+    """And nobody else's."""
+    foreign = tmp_path / "notes.log"
+    foreign.write_text("mine")
+    clock = iter(range(10**18, 2 * 10**18, 60 * 10**9))
+    settings = Recording(directory=tmp_path, limit_MB=1, file_minutes=0.1)
+    recorder = Recorder(settings, "can0", {}, now_ns=lambda: next(clock))
+    frames = list(drive(rate_Hz=100).frames(300))
+    for _ in range(12):
+        recorder.frames(frames)
+        recorder.flush()
+    recorder.close()
+    kept = sorted(tmp_path.glob("rover-*.log"))
+    size = sum(path.stat().st_size for path in tmp_path.glob("rover-*"))
+    assert 2 <= len(kept) < 12
+    assert size < 1_000_000 + 2 * kept[0].stat().st_size
+    assert foreign.read_text() == "mine"
+
+
+def test_a_disk_that_others_fill_costs_old_recordings_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, drive: Callable
+) -> None:
+    """Far below the limit, but the disk has less left than the reserve until two files are gone."""
+    frames = list(drive().frames(5))
+
+    def record(hour: int) -> None:
+        recorder = Recorder(Recording(directory=tmp_path), "can0", {}, now_ns=lambda: 10**18 + hour * 3600 * 10**9)
+        recorder.frames(frames)
+        recorder.close()
+
+    for hour in range(3):
+        record(hour)
+    before = sorted(tmp_path.iterdir(), key=lambda path: (path.stat().st_mtime_ns, path.name))
+    assert len(before) == 6
+    monkeypatch.setattr(
+        "regolithd.daemon.recording.recorder.shutil.disk_usage",
+        lambda folder: shutil._ntuple_diskusage(0, 0, 10**9 if len(list(folder.iterdir())) <= 4 else 0),
+    )
+    record(3)
+    assert not before[0].exists()
+    assert not before[1].exists()
+    assert all(path.exists() for path in before[2:])
+
+
+def test_a_disk_that_fails_stops_the_recording_and_nothing_else(tmp_path: Path, drive: Callable) -> None:
+    """It says why, and begins again when it can."""
+    now = 10**18
+    place = tmp_path / "recordings"
+    place.write_text("a file where a folder should be")
+    recorder = Recorder(Recording(directory=place), "can0", {}, now_ns=lambda: now)
+    assert recorder.trouble is not None
+    assert str(place) in recorder.trouble
+    recorder.frames(list(drive().frames(1)))
+    assert recorder.lost == 16
+    place.unlink()
+    recorder.flush()
+    assert recorder.paths is None
+    now += 11 * 10**9
+    recorder.flush()
+    assert recorder.paths is not None
+    assert recorder.trouble is None
+    recorder.close()
+
+
+def test_numbers_that_are_not_are_null(drive: Callable, configuration: Configuration, tmp_path: Path) -> None:
+    """The file is JSON that every reader takes."""
+    mcap, _, _ = recorded(tmp_path, list(drive(nodes_silent=frozenset({5})).frames(3)), configuration)
+    for message in read_messages(mcap):
+        assert not any(
+            isinstance(value, float) and math.isnan(value)
+            for row in message.content.values()
+            if isinstance(row, list)
+            for value in row
+        )

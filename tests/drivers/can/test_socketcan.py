@@ -1,0 +1,226 @@
+"""The SocketCAN reader against a real kernel: times, echoes, link states, errors, drops, full queues."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import struct
+import subprocess
+import time
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import pytest
+from lawicel import Adapter
+from rig import Rig, settings, until
+
+from regolithd.drivers.can.bus import Bus, BusState
+from regolithd.drivers.can.frame import Frame
+from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.errors import BusDownError, BusFullError, BusOpenError
+from regolithd.drivers.master.events import BusStateChanged, NodeBooted, NodeLost
+from regolithd.drivers.signals import Sync
+from regolithd.drivers.virtual.plant import Bench
+from regolithd.drivers.virtual.rover import KAPVIK, VirtualRover
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+pytestmark = pytest.mark.vcan
+SYNC = Frame(0, 0x80, b"")
+
+
+@pytest.fixture(autouse=True)
+def links_come_back() -> Iterator[None]:
+    """Leave vcan0 as it was found."""
+    yield
+    set_link("up")
+
+
+async def take(bus: Bus, count: int) -> list[Frame]:
+    """Return the next frames, at least so many."""
+    frames: list[Frame] = []
+    async with asyncio.timeout(20):
+        while len(frames) < count:
+            frames += await bus.receive()
+    return frames
+
+
+async def until_state(bus: Bus, state: BusState) -> None:
+    """Read until the bus is in a state."""
+    async with asyncio.timeout(20):
+        while bus.state is not state:
+            await bus.receive()
+
+
+def set_link(state: str) -> None:
+    """Bring vcan0 up or down."""
+    subprocess.run(["ip", "link", "set", "vcan0", state], check=True)
+
+
+async def flood(bus: Bus) -> None:
+    """Send more than any queue holds."""
+    for _ in range(5000):
+        await bus.send(Frame(0, 0x201, bytes(8)))
+
+
+def raw_sender(channel: str = "vcan0") -> socket.socket:
+    """Return a socket of nobody's, to send without an event loop."""
+    sender = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    sender.bind((channel,))
+    return sender
+
+
+async def test_frames_have_kernel_times_and_our_own_come_back_marked() -> None:
+    """Times lie between before and after, rise, and are the same for both readers; only the sender's are `sent`."""
+    async with open_bus("socketcan", "vcan0") as ours, open_bus("socketcan", "vcan0") as theirs:
+        before = time.time_ns()
+        sent = [SYNC, Frame(0, 0x181, bytes(range(8))), Frame(0, 0x12345, b"abc", extended=True)]
+        for frame in sent:
+            await ours.send(frame)
+        echoes, received = await take(ours, 3), await take(theirs, 3)
+        after = time.time_ns()
+        assert [frame._replace(time_ns=0, sent=False) for frame in echoes] == sent
+        assert [frame.sent for frame in echoes] == [True] * 3
+        assert [frame._replace(sent=True) for frame in received] == echoes
+        assert before <= echoes[0].time_ns <= echoes[-1].time_ns <= after
+        assert all(one.time_ns <= two.time_ns for one, two in pairwise(echoes))
+        assert (ours.counters.sent, ours.counters.echoed, ours.counters.received) == (3, 3, 0)
+        assert (theirs.counters.echoed, theirs.counters.received) == (0, 3)
+
+
+async def test_a_burst_is_drained_in_batches_and_nothing_is_lost() -> None:
+    """Five hundred frames while the loop is busy elsewhere: all arrive, in order, many to a wake-up."""
+    async with open_bus("socketcan", "vcan0") as bus:
+        with raw_sender() as sender:
+            for number in range(500):
+                sender.send(struct.pack("=IB3x8s", 0x181, 8, number.to_bytes(8, "big")))
+        frames = await take(bus, 500)
+        assert [int.from_bytes(frame.data, "big") for frame in frames] == list(range(500))
+        assert bus.counters.largest_batch == 64
+        assert bus.counters.kernel_drops == 0
+
+
+async def test_what_the_kernel_drops_is_counted_to_the_last_frame() -> None:
+    """With a tiny receive buffer: what arrived and what was dropped make what was sent."""
+    async with open_bus("socketcan", "vcan0") as bus:
+        bus._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        with raw_sender() as sender:
+            for _ in range(300):
+                sender.send(struct.pack("=IB3x8s", 0x181, 8, bytes(8)))
+            await take(bus, 1)
+            sender.send(struct.pack("=IB3x8s", 0x182, 8, bytes(8)))  # brings the counter along
+            await until_received(bus, 0x182)
+        assert bus.counters.kernel_drops > 0
+        assert bus.counters.received + bus.counters.kernel_drops == 301
+
+
+async def until_received(bus: Bus, can_id: int) -> None:
+    """Read until a frame with this identifier has come."""
+    async with asyncio.timeout(20):
+        while all(frame.can_id != can_id for frame in await bus.receive()):
+            pass
+
+
+async def test_the_socket_survives_its_link() -> None:
+    """Down: a state, and sending says so; up: the same socket goes on."""
+    async with open_bus("socketcan", "vcan0") as bus:
+        set_link("down")
+        await until_state(bus, BusState.DOWN)
+        with pytest.raises(BusDownError, match=r"vcan0: cannot send: Network is down\. Bring it up"):
+            await bus.send(SYNC)
+        assert (bus.counters.link_down, bus.counters.transmit_failures) == (1, 1)
+        set_link("up")
+        await bus.send(SYNC)
+        assert (await take(bus, 1))[0].sent
+        assert bus.state is BusState.ACTIVE
+
+
+async def test_a_link_that_is_not_there_is_refused_with_the_cure() -> None:
+    """The message holds the command that makes one."""
+    with pytest.raises(BusOpenError, match=r"cannot open vcan7: No such device.*ip link add dev vcan7 type vcan"):
+        async with open_bus("socketcan", "vcan7"):
+            pass
+
+
+async def test_the_controller_s_errors_are_states_and_counts() -> None:
+    """Warning, passive, bus-off and a bus error from a real can-dev link; link down and up recovers it."""
+    with Adapter() as adapter:
+        async with open_bus("socketcan", adapter.link) as bus:
+            adapter.say("sw100100")
+            await until_state(bus, BusState.WARNING)
+            adapter.say("sp130140")
+            await until_state(bus, BusState.PASSIVE)
+            adapter.say("e2ab")
+            await until(lambda: bus.counters.errors["bus-error"] > 0, "a bus error")
+            adapter.say("sb256000")
+            await until_state(bus, BusState.OFF)
+            assert bus.counters.bus_off == 1
+            assert bus.counters.errors["bus-off"] == 1
+            assert bus.counters.errors["controller"] >= 2
+            adapter.ip("link", "set", adapter.link, "down")
+            await until_state(bus, BusState.DOWN)
+            adapter.ip("link", "set", adapter.link, "up")
+            adapter.frame(0x181, b"regolith")
+            frames = [frame for frame in await take(bus, 1) if not frame.error]
+            assert [frame.data for frame in frames] == [b"regolith"]
+            assert bus.state is BusState.ACTIVE
+
+
+async def test_a_full_queue_is_retried_counted_and_then_told() -> None:
+    """Nobody takes the frames: retries, then an error; once somebody does, sending goes on."""
+    with Adapter() as adapter:
+        async with open_bus("socketcan", adapter.link) as bus:
+            adapter.block()
+            with pytest.raises(BusFullError, match="stayed full"):
+                await flood(bus)
+            assert bus.counters.transmit_retries > 3
+            assert bus.counters.transmit_failures == 1
+            adapter.unblock()
+            sent = bus.counters.sent
+            async with asyncio.timeout(20):
+                while bus.counters.sent == sent:
+                    try:
+                        await bus.send(Frame(0, 0x201, bytes(8)))
+                    except BusFullError:
+                        await asyncio.sleep(0.05)
+
+
+async def test_an_adapter_that_is_unplugged_is_a_state() -> None:
+    """The link vanishes: down, not an exception; sending says what is wrong."""
+    with Adapter() as adapter:
+        async with open_bus("socketcan", adapter.link) as bus:
+            adapter.ip("link", "set", adapter.link, "down")
+            adapter.unplug()
+            await until_state(bus, BusState.DOWN)
+            with pytest.raises(BusDownError):
+                await bus.send(SYNC)
+            adapter.__enter__()  # plugged in again
+            async with asyncio.timeout(20):
+                while bus.state is not BusState.ACTIVE:
+                    adapter.frame(0x181, b"regolith")
+                    await asyncio.sleep(0.1)
+
+
+async def test_the_network_over_a_real_kernel_loses_its_link_and_finds_all_again() -> None:
+    """Fourteen nodes boot; link down: all lost; link up: all boot again, and SYNCs have kernel times throughout."""
+    async with (
+        open_bus("socketcan", "vcan0") as rover_bus,
+        open_bus("socketcan", "vcan0") as bus,
+        asyncio.TaskGroup() as tasks,
+    ):
+        serving = tasks.create_task(VirtualRover(Bench()).run(rover_bus))
+        rig = Rig(None, bus)
+        rig.start(tasks, settings(KAPVIK, sync_rate_Hz=10.0, sdo_timeout_s=2.0, boot_up_timeout_s=5.0))
+        await until(lambda: len(rig.told(NodeBooted)) == 14, "all nodes booted", 60)
+        await until(lambda: sum(isinstance(signal, Sync) for signal in rig.signals) > 10, "ten SYNCs")
+        assert all(frame.sent for frame in rig.frames if frame.can_id == 0x80)
+        set_link("down")
+        await rig.until_told(BusStateChanged, state=BusState.DOWN)
+        await until(lambda: len(rig.told(NodeLost)) == 14, "all nodes lost", 60)
+        set_link("up")
+        await rig.until_told(BusStateChanged, state=BusState.ACTIVE)
+        await until(lambda: len(rig.told(NodeBooted)) == 28, "all nodes booted again", 60)
+        assert rig.network.counters.sync.failed > 0
+        await rig.stop()
+        serving.cancel()

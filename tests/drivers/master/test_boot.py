@@ -1,0 +1,109 @@
+"""Booting: each way to fail has its own reason, its words and its cure, and is mended without a restart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from rig import rig
+
+from regolithd.drivers.errors import DictionaryError
+from regolithd.drivers.master.boot_reason import CURES, BootReason
+from regolithd.drivers.master.events import NodeBooted, NodeBootFailed
+from regolithd.drivers.master.network import NodePhase
+from regolithd.drivers.signals import NodeDescription, NodeKind
+
+MOTOR = NodeDescription(4, NodeKind.MOTOR, 3)
+LOAD_CELL = NodeDescription(11, NodeKind.LOAD_CELL, 0)
+
+FAULTS = {
+    BootReason.NO_BOOT_UP: "no-boot-up 4",
+    BootReason.NO_SDO_ANSWER: "no-sdo 4",
+    BootReason.WRONG_VENDOR: "identity 4 vendor 0x1",
+    BootReason.WRONG_PRODUCT: "identity 4 product 0x999",
+    BootReason.WRONG_REVISION: "identity 4 revision 0x99990000",
+    BootReason.CONFIGURATION_REFUSED: "refuse 4 0x1A00",
+    BootReason.CONFIGURATION_NOT_KEPT: "forget 4 0x1800",
+    BootReason.NO_HEARTBEAT: "no-heartbeat 4",
+}
+
+
+@pytest.mark.parametrize("reason", FAULTS)
+async def test_a_fault_has_its_reason_and_the_mended_node_boots(reason: BootReason) -> None:
+    """The reason is told with a cure, a healthy neighbour is not disturbed, and the node boots once it is mended."""
+    async with rig([MOTOR, LOAD_CELL], tell=[FAULTS[reason]]) as r:
+        failed = await r.until_told(NodeBootFailed)
+        assert (failed.node_id, failed.reason, failed.cure) == (4, reason, CURES[reason])
+        assert "node 4" in failed.text
+        assert failed.cure in failed.text
+        await r.until_told(NodeBooted, node_id=11)
+        assert r.network.status[4].phase in (NodePhase.FAILED, NodePhase.BOOTING)
+        for line in ("clear 4", "off 4", "on 4") if reason is BootReason.NO_BOOT_UP else ("clear 4",):
+            assert r.rover.tell(line) == "ok"
+        await r.until_told(NodeBooted, node_id=4)
+        assert r.network.status[11].boots == 1
+
+
+async def test_a_node_of_another_profile_is_refused() -> None:
+    """A load cell where a motor controller should be."""
+    async with rig([NodeDescription(4, NodeKind.LOAD_CELL, 3)], known=[MOTOR]) as r:
+        failed = await r.until_told(NodeBootFailed)
+        assert failed.reason is BootReason.WRONG_DEVICE_TYPE
+        assert "0x00020194" in failed.text
+        assert "0x00020192" in failed.text
+
+
+async def test_an_exchanged_device_is_noticed_by_its_serial_number() -> None:
+    """Where the serial number is configured, another one is refused."""
+    known = NodeDescription(4, NodeKind.MOTOR, 3, serial=77)
+    async with rig([MOTOR], known=[known]) as r:
+        assert (await r.until_told(NodeBootFailed)).reason is BootReason.WRONG_SERIAL
+        r.rover.tell("identity 4 serial 77")
+        assert (await r.until_told(NodeBooted)).identity.serial == 77
+
+
+async def test_a_node_that_restarts_while_it_is_configured_is_booted_again() -> None:
+    """A boot-up in the middle ends the attempt, with its own reason, and starts the next."""
+    async with rig([MOTOR]) as r:
+        await r.until_transfers(4, 10)
+        r.rover.tell("reset 4")
+        failed = await r.until_told(NodeBootFailed)
+        assert failed.reason in (BootReason.RESTARTED, BootReason.NO_HEARTBEAT)
+        await r.until_told(NodeBooted)
+
+
+async def test_a_missing_node_is_told_once_and_the_others_boot() -> None:
+    """However often it is tried, the same failure is one event."""
+    async with rig([LOAD_CELL], known=[MOTOR, LOAD_CELL], boot_up_timeout_s=0.2, retry_after_s=0.1) as r:
+        await r.until_told(NodeBooted, node_id=11)
+        await r.until_attempts(4, 3)
+        assert [event.reason for event in r.told(NodeBootFailed)] == [BootReason.NO_BOOT_UP]
+
+
+async def test_a_sensor_in_another_unit_is_refused_not_misread() -> None:
+    """A load cell whose process value has three decimal digits would be read ten times too large."""
+    async with rig([LOAD_CELL], tell=["off 11"]) as r:
+        objects = r.rover.nodes[11].dictionary
+        objects.entries = {**objects.entries, (0x6132, 1): replace(objects.entries[0x6132, 1], default=3)}
+        r.rover.tell("on 11")
+        failed = await r.until_told(NodeBootFailed, reason=BootReason.CONFIGURATION_NOT_KEPT)
+        assert "object 0x6132:01: must be 0x2, and reads 0x3" in failed.text
+
+
+async def test_an_eds_that_lacks_an_object_is_a_reason_and_no_crash(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The daemon goes on with the others."""
+
+    def lacking(*_: object, **__: object) -> None:
+        raise DictionaryError("the EDS of motor nodes has no such object", index=0x1017)
+
+    monkeypatch.setattr("regolithd.drivers.master.boot.configuration", lacking)
+    async with rig([MOTOR]) as r:
+        failed = await r.until_told(NodeBootFailed)
+        assert failed.reason is BootReason.UNUSABLE_EDS
+        assert "0x1017" in failed.text
+        assert not r.running.done()
+
+
+def test_every_reason_has_a_cure() -> None:
+    """The table of cures is complete."""
+    assert set(CURES) == set(BootReason)

@@ -1,0 +1,269 @@
+"""The network over a bus in this process: supervision, commands, and what is left behind."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+
+import pytest
+from rig import rig, until
+
+from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.canopen.nmt import NmtState
+from regolithd.drivers.devices.cia402 import DriveState
+from regolithd.drivers.errors import DriveError
+from regolithd.drivers.master.events import (
+    DriveStateChanged,
+    MotionStopped,
+    NodeBooted,
+    NodeBootFailed,
+    NodeEmergency,
+    NodeLost,
+    NodeReturned,
+)
+from regolithd.drivers.master.scan import probe
+from regolithd.drivers.signals import NodeDescription, NodeKind, Quantity, Sync
+
+MOTORS = tuple(NodeDescription(1 + wheel, NodeKind.MOTOR, wheel) for wheel in range(6))
+LOAD_CELLS = tuple(NodeDescription(11 + wheel, NodeKind.LOAD_CELL, wheel) for wheel in range(6))
+CREEP_rad_s = (0.29,) * 6
+
+
+def values(readings: list, quantity: Quantity) -> list[float]:
+    """Return what readings say of one quantity."""
+    return [value for reading in readings for name, value in reading.values if name is quantity]
+
+
+async def test_every_node_boots_and_measures() -> None:
+    """All fourteen become operational, and each SYNC is answered by each."""
+    async with rig() as r:
+        await r.network.settled()
+        assert {status.phase for status in r.network.status.values()} == {"operational"}
+        assert {status.nmt_state for status in r.network.status.values()} == {NmtState.OPERATIONAL}
+        await until(lambda: all(len(r.readings(node.node_id)) > 3 for node in r.decoder.nodes), "three readings of all")
+        assert values(r.readings(13), Quantity.LOAD)[-1] == pytest.approx(52.0)
+        assert any(isinstance(signal, Sync) for signal in r.signals)
+        assert not r.decoder.undecodable
+        assert r.network.counters.sdo_failures == 0
+
+
+async def test_wheels_turn_at_the_speed_that_is_asked_and_stop() -> None:
+    """Enable, turn, quick stop, disable: the motors' own speeds say so."""
+    async with rig(MOTORS) as r:
+        await r.network.settled()
+        await r.network.enable()
+        await r.network.set_speed((0.1, 0.2, 0.3, -0.1, -0.2, 0.0))
+        for node_id, speed in enumerate((140.0, 280.0, 420.0, -140.0, -280.0, 0.0), start=1):
+            await until(
+                lambda node_id=node_id, speed=speed: (
+                    values(r.readings(node_id), Quantity.MOTOR_SPEED)[-1] == pytest.approx(speed, abs=0.06)
+                ),
+                f"motor {node_id} turning at {speed} rad/s",
+            )
+        await r.network.quick_stop()
+        await until(
+            lambda: all(values(r.readings(node), Quantity.MOTOR_SPEED)[-1] == 0.0 for node in range(1, 7)),
+            "all wheels standing",
+        )
+        with pytest.raises(DriveError, match="a quick stop was commanded"):
+            await r.network.set_speed(CREEP_rad_s)
+        await r.network.disable()
+        assert not any(r.told(MotionStopped))
+
+
+async def test_mirrored_motors_turn_the_other_way_and_read_as_forward() -> None:
+    """Both sides drive forward; the right side's motors turn backwards for it."""
+    known = [replace(motor, mirrored=motor.node_id % 2 == 0) for motor in MOTORS]
+    async with rig(MOTORS, known=known) as r:
+        await r.network.settled()
+        await r.network.enable()
+        await r.network.set_speed((0.1,) * 6)
+        for node_id in range(1, 7):
+            await until(
+                lambda node_id=node_id: (
+                    values(r.readings(node_id), Quantity.MOTOR_SPEED)[-1] == pytest.approx(140.0, abs=0.06)
+                ),
+                f"motor {node_id} reads as forward",
+            )
+        assert r.rover.nodes[1].device.speed_rad_s > 0.0
+        assert r.rover.nodes[2].device.speed_rad_s < 0.0
+
+
+async def test_nothing_turns_before_it_is_enabled() -> None:
+    """A speed for a drive that is not enabled is refused, and no frame is sent."""
+    async with rig(MOTORS) as r:
+        await r.network.settled()
+        await until(lambda: len(r.frames), "frames")
+        with pytest.raises(DriveError, match=r"the wheels are locked: they have not been enabled yet\. Enable them"):
+            await r.network.set_speed(CREEP_rad_s)
+        assert not [frame for frame in r.frames if frame.can_id & 0x780 == 0x200]
+
+
+async def test_a_stop_while_the_drives_are_being_enabled_wins() -> None:
+    """Enabling that was under way fails and leaves no drive enabled."""
+    async with rig(MOTORS) as r:
+        await r.network.settled()
+        enabling = asyncio.ensure_future(r.network.enable())
+        await r.until_transfers(1, r.network._supervisors[1].link.sdo.transfers + 2)
+        await r.network.quick_stop()
+        with pytest.raises(DriveError, match="stopped meanwhile: a quick stop was commanded"):
+            await enabling
+        await until(
+            lambda: {r.network.status[node].drive_state for node in range(1, 7)} == {DriveState.SWITCH_ON_DISABLED},
+            "all drives switched off",
+        )
+        with pytest.raises(DriveError, match="locked"):
+            await r.network.set_speed(CREEP_rad_s)
+
+
+async def test_a_mutilated_statusword_is_none() -> None:
+    """A TPDO that is too short does not say that a drive has left its state."""
+    async with rig(MOTORS) as r:
+        await r.network.settled()
+        await r.network.enable()
+        await r.network.set_speed(CREEP_rad_s)
+        r.rover.tell("short 2 7")
+        await until(lambda: r.decoder.undecodable["wrong-length"] > 3, "short frames")
+        assert r.network.status[2].drive_state is DriveState.ENABLED
+        assert not r.told(MotionStopped)
+
+
+async def test_a_missing_drive_cannot_be_enabled_and_the_message_says_why() -> None:
+    """The message names the node, and why it is not on the bus."""
+    async with rig(MOTORS[:5], known=MOTORS) as r:
+        await r.network.settled()
+        with pytest.raises(DriveError, match=r"node 6: the drive is not operational .*no boot-up message"):
+            await r.network.enable()
+
+
+async def test_a_lost_drive_stops_the_others_and_returns_without_a_restart() -> None:
+    """Power off while driving: lost, all others stopped; power on: booted again, and it drives again."""
+    async with rig(MOTORS) as r:
+        await r.network.settled()
+        await r.network.enable()
+        await r.network.set_speed(CREEP_rad_s)
+        r.rover.tell("off 3")
+        lost = await r.until_told(NodeLost, node_id=3)
+        assert "no heartbeat" in lost.text
+        stopped = await r.until_told(MotionStopped, node_id=3)
+        assert "all others are stopped" in stopped.text
+        await until(
+            lambda: all(
+                r.network.status[node].drive_state is DriveState.SWITCH_ON_DISABLED for node in (1, 2, 4, 5, 6)
+            ),
+            "the others switched off",
+        )
+        r.rover.tell("on 3")
+        await r.until_told(NodeReturned, node_id=3)
+        await until(lambda: r.network.status[3].boots == 2, "node 3 booted a second time")
+        assert [r.network.status[node].boots for node in range(1, 7)] == [1, 1, 2, 1, 1, 1]
+        await r.network.enable()
+        await r.network.set_speed(CREEP_rad_s)
+
+
+async def test_a_lost_load_cell_that_is_not_required_does_not_stop_the_wheels() -> None:
+    """What the rover can drive without, it drives without."""
+    optional = NodeDescription(11, NodeKind.LOAD_CELL, 0, required=False)
+    async with rig((*MOTORS, optional)) as r:
+        await r.network.settled()
+        await r.network.enable()
+        await r.network.set_speed(CREEP_rad_s)
+        r.rover.tell("off 11")
+        await r.until_told(NodeLost, node_id=11)
+        await r.network.set_speed(CREEP_rad_s)
+        assert not r.told(MotionStopped)
+
+
+async def test_a_drive_that_faults_stops_the_others_and_is_reset_by_enabling() -> None:
+    """EMCY and state are told; enabling resets the fault with a rising edge."""
+    async with rig(MOTORS) as r:
+        await r.network.settled()
+        await r.network.enable()
+        await r.network.set_speed(CREEP_rad_s)
+        r.rover.tell("fault 2 0x2310")
+        emergency = (await r.until_told(NodeEmergency, node_id=2)).emergency
+        assert (emergency.code, emergency.cleared) == (0x2310, False)
+        assert "overcurrent" in emergency.text
+        await r.until_told(MotionStopped)
+        await until(lambda: r.network.status[2].drive_state is DriveState.FAULT, "drive 2 in fault")
+        await r.network.enable()
+        assert r.network.status[2].drive_state is DriveState.ENABLED
+        assert r.network.status[2].emergencies >= 1
+
+
+async def test_a_node_that_leaves_operational_or_restarts_is_booted_again() -> None:
+    """Nobody has to notice: it is told, and mended."""
+    async with rig([LOAD_CELLS[0]]) as r:
+        await r.until_told(NodeBooted)
+        r.rover.tell("leave 11")
+        assert "pre-operational" in (await r.until_told(NodeLost)).text
+        await r.until_told(NodeBooted)
+        r.rover.tell("reset 11")
+        assert "restarted" in (await r.until_told(NodeLost)).text
+        await r.until_told(NodeBooted)
+
+
+async def test_a_wrong_node_is_a_state_and_never_a_crash() -> None:
+    """One wrong identity: eleven others measure."""
+    async with rig((*MOTORS, *LOAD_CELLS), tell=["identity 4 vendor 0x1"]) as r:
+        await r.network.settled()
+        assert r.told(NodeBootFailed)[0].node_id == 4
+        assert [node for node, status in r.network.status.items() if status.phase != "operational"] == [4]
+        await until(lambda: len(r.readings(5)) > 2, "node 5 measures")
+
+
+async def test_stopping_leaves_the_bus_sane() -> None:
+    """Cancelled while driving: wheels stopped, voltage off, every node pre-operational and free of its master."""
+    async with rig((*MOTORS, LOAD_CELLS[0])) as r:
+        await r.network.settled()
+        await r.network.enable()
+        await r.network.set_speed(CREEP_rad_s)
+        await until(lambda: r.told(DriveStateChanged, node_id=1, state=DriveState.ENABLED), "driving")
+        await r.stop()
+        await until(
+            lambda: all(node.state == NmtState.PRE_OPERATIONAL for node in r.rover.nodes.values()), "pre-operational"
+        )
+        for node_id in range(1, 7):
+            assert r.rover.nodes[node_id].device.speed_rad_s == 0.0
+        await asyncio.sleep(2.5)  # longer than the drives would wait for a master
+        assert not r.told(NodeEmergency)
+        assert sum(node.counts["emcy"] for node in r.rover.nodes.values()) == 0
+
+
+async def test_a_drive_stops_by_itself_when_its_master_hangs() -> None:
+    """No heartbeat, no motion: the drive's own consumer (0x1016) acts, not we."""
+    async with rig([MOTORS[0]]) as r:
+        await r.network.settled()
+        await r.network.enable()
+        await r.network.set_speed(CREEP_rad_s)
+        motor = r.rover.nodes[1].device
+        await until(lambda: motor.speed_rad_s > 0.0, "the motor turning")
+        r.bus.send = forget  # type: ignore[method-assign]  # what a hung program sends
+        await until(lambda: motor.speed_rad_s == 0.0, "the motor standing")
+
+
+async def forget(_frame: object) -> None:
+    """Send nothing, and say nothing of it."""
+
+
+async def test_a_probe_finds_who_is_there_and_changes_nothing() -> None:
+    """Identities and problems are told; no NMT command and no SDO write is on the bus."""
+    nodes = (*MOTORS[:3], LOAD_CELLS[0])
+    async with rig(nodes, tell=["identity 2 product 0x999", "off 3"]) as r:
+        await r.network.settled()
+        await r.stop()
+        async with open_bus("virtual", r.bus.channel) as witness:
+            found = {each.node.node_id: each for each in await probe(r.bus, nodes, listen_s=0.1)}
+            await asyncio.sleep(0.2)
+            seen = await witness.receive()
+        requests = [frame for frame in seen if frame.can_id & 0x780 == 0x600]
+        assert requests
+        assert {frame.data[0] for frame in requests} <= {0x40, 0x80}  # reads, and the abort of one without answer
+        assert not [frame for frame in seen if frame.can_id < 0x80]
+        assert found[1].problem == ""
+        assert found[1].identity.vendor == 0xFB
+        assert "product code" in found[2].problem
+        assert found[2].cure
+        assert not found[3].answers
+        assert found[3].cure
+        assert found[11].answers

@@ -1,0 +1,137 @@
+"""One contract that every node driver passes against its virtual twin."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from rig import rig, until
+
+from regolithd.drivers.canopen.nmt import NmtState
+from regolithd.drivers.canopen.pdo import tpdos
+from regolithd.drivers.master.configuration import configuration
+from regolithd.drivers.master.events import NodeBooted, NodeEmergency, NodeLost
+from regolithd.drivers.signals import NodeDescription, NodeKind, Quantity
+from regolithd.drivers.virtual.plant import Measurement
+
+NODES = {
+    NodeKind.MOTOR: NodeDescription(3, NodeKind.MOTOR, 2, diagnostics=True),
+    NodeKind.LOAD_CELL: NodeDescription(14, NodeKind.LOAD_CELL, 3),
+    NodeKind.INCLINOMETER: NodeDescription(21, NodeKind.INCLINOMETER, None),
+    NodeKind.GROUND_SPEED: NodeDescription(22, NodeKind.GROUND_SPEED, None),
+}
+
+
+class World:
+    """A plant whose every value is another, negative ones among them."""
+
+    def measure(self, time_s: float, motor_speed_rad_s: np.ndarray) -> Measurement:
+        """Return the same always."""
+        del time_s, motor_speed_rad_s
+        return Measurement(
+            motor_current_A=np.array([0.01, 0.02, -0.081, 0.04, 0.05, 0.06]),
+            load_N=np.array([10.0, 20.0, 30.0, 44.56, 50.0, 60.0]),
+            motor_temperature_degC=np.array([1.0, 2.0, -3.5, 4.0, 5.0, 6.0]),
+            bus_voltage_V=23.456,
+            pitch_rad=math.radians(-12.34),
+            roll_rad=math.radians(5.67),
+            yaw_rate_rad_s=math.radians(-0.89),
+            ground_speed_m_s=-0.02199,
+        )
+
+
+EXPECTED = {
+    NodeKind.MOTOR: {
+        Quantity.MOTOR_CURRENT: -0.081,
+        Quantity.MOTOR_SPEED: 0.0,
+        Quantity.BUS_VOLTAGE: 23.456,
+        Quantity.MOTOR_TEMPERATURE: -3.5,
+    },
+    NodeKind.LOAD_CELL: {Quantity.LOAD: 44.56},
+    NodeKind.INCLINOMETER: {
+        Quantity.PITCH: math.radians(-12.34),
+        Quantity.ROLL: math.radians(5.67),
+        Quantity.YAW_RATE: math.radians(-0.89),
+    },
+    NodeKind.GROUND_SPEED: {Quantity.GROUND_SPEED: -0.02199},
+}
+
+
+@pytest.fixture(params=list(NodeKind))
+def node(request: pytest.FixtureRequest) -> NodeDescription:
+    """One node of each kind."""
+    return NODES[request.param]
+
+
+async def test_it_boots_says_who_it_is_and_beats(node: NodeDescription) -> None:
+    """Operational, with the identity of its EDS, heard again and again."""
+    async with rig([node]) as r:
+        booted = await r.until_told(NodeBooted)
+        assert booted.identity.vendor in (0xFB, 0xFFFF00)
+        heard = r.network.status[node.node_id].heard_ns
+        await until(lambda: r.network.status[node.node_id].heard_ns > heard, "the next heartbeat")
+        assert r.network.status[node.node_id].nmt_state is NmtState.OPERATIONAL
+
+
+async def test_its_configuration_is_in_the_node(node: NodeDescription) -> None:
+    """Every object that was written holds what was written."""
+    async with rig([node]) as r:
+        await r.until_told(NodeBooted)
+        sdo = r.network._supervisors[node.node_id].link.sdo
+        wanted = {}
+        for write in configuration(node, heartbeat_s=0.2, master_id=127, master_lost_after_s=2.0):
+            wanted[write.index, write.subindex] = write  # the last one counts
+        for write in wanted.values():
+            value = await sdo.read_number(write.index, write.subindex, signed=write.signed)
+            assert value & write.mask == write.value, hex(write.index)
+
+
+async def test_what_it_measures_arrives_in_si(node: NodeDescription) -> None:
+    """Every quantity of the layout arrives, with sign and scale, at every SYNC, and none that was not measured."""
+    async with rig([node], plant=World()) as r:
+        await r.until_told(NodeBooted)
+        pdos = tpdos(node.kind, diagnostics=node.diagnostics)
+        await until(lambda: len(r.readings(node.node_id)) >= 3 * len(pdos), "three readings of each PDO")
+        last = r.readings(node.node_id)[-len(pdos) :]
+        assert {reading.cob_id for reading in last} == {pdo.cob_id(node.node_id) for pdo in pdos}
+        measured = {quantity: value for reading in last for quantity, value in reading.values}
+        measured.pop(Quantity.STATUSWORD, None)
+        assert measured == pytest.approx(EXPECTED[node.kind], abs=1e-9)
+
+
+async def test_its_emergency_is_told_in_words(node: NodeDescription) -> None:
+    """An error arises and goes."""
+    async with rig([node]) as r:
+        await r.until_told(NodeBooted)
+        r.rover.tell(f"emcy {node.node_id} 0x4210")
+        told = await r.until_told(NodeEmergency)
+        assert "temperature" in told.text
+        r.rover.tell(f"emcy {node.node_id} 0")
+        assert (await r.until_told(NodeEmergency)).emergency.cleared
+
+
+async def test_it_is_lost_and_returns(node: NodeDescription) -> None:
+    """Power off and on."""
+    async with rig([node]) as r:
+        await r.until_told(NodeBooted)
+        r.rover.tell(f"off {node.node_id}")
+        await r.until_told(NodeLost)
+        r.rover.tell(f"on {node.node_id}")
+        await r.until_told(NodeBooted)
+
+
+async def test_short_frames_are_counted_and_not_decoded(node: NodeDescription) -> None:
+    """A PDO that is not as long as its mapping gives no value."""
+    async with rig([node]) as r:
+        await r.until_told(NodeBooted)
+        r.rover.tell(f"short {node.node_id} 1")
+        await until(lambda: r.decoder.undecodable["wrong-length"] > 3, "wrong lengths counted")
+
+
+async def test_an_invalid_measurement_has_no_value() -> None:
+    """A load cell that says `not valid` in 0x6150 is heard, and measures nothing."""
+    async with rig([NODES[NodeKind.LOAD_CELL]]) as r:
+        await r.until_told(NodeBooted)
+        r.rover.tell("status 14 1")
+        await until(lambda: r.readings(14) and r.readings(14)[-1].values == (), "a reading without value")

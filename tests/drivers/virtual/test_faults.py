@@ -1,0 +1,233 @@
+"""Each thing that can be made wrong with a virtual node is wrong on the bus, there alone, and can be mended."""
+
+from __future__ import annotations
+
+import struct
+from typing import TYPE_CHECKING
+
+import pytest
+from virtual_master import LOAD_CELL_TPDO, MASTER_ID, MOTOR_TPDO, AbortedError, Master
+
+from regolithd.drivers.virtual import Bench, Measurement
+from regolithd.drivers.virtual.fault_injection import COMMANDS
+
+if TYPE_CHECKING:
+    import numpy as np
+
+
+class Ticking(Bench):
+    """Loads that never stay the same."""
+
+    def measure(self, time_s: float, motor_speed_rad_s: np.ndarray) -> Measurement:
+        """Return loads that grow."""
+        measurement = super().measure(time_s, motor_speed_rad_s)
+        measurement.load_N[:] += time_s
+        return measurement
+
+
+class Running(Master):
+    """Two load cells and a drive, operational, with heartbeats of 100 ms."""
+
+    def __init__(self) -> None:
+        super().__init__(plant=Ticking())
+        for node in (11, 12):
+            self.configure(node, tpdo=LOAD_CELL_TPDO)
+        self.configure(1, tpdo=MOTOR_TPDO)
+        for node in (1, 11, 12):
+            self.write(node, 0x1017, 0, 100, 2)
+        self.nmt(1)
+
+    def tell(self, line: str) -> None:
+        """Command, which must be understood."""
+        assert self.rover.tell(line) == "ok"
+
+    def heartbeats(self, node: int) -> list[int]:
+        """Return what a node's heartbeat says in the next half second."""
+        return [frame.data[0] for frame in self.wait(0.5) if frame.can_id == 0x700 + node]
+
+    def load(self, node: int) -> int | None:
+        """Return a load cell's answer to a SYNC a little later."""
+        self.wait(0.02)
+        data = self.sync().get(0x180 + node)
+        return None if data is None else struct.unpack_from("<i", data)[0]
+
+    def well(self, node: int) -> bool:
+        """Whether a load cell does everything that it should."""
+        first, second = self.load(node), self.load(node)
+        grows = first is not None and second is not None and second > first
+        return grows and self.heartbeats(node).count(5) in {4, 5, 6}
+
+
+@pytest.fixture
+def running() -> Running:
+    """A part of the rover, running."""
+    master = Running()
+    assert master.well(11)
+    return master
+
+
+def test_a_node_without_power_is_silent_and_comes_back_new(running: Running) -> None:
+    """Off, it sends no frame; on again, it boots up, pre-operational and unconfigured."""
+    running.tell("off 11")
+    assert running.load(11) is None
+    assert running.heartbeats(11) == []
+    assert running.send(0x60B, bytes(8)) == []
+    assert running.well(12)
+    running.tell("on 11")
+    assert [f.data for f in running.wait(0.1) if f.can_id == 0x70B] == [b"\0"]
+    assert running.read(11, 0x1017) == 0
+    running.nmt(1)
+    assert running.load(11) is None
+
+
+def test_an_emergency_is_told_once_and_ends(running: Running) -> None:
+    """EMCY with error register, and later error code 0."""
+    running.tell("emcy 12 0x5000")
+    running.tell("emcy 12 0x5000")
+    running.tell("emcy 12 0")
+    frames = [f.data for f in running.wait(0.1) if f.can_id == 0x8C]
+    assert frames == [struct.pack("<HB5s", 0x5000, 0x01, b""), bytes(8)]
+    assert running.well(11)
+
+
+def test_a_node_may_be_another_one(running: Running) -> None:
+    """0x1018 says so until it is mended, through a reset as well."""
+    was = running.read(4, 0x1018, 2)
+    running.tell("identity 4 product 0x999")
+    assert running.read(4, 0x1018, 2) == 0x999
+    running.nmt(0x81, 4)
+    running.wait(0.1)
+    assert running.read(4, 0x1018, 2) == 0x999
+    running.tell("clear 4")
+    assert running.read(4, 0x1018, 2) == was
+
+
+def test_a_silent_node_lives(running: Running) -> None:
+    """No PDO, but heartbeat and SDO."""
+    running.tell("silent 11")
+    assert running.load(11) is None
+    assert set(running.heartbeats(11)) == {5}
+    assert running.read(11, 0x1000)
+    assert running.well(12)
+
+
+def test_a_frozen_node_repeats_itself(running: Running) -> None:
+    """The same value for ever, though the world goes on."""
+    running.tell("frozen 11")
+    before = running.load(11)
+    assert before is not None
+    assert running.load(11) == before
+    assert running.well(12)
+
+
+def test_a_deaf_drive_obeys_no_pdo(running: Running) -> None:
+    """Nor does it say that it does not."""
+    running.configure(2, tpdo=MOTOR_TPDO, rpdo=(0x60400010, 0x60FF0020))
+    running.nmt(1, 2)
+    running.tell("deaf 2")
+    running.send(0x202, struct.pack("<Hi", 0x06, 0))
+    assert running.read(2, 0x6041) & 0x6F == 0x40
+
+
+def test_a_slow_node_answers_later(running: Running) -> None:
+    """Its PDO comes, but not at its SYNC."""
+    running.tell("slow 11 30")
+    assert running.load(11) is None
+    assert [f for f in running.wait(0.02) if f.can_id == 0x18B] == []
+    assert len([f for f in running.wait(0.02) if f.can_id == 0x18B]) == 1
+
+
+def test_a_short_pdo_lacks_its_end(running: Running) -> None:
+    """The frame is cut, as by another mapping."""
+    running.tell("short 11 2")
+    assert len(running.sync()[0x18B]) == 3
+
+
+def test_a_status_says_not_valid(running: Running) -> None:
+    """Bits of 0x6150 by command."""
+    running.tell("status 11 1")
+    assert running.sync()[0x18B][4] == 1
+
+
+def test_no_boot_up(running: Running) -> None:
+    """After a reset nothing more is heard."""
+    running.tell("no-boot-up 11")
+    running.nmt(0x81, 11)
+    assert running.heartbeats(11) == []
+    assert running.send(0x60B, bytes(8)) == []
+
+
+def test_no_heartbeat_and_no_sdo(running: Running) -> None:
+    """One each, and the PDOs go on."""
+    running.tell("no-heartbeat 11")
+    running.tell("no-sdo 12")
+    assert running.heartbeats(11) == []
+    assert running.send(0x60C, bytes(8)) == []
+    assert running.load(11) is not None
+    assert running.load(12) is not None
+
+
+def test_it_refuses_or_forgets_what_is_written(running: Running) -> None:
+    """One object each: aborted by 'hardware error', or answered and not kept."""
+    running.tell("refuse 11 0x1017")
+    with pytest.raises(AbortedError, match="0x06060000"):
+        running.write(11, 0x1017, 0, 50, 2)
+    running.tell("forget 12 0x1017")
+    running.write(12, 0x1017, 0, 50, 2)
+    assert running.read(12, 0x1017) == 0
+
+
+def test_a_reset_of_its_own(running: Running) -> None:
+    """Boot-up without having been asked, and everything forgotten."""
+    running.tell("reset 11")
+    assert [f.data for f in running.wait(0.1) if f.can_id == 0x70B] == [b"\0"]
+    assert running.read(11, 0x1017) == 0
+
+
+def test_leaving_operational(running: Running) -> None:
+    """The heartbeat says pre-operational, and no PDO comes."""
+    running.tell("leave 11")
+    assert running.load(11) is None
+    assert set(running.heartbeats(11)) == {0x7F}
+
+
+def test_the_masters_silence_is_told_by_every_node(running: Running) -> None:
+    """EMCY 0x8130 and pre-operational (0x1029); what is heard again ends the error."""
+    running.write(11, 0x1016, 1, MASTER_ID << 16 | 200, 4)
+    running.heartbeat()
+    frames = running.wait(0.3)
+    assert [f.data for f in frames if f.can_id == 0x8B] == [struct.pack("<HB5s", 0x8130, 0x11, b"")]
+    assert running.load(11) is None
+    before = len(running.seen)
+    running.heartbeat()
+    assert [f.data for f in running.seen[before:] if f.can_id == 0x8B] == [bytes(8)]
+
+
+FOR_A_MASTER_TO_MEND = {"off", "on", "reset", "leave", "no-boot-up", "fault"}
+
+
+@pytest.mark.parametrize("name", [name for name in COMMANDS if name not in FOR_A_MASTER_TO_MEND])
+def test_everything_can_be_mended(running: Running, name: str) -> None:
+    """`clear` undoes a fault; what needs further words gets some."""
+    words = {"identity": "vendor 1", "emcy": "0x1000", "slow": "500", "short": "1", "status": "1"}
+    words |= {"refuse": "0x1017", "forget": "0x1017"}
+    running.tell(f"{name} 11 {words.get(name, '')}")
+    running.tell("clear all")
+    assert running.well(11)
+    assert running.read(11, 0x1018, 1) == running.read(12, 0x1018, 1)
+
+
+WRONG = ["bang 3", "off", "off 77", "off x", "identity 3", "identity 3 colour 1", "emcy 3", "fault 11 1", "refuse 3"]
+
+
+@pytest.mark.parametrize("line", WRONG)
+def test_a_wrong_command_says_what_is_wrong(running: Running, line: str) -> None:
+    """And changes nothing."""
+    assert running.rover.tell(line).startswith("error: ")
+    assert running.well(11)
+
+
+def test_help_names_every_command(running: Running) -> None:
+    """One line for each."""
+    lines = running.rover.tell("help").splitlines()
+    assert [line.split()[0] for line in lines] == list(COMMANDS)

@@ -1,0 +1,147 @@
+"""What a virtual node sends is what it was configured to send, when it was configured to."""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from virtual_master import LOAD_CELL_TPDO, MOTOR_TPDO, Drive, Master
+
+from regolithd.drivers.virtual import Bench, Measurement
+
+
+class Tilted(Bench):
+    """A plant with a slope, and a load that tells the time."""
+
+    def measure(self, time_s: float, motor_speed_rad_s: np.ndarray) -> Measurement:
+        """Return the bench's values on a slope."""
+        bench = super().measure(time_s, motor_speed_rad_s)
+        return replace(
+            bench,
+            load_N=bench.load_N + time_s,
+            pitch_rad=math.radians(1.25),
+            roll_rad=math.radians(-2.5),
+            yaw_rate_rad_s=math.radians(-0.75),
+            ground_speed_m_s=-0.021,
+            hub_speed_m_s=0.01 * np.arange(1.0, 7.0),
+        )
+
+
+def test_an_unconfigured_node_sends_nothing() -> None:
+    """Operational or not: SYNC brings no PDO before somebody configured one."""
+    master = Master()
+    assert master.sync() == {}
+    master.nmt(1)
+    assert master.sync() == {}
+
+
+@pytest.mark.parametrize(
+    ("what", "index", "sub", "value", "size"),
+    [
+        ("left disabled", 0x1800, 1, 0x8000_0181, 4),
+        ("another SYNC", 0x1005, 0, 0x81, 4),
+        ("event-driven, and nothing changes", 0x1800, 2, 255, 1),
+    ],
+)
+def test_a_wrongly_configured_node_sends_nothing(what: str, index: int, sub: int, value: int, size: int) -> None:
+    """One wrong object is enough."""
+    master = Master()
+    master.configure(1, tpdo=MOTOR_TPDO)
+    master.nmt(1)
+    assert list(master.sync()) == [0x181]
+    master.write(1, index, sub, value, size)
+    master.wait(0.5)
+    assert master.sync() == {}, what
+
+
+def test_only_an_operational_node_sends() -> None:
+    """Neither before start, nor after stop, nor after enter pre-operational."""
+    master = Master()
+    master.configure(1, tpdo=MOTOR_TPDO)
+    assert master.sync() == {}
+    for command, talks in ((1, True), (2, False), (1, True), (0x80, False)):
+        master.nmt(command, 1)
+        assert bool(master.sync()) is talks
+
+
+def test_a_pdo_carries_what_is_mapped_in_its_order() -> None:
+    """Two mappings of the same node, byte by byte, and another COB-ID."""
+    master = Master()
+    master.configure(3, tpdo=MOTOR_TPDO)
+    master.nmt(1)
+    assert master.sync() == {0x183: struct.pack("<Hhi", 0x1640, 0, 0)}
+    master.write(3, 0x1800, 1, 0x8000_0183, 4)
+    master.configure(3, tpdo=(0x2F000010, 0x60790020))
+    assert master.sync() == {0x183: struct.pack("<hI", 202, 24000)}
+
+
+def test_transmission_types() -> None:
+    """1: every SYNC; 3: every third; 0: at SYNC when something changed."""
+    for kind, expected in ((1, 6), (3, 2), (0, 1)):
+        master = Master()
+        master.configure(11, tpdo=LOAD_CELL_TPDO, kind=kind)
+        master.nmt(1)
+        assert sum(len(master.sync()) for _ in range(6)) == expected
+
+
+def test_an_event_timer_sends_without_sync() -> None:
+    """Type 255 with 0x1800:05 = 100 ms: ten a second."""
+    master = Master()
+    master.configure(11, tpdo=LOAD_CELL_TPDO, kind=255)
+    master.write(11, 0x1800, 5, 100, 2)
+    master.nmt(1)
+    assert sum(frame.can_id == 0x18B for frame in master.wait(1.001)) in {10, 11}
+
+
+def test_every_sensor_says_what_the_plant_says() -> None:
+    """Each in its own units and at its own place; all of the SYNC's instant."""
+    master = Master(plant=Tilted())
+    for wheel in range(6):
+        master.configure(11 + wheel, tpdo=LOAD_CELL_TPDO)
+    master.configure(21, tpdo=(0x60100010, 0x60200010, 0x20100010))
+    master.configure(22, tpdo=(0x21000020, 0x21010620))
+    master.nmt(1)
+    master.wait(0.4)
+    pdos = master.sync()
+    time_s = (struct.unpack("<iB", pdos[0x18B])[0] - 5000) / 100
+    assert time_s == pytest.approx(0.5, abs=0.011)
+    for wheel in range(6):
+        assert struct.unpack("<iB", pdos[0x18B + wheel])[0] == round(100 * (50 + wheel + time_s))
+    assert struct.unpack("<hhh", pdos[0x195]) == (125, -250, -75)
+    assert struct.unpack("<ii", pdos[0x196]) == (-2100, 6000)
+
+
+def test_a_synchronous_rpdo_waits_for_the_sync() -> None:
+    """Type 1: what came is done at the next SYNC; type 255: at once."""
+    drive = Drive()
+    assert drive.say(0x06) == 0x21
+    drive.master.write(1, 0x1400, 2, 1, 1)
+    assert drive.say(0x07) == 0x21
+    drive.master.sync()
+    assert drive.state == 0x23
+
+
+@pytest.mark.parametrize(("length", "code", "obeyed"), [(5, 0x8210, False), (7, 0x8220, True)])
+def test_an_rpdo_of_the_wrong_length_is_reported(length: int, code: int, *, obeyed: bool) -> None:
+    """Too short brings EMCY 0x8210 and does nothing; too long brings 0x8220, and what is mapped is done."""
+    drive = Drive()
+    frames = drive.master.send(0x201, struct.pack("<Hi", 0x06, 0).ljust(8, b"\0")[:length])
+    assert [struct.unpack_from("<H", f.data)[0] for f in frames if f.can_id == 0x81] == [code]
+    assert (drive.state == 0x21) is obeyed
+
+
+@pytest.mark.parametrize(("load", "status"), [(50.0, 0), (250.0, 2), (-1.0, 4), (math.nan, 1)])
+def test_a_load_cell_says_when_it_cannot_measure(load: float, status: int) -> None:
+    """0x6150: not valid, positive and negative overload (CiA 404)."""
+
+    class Overloaded(Bench):
+        def measure(self, time_s: float, motor_speed_rad_s: np.ndarray) -> Measurement:
+            return replace(super().measure(time_s, motor_speed_rad_s), load_N=np.full(6, load))
+
+    master = Master(plant=Overloaded())
+    master.configure(11, tpdo=LOAD_CELL_TPDO)
+    master.nmt(1)
+    assert master.sync()[0x18B][4] == status
