@@ -28,9 +28,9 @@ _INTRODUCTION = """# The bus
 others. Node-IDs are those of `rover.toml`; below stand its defaults, *id* being the node's own."""
 _ANOTHER_DEVICE = """## Another device
 
-1. Put its own EDS file in place of `drivers/eds/KIND.eds`: identity (0x1000, 0x1018), types and rights are its.
-2. Where its objects are others, change the layout and the meaning in `drivers/canopen/pdo.py`. A layout that the EDS does not
-   allow – no such object, not mappable, more than 8 bytes – is refused when the daemon starts.
+1. Put its own EDS file in place of `drivers/devices/eds/KIND.eds`: identity (0x1000, 0x1018), types and rights are its.
+2. Where its objects are others, change the layout and the meaning in `drivers/canopen/pdo.py`. A layout that the EDS
+   does not allow – no such object, not mappable, more than 8 bytes – is refused when the daemon starts.
 3. `regolithd check` asks every node who it is, and changes nothing."""
 
 

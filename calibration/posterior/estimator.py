@@ -12,7 +12,6 @@ from __future__ import annotations
 import json
 from collections import deque
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,6 +24,7 @@ from regolithd.calibration.posterior.window import INTERVAL_S, KNOWN, LONGEST, K
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
 
 Array = NDArray[np.float64]
 

@@ -134,8 +134,8 @@ def _readme() -> str:
     return f"""\
 # Messages
 
-Made from `daemon/messages/models.py` by `regolithd schema --write docs/messages`; do not edit. The same as an AsyncAPI 3
-document: [asyncapi.json](asyncapi.json).
+Made from `daemon/messages/models.py` by `regolithd schema --write docs/messages`; do not edit. The same as an
+AsyncAPI 3 document: [asyncapi.json](asyncapi.json).
 
 {table()}
 

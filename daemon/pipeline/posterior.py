@@ -1,8 +1,8 @@
 """The last stage: how sure the rover can be of the ground under it, from the last seconds of all six wheels.
 
 The terrain network before it is the paper's: a point for each wheel and instant, mostly its training prior. This one
-(`calibration.posterior.estimator`) gives intervals, twice a second. It says nothing while the drivetrain has not been calibrated:
-an unknown no-load current would be taken for soil.
+(`calibration.posterior.estimator`) gives intervals, twice a second. It says nothing while the drivetrain has not been
+calibrated: an unknown no-load current would be taken for soil.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Notices that the soil changes under the rover: `calibration.posterior.change_detection`, fed with half-second means of six wheels."""
+"""Detects a change of soil: `calibration.posterior.change_detection`, fed with half-second means of six wheels."""
 
 from __future__ import annotations
 

@@ -5,8 +5,8 @@
         async for batch in bus:
             for frame in batch: …
 
-SocketCAN is read by ourselves (`drivers.can.socketcan`: one system call brings up to 64 frames, with kernel times and drop
-counter). Every other interface of python-can goes through one thread (`drivers.can.python_can_bus`).
+SocketCAN is read by ourselves (`drivers.can.socketcan`: one system call brings up to 64 frames, with kernel times and
+drop counter). Every other interface of python-can goes through one thread (`drivers.can.python_can_bus`).
 
 An empty batch says that `bus.state` changed. The iteration ends only by cancellation: a link that goes down and comes
 up again is a state of the bus, never the end of it.

@@ -50,7 +50,7 @@ def variable(kind: NodeKind, index: int, subindex: int = 0) -> ODVariable:
             f"the EDS of {kind.value} nodes has no such object",
             index=index,
             subindex=subindex,
-            cure=f"Take the device's own EDS file as drivers/eds/{kind.value}.eds, or map another object",
+            cure=f"Take the device's own EDS file as drivers/devices/eds/{kind.value}.eds, or map another object",
         )
     return entry
 

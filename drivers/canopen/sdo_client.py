@@ -1,4 +1,4 @@
-"""The master's SDO client for one node: runs the transfers of `drivers.canopen.sdo` over the bus, one after the other."""
+"""The master's SDO client for one node: runs the transfers of `canopen.sdo` over the bus, one after the other."""
 
 from __future__ import annotations
 

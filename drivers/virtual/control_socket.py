@@ -1,6 +1,6 @@
 """Faults by command from outside the process: a UNIX socket, one line in, one answer out.
 
-A line is `drivers.virtual.fault_injection`'s. An answer of several lines is ended, as every answer is, by an empty line.
+A line is one of `drivers.virtual.fault_injection`. Every answer ends with an empty line.
 """
 
 from __future__ import annotations

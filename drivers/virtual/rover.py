@@ -133,7 +133,7 @@ class VirtualRover:
         return frames
 
     def tell(self, line: str) -> str:
-        """Obey a command (`drivers.virtual.fault_injection`) and return its answer; `counts` asks for `counts`, as JSON."""
+        """Obey a command of `virtual.fault_injection` and return its answer; `counts` asks for `counts`, as JSON."""
         return json.dumps(self.counts()) if line.split() == ["counts"] else tell(self.nodes, line, self._monotonic_ns())
 
     def counts(self) -> dict[str, dict[str, int]]:

@@ -1,1 +1,1 @@
-"""What a simulation states about itself, the built-in rover wheel, and the problem that the two make with a recording."""
+"""What a simulation states about itself, the built-in rover wheel, and the problem posed with a recording."""

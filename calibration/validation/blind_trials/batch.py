@@ -43,7 +43,10 @@ if TYPE_CHECKING:
 SOLVER = (
     f"{shlex.quote(sys.executable)} -m regolithd mismatch {{recording}} --simulation {{simulation}} --json {{answer}}"
 )
-PEERS = f"{shlex.quote(sys.executable)} -m regolithd.calibration.validation.blind_trials.baselines {{recording}} {{simulation}} {{answer}}"
+PEERS = (
+    f"{shlex.quote(sys.executable)} -m regolithd.calibration.validation.blind_trials.baselines "
+    "{recording} {simulation} {answer}"
+)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""A rigid wheel on soil, solved apart from `calibration.terrain.wheel_soil`: stresses integrated numerically, then tabulated.
+"""A rigid wheel on soil, solved apart from `terrain.wheel_soil`: stresses integrated numerically, then tabulated.
 
 The stress distribution is the paper's (Eqs 1–5): normal and shear stress rise linearly from the front edge θ_C to
 θ_m = θ_C/2 and fall linearly behind it, the shear to the cohesion c at the exit. Load and torque are integrals of
