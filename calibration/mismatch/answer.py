@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from regolithd.calibration.mismatch.candidates import Shape
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 Array = NDArray[np.float64]
 Verdict = Literal["consistent", "missing-physics", "unexplained"]
@@ -175,4 +175,4 @@ class Evidence:
     curves: tuple[Curve, ...]
     values: Mapping[str, float]
     contributions: tuple[Contribution, ...]
-    scene: Scene | None = field(default=None, repr=False)
+    problem: Problem | None = field(default=None, repr=False)

@@ -36,7 +36,7 @@ from regolithd.calibration.mismatch.regression.residuals import contribution, re
 from regolithd.calibration.mismatch.report.statements import statement
 from regolithd.calibration.mismatch.selection.decision import Decision, decide
 from regolithd.calibration.mismatch.selection.subset_selection import Search, Term
-from regolithd.calibration.mismatch.simulation.problem import Scene, build_scene
+from regolithd.calibration.mismatch.simulation.problem import Problem, build_problem
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -72,12 +72,12 @@ def compare(
         When there is nothing to compare.
     """
     progress("simulating")
-    scene = build_scene(recording, simulation)
+    problem = build_problem(recording, simulation)
     if effects:
-        scene = replace(scene, prediction=scene.prediction + effect_of(scene, effects))
-    noise = estimate_noise(np.where(scene.mask, scene.measured - scene.filled, 0.0), scene.mask)
-    blocks = blocks_of_time(scene, noise)
-    dictionary = Dictionary(scene, folds_of_blocks(scene, blocks))
+        problem = replace(problem, prediction=problem.prediction + effect_of(problem, effects))
+    noise = estimate_noise(np.where(problem.mask, problem.measured - problem.filled, 0.0), problem.mask)
+    blocks = blocks_of_time(problem, noise)
+    dictionary = Dictionary(problem, folds_of_blocks(problem, blocks))
     nuisance = add_nuisance(dictionary)
     progress("building what could be missing")
     fitting = add_candidates(dictionary, simulation.candidates())
@@ -85,7 +85,7 @@ def compare(
     grid = tuple(dictionary.groups)
     progress("searching")
     decision = decide(Search(dictionary, nuisance, noise.weights), fitting)
-    blocks = blocks_of_time(scene, decision.noise)
+    blocks = blocks_of_time(problem, decision.noise)
     progress("measuring on held-out blocks")
     sought = [g for g in dictionary.groups if g in grid or g.name == "wheel-angle-ripple"]
     held = hold_out(decision.search, decision.named, decision.noise, sought)
@@ -98,9 +98,9 @@ def compare(
         sensitivities(decision.search, decision.whole, simulation.candidates()),
         FitImprovement(simulation.channel, held.before, held.after, _floor(decision)),
         (
-            *scene.recording.notes,
-            *_about_the_mask(scene),
-            *_not_looked_for(scene, simulation, [c.name for c in fitting]),
+            *problem.recording.notes,
+            *_about_the_mask(problem),
+            *_not_looked_for(problem, simulation, [c.name for c in fitting]),
         ),
     )
     return Comparison(answer, _evidence(decision))
@@ -118,30 +118,30 @@ def _floor(decision: Decision) -> float:
     return float(np.sqrt(np.sum(decision.noise.deviation**2 * counts) / counts.sum()))
 
 
-def _names(scene: Scene, wheels: Sequence[int]) -> tuple[int, ...]:
+def _names(problem: Problem, wheels: Sequence[int]) -> tuple[int, ...]:
     """Return the names of those wheels of which something is known."""
-    return tuple(scene.recording.wheels[w] for w in wheels if scene.mask[:, w].any())
+    return tuple(problem.recording.wheels[w] for w in wheels if problem.mask[:, w].any())
 
 
 def _effects(decision: Decision, held: HeldOut, blocks: NDArray[np.int64]) -> tuple[Effect, ...]:
     search, named = decision.search, decision.named
     if not named.terms:
         return ()
-    scene = search.dictionary.scene
+    problem = search.dictionary.problem
     found = []
     for index, (term, parameters) in enumerate(zip(named.terms, parameters_of(search, named, blocks), strict=True)):
         candidate = term.group.candidate
         assert candidate is not None  # noqa: S101  # named terms are candidates
-        wheels = _names(scene, term.wheels)
+        wheels = _names(problem, term.wheels)
         onset = parameters.get("onset_s")
         errors = (held.without[index], held.with_it[index])
         told = statement(
-            candidate, wheels, len(scene.recording.wheels), parameters, errors, scene.simulation.wheel_column
+            candidate, wheels, len(problem.recording.wheels), parameters, errors, problem.simulation.wheel_column
         )
         found.append(
             Effect(
                 term.name,
-                candidate.channel or scene.simulation.channel,
+                candidate.channel or problem.simulation.channel,
                 wheels,
                 candidate.covariate,
                 onset.value if isinstance(onset, Parameter) else None,
@@ -156,7 +156,7 @@ def _effects(decision: Decision, held: HeldOut, blocks: NDArray[np.int64]) -> tu
 
 def _unexplained(decision: Decision, term: Term) -> Unexplained:
     """Say where a curve without a name lives, from when to when, and how much of the residual it is."""
-    search, scene = decision.search, decision.search.dictionary.scene
+    search, problem = decision.search, decision.search.dictionary.problem
     index = decision.whole.terms.index(term)
     values = contribution(search, decision.whole, index)
     before = residual_of(search, search.fit(()))
@@ -164,33 +164,33 @@ def _unexplained(decision: Decision, term: Term) -> Unexplained:
     share = float(np.sum(values[:, on] ** 2) / max(float(np.sum(before[:, on] ** 2)), 1e-300))
     size = np.sum(values[:, on] ** 2, axis=1)
     grown = np.cumsum(size) / max(float(size.sum()), 1e-300)
-    time_s = scene.time_s[:, 0]
+    time_s = problem.time_s[:, 0]
     first, last = (time_s[min(int(np.searchsorted(grown, part)), len(time_s) - 1)] for part in (0.01, 0.99))
     return Unexplained(
-        scene.simulation.channel, _names(scene, term.wheels), term.name, float(first), float(last), min(share, 1.0)
+        problem.simulation.channel, _names(problem, term.wheels), term.name, float(first), float(last), min(share, 1.0)
     )
 
 
-def _about_the_mask(scene: Scene) -> list[str]:
+def _about_the_mask(problem: Problem) -> list[str]:
     """Say what was left out of the comparison, and why."""
     told = []
-    kind = scene.simulation.wheel_column
-    silent = [name for k, name in enumerate(scene.recording.wheels) if not scene.mask[:, k].any()]
+    kind = problem.simulation.wheel_column
+    silent = [name for k, name in enumerate(problem.recording.wheels) if not problem.mask[:, k].any()]
     if silent:
         told.append(
             f"There is nothing to compare at {kind} {', '.join(map(str, silent))}: it never turns, or is not measured."
         )
-    spikes = int(np.sum(np.isfinite(scene.prediction) & np.isfinite(scene.measured) & ~scene.mask))
+    spikes = int(np.sum(np.isfinite(problem.prediction) & np.isfinite(problem.measured) & ~problem.mask))
     if spikes:
-        told.append(f"{spikes} readings of {scene.simulation.channel} are far outside all others; they are left out.")
+        told.append(f"{spikes} readings of {problem.simulation.channel} are far outside all others; they are left out.")
     return told
 
 
-def _not_looked_for(scene: Scene, simulation: Simulation, fitting: Sequence[str]) -> list[str]:
+def _not_looked_for(problem: Problem, simulation: Simulation, fitting: Sequence[str]) -> list[str]:
     told = []
     for candidate in simulation.candidates():
         if candidate.name not in fitting:
-            lacking = ", ".join(n for n in candidate.requires if n not in scene.covariates)
+            lacking = ", ".join(n for n in candidate.requires if n not in problem.covariates)
             told.append(f"{candidate.name} was not looked for: it needs {lacking or 'another simulation'}.")
     return told
 
@@ -198,51 +198,51 @@ def _not_looked_for(scene: Scene, simulation: Simulation, fitting: Sequence[str]
 def _evidence(decision: Decision) -> Evidence:
     search = decision.search
     dictionary = search.dictionary
-    scene, noise = dictionary.scene, decision.noise
+    problem, noise = dictionary.problem, decision.noise
     base, whole = search.fit(()), decision.named
-    nan = np.where(scene.mask, 0.0, np.nan)
+    nan = np.where(problem.mask, 0.0, np.nan)
     left, after = residual_of(search, base) + nan, residual_of(search, whole) + nan
-    blocks = blocks_of_time(scene, noise)
+    blocks = blocks_of_time(problem, noise)
     shift = whole.coefficients[: len(search.nuisance.names)] / dictionary.scale[list(search.nuisance.columns)]
     moved = dict(zip(search.nuisance.names, shift.tolist(), strict=True))
-    values = {name: scene.values.get(name, 0.0) + moved.get(name, 0.0) for name in {**scene.values, **moved}}
+    values = {name: problem.values.get(name, 0.0) + moved.get(name, 0.0) for name in {**problem.values, **moved}}
     contributions = tuple(
         Contribution(
             term.name,
             term.group.shape,
             tuple((whole.coefficients[whole.of_term(i)] / dictionary.scale[list(term.group.columns)]).tolist()),
-            _names(scene, term.wheels),
+            _names(problem, term.wheels),
         )
         for i, term in enumerate(whole.terms)
     )
     return Evidence(
-        scene.simulation.channel,
-        scene.simulation.unit,
-        scene.time_s[:, 0],
-        scene.recording.wheels,
-        scene.measured,
-        scene.measured - left,
-        scene.measured - after,
-        *_map(scene, noise, left, after, blocks),
+        problem.simulation.channel,
+        problem.simulation.unit,
+        problem.time_s[:, 0],
+        problem.recording.wheels,
+        problem.measured,
+        problem.measured - left,
+        problem.measured - after,
+        *_map(problem, noise, left, after, blocks),
         _curves(decision, left, after),
         values,
         contributions,
-        scene,
+        problem,
     )
 
 
 def _map(
-    scene: Scene, noise: Noise, left: Array, after: Array, blocks: NDArray[np.int64]
+    problem: Problem, noise: Noise, left: Array, after: Array, blocks: NDArray[np.int64]
 ) -> tuple[Array, Array, Array]:
     """Return block centres, and block means of the residual along the motion over their standard errors."""
-    along = scene.covariates.get("direction", np.ones(scene.mask.shape))
+    along = problem.covariates.get("direction", np.ones(problem.mask.shape))
     count = int(blocks.max()) + 1
-    centres = np.bincount(blocks, scene.time_s[:, 0], count) / np.bincount(blocks, minlength=count)
+    centres = np.bincount(blocks, problem.time_s[:, 0], count) / np.bincount(blocks, minlength=count)
 
     def means(residual: Array) -> Array:
         signed = np.nan_to_num(residual * along)
         sums = np.stack([np.bincount(blocks, signed[:, w], count) for w in range(signed.shape[1])], axis=1)
-        counts = np.stack([np.bincount(blocks, scene.mask[:, w], count) for w in range(signed.shape[1])], axis=1)
+        counts = np.stack([np.bincount(blocks, problem.mask[:, w], count) for w in range(signed.shape[1])], axis=1)
         errors = noise.deviation * np.sqrt(noise.memory * np.maximum(counts, 1))
         return np.where(counts > 0, sums / errors, np.nan)
 
@@ -251,17 +251,17 @@ def _map(
 
 def _curves(decision: Decision, left: Array, after: Array) -> tuple[Curve, ...]:
     """Return the residual against each covariate, those first along which most stood out before."""
-    scene, noise = decision.search.dictionary.scene, decision.noise
+    problem, noise = decision.search.dictionary.problem, decision.noise
     found = []
-    concerned = sorted({w for term in decision.whole.terms for w in term.wheels}) or list(range(scene.mask.shape[1]))
-    flavours = {"offset": np.ones(scene.mask.shape), "gain": np.sign(scene.filled)}
-    if "direction" in scene.covariates:
-        flavours["drag"] = scene.covariates["direction"]
-    for name, values in scene.covariates.items():
+    concerned = sorted({w for term in decision.whole.terms for w in term.wheels}) or list(range(problem.mask.shape[1]))
+    flavours = {"offset": np.ones(problem.mask.shape), "gain": np.sign(problem.filled)}
+    if "direction" in problem.covariates:
+        flavours["drag"] = problem.covariates["direction"]
+    for name, values in problem.covariates.items():
         if name in NOT_FOR_CURVES - {"direction"}:
             continue
         for flavour, factor in flavours.items():
-            curve = _curve(name, flavour, values, factor, (left, after), noise, concerned, scene)
+            curve = _curve(name, flavour, values, factor, (left, after), noise, concerned, problem)
             if curve is not None:
                 found.append(curve)
     return tuple(sorted(found, key=lambda c: -float(np.mean((c.before / c.standard_error) ** 2))))
@@ -275,9 +275,9 @@ def _curve(
     residuals: tuple[Array, Array],
     noise: Noise,
     wheels: list[int],
-    scene: Scene,
+    problem: Problem,
 ) -> Curve | None:
-    kept = scene.mask & np.isfinite(values)
+    kept = problem.mask & np.isfinite(values)
     kept[:, [w for w in range(kept.shape[1]) if w not in wheels]] = False
     chosen = values[kept]
     if chosen.size < 100:
@@ -290,5 +290,5 @@ def _curve(
     at = np.bincount(place, chosen, len(edges) - 1) / counts
     before, after = (np.bincount(place, (r * factor)[kept], len(edges) - 1) / counts for r in residuals)
     error = float(np.sqrt(np.mean(noise.deviation[wheels] ** 2) * noise.memory)) / np.sqrt(counts)
-    names = tuple(scene.recording.wheels[w] for w in wheels)
+    names = tuple(problem.recording.wheels[w] for w in wheels)
     return Curve(name, flavour, at, before, after, error, names)

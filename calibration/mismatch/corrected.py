@@ -19,7 +19,7 @@ from regolithd.calibration.mismatch.simulation.simulation import own_name
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]
@@ -144,15 +144,15 @@ def stated_effects(tables: Mapping[str, Any]) -> tuple[Contribution, ...]:
     return tuple(found)
 
 
-def effect_of(scene: Scene, effects: Sequence[Contribution]) -> Array:
+def effect_of(problem: Problem, effects: Sequence[Contribution]) -> Array:
     """Return what stated effects add to the prediction, shape (time, wheel)."""
-    known = {candidate.name: candidate for candidate in scene.simulation.candidates()}
-    total = np.zeros(scene.mask.shape)
+    known = {candidate.name: candidate for candidate in problem.simulation.candidates()}
+    total = np.zeros(problem.mask.shape)
     for effect in effects:
         if effect.name not in known:
             raise SimulationError(f"there is no effect {effect.name!r}; known are {', '.join(sorted(known))}")
-        columns = np.where(scene.mask, known[effect.name].columns(scene, effect.shape), 0.0)
-        on = np.isin(scene.recording.wheels, effect.wheels)
+        columns = np.where(problem.mask, known[effect.name].columns(problem, effect.shape), 0.0)
+        on = np.isin(problem.recording.wheels, effect.wheels)
         total += np.einsum("c,ctw,w->tw", np.array(effect.coefficients), columns, on)
     return total
 

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from regolithd.calibration.mismatch.data.recording import read_recording
-from regolithd.calibration.mismatch.simulation.problem import build_scene
+from regolithd.calibration.mismatch.simulation.problem import build_problem
 from regolithd.calibration.mismatch.simulation.simulation import load_simulation
 
 HERE = Path(__file__).resolve().parent
@@ -40,8 +40,8 @@ def mismatch(recording: Path, simulation: Path, report: Path) -> dict[str, Any]:
 def r_squared(recording: Path, simulation: Path, answer: dict[str, Any]) -> dict[str, float]:
     """Return the held-out R² before and after: 1 − error² over the variance of what was compared."""
     model = load_simulation(tomllib.loads(simulation.read_text()), beside=simulation.parent)
-    scene = build_scene(read_recording(recording, unit=model.wheel_column), model)
-    variance = float(np.var(scene.measured[scene.mask]))
+    problem = build_problem(read_recording(recording, unit=model.wheel_column), model)
+    variance = float(np.var(problem.measured[problem.mask]))
     return {when: 1 - answer["fit"][f"held_out_rmse_{when}"] ** 2 / variance for when in ("before", "after")}
 
 

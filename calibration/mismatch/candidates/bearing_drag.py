@@ -9,7 +9,7 @@ from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 
 class BearingDrag(Candidate):
@@ -27,24 +27,24 @@ class BearingDrag(Candidate):
     sharing: ClassVar = ("one",)
     free: ClassVar = {"onset_s": (0.0, float("inf"))}
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:
+    def shapes(self, problem: Problem) -> Sequence[Shape]:
         """At each of many times: at once, within minutes, or on and on, slower or faster with time."""
-        at = onsets(scene)
-        rises = (0.0, 0.03 * scene.length_s, 0.15 * scene.length_s, float("inf"))
+        at = onsets(problem)
+        rises = (0.0, 0.03 * problem.length_s, 0.15 * problem.length_s, float("inf"))
         soon: list[Shape] = [{"onset_s": t, "rise_s": rise} for t in at for rise in rises]
         wear: list[Shape] = [{"onset_s": t, "rise_s": float("inf"), "power": p} for t in at for p in (0.25, 0.5, 2.0)]
         return [*soon, *wear]
 
-    def growths(self, scene: Scene) -> Sequence[Shape]:
+    def growths(self, problem: Problem) -> Sequence[Shape]:
         """Add wear by more powers of time than are worth a search: an onset is only as sure as what follows it."""
         wear: list[Shape] = [{"rise_s": float("inf"), "power": p} for p in (0.12, 0.18, 0.35, 0.7, 1.4)]
-        return [*super().growths(scene), *wear]
+        return [*super().growths(problem), *wear]
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return sign(ω) g(t − t_0)."""
-        grown = since(scene, float(shape["onset_s"]), float(shape["rise_s"])) ** float(shape.get("power", 1.0))
-        return (scene.covariates["direction"] * grown)[None]
+        grown = since(problem, float(shape["onset_s"]), float(shape["rise_s"])) ** float(shape.get("power", 1.0))
+        return (problem.covariates["direction"] * grown)[None]
 
-    def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
+    def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Anywhere but at the very ends."""
-        return {"onset_s": (0.01 * scene.length_s, 0.97 * scene.length_s)}
+        return {"onset_s": (0.01 * problem.length_s, 0.97 * problem.length_s)}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 Array = NDArray[np.float64]
 AGREES = 0.02
@@ -59,48 +59,48 @@ class Candidate:
     words: ClassVar[str]
     """What it is, in a sentence after 'there is'."""
 
-    def applies(self, scene: Scene) -> bool:
+    def applies(self, problem: Problem) -> bool:
         """Say whether this recording and simulation can have it at all."""
-        return scene.has(*self.requires)
+        return problem.has(*self.requires)
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002  # subclasses look
+    def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002  # subclasses look
         """Return the grid of shapes that is searched."""
         return [{}]
 
-    def reluctance(self, scene: Scene, shape: Shape) -> float:  # noqa: ARG002
+    def reluctance(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
         """Return what this shape costs where it contradicts what was stated, or says no more than a plainer name."""
         return 0.0
 
-    def settled(self, scene: Scene, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002
+    def settled(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002
         """Return the shape that agrees with its fitted coefficients, where a law is not linear in them."""
         return shape
 
-    def growths(self, scene: Scene) -> Sequence[Shape]:
+    def growths(self, problem: Problem) -> Sequence[Shape]:
         """Return the ways to grow after an onset: every shape but for its onset."""
-        found = {tuple(sorted((k, v) for k, v in s.items() if k != "onset_s")) for s in self.shapes(scene)}
+        found = {tuple(sorted((k, v) for k, v in s.items() if k != "onset_s")) for s in self.shapes(problem)}
         return [dict(growth) for growth in sorted(found, key=str)]
 
-    def tried(self, scene: Scene) -> float:
+    def tried(self, problem: Problem) -> float:
         """Return how many different shapes were open to choice: what a choice among them must be paid for."""
-        return max(len(self.shapes(scene)), 1)
+        return max(len(self.shapes(problem)), 1)
 
-    def seek(self, scene: Scene, residual: Array) -> Sequence[Shape]:  # noqa: ARG002
+    def seek(self, problem: Problem, residual: Array) -> Sequence[Shape]:  # noqa: ARG002
         """Return further shapes that a residual suggests, where a grid would be too fine to search blindly."""
         return []
 
-    def memory_at(self, scene: Scene, residual: Array, shape: Shape) -> float:  # noqa: ARG002
+    def memory_at(self, problem: Problem, residual: Array, shape: Shape) -> float:  # noqa: ARG002
         """Return how many readings count as one for this shape's columns; infinite where only the long run is known."""
         return float("inf")
 
-    def evidence(self, scene: Scene, shape: Shape) -> tuple[Array, Array] | None:  # noqa: ARG002
+    def evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array] | None:  # noqa: ARG002
         """Return what the fault's own channel says, for each wheel: the gain there and the coefficient; or nothing."""
         return None
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the columns, shape (coefficient, time, wheel), in the predicted channel's unit per coefficient."""
         raise NotImplementedError
 
-    def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
+    def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Return the free shape parameters' range in this recording."""
         return self.free
 
@@ -110,16 +110,16 @@ class Candidate:
         return {**found, **{name: float(shape[name]) for name in self.free if name in shape}}
 
 
-def onsets(scene: Scene, count: int = 24) -> list[float]:
+def onsets(problem: Problem, count: int = 24) -> list[float]:
     """Return times at which something may begin [s]: evenly spread, not within 3 % of either end."""
-    return [float(t) for t in scene.length_s * np.linspace(0.03, 0.95, count)]
+    return [float(t) for t in problem.length_s * np.linspace(0.03, 0.95, count)]
 
 
-def since(scene: Scene, onset_s: float, rise_s: float) -> Array:
+def since(problem: Problem, onset_s: float, rise_s: float) -> Array:
     """Return growth from 0 at the onset, shape (time, 1): a step (rise 0), an approach to 1, or a ramp (rise inf)."""
-    after = np.maximum(scene.time_s - onset_s, 0.0)
+    after = np.maximum(problem.time_s - onset_s, 0.0)
     if rise_s == 0:
-        return (scene.time_s >= onset_s).astype(np.float64)
+        return (problem.time_s >= onset_s).astype(np.float64)
     if np.isinf(rise_s):
-        return after / max(scene.length_s - onset_s, 1e-9)
+        return after / max(problem.length_s - onset_s, 1e-9)
     return -np.expm1(-after / rise_s)

@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.candidates.candidate import UNLIKELY, Array,
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 
 POLES_DEGC = (-125.0, -95.0)
@@ -34,10 +34,10 @@ class ColdLubricantFriction(Candidate):
     coefficients: ClassVar = (Coefficient("cold_drag", "{unit} (s/rad)^p"),)
     free: ClassVar = {"scale_K": (STEEPEST_K, 80.0), "no_drag_above_degC": (-60.0, 80.0)}
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:
+    def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Vogel's law of several steepnesses, and straight lines that end at several temperatures."""
-        temperature = scene.covariates["temperature"][scene.mask]
-        soonest = _coldest(scene) + STEEPEST_K
+        temperature = problem.covariates["temperature"][problem.mask]
+        soonest = _coldest(problem) + STEEPEST_K
         top = max(float(np.nanmax(temperature)), soonest)
         ends = np.unique(np.maximum([*np.nanquantile(temperature, [0.35, 0.6, 0.85]), top], soonest)).tolist()
         found: list[Shape] = []
@@ -50,21 +50,21 @@ class ColdLubricantFriction(Candidate):
             found += [{"power": power, "no_drag_above_degC": end} for end in (*ends, top + 20)]
         return found
 
-    def reluctance(self, scene: Scene, shape: Shape) -> float:
+    def reluctance(self, problem: Problem, shape: Shape) -> float:
         """Charge a drag that no wheel's own temperature changes: Coulomb and viscous friction are the plainer names."""
-        return 0.0 if scene.changes_within(self._growth(scene, shape)) else UNLIKELY
+        return 0.0 if problem.changes_within(self._growth(problem, shape)) else UNLIKELY
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return g(T) sign(ω)|ω|^p; g is 1 at the coldest that was driven."""
-        drag = scene.covariates["direction"] * self._growth(scene, shape)
-        if float(shape["power"]) and "wheel_speed" in scene.covariates:
-            drag = drag * np.abs(scene.covariates["wheel_speed"])
+        drag = problem.covariates["direction"] * self._growth(problem, shape)
+        if float(shape["power"]) and "wheel_speed" in problem.covariates:
+            drag = drag * np.abs(problem.covariates["wheel_speed"])
         return drag[None]
 
-    def _growth(self, scene: Scene, shape: Shape) -> Array:
+    def _growth(self, problem: Problem, shape: Shape) -> Array:
         """Return g(T), shape (time, wheel)."""
-        temperature = np.nan_to_num(scene.covariates["temperature"])
-        coldest = _coldest(scene)
+        temperature = np.nan_to_num(problem.covariates["temperature"])
+        coldest = _coldest(problem)
         if "scale_K" in shape:
             # Vogel: ln of viscosity goes with 1/(T − T_0); near the coldest it falls by e over the scale.
             pole = float(shape["pole_degC"])
@@ -73,14 +73,14 @@ class ColdLubricantFriction(Candidate):
         end = float(shape["no_drag_above_degC"])
         return np.maximum(end - temperature, 0.0) / max(end - coldest, STEEPEST_K)
 
-    def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:
+    def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
         """Only the parameter that this shape has."""
-        temperature = scene.covariates["temperature"][scene.mask]
-        soonest = max(float(np.nanquantile(temperature, 0.2)), _coldest(scene) + STEEPEST_K)
+        temperature = problem.covariates["temperature"][problem.mask]
+        soonest = max(float(np.nanquantile(temperature, 0.2)), _coldest(problem) + STEEPEST_K)
         ends = (soonest, max(float(np.nanmax(temperature)), soonest) + 40)
         return {"scale_K": self.free["scale_K"]} if "scale_K" in shape else {"no_drag_above_degC": ends}
 
 
-def _coldest(scene: Scene) -> float:
+def _coldest(problem: Problem) -> float:
     """Return the coldest that was driven [°C], single readings aside."""
-    return float(np.nanquantile(scene.covariates["temperature"][scene.mask], 0.005))
+    return float(np.nanquantile(problem.covariates["temperature"][problem.mask], 0.005))

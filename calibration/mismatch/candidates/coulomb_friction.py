@@ -9,7 +9,7 @@ import numpy as np
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 
 class CoulombFriction(Candidate):
@@ -25,6 +25,6 @@ class CoulombFriction(Candidate):
     requires = ("direction",)
     coefficients: ClassVar = (Coefficient("coulomb_current", "{unit}"),)
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:  # noqa: ARG002
+    def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002
         """Return sign(ω)."""
-        return np.asarray(scene.covariates["direction"])[None]
+        return np.asarray(problem.covariates["direction"])[None]

@@ -9,7 +9,7 @@ import numpy as np
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 
 class CurrentSensorBias(Candidate):
@@ -25,6 +25,6 @@ class CurrentSensorBias(Candidate):
     coefficients: ClassVar = (Coefficient("offset", "{unit}", 0),)
     sharing: ClassVar = ("one",)
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:  # noqa: ARG002
+    def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002
         """Return 1."""
-        return np.ones((1, *scene.mask.shape))
+        return np.ones((1, *problem.mask.shape))

@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 
 class GradeResistance(Candidate):
@@ -28,14 +28,14 @@ class GradeResistance(Candidate):
     coefficients: ClassVar = (Coefficient("grade_current", "{unit}"),)
     sharing: ClassVar = ("all",)
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:
+    def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Shared by what each wheel carries, or evenly."""
-        return [{"shared": "by load"}, {"shared": "evenly"}] if "load" in scene.covariates else [{"shared": "evenly"}]
+        return [{"shared": "by load"}, {"shared": "evenly"}] if "load" in problem.covariates else [{"shared": "evenly"}]
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return sin(pitch), times each wheel's share of the load relative to the mean."""
-        along = np.sin(np.nan_to_num(scene.covariates["pitch"]))
+        along = np.sin(np.nan_to_num(problem.covariates["pitch"]))
         if shape["shared"] == "by load":
-            load = np.nan_to_num(scene.covariates["load"])
-            along = along * load / np.mean(load[scene.mask])
+            load = np.nan_to_num(problem.covariates["load"])
+            along = along * load / np.mean(load[problem.mask])
         return along[None]

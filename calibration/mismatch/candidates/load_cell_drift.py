@@ -14,7 +14,7 @@ from regolithd.calibration.mismatch.simulation.errors_in_variables import known_
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 WANDER_KNOTS, POSTURE_KNOTS = 24, 4
 """Of the line that a drift follows; and of the one that is fitted beside what pitch and roll say."""
@@ -43,11 +43,11 @@ class LoadCellDrift(Candidate):
     sharing: ClassVar = ("one",)
     free: ClassVar = {"relative_offset": (-3.0, 0.85)}
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002
+    def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
         """As the cell itself shows it, from several readings that were wrong on the mean already."""
         return [{"relative_offset": offset} for offset in OFFSETS[2:-2]]
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return what the simulation says to the load without the drift, less what it said.
 
         The cell shows how the drift went, but not what it was on the mean: that is the offset, in mean readings.
@@ -56,49 +56,49 @@ class LoadCellDrift(Candidate):
         offset = float(shape["relative_offset"])
         middle = int(np.clip(np.argmin(np.abs(np.array(OFFSETS) - offset)), 1, len(OFFSETS) - 2))
         at = OFFSETS[middle - 1 : middle + 2]
-        total = np.zeros(scene.mask.shape)
+        total = np.zeros(problem.mask.shape)
         for here in at:
             weight = np.prod([(offset - other) / (here - other) for other in at if other != here])
-            total += weight * self._simulated(scene, here)
+            total += weight * self._simulated(problem, here)
         return total[None]
 
-    def evidence(self, scene: Scene, shape: Shape) -> tuple[Array, Array]:  # noqa: ARG002
+    def evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array]:  # noqa: ARG002
         """Return, for each wheel, what this drift explains of its own cell's reading, and how large it is there."""
         key = ("drift seen by the cell", 0.0)
-        if key not in scene.made:
-            reading, drift = self._unexplained_load(scene), self._drift(scene)
+        if key not in problem.made:
+            reading, drift = self._unexplained_load(problem), self._drift(problem)
             noise = estimate_noise(np.nan_to_num(reading - drift), np.isfinite(reading))
             seen = np.nansum(np.where(np.isfinite(reading), drift**2, 0.0), axis=0) * noise.weights
             # A line of many pieces follows noise too: each piece gains 1 by chance. And the ground: that all cells do.
             usual = float(np.median(seen)) if len(seen) > 2 else 0.0
-            scene.made[key] = np.maximum(seen - max(usual, WANDER_KNOTS), 0.0)
-        return scene.made[key], np.ones(scene.mask.shape[1])
+            problem.made[key] = np.maximum(seen - max(usual, WANDER_KNOTS), 0.0)
+        return problem.made[key], np.ones(problem.mask.shape[1])
 
-    def _simulated(self, scene: Scene, offset: float) -> Array:
+    def _simulated(self, problem: Problem, offset: float) -> Array:
         key = ("drift with offset", offset)
-        if key not in scene.made:
-            load = scene.covariates["load"]
-            wrong = known_mean(load) * (self._drift(scene) + offset)
-            scene.made[key] = scene.with_input("load_N", np.maximum(load - wrong, 0.1 * load)) - scene.filled
-        return scene.made[key]
+        if key not in problem.made:
+            load = problem.covariates["load"]
+            wrong = known_mean(load) * (self._drift(problem) + offset)
+            problem.made[key] = problem.with_input("load_N", np.maximum(load - wrong, 0.1 * load)) - problem.filled
+        return problem.made[key]
 
-    def _drift(self, scene: Scene) -> Array:
+    def _drift(self, problem: Problem) -> Array:
         key = ("drift", 0.0)
-        if key not in scene.made:
-            reading = self._unexplained_load(scene)
-            scene.made[key] = np.stack([_wander(scene, reading[:, k]) for k in range(reading.shape[1])], axis=1)
-        return scene.made[key]
+        if key not in problem.made:
+            reading = self._unexplained_load(problem)
+            problem.made[key] = np.stack([_wander(problem, reading[:, k]) for k in range(reading.shape[1])], axis=1)
+        return problem.made[key]
 
-    def _unexplained_load(self, scene: Scene) -> Array:
+    def _unexplained_load(self, problem: Problem) -> Array:
         """Return the cells' readings less what pitch and roll explain, over the mean reading; NaN where unknown."""
         key = ("unexplained load", 0.0)
-        if key not in scene.made:
-            load = scene.covariates["load"]
-            scene.made[key] = _without_posture(scene, load / np.where(known_mean(load) > 0, known_mean(load), 1.0))
-        return scene.made[key]
+        if key not in problem.made:
+            load = problem.covariates["load"]
+            problem.made[key] = _without_posture(problem, load / np.where(known_mean(load) > 0, known_mean(load), 1.0))
+        return problem.made[key]
 
 
-def _without_posture(scene: Scene, values: Array) -> Array:
+def _without_posture(problem: Problem, values: Array) -> Array:
     """Return each column less its mean and what pitch and roll say, fitted beside a line of few pieces over time.
 
     Over half an hour a slope that changes slowly looks like a drift: fitted alone, posture would take the drift along.
@@ -106,11 +106,11 @@ def _without_posture(scene: Scene, values: Array) -> Array:
     """
     left = np.full(values.shape, np.nan)
     for k in range(values.shape[1]):
-        pitch, roll = (np.nan_to_num(scene.covariates[name][:, k]) for name in ("pitch", "roll"))
+        pitch, roll = (np.nan_to_num(problem.covariates[name][:, k]) for name in ("pitch", "roll"))
         posture = np.column_stack((pitch, roll, pitch**2, roll**2, pitch * roll))
         known = np.isfinite(values[:, k])
         if known.sum() > 10:
-            line = broken_lines(scene.time_s[:, 0], known, POSTURE_KNOTS) or [np.ones(len(pitch))]
+            line = broken_lines(problem.time_s[:, 0], known, POSTURE_KNOTS) or [np.ones(len(pitch))]
             beside = np.column_stack((posture, *line))
             fitted = np.linalg.lstsq(beside[known], values[known, k], rcond=None)[0][: posture.shape[1]]
             rest = values[known, k] - posture[known] @ fitted
@@ -118,10 +118,10 @@ def _without_posture(scene: Scene, values: Array) -> Array:
     return left
 
 
-def _wander(scene: Scene, reading: Array) -> Array:
+def _wander(problem: Problem, reading: Array) -> Array:
     """Return a broken line over time through a reading."""
     known = np.isfinite(reading)
-    hats = broken_lines(scene.time_s[:, 0], known, WANDER_KNOTS)
+    hats = broken_lines(problem.time_s[:, 0], known, WANDER_KNOTS)
     if not hats:
         return np.zeros(len(reading))
     columns = np.stack(hats, axis=1)

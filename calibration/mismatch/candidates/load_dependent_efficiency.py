@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.candidates.candidate import AGREES, UNLIKELY
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 
 class LoadDependentEfficiency(Candidate):
@@ -32,37 +32,37 @@ class LoadDependentEfficiency(Candidate):
     requires = ("torque",)
     coefficients: ClassVar = (Coefficient("relative_loss", "1", 0),)
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002
+    def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
         """From proportional to strongly curved, losses at light loads, and an efficiency that is right on the mean."""
         curved: list[Shape] = [{"power": p} for p in (0.0, 0.5, 1.0, 2.0, 3.5)]
         light: list[Shape] = [{"light": s} for s in (0.5, 1.0)]
         bent: list[Shape] = [{"bent": b} for b in (-0.2, 0.0, 0.3)]
         return [*curved, *light, *bent]
 
-    def settled(self, scene: Scene, shape: Shape, values: Sequence[float]) -> Shape:
+    def settled(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
         """Bend the current by the fitted loss, as far as the gears keep a third of their efficiency."""
         if "bent" not in shape:
             return shape
-        above = self._relative(scene)[scene.mask] - 1
+        above = self._relative(problem)[problem.mask] - 1
         least, most = 2 / 3 / min(float(np.min(above)), -1e-9), 2 / 3 / max(float(np.max(above)), 1e-9)
         bent = float(np.clip(values[0], least, most))
         return shape if abs(bent - float(shape["bent"])) <= AGREES * abs(bent) else {"bent": bent}
 
-    def reluctance(self, scene: Scene, shape: Shape) -> float:  # noqa: ARG002
+    def reluctance(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
         """Charge a loss in proportion: it is the stated gain far outside its own doubt."""
         return UNLIKELY if shape.get("power") == 0.0 else 0.0
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the loss as a multiple of the prediction."""
-        relative = self._relative(scene)
+        relative = self._relative(problem)
         if "bent" in shape:
             above = relative - 1
-            return (scene.filled * above / (1 - float(shape["bent"]) * above))[None]
+            return (problem.filled * above / (1 - float(shape["bent"]) * above))[None]
         if "light" in shape:
-            return (scene.filled * np.exp(-relative / float(shape["light"])))[None]
-        return (scene.filled * relative ** float(shape["power"]))[None]
+            return (problem.filled * np.exp(-relative / float(shape["light"])))[None]
+        return (problem.filled * relative ** float(shape["power"]))[None]
 
-    def _relative(self, scene: Scene) -> Array:
+    def _relative(self, problem: Problem) -> Array:
         """Return the predicted current over its mean magnitude, shape (time, wheel)."""
-        size = np.abs(scene.filled)
-        return size / max(float(np.mean(size[scene.mask])), 1e-30)
+        size = np.abs(problem.filled)
+        return size / max(float(np.mean(size[problem.mask])), 1e-30)

@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.candidates.candidate import UNLIKELY, Array,
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 
 class MultiPassCompaction(Candidate):
@@ -36,36 +36,36 @@ class MultiPassCompaction(Candidate):
     )
     sharing: ClassVar = ("all",)
 
-    def applies(self, scene: Scene) -> bool:
+    def applies(self, problem: Problem) -> bool:
         """Only where there are rows."""
-        return super().applies(scene) and scene.row is not None and bool(np.ptp(scene.row) > 0)
+        return super().applies(problem) and problem.row is not None and bool(np.ptp(problem.row) > 0)
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:
+    def shapes(self, problem: Problem) -> Sequence[Shape]:
         """All at the first pass, or evenly; counted from the front, or from whichever end leads."""
-        leads = ("front", "travel") if "direction" in scene.covariates else ("front",)
+        leads = ("front", "travel") if "direction" in problem.covariates else ("front",)
         ways = ["current"]
-        ways += ["stiffness"] if "stiffness_factor" in scene.simulation.variants() else []
-        ways += ["soil"] if {"shear_factor", "cohesion_Pa"} <= {*scene.simulation.variants(), *scene.values} else []
+        ways += ["stiffness"] if "stiffness_factor" in problem.simulation.variants() else []
+        ways += ["soil"] if {"shear_factor", "cohesion_Pa"} <= {*problem.simulation.variants(), *problem.values} else []
         return [{"kept": kept, "leads": lead, "by": way} for kept in (0.0, 0.5, 1.0) for lead in leads for way in ways]
 
-    def reluctance(self, scene: Scene, shape: Shape) -> float:  # noqa: ARG002
+    def reluctance(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
         """Charge three numbers for a rut where mostly one will do."""
         return UNLIKELY if shape["by"] == "soil" else 0.0
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the prediction (or its answer to stiffer soil) times what the passes before have done."""
-        assert scene.row is not None  # noqa: S101  # applies() said so
-        last = np.max(scene.row)
-        passes = np.broadcast_to(scene.row, scene.mask.shape)
+        assert problem.row is not None  # noqa: S101  # applies() said so
+        last = np.max(problem.row)
+        passes = np.broadcast_to(problem.row, problem.mask.shape)
         if shape["leads"] == "travel":
-            passes = np.where(scene.covariates["direction"] >= 0, passes, last - passes)
+            passes = np.where(problem.covariates["direction"] >= 0, passes, last - passes)
         # 1 + k + k² …: what each further pass adds is the fraction k of what the one before did.
         kept = float(shape["kept"])
         done = np.where(passes > 0, 1.0, 0.0) + np.where(passes > 1, kept * (passes - 1), 0.0)
         if shape["by"] == "current":
-            return (scene.filled * done)[None]
-        stiffer = scene.secant("stiffness_factor", 0.3)
+            return (problem.filled * done)[None]
+        stiffer = problem.secant("stiffness_factor", 0.3)
         if shape["by"] == "stiffness":
             return (stiffer * done)[None]
-        coheres = scene.values["cohesion_Pa"] * scene.tangent("cohesion_Pa")
-        return np.stack((stiffer * done, scene.secant("shear_factor", -0.3) * done, coheres * done))
+        coheres = problem.values["cohesion_Pa"] * problem.tangent("cohesion_Pa")
+        return np.stack((stiffer * done, problem.secant("shear_factor", -0.3) * done, coheres * done))

@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 
 MOST_READINGS = 4
@@ -35,18 +35,18 @@ class RotorInertia(Candidate):
     coefficients: ClassVar = (Coefficient("inertia_current", "{unit} s²/rad"),)
     free: ClassVar = {"lag_s": (0.0, 1.0)}
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:
+    def shapes(self, problem: Problem) -> Sequence[Shape]:
         """At once, and half a reading and one and a half later."""
-        return [{"lag_s": readings * scene.recording.step_s} for readings in (0.0, 0.5, 1.5)]
+        return [{"lag_s": readings * problem.recording.step_s} for readings in (0.0, 0.5, 1.5)]
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return dω/dt as it was the lag before, between readings on a straight line."""
-        late = float(shape.get("lag_s", 0.0)) / scene.recording.step_s
+        late = float(shape.get("lag_s", 0.0)) / problem.recording.step_s
         whole = int(late)
-        before = np.pad(scene.covariates["wheel_acceleration"], ((whole + 1, 0), (0, 0)))
-        count = len(scene.mask)
+        before = np.pad(problem.covariates["wheel_acceleration"], ((whole + 1, 0), (0, 0)))
+        count = len(problem.mask)
         return ((1 - late + whole) * before[1 : count + 1] + (late - whole) * before[:count])[None]
 
-    def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
+    def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Return a few readings at most."""
-        return {"lag_s": (0.0, min(MOST_READINGS * scene.recording.step_s, self.free["lag_s"][1]))}
+        return {"lag_s": (0.0, min(MOST_READINGS * problem.recording.step_s, self.free["lag_s"][1]))}

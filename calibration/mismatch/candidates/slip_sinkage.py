@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 
 class SlipSinkage(Candidate):
@@ -28,15 +28,15 @@ class SlipSinkage(Candidate):
     coefficients: ClassVar = (Coefficient("strength", "1"),)
     sharing: ClassVar = ("all",)
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:
+    def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Through the soil model at small and full strength; else in proportion to slip."""
-        has_soil = "slip_sinkage" in scene.simulation.variants()
+        has_soil = "slip_sinkage" in problem.simulation.variants()
         through: list[Shape] = [{"step": 0.3}, {"step": 1.0}] if has_soil else []
         return [*through, {"power": 1.0}]
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return what the soil model says to more sinkage, or prediction × slip."""
         if "step" in shape:
-            return scene.secant("slip_sinkage", float(shape["step"]))[None]
-        slip = np.maximum(np.nan_to_num(scene.covariates["slip"]), 0.0)
-        return (scene.filled * slip ** float(shape["power"]))[None]
+            return problem.secant("slip_sinkage", float(shape["step"]))[None]
+        slip = np.maximum(np.nan_to_num(problem.covariates["slip"]), 0.0)
+        return (problem.filled * slip ** float(shape["power"]))[None]

@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 
 BORDERS_M = (0.01, 0.5)
@@ -32,41 +32,41 @@ class SoilTransition(Candidate):
     sharing: ClassVar = ("all",)
     free: ClassVar = {"onset_s": (0.0, float("inf"))}
 
-    def applies(self, scene: Scene) -> bool:
+    def applies(self, problem: Problem) -> bool:
         """Only where the simulation has a soil."""
-        return {"cohesion_Pa", "friction_angle_deg"} <= set(scene.simulation.parameters)
+        return {"cohesion_Pa", "friction_angle_deg"} <= set(problem.simulation.parameters)
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:
+    def shapes(self, problem: Problem) -> Sequence[Shape]:
         """At each of many times: under all wheels at once, or where each wheel comes to the border in its turn."""
-        return [{"onset_s": t, **way} for t in onsets(scene, 40) for way in self.growths(scene)]
+        return [{"onset_s": t, **way} for t in onsets(problem, 40) for way in self.growths(problem)]
 
-    def growths(self, scene: Scene) -> Sequence[Shape]:
+    def growths(self, problem: Problem) -> Sequence[Shape]:
         """At once everywhere, or along the way: at a line, or over half a metre."""
         everywhere: Shape = {"along": "time", "of": "strength"}
-        if "place" not in scene.covariates:
+        if "place" not in problem.covariates:
             return [everywhere]
         borders: list[Shape] = [{"along": "place", "within_m": width, "of": "strength"} for width in BORDERS_M]
         return [everywhere, *borders]
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the prediction's answer to stronger soil, after the onset."""
-        values = scene.values
-        cohesion = values["cohesion_Pa"] * scene.tangent("cohesion_Pa")
+        values = problem.values
+        cohesion = values["cohesion_Pa"] * problem.tangent("cohesion_Pa")
         # d tan φ / tan φ = dφ · 2 / sin 2φ; to a few percent the angle itself scales alike.
-        friction = values["friction_angle_deg"] * scene.tangent("friction_angle_deg")
+        friction = values["friction_angle_deg"] * problem.tangent("friction_angle_deg")
         of = {"strength": cohesion + friction, "cohesion": cohesion, "friction": friction}[str(shape["of"])]
-        return (of * _beyond(scene, shape))[None]
+        return (of * _beyond(problem, shape))[None]
 
-    def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
+    def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Anywhere but at the very ends."""
-        return {"onset_s": (0.02 * scene.length_s, 0.97 * scene.length_s)}
+        return {"onset_s": (0.02 * problem.length_s, 0.97 * problem.length_s)}
 
 
-def _beyond(scene: Scene, shape: Shape) -> Array:
+def _beyond(problem: Problem, shape: Shape) -> Array:
     """Return how far it is the other soil, 0 to 1, shape (time, wheel); the rover's middle meets it at the onset."""
     onset_s = float(shape["onset_s"])
     if shape["along"] == "time":
-        return np.broadcast_to(scene.time_s >= onset_s, scene.mask.shape).astype(np.float64)
-    place = scene.covariates["place"]
-    beyond_m = place - np.interp(onset_s, scene.time_s[:, 0], np.mean(place, axis=1))
+        return np.broadcast_to(problem.time_s >= onset_s, problem.mask.shape).astype(np.float64)
+    place = problem.covariates["place"]
+    beyond_m = place - np.interp(onset_s, problem.time_s[:, 0], np.mean(place, axis=1))
     return np.clip(0.5 + beyond_m / float(shape["within_m"]), 0.0, 1.0)

@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 
 FADES: dict[str, Callable[[Array], Array]] = {
@@ -36,25 +36,25 @@ class StribeckFriction(Candidate):
     coefficients: ClassVar = (Coefficient("stribeck_current", "{unit}"),)
     free: ClassVar = {"stribeck_speed_rad_s": (0.0, np.inf)}
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:
+    def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Stribeck speeds between the slowest and the median speed driven."""
         return [
             {"stribeck_speed_rad_s": float(speed), "fades": fades}
             for fades in ("exponent 1", "exponent 2", "quotient")
-            for speed in np.geomspace(*self._range(scene), 6)
+            for speed in np.geomspace(*self._range(problem), 6)
         ]
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return sign(ω) times what is left of the extra drag at this speed."""
-        speed = scene.covariates["wheel_speed"]
+        speed = problem.covariates["wheel_speed"]
         ratio = np.abs(speed) / float(shape["stribeck_speed_rad_s"])
         return (np.sign(speed) * FADES[str(shape["fades"])](ratio))[None]
 
-    def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
+    def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Below the slowest speed driven it cannot be told from nothing, above the median not from viscous."""
-        return {"stribeck_speed_rad_s": self._range(scene)}
+        return {"stribeck_speed_rad_s": self._range(problem)}
 
-    def _range(self, scene: Scene) -> tuple[float, float]:
-        speed = np.abs(scene.covariates["wheel_speed"][scene.mask])
+    def _range(self, problem: Problem) -> tuple[float, float]:
+        speed = np.abs(problem.covariates["wheel_speed"][problem.mask])
         speed = speed[speed > 0]
         return 0.5 * float(np.quantile(speed, 0.02)), 0.8 * float(np.quantile(speed, 0.5))

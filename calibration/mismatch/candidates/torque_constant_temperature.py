@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.candidates.candidate import AGREES, UNLIKELY
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 
 class TorqueConstantTemperature(Candidate):
@@ -29,26 +29,26 @@ class TorqueConstantTemperature(Candidate):
     requires = ("temperature",)
     coefficients: ClassVar = (Coefficient("temperature_coefficient", "1/K"),)
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:
+    def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the reference temperatures of data sheets, and the recording's mean."""
-        middle = float(np.nanmean(scene.covariates["temperature"][scene.mask]))
+        middle = float(np.nanmean(problem.covariates["temperature"][problem.mask]))
         return [{"reference_degC": t, "bent_per_K": 0.0} for t in (25.0, 20.0, 0.0, middle)]
 
-    def settled(self, scene: Scene, shape: Shape, values: Sequence[float]) -> Shape:
+    def settled(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
         """Bend the column by the coefficient that was fitted to it, as far as the magnets keep a third."""
-        warmest = float(np.max(self._warmer(scene, shape)[scene.mask]))
+        warmest = float(np.max(self._warmer(problem, shape)[problem.mask]))
         most = 2 / 3 / warmest if warmest > 0 else np.inf
         bent = float(np.clip(values[0], 0.0, most))
         return shape if abs(bent - float(shape["bent_per_K"])) < AGREES * bent else {**shape, "bent_per_K": bent}
 
-    def reluctance(self, scene: Scene, shape: Shape) -> float:
+    def reluctance(self, problem: Problem, shape: Shape) -> float:
         """Charge a factor that no wheel's own temperature changes: that is a gain that was stated wrongly."""
-        return 0.0 if scene.changes_within(self._warmer(scene, shape)) else UNLIKELY
+        return 0.0 if problem.changes_within(self._warmer(problem, shape)) else UNLIKELY
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return (T − T_0)/(1 − α (T − T_0)) times the prediction, for the α that bends it."""
-        warmer = self._warmer(scene, shape)
-        return (warmer / (1 - float(shape.get("bent_per_K", 0.0)) * warmer) * scene.filled)[None]
+        warmer = self._warmer(problem, shape)
+        return (warmer / (1 - float(shape.get("bent_per_K", 0.0)) * warmer) * problem.filled)[None]
 
-    def _warmer(self, scene: Scene, shape: Shape) -> Array:
-        return np.nan_to_num(scene.covariates["temperature"]) - float(shape["reference_degC"])
+    def _warmer(self, problem: Problem, shape: Shape) -> Array:
+        return np.nan_to_num(problem.covariates["temperature"]) - float(shape["reference_degC"])

@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 
 class ViscousFriction(Candidate):
@@ -28,11 +28,11 @@ class ViscousFriction(Candidate):
     coefficients: ClassVar = (Coefficient("viscous_coefficient", "{unit} (s/rad)^p"),)
     free: ClassVar = {"power": (0.7, 1.4)}
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002
+    def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
         """Proportional first; then thinner and thicker."""
         return [{"power": 1.0}, {"power": 0.75}, {"power": 1.35}]
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return sign(ω)|ω|^p."""
-        speed = scene.covariates["wheel_speed"]
+        speed = problem.covariates["wheel_speed"]
         return (np.sign(speed) * np.abs(speed) ** float(shape["power"]))[None]

@@ -12,7 +12,7 @@ from regolithd.calibration.mismatch.regression.spectrum import padded_length, po
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 BINS_PER_TURN = 256
 HIGHEST_ORDER = 64
@@ -36,47 +36,47 @@ class WheelAngleRipple(Candidate):
     sharing: ClassVar = ("all", "one")
     free: ClassVar = {"order": (0.9, HIGHEST_ORDER)}
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002
+    def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
         """None: orders are sought in the residual, where thousands can be tried at once."""
         return []
 
-    def tried(self, scene: Scene) -> float:
+    def tried(self, problem: Problem) -> float:
         """Return the number of lines that the angle turned can resolve, of each kind.
 
         And ten times as many: of sums of twelve squares the largest is larger than two logarithms allow.
         """
-        turns = float(np.ptp(scene.covariates["wheel_angle"])) / (2 * np.pi)
+        turns = float(np.ptp(problem.covariates["wheel_angle"])) / (2 * np.pi)
         return max(10 * 3 * HIGHEST_ORDER * turns, 1.0)
 
-    def seek(self, scene: Scene, residual: Array) -> Sequence[Shape]:
+    def seek(self, problem: Problem, residual: Array) -> Sequence[Shape]:
         """Return the strongest order of each kind, as a sine and with its overtone.
 
         The residual is summed over angle bins, and its spectrum taken.
         """
-        kinds = ("drag", "torque", "load") if "direction" in scene.covariates else ("torque",)
+        kinds = ("drag", "torque", "load") if "direction" in problem.covariates else ("torque",)
         found: list[Shape] = []
         for kind in kinds:
-            weighted = residual * self._base(scene, kind)
-            order = self._strongest(scene, weighted)
-            line: Shape = {"order": order, "kind": kind, "lag": self._lag(scene, weighted, order)}
+            weighted = residual * self._base(problem, kind)
+            order = self._strongest(problem, weighted)
+            line: Shape = {"order": order, "kind": kind, "lag": self._lag(problem, weighted, order)}
             found += [{**line, "sines": sines} for sines in (1.0, 2.0)]
         return found
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return cosine and sine for each wheel, then those of the overtone, shape (2 sines wheels, time, wheel)."""
-        phase = float(shape["order"]) * _angle(scene, float(shape.get("lag", 0.0)))
-        base = self._base(scene, str(shape["kind"]))
-        wheels, sines = scene.mask.shape[1], int(float(shape["sines"]))
-        found = np.zeros((sines, wheels, 2, *scene.mask.shape))
+        phase = float(shape["order"]) * _angle(problem, float(shape.get("lag", 0.0)))
+        base = self._base(problem, str(shape["kind"]))
+        wheels, sines = problem.mask.shape[1], int(float(shape["sines"]))
+        found = np.zeros((sines, wheels, 2, *problem.mask.shape))
         for sine in range(sines):
             waves = base * np.stack((np.cos((sine + 1) * phase), np.sin((sine + 1) * phase)))
             for k in range(wheels):
                 found[sine, k, :, :, k] = waves[:, :, k]
-        return found.reshape(-1, *scene.mask.shape)
+        return found.reshape(-1, *problem.mask.shape)
 
-    def bounds(self, scene: Scene, shape: Shape) -> Mapping[str, tuple[float, float]]:
+    def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
         """Within one line's width of where it was found."""
-        width = np.pi / max(float(np.ptp(scene.covariates["wheel_angle"])), 1.0)
+        width = np.pi / max(float(np.ptp(problem.covariates["wheel_angle"])), 1.0)
         order = float(shape["order"])
         return {"order": (order - width, order + width)}
 
@@ -87,62 +87,62 @@ class WheelAngleRipple(Candidate):
         amplitude = float(np.sqrt(np.mean(amplitudes**2)))
         return {"amplitude": amplitude, "order": float(shape["order"])}
 
-    def _base(self, scene: Scene, kind: str) -> Array:
+    def _base(self, problem: Problem, kind: str) -> Array:
         """Return a torque that ripples whichever way the wheel turns, a drag, or a ripple in proportion to the load."""
         if kind == "drag":
-            return scene.covariates["direction"]
-        return np.ones(scene.mask.shape) if kind == "torque" else scene.filled / scene.mean_size
+            return problem.covariates["direction"]
+        return np.ones(problem.mask.shape) if kind == "torque" else problem.filled / problem.mean_size
 
-    def memory_at(self, scene: Scene, residual: Array, shape: Shape) -> float:
+    def memory_at(self, problem: Problem, residual: Array, shape: Shape) -> float:
         """Return the noise's power around this order, over that of white noise: lines stand out of their neighbours.
 
         It is the louder one's of torque and drag, so that no kind of ripple is preferred for its estimate.
         """
-        kinds = ("drag", "torque") if "direction" in scene.covariates else ("torque",)
-        return max(self._memory(scene, residual * self._base(scene, kind), float(shape["order"])) for kind in kinds)
+        kinds = ("drag", "torque") if "direction" in problem.covariates else ("torque",)
+        return max(self._memory(problem, residual * self._base(problem, kind), float(shape["order"])) for kind in kinds)
 
-    def _memory(self, scene: Scene, weighted: Array, at: float) -> float:
-        order, power = self._spectrum(scene, weighted)
+    def _memory(self, problem: Problem, weighted: Array, at: float) -> float:
+        order, power = self._spectrum(problem, weighted)
         above = order - at
         # Slow noise has more power at lower orders: the louder side counts.
         sides = [power[(side * above > 0.1) & (side * above < 1.5)] for side in (-1, 1)]
         # Half of all squares are below their median: of two a wheel, 1 − 1/9n of the mean, cubed (Wilson, Hilferty).
-        wheels = max(int(scene.mask.any(axis=0).sum()), 1)
+        wheels = max(int(problem.mask.any(axis=0).sum()), 1)
         usual = max((float(np.median(side)) for side in sides if side.size), default=float("inf"))
         return usual / (wheels * (1 - 1 / (9 * wheels)) ** 3)
 
-    def _strongest(self, scene: Scene, weighted: Array) -> float:
-        order, power = self._spectrum(scene, weighted)
-        sought = (order >= self.free["order"][0]) & (order <= _resolved(scene))
+    def _strongest(self, problem: Problem, weighted: Array) -> float:
+        order, power = self._spectrum(problem, weighted)
+        sought = (order >= self.free["order"][0]) & (order <= _resolved(problem))
         return float(order[np.argmax(np.where(sought, power, 0.0))])
 
-    def _lag(self, scene: Scene, weighted: Array, order: float) -> float:
+    def _lag(self, problem: Problem, weighted: Array, order: float) -> float:
         """Return by how many readings the angle lags: a speed may be of the instant, or a mean before or after it."""
-        waves = {lag: np.exp(1j * order * _angle(scene, lag)) for lag in LAGS}
+        waves = {lag: np.exp(1j * order * _angle(problem, lag)) for lag in LAGS}
         return max(waves, key=lambda lag: float(np.sum(np.abs(np.sum(weighted * waves[lag], axis=0)) ** 2)))
 
-    def _spectrum(self, scene: Scene, weighted: Array) -> tuple[Array, Array]:
+    def _spectrum(self, problem: Problem, weighted: Array) -> tuple[Array, Array]:
         """Return orders and the power of a residual at each, summed over the wheels; white noise has 1 on each."""
-        angle = scene.covariates["wheel_angle"]
+        angle = problem.covariates["wheel_angle"]
         low = np.min(angle, axis=0)
         bins = np.rint((angle - low) * BINS_PER_TURN / (2 * np.pi)).astype(np.int64)
         length = padded_length(int(np.max(bins)))
         power: Array = np.zeros(length // 2 + 1)
         for k in range(angle.shape[1]):
-            here = scene.mask[:, k]
+            here = problem.mask[:, k]
             summed = power_of_sums(bins[here, k], weighted[here, k], length)
             power += summed / max(float(np.sum(weighted[here, k] ** 2)), 1e-300)
         order = np.arange(len(power)) * BINS_PER_TURN / length
         return order, power
 
 
-def _resolved(scene: Scene) -> float:
+def _resolved(problem: Problem) -> float:
     """Return the highest order that a wheel at its usual speed shows in enough readings a cycle."""
-    usual = float(np.median(np.abs(scene.covariates["wheel_speed"][scene.mask])))
-    return min(HIGHEST_ORDER, 2 * np.pi / (READINGS_PER_CYCLE * scene.recording.step_s * max(usual, 1e-9)))
+    usual = float(np.median(np.abs(problem.covariates["wheel_speed"][problem.mask])))
+    return min(HIGHEST_ORDER, 2 * np.pi / (READINGS_PER_CYCLE * problem.recording.step_s * max(usual, 1e-9)))
 
 
-def _angle(scene: Scene, lag: float) -> Array:
+def _angle(problem: Problem, lag: float) -> Array:
     """Return the angle turned [rad] by so many readings before each instant, shape (time, wheel)."""
-    speed = np.nan_to_num(scene.covariates["wheel_speed"])
-    return scene.covariates["wheel_angle"] - lag * scene.recording.step_s * speed
+    speed = np.nan_to_num(problem.covariates["wheel_speed"])
+    return problem.covariates["wheel_angle"] - lag * problem.recording.step_s * speed

@@ -58,10 +58,10 @@ def _minutes_needed(search: Search) -> int:
     A drive that moves the right covariates leaves about a tenth of an effect outside the free parameters' reach; each
     reading then adds to its gain what the noise of this recording lets it.
     """
-    scene = search.dictionary.scene
+    problem = search.dictionary.problem
     needed = (sqrt(search.threshold + PER_COEFFICIENT) + NINE_IN_TEN) ** 2
-    readings = 60 / scene.recording.step_s
-    gained = REMAINS * readings * float(search.weights.sum()) * (SMALLEST * scene.mean_size) ** 2
+    readings = 60 / problem.recording.step_s
+    gained = REMAINS * readings * float(search.weights.sum()) * (SMALLEST * problem.mean_size) ** 2
     return int(np.clip(5 * np.ceil(needed / gained / 5), *MINUTES))
 
 

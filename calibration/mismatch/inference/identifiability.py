@@ -94,7 +94,7 @@ def collinear(search: Search, given: Fit) -> tuple[Indistinguishable, ...]:
     Coulomb friction, viscous friction and cohesion one.
     """
     terms = _representatives(search)
-    size = WORTH_WORRYING * search.dictionary.scene.mean_size
+    size = WORTH_WORRYING * search.dictionary.problem.mean_size
     like = {
         one: {two for two in terms if two != one and _imitates(search, given, terms[one], terms[two], size)}
         for one in terms
@@ -119,8 +119,8 @@ def collinear(search: Search, given: Fit) -> tuple[Indistinguishable, ...]:
 
 def _parameters_like(search: Search, given: Sequence[Term], members: Sequence[Term]) -> list[str]:
     """Return the free parameters that could stand for every member, were they as wrong as that takes."""
-    nuisance, size = search.nuisance, WORTH_WORRYING * search.dictionary.scene.mean_size
-    aliases = search.dictionary.scene.simulation.parameter_effects
+    nuisance, size = search.nuisance, WORTH_WORRYING * search.dictionary.problem.mean_size
+    aliases = search.dictionary.problem.simulation.parameter_effects
     found = []
     for place, name in enumerate(nuisance.names):
         if name not in aliases:
@@ -178,7 +178,7 @@ def _survives(search: Search, named: Fit, rival: Fit, others: Sequence[Term], te
     own = rival.terms[-1]
     candidate, shape = own.group.candidate, own.group.shape
     # What speaks against a rival beforehand is not what the recording says against it.
-    beforehand = candidate.reluctance(search.dictionary.scene, shape) if candidate else 0.0
+    beforehand = candidate.reluctance(search.dictionary.problem, shape) if candidate else 0.0
     lead = max(search.score(named) - search.score(rival) - beforehand - SLACK, 0.0)
     block, reach = search.beside((*others, term), own)
     values = rival.coefficients[rival.of_term(len(rival.terms) - 1)]

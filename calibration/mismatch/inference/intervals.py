@@ -63,26 +63,26 @@ def _design(search: Search, fit: Fit) -> tuple[Array, list[tuple[int, str, float
             values[w] = dictionary.columns[column, w]
         parts.append(values[:, back].T)
     names: list[tuple[int, str, float]] = []
-    scene = dictionary.scene
+    problem = dictionary.problem
     for index, term in enumerate(fit.terms):
         candidate, shape = term.group.candidate, term.group.shape
         if candidate is None:
             continue
         values = fit.coefficients[fit.of_term(index)] / dictionary.scale[list(term.group.columns)]
-        for name, (low, high) in candidate.bounds(scene, shape).items():
+        for name, (low, high) in candidate.bounds(problem, shape).items():
             if name in shape and name != "onset_s":
                 step = OF_ITS_RANGE * (high - low)
-                changed = candidate.columns(scene, {**shape, name: float(shape[name]) + step})
-                before = candidate.columns(scene, shape)
+                changed = candidate.columns(problem, {**shape, name: float(shape[name]) + step})
+                before = candidate.columns(problem, shape)
                 slope = np.einsum("c,ctw->tw", values, changed - before) / step
                 on = np.zeros(slope.shape[1])
                 on[list(term.wheels)] = 1
-                slope = np.where(scene.mask, slope, 0.0) * on
+                slope = np.where(problem.mask, slope, 0.0) * on
                 size = float(np.sqrt(np.mean(slope**2)))
                 if size > 0:
                     names.append((index, name, size))
                     parts.append(slope / size)
-    return np.stack(parts) if parts else np.zeros((0, *scene.mask.shape)), names
+    return np.stack(parts) if parts else np.zeros((0, *problem.mask.shape)), names
 
 
 def _sandwich(
@@ -125,7 +125,7 @@ def _of_term(
             other[name] = float(shape[name]) + row[place] / unit
         for name, value in candidate.parameters(other, ((fit.coefficients[at] + row[at]) / scale).tolist()).items():
             drawn[name].append(value)
-    units = {c.name: c.unit.format(unit=dictionary.scene.simulation.unit) for c in candidate.coefficients}
+    units = {c.name: c.unit.format(unit=dictionary.problem.simulation.unit) for c in candidate.coefficients}
     units |= {name: _unit(name) for name in candidate.free}
     found = {}
     for name, value in central.items():
@@ -148,14 +148,16 @@ def _sizes(search: Search, fit: Fit, index: int, parts: Array, moved: Array) -> 
     `parts` are its columns, what its shape changes and its bends (part, time, wheel); `moved` is how far each went in
     each draw (draw, part).
     """
-    scene, term = search.dictionary.scene, fit.terms[index]
+    problem, term = search.dictionary.problem, fit.terms[index]
     on = list(term.wheels)
     flat = parts[:, :, on].reshape(len(parts), -1)
-    gram = flat @ flat.T / scene.mask[:, on].sum()
+    gram = flat @ flat.T / problem.mask[:, on].sum()
     drawn = moved.copy()
     drawn[:, : len(term.group.columns)] += fit.coefficients[fit.of_term(index)]
-    sizes = np.sqrt(np.maximum(np.einsum("da,ab,db->d", drawn, gram, drawn), 0)) / scene.mean_size
-    value = float(np.sqrt(np.mean(contribution(search, fit, index)[:, on][scene.mask[:, on]] ** 2))) / scene.mean_size
+    sizes = np.sqrt(np.maximum(np.einsum("da,ab,db->d", drawn, gram, drawn), 0)) / problem.mean_size
+    value = (
+        float(np.sqrt(np.mean(contribution(search, fit, index)[:, on][problem.mask[:, on]] ** 2))) / problem.mean_size
+    )
     low, high = np.quantile(np.concatenate(_over_shapes(search, fit, index, sizes, value)), [0.05, 0.95])
     return Parameter(value, float(min(low, value)), float(max(high, value)), "1")
 
@@ -166,7 +168,7 @@ def _over_shapes(search: Search, fit: Fit, index: int, sizes: Array, value: floa
     Where a reference temperature or the way it grew is not known, neither is what hangs on it: each kind counts, at its
     best, as it fits. `sizes` are draws for the fitted shape, `value` its best.
     """
-    scene, term = search.dictionary.scene, fit.terms[index]
+    problem, term = search.dictionary.problem, fit.terms[index]
     others = [other for i, other in enumerate(fit.terms) if i != index]
     family = [group for group in search.dictionary.groups if group.named and group.name == term.name]
     free = term.group.candidate.free if term.group.candidate else {}
@@ -181,8 +183,8 @@ def _over_shapes(search: Search, fit: Fit, index: int, sizes: Array, value: floa
         if (weight := float(np.exp(0.5 * (gain - best)))) < UNLIKELY:
             continue
         refit = search.fit((*others, other))
-        values = contribution(search, refit, len(others))[:, list(term.wheels)][scene.mask[:, list(term.wheels)]]
-        size = float(np.sqrt(np.mean(values**2))) / scene.mean_size
+        values = contribution(search, refit, len(others))[:, list(term.wheels)][problem.mask[:, list(term.wheels)]]
+        size = float(np.sqrt(np.mean(values**2))) / problem.mean_size
         drawn.append(size / max(value, 1e-30) * sizes[: max(int(weight * len(sizes)), 1)])
     return drawn or [sizes]
 
@@ -194,10 +196,10 @@ def _onset_bounds(search: Search, fit: Fit, index: int) -> tuple[float, float]:
     assert candidate is not None  # noqa: S101
     others = [t for i, t in enumerate(fit.terms) if i != index]
     profile = Profile(search, others, candidate, term.wheels)
-    scene = search.dictionary.scene
-    at, length = float(shape["onset_s"]), scene.length_s
+    problem = search.dictionary.problem
+    at, length = float(shape["onset_s"]), problem.length_s
     # How it grew after its onset is not known either: at each onset the best growth counts.
-    ways_to_grow = candidate.growths(scene)
+    ways_to_grow = candidate.growths(problem)
 
     def gain(onset_s: float) -> float:
         return max(profile({**growth, "onset_s": onset_s}) for growth in ways_to_grow)

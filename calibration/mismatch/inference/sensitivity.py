@@ -23,8 +23,8 @@ NINE_IN_TEN = 1.2816
 
 def sensitivities(search: Search, given: Fit, candidates: Sequence[Candidate]) -> tuple[Sensitivity, ...]:
     """Return root mean squares on the wheels concerned, in the channel's unit, with the effects found in the fit."""
-    scene = search.dictionary.scene
-    unit = scene.simulation.unit
+    problem = search.dictionary.problem
+    unit = problem.simulation.unit
     found = []
     for candidate in candidates:
         groups = [g for g in search.dictionary.groups if g.name == candidate.name and g.named]
@@ -44,7 +44,7 @@ def sensitivities(search: Search, given: Fit, candidates: Sequence[Candidate]) -
 
 def _smallest(search: Search, given: Sequence[Term], term: Term) -> float:
     """Return the effect whose gain passes the threshold nine times in ten."""
-    scene, dictionary = search.dictionary.scene, search.dictionary
+    problem, dictionary = search.dictionary.problem, search.dictionary
     block, reach = search.beside(given, term)
     own = np.linalg.eigvalsh(block - reach)
     total = float(np.trace(block)) / len(block)
@@ -54,8 +54,8 @@ def _smallest(search: Search, given: Sequence[Term], term: Term) -> float:
     if outside <= 1e-9 * total:
         return float("inf")
     on = list(term.wheels)
-    known = scene.mask.T[:, dictionary.order][on]
+    known = problem.mask.T[:, dictionary.order][on]
     power = np.mean(dictionary.columns[term.group.span][:, on].astype(np.float64) ** 2, axis=0)[known]
     rms = float(np.sqrt(np.mean(power)))
-    least = WORTH_A_NAME * scene.mean_size / magnitude(power)
+    least = WORTH_A_NAME * problem.mean_size / magnitude(power)
     return rms * max(float(np.sqrt(needed / outside)), least)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.candidates import Candidate, Shape
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -77,13 +77,13 @@ class Dictionary:
     energy, counts: sum of squares and number of the residual's values, shape (fold, wheel)
     """
 
-    def __init__(self, scene: Scene, folds: NDArray[np.int64]) -> None:
-        self.scene = scene
+    def __init__(self, problem: Problem, folds: NDArray[np.int64]) -> None:
+        self.problem = problem
         self.groups: list[Group] = []
         self.order = np.argsort(folds, kind="stable")
         self.cuts = np.searchsorted(folds[self.order], np.arange(folds.max() + 2))
-        self.residual: Single = self._arranged((scene.measured - scene.filled)[None])[0]
-        self._wheels, self._folds = scene.mask.shape[1], len(self.cuts) - 1
+        self.residual: Single = self._arranged((problem.measured - problem.filled)[None])[0]
+        self._wheels, self._folds = problem.mask.shape[1], len(self.cuts) - 1
         self._size = 0
         self._columns: Single = np.zeros((0, self._wheels, len(folds)), np.float32)
         self._gram: Array = np.zeros((self._folds, self._wheels, 0, 0))
@@ -91,7 +91,7 @@ class Dictionary:
         self.scale: Array = np.zeros(0)
         parts = self._parts(self.residual)
         self.energy: Array = np.stack([np.sum(part.astype(np.float64) ** 2, axis=1) for part in parts])
-        known = self._parts(scene.mask.T[:, self.order].astype(np.float64))
+        known = self._parts(problem.mask.T[:, self.order].astype(np.float64))
         self.counts: Array = np.stack([np.sum(part, axis=1) for part in known])
 
     @property
@@ -111,7 +111,7 @@ class Dictionary:
 
     def _arranged(self, values: Array) -> Single:
         """Return (column, time, wheel) as (column, wheel, time) in the order of folds, 0 outside the mask."""
-        kept = np.where(self.scene.mask, values, 0.0)
+        kept = np.where(self.problem.mask, values, 0.0)
         return np.ascontiguousarray(np.swapaxes(kept, 1, 2)[:, :, self.order], dtype=np.float32)
 
     def _parts(self, values: NDArray[Any]) -> list[NDArray[Any]]:
@@ -122,7 +122,7 @@ class Dictionary:
         if not len(columns):
             return []
         fresh = self._arranged(np.stack(columns))
-        scale = np.sqrt(np.sum(fresh.astype(np.float64) ** 2, axis=(1, 2)) / max(int(self.scene.mask.sum()), 1))
+        scale = np.sqrt(np.sum(fresh.astype(np.float64) ** 2, axis=(1, 2)) / max(int(self.problem.mask.sum()), 1))
         scale = np.where(scale > 0, scale, 1.0)
         fresh /= scale[:, None, None].astype(np.float32)
         old, new = self._size, self._size + len(fresh)

@@ -31,15 +31,15 @@ WITHOUT_A_FORM = frozenset({"wheel_row", "wheel_angle"})
 
 def bends(search: Search, fit: Fit, index: int) -> Array:
     """Return how one effect would change were its law wrong by its whole self, shape (bend, time, wheel)."""
-    scene, term = search.dictionary.scene, fit.terms[index]
+    problem, term = search.dictionary.problem, fit.terms[index]
     effect = contribution(search, fit, index)
     found = []
     covariate = term.group.candidate.covariate if term.group.candidate else "none"
     covariate = "time" if covariate in CONSTANT else covariate
-    if covariate in scene.covariates and covariate not in WITHOUT_A_FORM:
-        values = scene.covariates[covariate]
+    if covariate in problem.covariates and covariate not in WITHOUT_A_FORM:
+        values = problem.covariates[covariate]
         values = values if np.nanmin(values) >= 0 or covariate == "temperature" else np.abs(values)
-        found += [hat * effect for hat in broken_lines(values, scene.mask & (effect != 0), KNOTS)]
+        found += [hat * effect for hat in broken_lines(values, problem.mask & (effect != 0), KNOTS)]
     if len(term.wheels) > 1:
         found += [effect * (np.arange(effect.shape[1]) == wheel) for wheel in term.wheels]
     return np.stack(found) if found else np.zeros((0, *effect.shape))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -61,22 +61,22 @@ def estimate_noise(residual: Array, mask: NDArray[np.bool_]) -> Noise:
     return Noise(deviation, float(max(1.0, 1 + 2 * np.sum(correlation[1:end]))))
 
 
-def blocks_of_time(scene: Scene, noise: Noise) -> NDArray[np.int64]:
+def blocks_of_time(problem: Problem, noise: Noise) -> NDArray[np.int64]:
     """Return each instant's block, shape (time,): long against the noise's memory, yet enough of them for folds.
 
     Runs are never mixed in one block. Blocks of the same number stay together when data are held out.
     """
-    step = scene.recording.step_s
+    step = problem.recording.step_s
     wanted = np.clip(10 * noise.memory * step, 20.0, LONGEST_MEMORY_S)
-    wanted = min(wanted, max(scene.length_s / (6 * FOLDS), 2 * step))
-    number = np.floor(scene.time_s[:, 0] / wanted).astype(np.int64)
-    pairs = np.stack((scene.recording.run, number), axis=1)
+    wanted = min(wanted, max(problem.length_s / (6 * FOLDS), 2 * step))
+    number = np.floor(problem.time_s[:, 0] / wanted).astype(np.int64)
+    pairs = np.stack((problem.recording.run, number), axis=1)
     return np.unique(pairs, axis=0, return_inverse=True)[1].ravel()
 
 
-def folds_of_blocks(scene: Scene, blocks: NDArray[np.int64]) -> NDArray[np.int64]:
+def folds_of_blocks(problem: Problem, blocks: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return each instant's fold, shape (time,): whole runs where there are several, else every fifth block."""
-    runs = np.unique(scene.recording.run)
+    runs = np.unique(problem.recording.run)
     if len(runs) >= FOLDS:
-        return np.searchsorted(runs, scene.recording.run) % FOLDS
+        return np.searchsorted(runs, problem.recording.run) % FOLDS
     return blocks % FOLDS

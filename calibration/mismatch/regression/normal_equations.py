@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.candidates import Candidate, Shape
     from regolithd.calibration.mismatch.candidates.candidate import Sharing
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 Array = NDArray[np.float64]
 
@@ -48,15 +48,15 @@ class Nuisance:
 
 def add_nuisance(dictionary: Dictionary) -> Nuisance:
     """Add ∂prediction/∂parameter of every parameter that the priors leave free, and of each wheel's own part of it."""
-    scene, simulation = dictionary.scene, dictionary.scene.simulation
+    problem, simulation = dictionary.problem, dictionary.problem.simulation
     free = {name: prior.std for name, prior in simulation.parameters.items() if prior.std > 0}
-    names, stds, tangents = list(free), list(free.values()), [scene.tangent(name) for name in free]
-    wheels = scene.recording.wheels
+    names, stds, tangents = list(free), list(free.values()), [problem.tangent(name) for name in free]
+    wheels = problem.recording.wheels
     for name in free if len(wheels) > 1 else ():
         if name in simulation.own_to_each_wheel:
             names += [own_name(name, wheel) for wheel in wheels]
             stds += [OWN_SHARE * free[name]] * len(wheels)
-            tangents += [np.where(np.array(wheels) == wheel, scene.tangent(name), 0.0) for wheel in wheels]
+            tangents += [np.where(np.array(wheels) == wheel, problem.tangent(name), 0.0) for wheel in wheels]
     places = dictionary.append(tangents)
     # A coefficient of a column that was divided by its scale is the parameter's shift times that scale.
     precision = 1 / (np.array(stds) * dictionary.scale[places]) ** 2 if places else np.zeros(0)
@@ -67,17 +67,17 @@ def add_candidate(
     dictionary: Dictionary, candidate: Candidate, shapes: Sequence[Shape], quieter: Sequence[float] = ()
 ) -> list[Group]:
     """Add a candidate in each of these shapes; `quieter` says where there is less noise than in the long run."""
-    scene, made, columns = dictionary.scene, [], []
+    problem, made, columns = dictionary.problem, [], []
     start = len(dictionary.columns)
-    price = 2 * float(np.log(candidate.tried(scene)))
+    price = 2 * float(np.log(candidate.tried(problem)))
     for shape, less in zip(shapes, quieter or [1.0] * len(shapes), strict=True):
-        found = np.asarray(candidate.columns(scene, shape), np.float64)
+        found = np.asarray(candidate.columns(problem, shape), np.float64)
         places = tuple(range(start, start + len(found)))
         start += len(found)
         columns += list(found)
         signs = tuple(c.sign for c in candidate.coefficients[: len(found)])
         signs += (0,) * (len(found) - len(signs))
-        paid = price + candidate.reluctance(scene, shape)
+        paid = price + candidate.reluctance(problem, shape)
         made.append(
             Group(
                 candidate.name,
@@ -88,8 +88,8 @@ def add_candidate(
                 candidate,
                 shape,
                 quieter=less,
-                evidence=candidate.evidence(scene, shape),
-                alive=np.any(np.where(scene.mask, found, 0.0) != 0, axis=1) if len(found) > 1 else None,
+                evidence=candidate.evidence(problem, shape),
+                alive=np.any(np.where(problem.mask, found, 0.0) != 0, axis=1) if len(found) > 1 else None,
             )
         )
     dictionary.append(columns)
@@ -99,46 +99,46 @@ def add_candidate(
 
 def add_candidates(dictionary: Dictionary, candidates: Sequence[Candidate]) -> list[Candidate]:
     """Add every candidate that this recording can have; return those."""
-    fitting = [candidate for candidate in candidates if candidate.applies(dictionary.scene)]
+    fitting = [candidate for candidate in candidates if candidate.applies(dictionary.problem)]
     for candidate in fitting:
-        add_candidate(dictionary, candidate, candidate.shapes(dictionary.scene))
+        add_candidate(dictionary, candidate, candidate.shapes(dictionary.problem))
     return fitting
 
 
-def _opposed(scene: Scene, covariate: str) -> dict[str, Array]:
+def _opposed(problem: Problem, covariate: str) -> dict[str, Array]:
     """Return how an effect may differ over the machine: what tilts or turns it acts oppositely on its two sides."""
-    direction = np.nan_to_num(scene.covariates.get("direction", np.ones(scene.mask.shape)))
-    if covariate in {"roll", "yaw_rate"} and scene.side is not None:
-        return {"drag, opposite sides": direction * scene.side}
-    if covariate == "pitch" and scene.row is not None and np.ptp(scene.row) > 0:
-        return {"drag, opposite ends": direction * (scene.row - np.mean(scene.row))}
+    direction = np.nan_to_num(problem.covariates.get("direction", np.ones(problem.mask.shape)))
+    if covariate in {"roll", "yaw_rate"} and problem.side is not None:
+        return {"drag, opposite sides": direction * problem.side}
+    if covariate == "pitch" and problem.row is not None and np.ptp(problem.row) > 0:
+        return {"drag, opposite ends": direction * (problem.row - np.mean(problem.row))}
     return {}
 
 
 def add_curves(dictionary: Dictionary) -> None:
     """Add, for each covariate, broken lines that act as drag, as an offset, and in proportion to the prediction."""
-    scene = dictionary.scene
-    flavours = {"offset": np.ones(scene.mask.shape), "gain": scene.filled}
-    if "direction" in scene.covariates:
-        flavours["drag"] = np.nan_to_num(scene.covariates["direction"])
-    for name, values in scene.covariates.items():
+    problem = dictionary.problem
+    flavours = {"offset": np.ones(problem.mask.shape), "gain": problem.filled}
+    if "direction" in problem.covariates:
+        flavours["drag"] = np.nan_to_num(problem.covariates["direction"])
+    for name, values in problem.covariates.items():
         if name in NOT_FOR_CURVES:
             continue
-        if _tells_wheels_apart(scene, values):
+        if _tells_wheels_apart(problem, values):
             continue
         curve = np.abs(values) if name == "wheel_speed" else values
-        hats = broken_lines(curve, scene.mask, CURVE_KNOTS)
+        hats = broken_lines(curve, problem.mask, CURVE_KNOTS)
         if len(hats) < 3:
             continue
-        for flavour, factor in {**flavours, **_opposed(scene, name)}.items():
+        for flavour, factor in {**flavours, **_opposed(problem, name)}.items():
             sharing: tuple[Sharing, ...] = ("all",) if "opposite" in flavour else ("all", "one")
             _add_curve(dictionary, name, [hat * factor for hat in hats], flavour, sharing)
-    speed = scene.covariates.get("wheel_speed")
+    speed = problem.covariates.get("wheel_speed")
     if speed is not None and np.nanmin(speed) < 0:
         # What acts one way only is neither a drag nor an offset.
-        _add_curve(dictionary, "wheel_speed", broken_lines(speed, scene.mask, CURVE_KNOTS), "each way")
+        _add_curve(dictionary, "wheel_speed", broken_lines(speed, problem.mask, CURVE_KNOTS), "each way")
     flavour = "drag" if "drag" in flavours else "offset"
-    hats = broken_lines(scene.covariates["time"], scene.mask, TIME_KNOTS)
+    hats = broken_lines(problem.covariates["time"], problem.mask, TIME_KNOTS)
     _add_curve(dictionary, "time", [hat * flavours[flavour] for hat in hats], flavour)
 
 
@@ -156,26 +156,26 @@ def _add_curve(
         dictionary.groups.append(Group(covariate, tuple(places), signs, sharing, price, None, {}, flavour))
 
 
-def _tells_wheels_apart(scene: Scene, values: Array) -> bool:
+def _tells_wheels_apart(problem: Problem, values: Array) -> bool:
     """Say whether a covariate hardly varies but from wheel to wheel: a curve over it would be a name for the wheels."""
-    known = values[scene.mask & np.isfinite(values)]
-    return scene.variance_within(values) < BETWEEN_WHEELS * float(np.var(known))
+    known = values[problem.mask & np.isfinite(values)]
+    return problem.variance_within(values) < BETWEEN_WHEELS * float(np.var(known))
 
 
 def add_beat(dictionary: Dictionary, residual: Array) -> None:
     """Add the sine over time, acting as drag, that the residual [time, wheel] shows most of: what switches on board."""
-    scene = dictionary.scene
-    along = np.nan_to_num(scene.covariates.get("direction", np.ones(scene.mask.shape)))
-    time_s, step_s = scene.time_s[:, 0], scene.recording.step_s
-    lowest, highest = LEAST_BEATS / scene.length_s, 1 / (SHORTEST_BEAT * step_s)
+    problem = dictionary.problem
+    along = np.nan_to_num(problem.covariates.get("direction", np.ones(problem.mask.shape)))
+    time_s, step_s = problem.time_s[:, 0], problem.recording.step_s
+    lowest, highest = LEAST_BEATS / problem.length_s, 1 / (SHORTEST_BEAT * step_s)
     if lowest >= highest:
         return
     place = np.rint(time_s / step_s).astype(np.int64)
     length = padded_length(int(place[-1]))
     frequency_Hz = np.fft.rfftfreq(length, step_s)
-    power = np.stack([power_of_sums(place, values, length) for values in (residual * along * scene.mask).T])
+    power = np.stack([power_of_sums(place, values, length) for values in (residual * along * problem.mask).T])
     for wheels in (power.sum(axis=0), *power):
         sought = np.where((frequency_Hz >= lowest) & (frequency_Hz <= highest), wheels, 0.0)
-        phase = 2 * np.pi * frequency_Hz[np.argmax(sought)] * scene.time_s
-        price = 2 * float(np.log(scene.length_s * highest))
+        phase = 2 * np.pi * frequency_Hz[np.argmax(sought)] * problem.time_s
+        price = 2 * float(np.log(problem.length_s * highest))
         _add_curve(dictionary, "time", [along * np.cos(phase), along * np.sin(phase)], "drag, periodic", price=price)

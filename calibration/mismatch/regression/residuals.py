@@ -25,7 +25,7 @@ def residual_of(search: Search, fit: Fit) -> Array:
             left[w] -= value * dictionary.columns[column, w]
     restored = np.empty_like(left)
     restored[:, dictionary.order] = left
-    return np.where(dictionary.scene.mask, restored.T, 0.0)
+    return np.where(dictionary.problem.mask, restored.T, 0.0)
 
 
 def contribution(search: Search, fit: Fit, index: int) -> Array:
@@ -42,8 +42,8 @@ def contribution(search: Search, fit: Fit, index: int) -> Array:
 
 def size_of(search: Search, fit: Fit, index: int) -> float:
     """Return a term's size on its wheels, as a share of the channel's mean magnitude."""
-    scene, on = search.dictionary.scene, list(fit.terms[index].wheels)
-    return magnitude(contribution(search, fit, index)[:, on][scene.mask[:, on]] ** 2) / scene.mean_size
+    problem, on = search.dictionary.problem, list(fit.terms[index].wheels)
+    return magnitude(contribution(search, fit, index)[:, on][problem.mask[:, on]] ** 2) / problem.mean_size
 
 
 def magnitude(power: Array) -> float:

@@ -26,17 +26,17 @@ def curve_of(evidence: Evidence, covariate: str, wheels: Sequence[int]) -> Curve
 
     Bins share the data evenly; a covariate with few values (a row of wheels) has one bin for each.
     """
-    scene = evidence.scene
+    problem = evidence.problem
     shown = INSTEAD.get(covariate, covariate)
-    if scene is None or covariate == "wheel_angle":
+    if problem is None or covariate == "wheel_angle":
         return None
     values = _covariate(evidence, shown)
     if values is None:
         return None
     on = np.isin(np.asarray(evidence.wheels), list(wheels))
     known = np.isfinite(evidence.before) & np.isfinite(values) & on
-    signed = covariate in SIGNED or "direction" not in scene.covariates
-    along = np.where(signed or covariate == "direction", 1.0, scene.covariates.get("direction", np.ones(known.shape)))
+    signed = covariate in SIGNED or "direction" not in problem.covariates
+    along = np.where(signed or covariate == "direction", 1.0, problem.covariates.get("direction", np.ones(known.shape)))
     if known.sum() < 10 * BINS:
         return None
     edges = _edges(values[known])
@@ -57,11 +57,11 @@ def curve_of(evidence: Evidence, covariate: str, wheels: Sequence[int]) -> Curve
 
 def _covariate(evidence: Evidence, name: str) -> Array | None:
     """Return a covariate's values, shape (time, wheel); wheel rows too."""
-    scene = evidence.scene
-    assert scene is not None  # noqa: S101  # the caller looked
+    problem = evidence.problem
+    assert problem is not None  # noqa: S101  # the caller looked
     if name == "wheel_row":
-        return None if scene.row is None else np.broadcast_to(scene.row, scene.mask.shape)
-    return scene.covariates.get(name)
+        return None if problem.row is None else np.broadcast_to(problem.row, problem.mask.shape)
+    return problem.covariates.get(name)
 
 
 def _edges(values: Array) -> Array:

@@ -66,7 +66,7 @@ def margin(search: Search, terms: Sequence[Term], index: int, enough: float) -> 
         for fold in range(len(gains))
     )
     found = float(gains.sum()) + 2 * len(terms[index].group.columns) - COMES_BACK * gained
-    if len(np.unique(search.dictionary.scene.recording.run)) < len(gains):
+    if len(np.unique(search.dictionary.problem.recording.run)) < len(gains):
         return found
     return min(found, float(gains.sum() - gains.max()) - enough - terms[index].price(len(search.weights)))
 

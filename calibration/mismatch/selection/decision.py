@@ -49,7 +49,7 @@ def settle_noise(search: Search) -> tuple[Noise, Array]:
     telling terms are taken out as if the noise forgot quickly, whether they are significant or not: their few
     coefficients cost the estimate little. Then again, with that noise, only what is significant.
     """
-    mask = search.dictionary.scene.mask
+    mask = search.dictionary.problem.mask
     noise = estimate_noise(residual_of(search, search.fit(())), mask)
     quick = Noise(noise.deviation, min(noise.memory, QUICK_MEMORY))
     terms: list[Term] = []
@@ -85,13 +85,13 @@ def _most_telling(search: Search, terms: Sequence[Term]) -> list[tuple[float, Te
 
 def seek_in_residual(search: Search, candidates: Sequence[Candidate], terms: Iterable[Term]) -> None:
     """Let candidates with too fine a grid look at the residual for their shapes."""
-    scene = search.dictionary.scene
+    problem = search.dictionary.problem
     residual = residual_of(search, search.fit(terms))
-    counts = np.maximum(scene.mask.sum(axis=0), 1)
+    counts = np.maximum(problem.mask.sum(axis=0), 1)
     memory = float(np.median(counts / np.maximum(search.weights * np.sum(residual**2, axis=0), 1e-300)))
     for candidate in candidates:
-        if shapes := candidate.seek(scene, residual):
-            quieter = [max(memory / candidate.memory_at(scene, residual, shape), 1.0) for shape in shapes]
+        if shapes := candidate.seek(problem, residual):
+            quieter = [max(memory / candidate.memory_at(problem, residual, shape), 1.0) for shape in shapes]
             add_candidate(search.dictionary, candidate, shapes, quieter)
     add_beat(search.dictionary, residual)
     search.refresh()
@@ -101,7 +101,7 @@ def decide(search: Search, candidates: Sequence[Candidate]) -> Decision:
     """Choose names, and say what is left without."""
     noise, left = settle_noise(search)
     none = search.fit(())
-    search.threshold = naming_threshold(search, left, blocks_of_time(search.dictionary.scene, noise))
+    search.threshold = naming_threshold(search, left, blocks_of_time(search.dictionary.problem, noise))
     seek_in_residual(search, candidates, ())
     sets = best_named(search)[1:]
     named = none
@@ -111,7 +111,7 @@ def decide(search: Search, candidates: Sequence[Candidate]) -> Decision:
     named = that_transfer(search, named, search.threshold)
     named, unnamed = without_a_name(search, named, [fit for fit in sets if len(fit.terms) < len(named.terms)])
     whole = search.fit((*named.terms, *unnamed))
-    noise = estimate_noise(residual_of(search, whole), search.dictionary.scene.mask)
+    noise = estimate_noise(residual_of(search, whole), search.dictionary.problem.mask)
     search.weights = noise.weights
     search.refresh()
     return Decision(search, noise, search.fit(named.terms), unnamed, search.fit((*named.terms, *unnamed)))

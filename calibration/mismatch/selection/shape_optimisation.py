@@ -28,7 +28,7 @@ class Profile:
         self.search, self.candidate, self.wheels = search, candidate, wheels
         dictionary = search.dictionary
         fitted = search.fit(others)
-        self._scene = dictionary.scene
+        self._problem = dictionary.problem
         count = dictionary.columns.shape[2]
         self._others = np.zeros((len(fitted.columns), len(wheels), count), np.float32)
         for row, (column, on) in enumerate(fitted.columns):
@@ -49,8 +49,8 @@ class Profile:
     def __call__(self, shape: Shape) -> float:
         """Return the further gain."""
         dictionary = self.search.dictionary
-        columns = np.asarray(self.candidate.columns(self._scene, shape), np.float64)
-        kept = np.where(self._scene.mask, columns, 0.0)[:, :, list(self.wheels)]
+        columns = np.asarray(self.candidate.columns(self._problem, shape), np.float64)
+        kept = np.where(self._problem.mask, columns, 0.0)[:, :, list(self.wheels)]
         fresh = np.swapaxes(kept, 1, 2)[:, :, dictionary.order].astype(np.float32) * self._weights
         rows = fresh.reshape(len(fresh), -1)
         cross = (rows @ self._flat.T).astype(np.float64)
@@ -77,11 +77,11 @@ def refined(search: Search, others: Sequence[Term], term: Term) -> Term:
         return _settled(search, others, term)
     profile = Profile(search, others, candidate, term.wheels)
     best, gain = dict(term.group.shape), profile(term.group.shape)
-    scene = search.dictionary.scene
-    for name, (low, high) in candidate.bounds(scene, best).items():
+    problem = search.dictionary.problem
+    for name, (low, high) in candidate.bounds(problem, best).items():
         if name not in best:
             continue
-        reach = _reach(scene.length_s, name, float(best[name]), low, high)
+        reach = _reach(problem.length_s, name, float(best[name]), low, high)
         value, found = maximise(profile.along(best, name), *reach)
         if found > gain:
             best, gain = {**best, name: value}, found
@@ -96,7 +96,7 @@ def _settled(search: Search, others: Sequence[Term], term: Term) -> Term:
         fit = search.fit((*others, term))
         scale = search.dictionary.scale[list(term.group.columns)]
         values = fit.coefficients[fit.of_term(len(others))] / scale
-        settled = candidate.settled(search.dictionary.scene, term.group.shape, values.tolist())
+        settled = candidate.settled(search.dictionary.problem, term.group.shape, values.tolist())
         if settled == term.group.shape:
             break
         term = _reshaped(search, term, settled)

@@ -124,9 +124,9 @@ class Search:
     @property
     def patterns(self) -> dict[tuple[int, ...], str]:
         """Wheels that may share an effect: all, each alone, a side, a row; and which of these it is."""
-        scene = self.dictionary.scene
+        problem = self.dictionary.problem
         found = {self.all_wheels: "all"}
-        for place in (scene.side, scene.row):
+        for place in (problem.side, problem.row):
             for value in np.unique(place) if place is not None else ():
                 found.setdefault(tuple(int(w) for w in np.flatnonzero(place == value)), "some")
         return {**{(w,): "one" for w in self.all_wheels}, **found}

@@ -31,7 +31,7 @@ RELATIVE_STEP = 0.01
 
 
 @dataclass(frozen=True)
-class Scene:
+class Problem:
     """A recording and a simulation of it.
 
     Attributes
@@ -124,7 +124,7 @@ class Scene:
         return np.where(self.mask, self.prediction, 0.0)
 
 
-def build_scene(recording: Recording, simulation: Simulation, values: Mapping[str, float] | None = None) -> Scene:
+def build_problem(recording: Recording, simulation: Simulation, values: Mapping[str, float] | None = None) -> Problem:
     """Simulate the recording.
 
     Raises
@@ -149,7 +149,7 @@ def build_scene(recording: Recording, simulation: Simulation, values: Mapping[st
         )
     covariates = _covariates(prepared, simulation, inputs, prediction)
     wheels = recording.wheels
-    return Scene(
+    return Problem(
         prepared,
         simulation,
         chosen,

@@ -9,7 +9,7 @@ import numpy as np
 from regolithd.calibration.mismatch.candidates import Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
     from regolithd.calibration.mismatch.simulation.simulation import Array
 
 
@@ -38,9 +38,9 @@ class SideShear(SideForce):
     source = "Ishigami et al. (2007): shear follows the direction of sliding"
     coefficients: ClassVar = (Coefficient("shear_per_sinkage", "{unit}/mm"),)
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:  # noqa: ARG002  # it has no shape
+    def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002  # it has no shape
         """Return sinkage × lateral part of the sliding direction."""
-        return (scene.covariates["sinkage"] * scene.covariates["sideways"])[None]
+        return (problem.covariates["sinkage"] * problem.covariates["sideways"])[None]
 
 
 class Bulldozing(SideForce):
@@ -52,9 +52,9 @@ class Bulldozing(SideForce):
     source = "Hegedus (1960): passive pressure on a flank grows with sinkage squared"
     coefficients: ClassVar = (Coefficient("resistance_per_sinkage_squared", "{unit}/mm²"),)
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:  # noqa: ARG002  # it has no shape
+    def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002  # it has no shape
         """Return sinkage² × sin β."""
-        return (scene.covariates["sinkage"] ** 2 * np.sin(scene.covariates["slip_angle"]))[None]
+        return (problem.covariates["sinkage"] ** 2 * np.sin(problem.covariates["slip_angle"]))[None]
 
 
 class SideFriction(SideForce):
@@ -66,9 +66,9 @@ class SideFriction(SideForce):
     source = "a tyre on a road; sand has no such surface"
     coefficients: ClassVar = (Coefficient("friction_coefficient", "1"),)
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:  # noqa: ARG002  # it has no shape
+    def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002  # it has no shape
         """Return load × sin β."""
-        return (scene.covariates["load"] * np.sin(scene.covariates["slip_angle"]))[None]
+        return (problem.covariates["load"] * np.sin(problem.covariates["slip_angle"]))[None]
 
 
 class TurnedTraction(SideForce):
@@ -80,9 +80,9 @@ class TurnedTraction(SideForce):
     source = "geometry: the sliding direction turns by the slip angle"
     coefficients: ClassVar = (Coefficient("share_lost", "1"),)
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:  # noqa: ARG002  # it has no shape
+    def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002  # it has no shape
         """Return what a cosine takes from the straight-ahead force."""
-        return (-scene.filled * (1 - np.cos(scene.covariates["slip_angle"])))[None]
+        return (-problem.filled * (1 - np.cos(problem.covariates["slip_angle"])))[None]
 
 
 CANDIDATES = (SideShear(), Bulldozing(), SideFriction(), TurnedTraction())

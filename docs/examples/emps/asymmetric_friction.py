@@ -9,7 +9,7 @@ import numpy as np
 from regolithd.calibration.mismatch.candidates import Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
     from regolithd.calibration.mismatch.simulation.simulation import Array
 
 
@@ -26,6 +26,6 @@ class AsymmetricFriction(Candidate):
     requires = ("direction",)
     coefficients: ClassVar = (Coefficient("half_difference", "{unit}", 0),)
 
-    def columns(self, scene: Scene, shape: Shape) -> Array:  # noqa: ARG002  # it has no shape
+    def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002  # it has no shape
         """Return 1 while the axis moves."""
-        return np.abs(np.asarray(scene.covariates["direction"]))[None]
+        return np.abs(np.asarray(problem.covariates["direction"]))[None]

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.candidates import Shape
-    from regolithd.calibration.mismatch.simulation.problem import Scene
+    from regolithd.calibration.mismatch.simulation.problem import Problem
 
 
 class LinearFriction(ViscousFriction):
@@ -19,6 +19,6 @@ class LinearFriction(ViscousFriction):
     equation = "F = b v"
     free: ClassVar[Mapping[str, tuple[float, float]]] = {}
 
-    def shapes(self, scene: Scene) -> Sequence[Shape]:  # noqa: ARG002  # it has one
+    def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002  # it has one
         """Return the one shape."""
         return [{"power": 1.0}]

@@ -15,7 +15,7 @@ from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.compare import Comparison, compare
 from regolithd.calibration.mismatch.corrected import corrected_tables, effect_of, stated_effects, to_toml
 from regolithd.calibration.mismatch.data.recording import from_columns
-from regolithd.calibration.mismatch.simulation.problem import build_scene
+from regolithd.calibration.mismatch.simulation.problem import build_problem
 from regolithd.calibration.mismatch.simulation.simulation import load_simulation
 
 if TYPE_CHECKING:
@@ -93,9 +93,9 @@ def test_effects_of_other_kinds_are_read_again_too(worn: Comparison) -> None:
     drag = Contribution("bearing-drag", {"onset_s": 100.0, "rise_s": 30.0}, (0.004,), (3,))
     tables = tomllib.loads(to_toml(corrected_tables(TABLES, simulation(), worn.evidence.values, (drag,))))
     assert stated_effects(tables) == (drag,)
-    scene = build_scene(recording(3), simulation())
-    added = effect_of(scene, stated_effects(tables))
-    assert added[scene.time_s[:, 0] < 100].max() == 0
+    problem = build_problem(recording(3), simulation())
+    added = effect_of(problem, stated_effects(tables))
+    assert added[problem.time_s[:, 0] < 100].max() == 0
     assert np.abs(added[:, 2]).max() == pytest.approx(0.004, rel=0.01)
     assert np.abs(np.delete(added, 2, axis=1)).max() == 0
 
@@ -154,7 +154,7 @@ def test_a_twentieth_of_drag_shows_once_the_wheels_are_lifted() -> None:
     table, sim = with_drag(0.05), simulation()
     on_soil = from_columns(table)
     assert not compare(on_soil, sim).answer.effects
-    asked = np.nan_to_num(build_scene(on_soil, sim).prediction).ravel()
+    asked = np.nan_to_num(build_problem(on_soil, sim).prediction).ravel()
     lifted = table["t_s"] > 250
     for name, there in (
         ("load_N", 0.2),

@@ -10,7 +10,7 @@ from drives import columns, recording, simulation
 
 from regolithd.calibration.mismatch.candidates import Candidate, Shape, library
 from regolithd.calibration.mismatch.data.recording import from_columns
-from regolithd.calibration.mismatch.simulation.problem import Scene, build_scene
+from regolithd.calibration.mismatch.simulation.problem import Problem, build_problem
 
 CONTRACT = {
     "coulomb-friction": "direction",
@@ -33,9 +33,9 @@ CONTRACT = {
 
 
 @pytest.fixture(scope="module")
-def scene() -> Scene:
+def problem() -> Problem:
     """Return a short drive."""
-    return build_scene(recording(length_s=120.0), simulation())
+    return build_problem(recording(length_s=120.0), simulation())
 
 
 def test_the_library_has_every_name_of_the_contract_with_its_covariate() -> None:
@@ -44,56 +44,56 @@ def test_the_library_has_every_name_of_the_contract_with_its_covariate() -> None
 
 
 @pytest.mark.parametrize("candidate", library(), ids=lambda c: c.name)
-def test_a_candidate_tells_what_it_is_and_has_finite_columns(candidate: Candidate, scene: Scene) -> None:
+def test_a_candidate_tells_what_it_is_and_has_finite_columns(candidate: Candidate, problem: Problem) -> None:
     """Equation, words, signature, experiment and source; columns of the recording's shape, a coefficient each."""
     for told in (candidate.equation, candidate.words, candidate.signature, candidate.experiment, candidate.source):
         assert len(told) > 5
-    shapes = [*candidate.shapes(scene), *candidate.seek(scene, np.where(scene.mask, 0.001, 0.0))]
-    assert shapes or not candidate.applies(scene)
+    shapes = [*candidate.shapes(problem), *candidate.seek(problem, np.where(problem.mask, 0.001, 0.0))]
+    assert shapes or not candidate.applies(problem)
     for shape in shapes[:: max(1, len(shapes) // 5)]:
-        columns = candidate.columns(scene, shape)
-        assert columns.shape[1:] == scene.mask.shape
-        assert np.isfinite(columns[:, scene.mask]).all()
+        columns = candidate.columns(problem, shape)
+        assert columns.shape[1:] == problem.mask.shape
+        assert np.isfinite(columns[:, problem.mask]).all()
         assert candidate.parameters(shape, [1.0] * len(columns))
 
 
-def test_friction_changes_sign_with_rotation_and_slope_does_not(scene: Scene) -> None:
+def test_friction_changes_sign_with_rotation_and_slope_does_not(problem: Problem) -> None:
     """What tells Coulomb friction, a sensor's bias and the slope apart."""
     by_name = {c.name: c for c in library()}
-    direction = scene.covariates["direction"]
-    drag = by_name["coulomb-friction"].columns(scene, {})[0]
-    np.testing.assert_array_equal(drag[scene.mask], direction[scene.mask])
-    slope = by_name["grade-resistance"].columns(scene, {"shared": "evenly"})[0]
-    np.testing.assert_allclose(slope, np.sin(scene.covariates["pitch"]))
+    direction = problem.covariates["direction"]
+    drag = by_name["coulomb-friction"].columns(problem, {})[0]
+    np.testing.assert_array_equal(drag[problem.mask], direction[problem.mask])
+    slope = by_name["grade-resistance"].columns(problem, {"shared": "evenly"})[0]
+    np.testing.assert_allclose(slope, np.sin(problem.covariates["pitch"]))
 
 
-def test_a_temperature_that_no_wheel_changes_is_no_reason_to_call_friction_cold(scene: Scene) -> None:
+def test_a_temperature_that_no_wheel_changes_is_no_reason_to_call_friction_cold(problem: Problem) -> None:
     """Wheels that differ by a kelvin and stay there say nothing of grease, nor of magnets; one that warms does."""
-    steady = np.broadcast_to(np.linspace(0.8, 1.6, 6), scene.mask.shape)
-    kept = replace(scene, covariates={**scene.covariates, "temperature": steady})
+    steady = np.broadcast_to(np.linspace(0.8, 1.6, 6), problem.mask.shape)
+    kept = replace(problem, covariates={**problem.covariates, "temperature": steady})
     by_name = {c.name: c for c in library()}
     cold, magnets = by_name["cold-lubricant-friction"], by_name["torque-constant-temperature"]
     assert all(cold.reluctance(kept, shape) > 5 for shape in cold.shapes(kept))
     assert all(magnets.reluctance(kept, shape) > 5 for shape in magnets.shapes(kept))
-    assert any(cold.reluctance(scene, shape) == 0 for shape in cold.shapes(scene))
-    assert any(magnets.reluctance(scene, shape) == 0 for shape in magnets.shapes(scene))
+    assert any(cold.reluctance(problem, shape) == 0 for shape in cold.shapes(problem))
+    assert any(magnets.reluctance(problem, shape) == 0 for shape in magnets.shapes(problem))
     drag = [cold.columns(kept, shape)[0] for shape in cold.shapes(kept) if shape["power"] == 0.0]
     assert min(float(np.min(np.abs(d[kept.mask]))) for d in drag) > 0.5, "no grease loses its drag within a kelvin"
 
 
-def test_a_wheel_whose_temperature_nobody_measured_does_not_hide_that_the_others_warm(scene: Scene) -> None:
+def test_a_wheel_whose_temperature_nobody_measured_does_not_hide_that_the_others_warm(problem: Problem) -> None:
     """What varies on a wheel is the mean over the wheels of which it is known."""
-    values = scene.covariates["temperature"].copy()
-    before = scene.variance_within(values)
+    values = problem.covariates["temperature"].copy()
+    before = problem.variance_within(values)
     values[:, 2] = np.nan
-    assert scene.variance_within(values) == pytest.approx(before)
+    assert problem.variance_within(values) == pytest.approx(before)
 
 
 @pytest.mark.parametrize("true", [0.002, 0.012])
-def test_a_torque_constant_is_bent_by_its_own_coefficient(scene: Scene, true: float) -> None:
+def test_a_torque_constant_is_bent_by_its_own_coefficient(problem: Problem, true: float) -> None:
     """k_t = k_0 (1 − α ΔT) makes the current I/(1 − α ΔT), not I (1 + α ΔT): thirty kelvin away that matters."""
     candidate = next(c for c in library() if c.name == "torque-constant-temperature")
-    cold = replace(scene, covariates={**scene.covariates, "temperature": scene.covariates["temperature"] - 30})
+    cold = replace(problem, covariates={**problem.covariates, "temperature": problem.covariates["temperature"] - 30})
     warmer = cold.covariates["temperature"] - 20.0
     effect = np.where(cold.mask, cold.filled * (1 / (1 - true * warmer) - 1), 0.0)
     shape: Shape = {"reference_degC": 20.0, "bent_per_K": 0.0}
@@ -104,36 +104,36 @@ def test_a_torque_constant_is_bent_by_its_own_coefficient(scene: Scene, true: fl
     assert fitted == pytest.approx(true, rel=0.03)
 
 
-def test_an_efficiency_that_falls_with_torque_bends_the_current(scene: Scene) -> None:
+def test_an_efficiency_that_falls_with_torque_bends_the_current(problem: Problem) -> None:
     """η (1 − a x), x the torque above its mean: the current is I/(1 − a x), and a is found."""
     candidate = next(c for c in library() if c.name == "load-dependent-efficiency")
-    above = np.abs(scene.filled) / np.mean(np.abs(scene.filled[scene.mask])) - 1
-    effect = np.where(scene.mask, scene.filled * (1 / (1 - 0.3 * above) - 1), 0.0)
+    above = np.abs(problem.filled) / np.mean(np.abs(problem.filled[problem.mask])) - 1
+    effect = np.where(problem.mask, problem.filled * (1 / (1 - 0.3 * above) - 1), 0.0)
     shape: Shape = {"bent": 0.0}
     for _ in range(8):
-        column = np.where(scene.mask, candidate.columns(scene, shape)[0], 0.0)
+        column = np.where(problem.mask, candidate.columns(problem, shape)[0], 0.0)
         fitted = float(np.sum(column * effect) / np.sum(column**2))
-        shape = candidate.settled(scene, shape, [fitted])
+        shape = candidate.settled(problem, shape, [fitted])
     assert fitted == pytest.approx(0.3, rel=0.05)
 
 
 def test_no_ripple_is_sought_that_the_readings_cannot_tell_from_a_drag() -> None:
     """At one speed a constant drag is the image of every ripple with a whole number of cycles between two readings."""
-    steady = build_scene(recording(length_s=120.0, speed=0.4), simulation())
+    steady = build_problem(recording(length_s=120.0, speed=0.4), simulation())
     candidate = next(c for c in library() if c.name == "wheel-angle-ripple")
     cycles = [float(s["order"]) * 0.4 * 0.2 / (2 * np.pi) for s in candidate.seek(steady, 0.003 * steady.mask)]
     assert max(cycles) <= 1 / 2.5
 
 
-def test_a_ripple_is_found_whether_a_speed_is_of_the_instant_or_of_the_time_before(scene: Scene) -> None:
+def test_a_ripple_is_found_whether_a_speed_is_of_the_instant_or_of_the_time_before(problem: Problem) -> None:
     """Angle summed from speeds lags by half a reading; the phase of a high order does not forgive that."""
     candidate = next(c for c in library() if c.name == "wheel-angle-ripple")
-    summed = np.cumsum(scene.covariates["wheel_speed"], axis=0) * 0.2
-    ripple = np.where(scene.mask, 0.004 * np.cos(16 * summed), 0.0)
-    shapes = [shape for shape in candidate.seek(scene, ripple) if shape["kind"] == "torque"]
+    summed = np.cumsum(problem.covariates["wheel_speed"], axis=0) * 0.2
+    ripple = np.where(problem.mask, 0.004 * np.cos(16 * summed), 0.0)
+    shapes = [shape for shape in candidate.seek(problem, ripple) if shape["kind"] == "torque"]
     left = []
     for shape in shapes:
-        columns = np.where(scene.mask, candidate.columns(scene, shape), 0.0).reshape(-1, ripple.size)
+        columns = np.where(problem.mask, candidate.columns(problem, shape), 0.0).reshape(-1, ripple.size)
         fitted = np.linalg.lstsq(columns.T, ripple.ravel(), rcond=None)[0]
         left.append(float(np.std(ripple.ravel() - fitted @ columns)))
     assert min(left) < 0.1 * float(np.std(ripple))
@@ -145,20 +145,20 @@ def test_a_slope_that_changes_slowly_does_not_take_a_drift_along() -> None:
     share = table["t_s"] / 240.0
     table["pitch_rad"] = 0.08 * share + 0.02 * np.sin(table["t_s"] / 9)
     table["load_N"] = np.where(table["wheel"] == 2, table["load_N"] - 20 * share, table["load_N"])
-    scene = build_scene(from_columns(table), simulation())
+    problem = build_problem(from_columns(table), simulation())
     candidate = next(c for c in library() if c.name == "load-cell-drift")
-    seen, _ = candidate.evidence(scene, {"relative_offset": 0.0}) or (np.zeros(6), None)
+    seen, _ = candidate.evidence(problem, {"relative_offset": 0.0}) or (np.zeros(6), None)
     assert int(np.argmax(seen)) == 1
     assert seen[1] > 25
     assert np.all(np.delete(seen, 1) < 0.2 * seen[1])
 
 
-def test_inertia_may_come_late(scene: Scene) -> None:
+def test_inertia_may_come_late(problem: Problem) -> None:
     """The column a reading and a half late lies halfway between those one and two readings late."""
     candidate = next(c for c in library() if c.name == "rotor-inertia")
-    step_s = scene.recording.step_s
-    at_once, one, between, two = (candidate.columns(scene, {"lag_s": n * step_s})[0] for n in (0.0, 1.0, 1.5, 2.0))
-    assert np.array_equal(at_once, scene.covariates["wheel_acceleration"])
+    step_s = problem.recording.step_s
+    at_once, one, between, two = (candidate.columns(problem, {"lag_s": n * step_s})[0] for n in (0.0, 1.0, 1.5, 2.0))
+    assert np.array_equal(at_once, problem.covariates["wheel_acceleration"])
     assert np.allclose(one[1:], at_once[:-1])
     assert np.allclose(two[2:], at_once[:-2])
     assert np.allclose(between, 0.5 * (one + two))

@@ -162,15 +162,17 @@ def test_an_effect_s_curve_shows_its_own_wheels(evidence: Evidence) -> None:
     drag = np.zeros((900, 6))
     drag[:, 3] = 0.5 * direction[:, 3]
     time_s = np.broadcast_to(evidence.time_s[:, None], (900, 6))
-    scene = SimpleNamespace(covariates={"time": time_s, "direction": direction}, row=None, mask=np.ones((900, 6), bool))
+    problem = SimpleNamespace(
+        covariates={"time": time_s, "direction": direction}, row=None, mask=np.ones((900, 6), bool)
+    )
     noise = 0.01 * rng.normal(size=(900, 6))
-    seen = replace(evidence, measured=drag + noise, before=0 * drag, after=drag, scene=scene)  # type: ignore[arg-type]
+    seen = replace(evidence, measured=drag + noise, before=0 * drag, after=drag, problem=problem)  # type: ignore[arg-type]
     curve = curve_of(seen, "time", (4,))
     assert curve is not None
     np.testing.assert_allclose(curve.before, 0.5, atol=0.02)
     np.testing.assert_allclose(curve.after, 0.0, atol=0.02)
     assert curve_of(seen, "wheel_angle", (4,)) is None
-    assert curve_of(replace(seen, scene=None), "time", (4,)) is None
+    assert curve_of(replace(seen, problem=None), "time", (4,)) is None
 
 
 def test_names_are_spoken_as_people_speak() -> None:
