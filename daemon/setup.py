@@ -10,7 +10,7 @@ from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.calibration.models.onnx_session import NetworkError
 from regolithd.daemon.config.configuration import Configuration
 from regolithd.daemon.config.reader import EXIT_STATUS, ConfigurationError, read_configuration
-from regolithd.daemon.pipeline.posterior import belief_stage
+from regolithd.daemon.pipeline.posterior import posterior_stage
 from regolithd.daemon.pipeline.terrain_network import Network
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def configuration_or_exit(path: Path | None) -> Configuration:
 def network_or_exit(configuration: Configuration) -> Network:
     """Return the terrain network that the configuration names; end with what does not fit, the posterior's included."""
     try:
-        belief_stage(configuration)  # not kept: the pipeline makes its own, but what does not fit shall show now
+        posterior_stage(configuration)  # not kept: the pipeline makes its own, but what does not fit shall show now
         return Network(configuration.estimator.model or TERRAIN_MODEL)
     except NetworkError as error:
         _end([str(error)])

@@ -1,7 +1,7 @@
 """The posterior on the rover: the last seconds of six wheels in, intervals of cohesion, friction angle and margin out.
 
-NumPy and onnxruntime only. A `Buffer` collects measurements and hands out the window; an `Estimator` runs the network
-on it. Neither looks at a clock: time comes with the measurements, so that a replay gives the same numbers.
+NumPy and onnxruntime only. A `Buffer` collects measurements and hands out the window; a `PosteriorEstimator` runs the
+network on it. Neither reads a clock: time comes with the measurements, so that a replay gives the same numbers.
 
 What comes out is the posterior under the prior of `soils`: as wide as the data leave it. One instant of one wheel says
 little more than the prior, and the intervals show it.
@@ -20,7 +20,14 @@ from numpy.typing import NDArray
 from regolithd.calibration.models import POSTERIOR_MODEL
 from regolithd.calibration.models.onnx_session import NetworkError, open_session
 from regolithd.calibration.posterior.mixture import TARGETS, Mixture, unpack
-from regolithd.calibration.posterior.window import INTERVAL_S, KNOWN, LONGEST, Knowledge, Windows, reduce_windows
+from regolithd.calibration.posterior.window import (
+    INTERVAL_S,
+    KNOWN,
+    LONGEST,
+    CalibrationUncertainty,
+    Windows,
+    reduce_windows,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -58,8 +65,8 @@ class Interval:
 
 
 @dataclass(frozen=True, slots=True)
-class Belief:
-    """What a window says about the soil under the rover."""
+class Posterior:
+    """The posterior of the soil under the rover, given one window of measurements."""
 
     cohesion_Pa: Interval
     friction_angle_rad: Interval
@@ -121,7 +128,7 @@ class Buffer:
             self._closed.popleft()
 
 
-class Estimator:
+class PosteriorEstimator:
     """The posterior network, ready to run."""
 
     def __init__(self, path: Path = POSTERIOR_MODEL) -> None:
@@ -146,7 +153,7 @@ class Estimator:
         (raw,) = self._session.run(None, {name: value.astype(np.float32) for name, value in inputs.items()})
         return unpack(raw, self._centre, self._unit)
 
-    def fall(self, before: Array, after: Array, knowledge: Knowledge) -> Fall | None:
+    def fall(self, before: Array, after: Array, uncertainty: CalibrationUncertainty) -> Fall | None:
         """Return how likely each quantity fell from one window, (3, instants, 6), to another; None if either is empty.
 
         The two windows share the errors of gain and no-load current, which are counted in each as if they were not
@@ -155,27 +162,27 @@ class Estimator:
         if not (_usable(before).any() and _usable(after).any()):
             return None
         samples = [
-            self.mixtures(self._reduce(window, knowledge)).sample(_SAMPLES, np.random.default_rng(_SEED + k))[0]
+            self.mixtures(self._reduce(window, uncertainty)).sample(_SAMPLES, np.random.default_rng(_SEED + k))[0]
             for k, window in enumerate((before, after))
         ]
         return Fall(*np.mean(samples[1] < samples[0], axis=0).tolist())
 
-    def believe(self, window: Array, knowledge: Knowledge) -> Belief | None:
-        """Return what a window of shape (3, instants, 6) says; None where no wheel was measured."""
+    def estimate(self, window: Array, uncertainty: CalibrationUncertainty) -> Posterior | None:
+        """Return the posterior given a window of shape (3, instants, 6); None where no wheel was measured."""
         usable = _usable(window)
         if not usable.any():
             return None
-        windows = self._reduce(window, knowledge)
+        windows = self._reduce(window, uncertainty)
         mixture = self.mixtures(windows)
         means, quantiles = mixture.means()[0], mixture.quantiles(np.array(LEVELS))[0]
         cohesion, angle, margin = (
             Interval(float(mean), *map(float, row)) for mean, row in zip(means, quantiles, strict=True)
         )
-        return Belief(cohesion, angle, margin, int(windows.mask.sum()), int(np.any(usable, axis=1).sum()))
+        return Posterior(cohesion, angle, margin, int(windows.mask.sum()), int(np.any(usable, axis=1).sum()))
 
-    def _reduce(self, window: Array, knowledge: Knowledge) -> Windows:
+    def _reduce(self, window: Array, uncertainty: CalibrationUncertainty) -> Windows:
         load, slip, torque = window[:, None]
-        return reduce_windows(load, slip, torque, knowledge.deviations(), self.radius_m, knowledge.told())
+        return reduce_windows(load, slip, torque, uncertainty.deviations(), self.radius_m, uncertainty.told())
 
 
 def _usable(window: Array) -> NDArray[np.bool_]:

@@ -14,7 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.parameters import Drivetrain, Rover, Wheel
-from regolithd.calibration.posterior.window import INTERVAL_S, KNOWN_HIGH, KNOWN_LOW, Knowledge, USUAL_TORQUE_Nm
+from regolithd.calibration.posterior.window import (
+    INTERVAL_S,
+    KNOWN_HIGH,
+    KNOWN_LOW,
+    CalibrationUncertainty,
+    USUAL_TORQUE_Nm,
+)
 from regolithd.calibration.terrain.drawbar import drawbar_margin
 from regolithd.calibration.terrain.soils import Soils, draw_soils
 from regolithd.calibration.terrain.wheel_loads import wheel_loads
@@ -30,7 +36,7 @@ TABLE_4_LOAD = np.array([14.2, 11.9, 9.6, 7.0, 6.7, 7.2]) / 100
 """Relative standard deviation of the recorded loads, prepared ground."""
 
 USUALLY = 1 / 3
-"""How many of the rovers that are drawn are known as `window.Knowledge` says by default."""
+"""How many of the rovers that are drawn are known as `window.CalibrationUncertainty` says by default."""
 
 TOLD_WRONG = 0.35
 """How many of the rovers are told the scatter of another ground."""
@@ -57,7 +63,8 @@ class Noise:
 class Rovers:
     """Rovers standing ready: truth, and what is known of each.
 
-    Soils have shape (N,), `slip_error` (N, 1), `known` (N, 5) in the order of `window.Knowledge`, the others (N, 6).
+    Soils have shape (N,), `slip_error` (N, 1), `known` (N, 5) in the order of
+    `window.CalibrationUncertainty`, the others (N, 6).
     """
 
     soils: Soils
@@ -143,7 +150,7 @@ def _draw_known(count: int, rng: np.random.Generator) -> Array:
     """
     known = np.exp(rng.uniform(np.log(KNOWN_LOW), np.log(KNOWN_HIGH), (count, len(KNOWN_LOW))))
     known[:, 4] = rng.uniform(KNOWN_LOW[4], KNOWN_HIGH[4], count)
-    return np.where(rng.random((count, 1)) < USUALLY, Knowledge().deviations(), known)
+    return np.where(rng.random((count, 1)) < USUALLY, CalibrationUncertainty().deviations(), known)
 
 
 def told_scatter(rovers: Rovers, noise: Noise, gain_Nm_per_A: float, rng: np.random.Generator) -> Array:

@@ -37,11 +37,11 @@ USUAL_TORQUE_Nm = 0.3
 
 KNOWN_LOW = np.array([0.01, 0.0003, 0.003, 0.01, 0.001])
 KNOWN_HIGH = np.array([0.10, 0.010, 0.030, 0.60, 0.060])
-"""How well and how badly a rover may be known for the posterior, in the order of `Knowledge`."""
+"""How well and how badly a rover may be known for the posterior, in the order of `CalibrationUncertainty`."""
 
 
 @dataclass(frozen=True, slots=True)
-class Knowledge:
+class CalibrationUncertainty:
     """What is known beside the measurements: deviations of gain (relative), no-load current and slip; and the ground.
 
     The posterior widens with each of them. After a wheels-up spin the no-load current is known to about 1 mA, before
@@ -80,8 +80,8 @@ class Windows:
     mask
         Shape (N, 6): 1 where the wheel was measured, else 0.
     known
-        Shape (N, `KNOWN`): logarithms of the five numbers of `Knowledge` and of the instants; and the class of
-        soil that is told as a one among four zeros, or zeros.
+        Shape (N, `KNOWN`): logarithms of the five numbers of `CalibrationUncertainty` and of the instants; and
+        the class of soil that is told as a one among four zeros, or zeros.
     """
 
     wheels: Array
@@ -99,7 +99,7 @@ def reduce_windows(
 ) -> Windows:
     """Reduce windows of shape (N, instants, 6); NaN is "not measured".
 
-    `known` has shape (N, 5), the numbers of `Knowledge`; `told`, shape (N,), the class of soil or −1.
+    `known` has shape (N, 5), the numbers of `CalibrationUncertainty`; `told`, shape (N,), the class of soil or −1.
     """
     usable = np.isfinite(load_N) & np.isfinite(slip) & np.isfinite(torque_Nm) & (load_N > 0)
     count = usable.sum(axis=1)

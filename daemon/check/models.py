@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.calibration.models.onnx_session import NetworkError
 from regolithd.daemon.check.finding import Finding, good, warning, wrong
-from regolithd.daemon.pipeline.posterior import belief_stage
+from regolithd.daemon.pipeline.posterior import posterior_stage
 from regolithd.daemon.pipeline.terrain_network import Network
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ async def check_network(configuration: Configuration) -> list[Finding]:
     except NetworkError as error:
         return [wrong("model", str(error), "")]
     try:
-        stage = await asyncio.to_thread(belief_stage, configuration)
+        stage = await asyncio.to_thread(posterior_stage, configuration)
     except NetworkError as error:
         return [judge_card(network.card, configuration), wrong("posterior", str(error), "")]
     return [judge_card(network.card, configuration), judge_posterior(configuration, there=stage is not None)]

@@ -54,9 +54,9 @@ def read(driven: Driven, configuration: Configuration, network: Network) -> Read
     made = list(estimates(driven, asked(configuration), network))
     truth = driven.truth[: len(made)]
     nothing = (np.nan,) * 6
-    beliefs = [
+    posteriors = [
         nothing
-        if (each := estimate.belief) is None
+        if (each := estimate.posterior) is None
         else tuple(
             getattr(interval, name)
             for name in ("mean", "low_90", "high_90")
@@ -64,7 +64,7 @@ def read(driven: Driven, configuration: Configuration, network: Network) -> Read
         )
         for estimate in made
     ]
-    mean, low, high = _for_people(np.array(beliefs).reshape(-1, 3, 2)).transpose(1, 0, 2)
+    mean, low, high = _for_people(np.array(posteriors).reshape(-1, 3, 2)).transpose(1, 0, 2)
     points = np.array([[each.cohesion_Pa, each.friction_angle_rad] for each in made])
     valid = np.array([each.valid for each in made])
     count = valid.sum(axis=1)[:, None]

@@ -44,7 +44,7 @@ def evaluate(
     import numpy as np
     from rich.progress import Progress
 
-    from regolithd.calibration.posterior.estimator import Estimator
+    from regolithd.calibration.posterior.estimator import PosteriorEstimator
     from regolithd.calibration.validation.estimators import bias, drivetrain
     from regolithd.calibration.validation.estimators import change_detector as detector
     from regolithd.calibration.validation.estimators import errors_and_coverage as estimators
@@ -53,7 +53,7 @@ def evaluate(
     kept: dict[str, Array] = dict(np.load(details)) if details.is_file() else {}
     with Progress() as progress:
         if part != Part.ALARM:
-            estimator = Estimator()
+            estimator = PosteriorEstimator()
             task = progress.add_task("estimators", total=len(estimators.CASES) + 1)
             for name, case in estimators.CASES.items():
                 answers = estimators.answers(rovers, case, seed, estimator)

@@ -25,7 +25,7 @@ def pictures(
 
     import numpy as np
 
-    from regolithd.calibration.posterior.estimator import Estimator
+    from regolithd.calibration.posterior.estimator import PosteriorEstimator
     from regolithd.calibration.validation.estimators import pictures as draw
 
     if not (figures.is_file() and details.is_file()):
@@ -37,7 +37,7 @@ def pictures(
         ranks = kept["window_ranks"]
     draw.errors(found, docs / "estimators.svg")
     draw.calibration(found, ranks, docs / "coverage.svg")
-    draw.one_sample(Estimator(), docs / "one-sample.png")
+    draw.one_sample(PosteriorEstimator(), docs / "one-sample.png")
     draw.alarm(delays, docs / "alarm.svg")
     draw.drivetrain(found, docs / "drivetrain.svg")
     typer.echo(f"Wrote five pictures to {docs}.")

@@ -103,7 +103,7 @@ class Estimator(Table):
     model: Path | None = None
 
 
-class Posterior(Table):
+class PosteriorSettings(Table):
     """`[posterior]`: intervals of the soil under the rover; needs a calibrated drivetrain."""
 
     enabled: bool = True
@@ -165,7 +165,7 @@ class Configuration(Table):
     slip: Slip = Slip()
     smoothing: Smoothing = Smoothing()
     estimator: Estimator = Estimator()
-    posterior: Posterior = Posterior()
+    posterior: PosteriorSettings = PosteriorSettings()
     change: Change = Change()
     recording: Recording = Recording()
     mqtt: Mqtt = Mqtt()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from regolithd.calibration.posterior.estimator import Belief
+    from regolithd.calibration.posterior.estimator import Posterior
     from regolithd.daemon.pipeline.snapshot import Array, Estimate
     from regolithd.daemon.simulator.virtual_rover import Truth, VirtualWorld
     from regolithd.drivers.master.events import NetworkEvent
@@ -89,20 +89,20 @@ def _stretch(wheel: int, soil: str, pairs: list[tuple[Estimate, Truth]]) -> Stre
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """What all wheels together came to believe while all were on one soil: the last of it."""
+    """The last posterior while all six wheels were on one soil, and that soil's true values."""
 
     soil: str
-    belief: Belief
+    posterior: Posterior
     true_cohesion_Pa: float
     true_friction_angle_rad: float
 
 
 def grounds(seen: list[tuple[Estimate, Truth]]) -> list[Ground]:
-    """Return the last belief on each soil that was under all six wheels, in the order driven."""
+    """Return the last posterior on each soil that was under all six wheels, in the order driven."""
     last: dict[str, Ground] = {}
     for estimate, truth in seen:
-        if estimate.belief is not None and len(set(truth.soils)) == 1:
+        if estimate.posterior is not None and len(set(truth.soils)) == 1:
             soil = truth.soils[0]
             angle = float(truth.friction_angle_rad[0])
-            last[soil] = Ground(soil, estimate.belief, float(truth.cohesion_Pa[0]), angle)
+            last[soil] = Ground(soil, estimate.posterior, float(truth.cohesion_Pa[0]), angle)
     return list(last.values())

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 COLOURS = ("#0b6e99", "#0b6e99", "#c4622d", "#c4622d", "#4a7c3a", "#4a7c3a")
 STYLES = ("-", "--") * 3
 NAMES = ("1 front left", "2 front right", "3 middle left", "4 middle right", "5 rear left", "6 rear right")
-BELIEF = "#7b4b94"
+POSTERIOR = "#7b4b94"
 
 Seen = list[tuple["Estimate", "Truth"]]
 
@@ -38,7 +38,7 @@ def draw(seen: Seen, path: Path) -> None:
         seen,
         [estimate.cohesion_Pa / 1000 for estimate, _ in seen],
         [truth.cohesion_Pa / 1000 for _, truth in seen],
-        [(estimate.belief.cohesion_Pa if estimate.belief else None) for estimate, _ in seen],
+        [(estimate.posterior.cohesion_Pa if estimate.posterior else None) for estimate, _ in seen],
         1e-3,
     )
     _ground(
@@ -46,7 +46,7 @@ def draw(seen: Seen, path: Path) -> None:
         seen,
         [np.degrees(estimate.friction_angle_rad) for estimate, _ in seen],
         [np.degrees(truth.friction_angle_rad) for _, truth in seen],
-        [(estimate.belief.friction_angle_rad if estimate.belief else None) for estimate, _ in seen],
+        [(estimate.posterior.friction_angle_rad if estimate.posterior else None) for estimate, _ in seen],
         float(np.degrees(1)),
     )
     cohesion.set_ylabel("cohesion c (kPa)")
@@ -86,23 +86,23 @@ def _ground(
     seen: Seen,
     alone: list[Array],
     true: list[Array],
-    beliefs: list[Interval | None],
+    posteriors: list[Interval | None],
     factor: float,
 ) -> None:
     """Draw one quantity: the posterior's band, the paper's network of each wheel, the soil of each wheel."""
     seconds = _seconds(seen)
-    believed = [(at, belief) for at, belief in zip(seconds, beliefs, strict=True) if belief is not None]
-    if believed:
-        at = np.array([second for second, _ in believed])
+    known = [(at, posterior) for at, posterior in zip(seconds, posteriors, strict=True) if posterior is not None]
+    if known:
+        at = np.array([second for second, _ in known])
         band = {
-            name: factor * np.array([getattr(belief, name) for _, belief in believed])
+            name: factor * np.array([getattr(posterior, name) for _, posterior in known])
             for name in ("low_90", "low_50", "median", "high_50", "high_90")
         }
         axis.fill_between(
-            at, band["low_90"], band["high_90"], color=BELIEF, alpha=0.13, linewidth=0, label="six wheels: 90 %"
+            at, band["low_90"], band["high_90"], color=POSTERIOR, alpha=0.13, linewidth=0, label="six wheels: 90 %"
         )
-        axis.fill_between(at, band["low_50"], band["high_50"], color=BELIEF, alpha=0.22, linewidth=0, label="50 %")
-        axis.plot(at, band["median"], color=BELIEF, linewidth=2, label="median")
+        axis.fill_between(at, band["low_50"], band["high_50"], color=POSTERIOR, alpha=0.22, linewidth=0, label="50 %")
+        axis.plot(at, band["median"], color=POSTERIOR, linewidth=2, label="median")
     axis.plot(seconds, np.stack(alone), color="#888888", linewidth=0.6, alpha=0.7)
     axis.plot([], [], color="#888888", linewidth=0.8, label="each wheel alone, the paper's network")
     for first, second, colour, name in (

@@ -41,7 +41,7 @@ def ground_summary(grounds: list[Ground]) -> Table:
     table.add_column("c\nkPa", justify="right", no_wrap=True)
     table.add_column("φ\n°", justify="right", no_wrap=True)
     for each in grounds:
-        cohesion, angle = each.belief.cohesion_Pa, each.belief.friction_angle_rad
+        cohesion, angle = each.posterior.cohesion_Pa, each.posterior.friction_angle_rad
         table.add_row(
             each.soil,
             f"{cohesion.median / 1000:.1f}, {cohesion.low_90 / 1000:.1f} … {cohesion.high_90 / 1000:.1f} "

@@ -37,7 +37,7 @@ class Viewer:
     nodes: int = 0
     messages: int = 0
     snapshots: int = 0
-    belief: dict[str, Any] | None = None
+    posterior: dict[str, Any] | None = None
     alarms: dict[str, str] = field(default_factory=dict)
 
     def take(self, topic: str, payload: bytes) -> None:
@@ -50,8 +50,8 @@ class Viewer:
                 self.snapshots += 1
             case ["state"]:
                 self.state = json.loads(payload)["state"]
-            case ["belief"]:
-                self.belief = json.loads(payload)
+            case ["posterior"]:
+                self.posterior = json.loads(payload)
             case ["alarm", name]:
                 self._alarm(name, json.loads(payload))
 
@@ -79,17 +79,17 @@ class Viewer:
         top = max([0.1, *(max(values) for values in self.torque.values() if values)])
         for wheel in range(1, 7):
             table.add_row(*self._row(wheel, top))
-        return Group(table, Text(MEANING, style="dim"), Text(), *self._belief(), Text(), self._footer())
+        return Group(table, Text(MEANING, style="dim"), Text(), *self._posterior(), Text(), self._footer())
 
-    def _belief(self) -> list[Text]:
+    def _posterior(self) -> list[Text]:
         """Return what the six wheels say together."""
-        if self.belief is None:
+        if self.posterior is None:
             return [Text("the ground under all six wheels: nothing to go by yet", style="dim"), *[Text()] * len(SCALES)]
-        seconds = self.belief["instants"] * INTERVAL_S
+        seconds = self.posterior["instants"] * INTERVAL_S
         title = Text.assemble(
             ("the ground, by all six wheels over the last ", "dim"), f"{seconds:g} s", (" (90 % sure)", "dim")
         )
-        return [title, *(interval_line(scale, self.belief[scale.key]) for scale in SCALES)]
+        return [title, *(interval_line(scale, self.posterior[scale.key]) for scale in SCALES)]
 
     def _row(self, wheel: int, top: float) -> tuple[RenderableType, ...]:
         name = Text.assemble((f"{wheel} ", "bold"), (PLACES[wheel - 1], "dim"))

@@ -94,7 +94,7 @@ _HEALTH = {
     "tasks": {"network": 0.1, "recording": 0.2, "publishing": 0.3, "control": 0.2},
 }
 _INTERVAL = ("mean", "low_90", "low_50", "median", "high_50", "high_90")
-_BELIEF = {
+_POSTERIOR = {
     "cohesion_Pa": dict(zip(_INTERVAL, (3370.0, 1900.0, 2760.0, 3350.0, 3960.0, 4800.0), strict=True)),
     "friction_angle_rad": dict(zip(_INTERVAL, (0.495, 0.42, 0.47, 0.5, 0.52, 0.56), strict=True)),
     "drawbar_margin": dict(zip(_INTERVAL, (0.295, 0.21, 0.27, 0.3, 0.32, 0.37), strict=True)),
@@ -105,7 +105,7 @@ _FIELDS: dict[str, dict[str, Any]] = {
     "state": {"sequence": 1, "state": "online", "reason": "connected", "software_version": "0.1.0"},
     "snapshot": _SNAPSHOT,
     "wheel": {"model_version": "paper-3:64:2", "wheel": 5, **_WHEEL},
-    "belief": {"sequence": 480, **_BELIEF},
+    "posterior": {"sequence": 480, **_POSTERIOR},
     "node": {"sequence": 2, **_NODE},
     "emcy": {"sequence": 0, **_EMERGENCY},
     "event": {"sequence": 12, "kind": "node-lost", "node_id": 13, "text": _NODE["text"]},

@@ -7,7 +7,7 @@ A list of six belongs to wheels 1 to 6: odd left, even right; 1, 2 front, 3, 4 m
 
 For example, `regolith/kapvik/wheel/5`:
 
-    {"schema_version": 1, "late": false, "session": "20130611T140312Z-5f1c", "sequence": 500,
+    {"schema_version": 2, "late": false, "session": "20130611T140312Z-5f1c", "sequence": 500,
      "time": "2013-06-11T14:07:22.018291000Z", "wheel": 5, "measured": true, "valid": true, "motor_current_A": 0.08,
      "load_N": 31.6, "slip": 0.025, "slip_source": "configured", "cohesion_Pa": 3352.0, "friction_angle_rad": 0.499, …}
 """
@@ -26,7 +26,7 @@ from regolithd.daemon.pipeline.snapshot import SlipSource
 from regolithd.drivers.master.status import NodePhase  # noqa: TC001  # pydantic reads it at run time
 from regolithd.drivers.signals import NodeKind  # noqa: TC001  # likewise
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 """Rises when a field is removed or changes its meaning; new fields alone do not raise it."""
 
 _PER_SECOND = 1_000_000_000
@@ -66,7 +66,7 @@ class Header(BaseModel):
         frozen=True, extra="forbid", use_attribute_docstrings=True, json_schema_serialization_defaults_required=True
     )
 
-    schema_version: Literal[1] = 1
+    schema_version: Literal[2] = 2
     """Rises when a field is removed or changes its meaning."""
     late: bool = False
     """True: not delivered when it happened, but from the store, after the broker had been away. It may have been
@@ -158,7 +158,7 @@ class IntervalReport(BaseModel):
     high_90: float
 
 
-class BeliefMessage(Header):
+class PosteriorMessage(Header):
     """How sure the rover can be of its ground: intervals from the last seconds of all wheels that turned.
 
     Under the prior of the soils that the posterior was trained on. Wide where the data say little.
@@ -367,7 +367,9 @@ CHANNELS = (
     Channel("state", "state", StateMessage, QoS.AT_LEAST_ONCE, True, False, "at each connection, and at its end"),
     Channel("snapshot", "snapshot", SnapshotMessage, QoS.AT_LEAST_ONCE, False, True, "at each SYNC, in order"),
     Channel("wheel", "wheel/{wheel}", WheelMessage, QoS.AT_MOST_ONCE, False, False, "at each SYNC, live alone"),
-    Channel("belief", "belief", BeliefMessage, QoS.AT_LEAST_ONCE, False, True, "twice a second while wheels turn"),
+    Channel(
+        "posterior", "posterior", PosteriorMessage, QoS.AT_LEAST_ONCE, False, True, "twice a second while wheels turn"
+    ),
     Channel("node", "node/{node_id}", NodeMessage, QoS.AT_LEAST_ONCE, True, True, "when something about it changes"),
     Channel("emcy", "emcy", EmergencyMessage, QoS.AT_LEAST_ONCE, False, True, "when a node sends one"),
     Channel("event", "event", EventMessage, QoS.AT_LEAST_ONCE, False, True, "when it happens"),

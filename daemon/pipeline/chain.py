@@ -69,7 +69,7 @@ class Digest:
         ):
             self._hash.update(np.where(np.isnan(array), np.nan, array).tobytes())  # one NaN for all
         self._hash.update(estimate.outside.tobytes() + "".join(estimate.slip_source).encode())
-        self._hash.update(repr((estimate.belief, estimate.soil_change)).encode())  # floats in full
+        self._hash.update(repr((estimate.posterior, estimate.soil_change)).encode())  # floats in full
         self.count += 1
 
     def __str__(self) -> str:

@@ -1,4 +1,4 @@
-"""torque ▸ smooth ▸ slip ▸ estimate ▸ believe: from one snapshot to one estimate.
+"""torque ▸ smooth ▸ slip ▸ estimate ▸ posterior: from one snapshot to one estimate.
 
 The stages are the modules of those names; this one only joins them. Everything depends on the snapshots that came
 before and on nothing else, so a replay gives the same numbers to the last bit.
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.drivetrain.torque import wheel_torque
-from regolithd.daemon.pipeline.posterior import belief_stage
+from regolithd.daemon.pipeline.posterior import posterior_stage
 from regolithd.daemon.pipeline.slip import choose_slip, wheel_slip
 from regolithd.daemon.pipeline.smooth import Smoother
 from regolithd.daemon.pipeline.snapshot import WHEELS, Estimate
@@ -36,7 +36,7 @@ class Pipeline:
         rate = configuration.sync.rate_Hz
         self._smoother = Smoother(rate, smoothing.window_s, smoothing.threshold, smoothing.time_constant_s)
         self._direction = np.zeros(WHEELS)
-        self._belief = belief_stage(configuration)
+        self._posterior = posterior_stage(configuration)
 
     def step(self, snapshot: Snapshot) -> Estimate:
         """Return what the stages make of the next snapshot."""
@@ -51,9 +51,9 @@ class Pipeline:
         smoothed = self._smoother.step(snapshot.time_ns, driving, load, measured)
         slip, source = choose_slip(smoothed.slip, self._slip.constant, turning)
         raw_slip, sources = choose_slip(measured, self._slip.constant, turning)
-        belief, alarm = None, None
-        if self._belief:
-            belief, alarm = self._belief.step(snapshot.time_ns, load, raw_slip, driving, sources)
+        posterior, alarm = None, None
+        if self._posterior:
+            posterior, alarm = self._posterior.step(snapshot.time_ns, load, raw_slip, driving, sources)
         terrain = self._network.estimate(self._inputs(smoothed.torque, smoothed.load, slip, np.abs(speed)))
         return Estimate(
             snapshot=snapshot,
@@ -68,7 +68,7 @@ class Pipeline:
             input_names=self._network.input_names,
             outside=terrain.outside,
             model_version=self._network.card.version,
-            belief=belief,
+            posterior=posterior,
             soil_change=alarm,
         )
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.models import POSTERIOR_MODEL
-from regolithd.calibration.posterior.estimator import Belief, Buffer, Estimator, PosteriorError
-from regolithd.calibration.posterior.window import INTERVAL_S, LONGEST, Knowledge, USUAL_TORQUE_Nm
+from regolithd.calibration.posterior.estimator import Buffer, Posterior, PosteriorError, PosteriorEstimator
+from regolithd.calibration.posterior.window import INTERVAL_S, LONGEST, CalibrationUncertainty, USUAL_TORQUE_Nm
 from regolithd.daemon.pipeline.snapshot import ChangeOfSoil, SlipSource
 from regolithd.daemon.pipeline.soil_change import SoilChange
 
@@ -33,14 +33,14 @@ HISTORY = 400
 """Half seconds that are kept to compare before and after a change."""
 
 
-class BeliefStage:
+class PosteriorStage:
     """Collects half-second means and asks the posterior; no clock but the snapshots'."""
 
-    def __init__(self, estimator: Estimator, configuration: Configuration) -> None:
+    def __init__(self, estimator: PosteriorEstimator, configuration: Configuration) -> None:
         settings, drivetrain = configuration.posterior, configuration.drivetrain
         self._estimator = estimator
         self._buffer = Buffer(settings.window_s)
-        self._gain_std = gain_doubt(drivetrain)
+        self._gain_std = gain_relative_std(drivetrain)
         self._no_load_std_A = float(np.mean(drivetrain.no_load_current_std_A))
         self._no_load_A = float(np.mean(drivetrain.no_load_current_A))
         self._soil = settings.soil
@@ -49,8 +49,8 @@ class BeliefStage:
 
     def step(
         self, time_ns: int, load_N: Array, slip: Array, driving_torque_Nm: Array, sources: tuple[SlipSource, ...]
-    ) -> tuple[Belief | None, ChangeOfSoil | None]:
-        """Return a belief when a half second has closed, and an alarm when the soil has changed.
+    ) -> tuple[Posterior | None, ChangeOfSoil | None]:
+        """Return a posterior when a half second has closed, and an alarm when the soil has changed.
 
         Arrays have shape (6,), unsmoothed, NaN where a wheel stands.
         """
@@ -59,10 +59,10 @@ class BeliefStage:
         window = self._buffer.window()
         if not window.size:
             return None, None
-        knowledge = self._knowledge(sources)
-        return self._estimator.believe(window, knowledge), self._watch(time_ns, window[:, -1], knowledge)
+        uncertainty = self._uncertainty(sources)
+        return self._estimator.estimate(window, uncertainty), self._watch(time_ns, window[:, -1], uncertainty)
 
-    def _watch(self, time_ns: int, means: Array, knowledge: Knowledge) -> ChangeOfSoil | None:
+    def _watch(self, time_ns: int, means: Array, uncertainty: CalibrationUncertainty) -> ChangeOfSoil | None:
         """Return the alarm, if any, with how likely each quantity fell between before its onset and since."""
         if self._change is None:
             return None
@@ -73,12 +73,12 @@ class BeliefStage:
         past = np.stack(self._history, axis=1)
         since = max(1, round((alarm.time_ns - alarm.onset_ns) / (INTERVAL_S * 1e9)))
         before, after = past[:, :-since][:, -LONGEST:], past[:, -since:][:, -LONGEST:]
-        fall = self._estimator.fall(before, after, knowledge) if before.size else None
+        fall = self._estimator.fall(before, after, uncertainty) if before.size else None
         return ChangeOfSoil(alarm, fall)
 
-    def _knowledge(self, sources: tuple[SlipSource, ...]) -> Knowledge:
+    def _uncertainty(self, sources: tuple[SlipSource, ...]) -> CalibrationUncertainty:
         guessed = SlipSource.CONFIGURED in sources
-        return Knowledge(
+        return CalibrationUncertainty(
             gain_relative_std=self._gain_std,
             no_load_current_std_A=self._no_load_std_A,
             slip_std=SLIP_STD_GUESSED if guessed else SLIP_STD_MEASURED,
@@ -87,7 +87,7 @@ class BeliefStage:
         )
 
 
-def gain_doubt(drivetrain: Drivetrain) -> float:
+def gain_relative_std(drivetrain: Drivetrain) -> float:
     """Return how well the gain is known at a usual torque, relative: from the brake where a wheel had one, mean of all.
 
     A brake measures the whole gain, so that how well Eq. 11's constants are known no longer counts at its wheels.
@@ -97,7 +97,7 @@ def gain_doubt(drivetrain: Drivetrain) -> float:
     return float(np.mean(np.where(braked > 0, braked, drivetrain.gain_relative_std)))
 
 
-def belief_stage(configuration: Configuration) -> BeliefStage | None:
+def posterior_stage(configuration: Configuration) -> PosteriorStage | None:
     """Return the stage, or None where it is switched off or the drivetrain's no-load current is not known.
 
     Raises
@@ -109,11 +109,11 @@ def belief_stage(configuration: Configuration) -> BeliefStage | None:
     if not settings.enabled or not any(drivetrain.no_load_current_A):
         return None
     path = settings.model or Path(POSTERIOR_MODEL)
-    estimator = Estimator(path)
+    estimator = PosteriorEstimator(path)
     radius_m = configuration.wheel.radius_m
     if abs(radius_m / estimator.radius_m - 1) > RADIUS_WITHIN:
         raise PosteriorError(
             f"{path}: trained for wheels of {estimator.radius_m} m radius, not {radius_m} m. "
             "Train one for this rover (`regolithd train-posterior`), or set [posterior] enabled = false."
         )
-    return BeliefStage(estimator, configuration)
+    return PosteriorStage(estimator, configuration)

@@ -17,7 +17,7 @@ from regolithd.drivers.signals import Quantity
 
 if TYPE_CHECKING:
     from regolithd.calibration.posterior.change_detection import Alarm
-    from regolithd.calibration.posterior.estimator import Belief, Fall
+    from regolithd.calibration.posterior.estimator import Fall, Posterior
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -161,7 +161,7 @@ class Estimate:
         Shape (inputs, 6): where an input lies outside the range that the network was trained on.
     model_version
         The network's version.
-    belief
+    posterior
         What the last seconds of all wheels say about the ground, as intervals; where a half second has just ended.
     soil_change
         The alarm that the soil has changed, where it has just been noticed.
@@ -179,7 +179,7 @@ class Estimate:
     input_names: tuple[str, ...]
     outside: Mask
     model_version: str
-    belief: Belief | None = None
+    posterior: Posterior | None = None
     soil_change: ChangeOfSoil | None = None
 
     def outside_inputs(self, wheel: int) -> tuple[str, ...]:

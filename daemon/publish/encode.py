@@ -6,6 +6,7 @@ computed would cost ten times as much. A test holds that what is written here is
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,8 +21,7 @@ if TYPE_CHECKING:
 
     from regolithd.daemon.pipeline.snapshot import Array, Estimate
 
-_LIVE = f'{{"schema_version":{SCHEMA_VERSION},"late":false,'.encode()
-_LATE = f'{{"schema_version":{SCHEMA_VERSION},"late":true,'.encode()
+_START = re.compile(rb'(\{"schema_version":\d+,"late":)(false|true),')
 
 _MEASURED_PER_WHEEL = (
     Quantity.MOTOR_CURRENT,
@@ -40,12 +40,11 @@ def write(fields: dict[str, Any]) -> bytes:
 
 
 def as_late(payload: bytes) -> bytes:
-    """Return the same message marked as late."""
-    if payload.startswith(_LATE):
-        return payload
-    if not payload.startswith(_LIVE):
-        raise ValueError(f"not a message of schema version {SCHEMA_VERSION}: {payload[:60]!r}")
-    return _LATE + payload[len(_LIVE) :]
+    """Return the same message marked as late. Its schema version stays: the store may hold messages of an older one."""
+    start = _START.match(payload)
+    if start is None:
+        raise ValueError(f"not a message: {payload[:60]!r}")
+    return start[1] + b"true," + payload[start.end() :]
 
 
 def _integers(numbers: Array) -> list[int | None]:

@@ -15,12 +15,12 @@ from regolithd.daemon.health.stuck_sensor import StuckWatch
 from regolithd.daemon.messages.models import (
     AcquisitionReport,
     AlarmMessage,
-    BeliefMessage,
     EmergencyMessage,
     EventMessage,
     HealthMessage,
     IdentityReport,
     NodeMessage,
+    PosteriorMessage,
     RecordingReport,
     Severity,
     SyncReport,
@@ -89,8 +89,10 @@ class MqttOutlet:
             say = self.publisher.say
             time_ns = estimate.snapshot.time_ns
             say("event", EventMessage, time_ns=time_ns, kind="soil-change", node_id=None, text=self._soil_change)
-        if estimate.belief is not None:
-            self.publisher.say("belief", BeliefMessage, time_ns=estimate.snapshot.time_ns, **asdict(estimate.belief))
+        if estimate.posterior is not None:
+            self.publisher.say(
+                "posterior", PosteriorMessage, time_ns=estimate.snapshot.time_ns, **asdict(estimate.posterior)
+            )
 
     def event(self, event: NetworkEvent) -> None:
         """Publish what happened, and soon after, when its consequences have been drawn, how the nodes are."""

@@ -17,6 +17,9 @@ SNAPSHOT = "snapshot"
 ESTIMATE = "estimate"
 EVENT = "event"
 
+_RENAMED = {"belief": "posterior"}
+"""Fields of an estimate whose name has changed: in recordings of version 0.1, and now."""
+
 
 def _write(content: dict[str, Any]) -> bytes:
     return to_json(content, inf_nan_mode="null")  # pydantic's writer: all digits, five times as fast as json's
@@ -57,8 +60,13 @@ def estimate_json(estimate: Estimate) -> bytes:
         "outside": [estimate.outside_inputs(wheel) for wheel in range(WHEELS)],
         "model_version": estimate.model_version,
     }
-    if estimate.belief is not None:
-        content["belief"] = asdict(estimate.belief)
+    if estimate.posterior is not None:
+        content["posterior"] = asdict(estimate.posterior)
     if estimate.soil_change is not None:
         content["soil_change"] = asdict(estimate.soil_change)
     return _write(content)
+
+
+def with_current_names(content: dict[str, Any]) -> dict[str, Any]:
+    """Return a recorded snapshot or estimate with the field names of this version, whichever version wrote it."""
+    return {_RENAMED.get(name, name): value for name, value in content.items()}

@@ -8,7 +8,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from regolithd.daemon.pipeline.chain import Chain, Digest
 from regolithd.daemon.recording.candump import open_log, read_log
-from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, estimate_json, snapshot_json
+from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, estimate_json, snapshot_json, with_current_names
 from regolithd.daemon.recording.mcap_file import read_messages
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def _recorded(mcap: Path) -> dict[tuple[str, int], dict[str, Any]]:
     if not mcap.is_file():
         return {}
     return {
-        (message.topic, message.content["sequence"]): message.content
+        (message.topic, message.content["sequence"]): with_current_names(message.content)
         for message in read_messages(mcap)
         if message.topic in {SNAPSHOT, ESTIMATE}
     }

@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.calibration.parameters import SOILS, Drivetrain, Wheel
 from regolithd.calibration.posterior import simulated_rovers as simulation
-from regolithd.calibration.posterior.window import Knowledge, reduce_windows
+from regolithd.calibration.posterior.window import CalibrationUncertainty, reduce_windows
 from regolithd.calibration.terrain.soils import soils_from
 from regolithd.calibration.validation.estimators.errors_and_coverage import NO_LOAD_A
 from regolithd.calibration.validation.reproduction import published
 
 if TYPE_CHECKING:
-    from regolithd.calibration.posterior.estimator import Estimator
+    from regolithd.calibration.posterior.estimator import PosteriorEstimator
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ QUIET = 0.10
 """Relative noise of the current in the quiet runs: the least that the posterior was trained with."""
 
 
-def figures(count: int, seed: int, estimator: Estimator) -> dict[str, float]:
+def figures(count: int, seed: int, estimator: PosteriorEstimator) -> dict[str, float]:
     """Return the mean φ of each method [°] with the noise of Table 4 and without, and the difference."""
     rng = np.random.default_rng(seed)
     out = {}
@@ -44,8 +44,8 @@ def figures(count: int, seed: int, estimator: Estimator) -> dict[str, float]:
     return out
 
 
-def _posterior(count: int, noise: simulation.Noise, rng: np.random.Generator, estimator: Estimator) -> float:
-    wheel, known = Wheel(), np.tile(Knowledge().deviations(), (count, 1))
+def _posterior(count: int, noise: simulation.Noise, rng: np.random.Generator, estimator: PosteriorEstimator) -> float:
+    wheel, known = Wheel(), np.tile(CalibrationUncertainty().deviations(), (count, 1))
     soils = soils_from([SOILS["sandy-loam"]] * count, wheel.width_m)
     rovers = simulation.draw_rovers(count, rng, known, no_load_A=NO_LOAD_A)
     rovers = replace(rovers, soils=soils, load_N=np.full((count, 6), 49.0), slip=np.full((count, 6), 0.025))

@@ -13,18 +13,18 @@ import numpy as np
 
 from regolithd.calibration.parameters import Drivetrain, Wheel
 from regolithd.calibration.posterior import simulated_rovers as simulation
-from regolithd.calibration.posterior.window import KNOWN_HIGH, KNOWN_LOW, Knowledge, reduce_windows
+from regolithd.calibration.posterior.window import KNOWN_HIGH, KNOWN_LOW, CalibrationUncertainty, reduce_windows
 from regolithd.calibration.validation.estimators.errors_and_coverage import NO_LOAD_A
 
 if TYPE_CHECKING:
-    from regolithd.calibration.posterior.estimator import Estimator
+    from regolithd.calibration.posterior.estimator import PosteriorEstimator
 
 
-def figures(count: int, seed: int, estimator: Estimator) -> dict[str, float]:
+def figures(count: int, seed: int, estimator: PosteriorEstimator) -> dict[str, float]:
     """Return error, bias and coverage of cohesion for windows of 10 s, with and without the calibration."""
     rng = np.random.default_rng(seed)
     wheel, drivetrain = Wheel(), Drivetrain()
-    known = np.tile(Knowledge().deviations(), (count, 1))
+    known = np.tile(CalibrationUncertainty().deviations(), (count, 1))
     unknown = known.copy()
     unknown[:, 4] = KNOWN_LOW[4]
     doubtful = unknown.copy()

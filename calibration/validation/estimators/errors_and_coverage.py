@@ -23,12 +23,12 @@ from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.calibration.paper.least_squares import least_squares
 from regolithd.calibration.parameters import SOILS, Drivetrain, Wheel
 from regolithd.calibration.posterior import simulated_rovers as simulation
-from regolithd.calibration.posterior.window import Knowledge, reduce_windows
+from regolithd.calibration.posterior.window import CalibrationUncertainty, reduce_windows
 from regolithd.calibration.terrain.soils import ANGLE_SPREAD_DEG, SPREAD
 from regolithd.calibration.terrain.wheel_soil import contact_angle, shear_displacement
 
 if TYPE_CHECKING:
-    from regolithd.calibration.posterior.estimator import Estimator
+    from regolithd.calibration.posterior.estimator import PosteriorEstimator
 
 Array = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ CASES = {
 """The cases of the evaluation: ten seconds of six wheels, one instant of one, and what becomes of the first."""
 
 
-def answers(count: int, case: Case, seed: int, estimator: Estimator) -> Answers:
+def answers(count: int, case: Case, seed: int, estimator: PosteriorEstimator) -> Answers:
     """Ask all methods about `count` rovers."""
     rng = np.random.default_rng(seed)
     parts = [_chunk(min(CHUNK, count - start), case, rng, estimator) for start in range(0, count, CHUNK)]
@@ -82,10 +82,10 @@ def answers(count: int, case: Case, seed: int, estimator: Estimator) -> Answers:
     )
 
 
-def _chunk(count: int, case: Case, rng: np.random.Generator, estimator: Estimator) -> Answers:
+def _chunk(count: int, case: Case, rng: np.random.Generator, estimator: PosteriorEstimator) -> Answers:
     wheel, drivetrain = Wheel(), Drivetrain()
-    knowledge = Knowledge() if case.noise else Knowledge(torque_noise_Nm=0.0)
-    known = np.tile(knowledge.deviations(), (count, 1))
+    uncertainty = CalibrationUncertainty() if case.noise else CalibrationUncertainty(torque_noise_Nm=0.0)
+    known = np.tile(uncertainty.deviations(), (count, 1))
     rovers = simulation.draw_rovers(count, rng, known, no_load_A=NO_LOAD_A)
     noise = simulation.table_4_noise(count) if case.noise else simulation.no_noise(count)
     measured = simulation.drive(rovers, noise, case.instants, rng, drivetrain, wheel)

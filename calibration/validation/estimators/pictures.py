@@ -9,7 +9,7 @@ import numpy as np
 
 from regolithd.calibration.parameters import SOILS, Drivetrain, Wheel
 from regolithd.calibration.posterior import simulated_rovers as simulation
-from regolithd.calibration.posterior.window import Knowledge, reduce_windows
+from regolithd.calibration.posterior.window import CalibrationUncertainty, reduce_windows
 from regolithd.calibration.terrain.soils import draw_soils, soils_from
 from regolithd.calibration.validation.estimators.errors_and_coverage import NO_LOAD_A
 from regolithd.calibration.validation.reproduction.pictures import OURS, PAPER, SOIL_COLOURS, STYLE, figure, save
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from regolithd.calibration.posterior.estimator import Estimator
+    from regolithd.calibration.posterior.estimator import PosteriorEstimator
 
     Array = NDArray[np.float64]
 
@@ -91,11 +91,11 @@ def _coverage(panel: Axes, found: Mapping[str, float], target: str) -> None:
     panel.set_ylim(0, 102)
 
 
-def one_sample(estimator: Estimator, path: Path, seed: int = 3) -> None:
+def one_sample(estimator: PosteriorEstimator, path: Path, seed: int = 3) -> None:
     """Draw what one instant of one wheel says of sandy loam, and what ten seconds of six wheels say."""
     rng = np.random.default_rng(seed)
     wheel, drivetrain = Wheel(), Drivetrain()
-    known = Knowledge().deviations()
+    known = CalibrationUncertainty().deviations()
     rovers = simulation.draw_rovers(1, rng, known, no_load_A=NO_LOAD_A)
     soils = soils_from([SOILS["sandy-loam"]], wheel.width_m)
     rovers = simulation.Rovers(

@@ -9,7 +9,7 @@ import pytest
 from regolithd.calibration.models import POSTERIOR_MODEL
 from regolithd.calibration.models.onnx_session import NetworkError
 from regolithd.calibration.parameters import Drivetrain, Wheel
-from regolithd.calibration.posterior.estimator import Buffer, Estimator
+from regolithd.calibration.posterior.estimator import Buffer, PosteriorEstimator
 from regolithd.calibration.posterior.mixture import PARAMETERS, unpack
 from regolithd.calibration.posterior.simulated_rovers import (
     TABLE_4_CURRENT,
@@ -21,7 +21,7 @@ from regolithd.calibration.posterior.simulated_rovers import (
     told_scatter,
 )
 from regolithd.calibration.posterior.training import apply, freeze, initial, scaling, simulate
-from regolithd.calibration.posterior.window import KNOWN_HIGH, Knowledge, reduce_windows
+from regolithd.calibration.posterior.window import KNOWN_HIGH, CalibrationUncertainty, reduce_windows
 
 
 def raw_mixture(rows: int = 3, components: int = 4) -> np.ndarray:
@@ -110,9 +110,9 @@ def test_the_onnx_graph_is_the_trained_network() -> None:
 
 
 @pytest.fixture(scope="module")
-def estimator() -> Estimator:
+def estimator() -> PosteriorEstimator:
     """Return the posterior that ships."""
-    return Estimator()
+    return PosteriorEstimator()
 
 
 def window(instants: int) -> np.ndarray:
@@ -122,46 +122,46 @@ def window(instants: int) -> np.ndarray:
     return values
 
 
-def test_more_data_narrow_the_posterior_and_less_knowledge_widens_it(estimator: Estimator) -> None:
+def test_more_data_narrow_the_posterior_and_less_certainty_widens_it(estimator: PosteriorEstimator) -> None:
     """Ten seconds of six wheels say more than an instant of one, and a drivetrain badly known takes it away again."""
     one = window(1)
     one[:, :, 1:] = np.nan
-    beliefs = [
-        estimator.believe(one, Knowledge()),
-        estimator.believe(window(20), Knowledge()),
-        estimator.believe(window(20), Knowledge(*KNOWN_HIGH.tolist())),
+    posteriors = [
+        estimator.estimate(one, CalibrationUncertainty()),
+        estimator.estimate(window(20), CalibrationUncertainty()),
+        estimator.estimate(window(20), CalibrationUncertainty(*KNOWN_HIGH.tolist())),
     ]
-    single, full, vague = (b.cohesion_Pa.high_90 - b.cohesion_Pa.low_90 for b in beliefs if b is not None)
+    single, full, vague = (b.cohesion_Pa.high_90 - b.cohesion_Pa.low_90 for b in posteriors if b is not None)
     assert full < single
     assert full < vague
 
 
-def test_the_posterior_knows_sandy_loam_from_lete_sand(estimator: Estimator) -> None:
+def test_the_posterior_knows_sandy_loam_from_lete_sand(estimator: PosteriorEstimator) -> None:
     """At the same load and slip, half the torque means less cohesion."""
     strong, weak = window(20), window(20)
     weak[2] /= 2
-    beliefs = [estimator.believe(each, Knowledge()) for each in (strong, weak)]
-    means = [belief.cohesion_Pa.mean for belief in beliefs if belief is not None]
+    posteriors = [estimator.estimate(each, CalibrationUncertainty()) for each in (strong, weak)]
+    means = [posterior.cohesion_Pa.mean for posterior in posteriors if posterior is not None]
     assert means[1] < 0.7 * means[0]
 
 
-def test_no_measurement_is_no_belief(estimator: Estimator) -> None:
+def test_no_measurement_is_no_posterior(estimator: PosteriorEstimator) -> None:
     """An empty window, or one of NaN, has nothing to say."""
-    assert estimator.believe(np.empty((3, 0, 6)), Knowledge()) is None
-    assert estimator.believe(np.full((3, 5, 6), np.nan), Knowledge()) is None
+    assert estimator.estimate(np.empty((3, 0, 6)), CalibrationUncertainty()) is None
+    assert estimator.estimate(np.full((3, 5, 6), np.nan), CalibrationUncertainty()) is None
 
 
-def test_a_fall_is_told_by_its_probability(estimator: Estimator) -> None:
+def test_a_fall_is_told_by_its_probability(estimator: PosteriorEstimator) -> None:
     """Half the torque at the same load and slip: cohesion fell, likely; the same window again: nobody knows."""
     strong, weak = window(20), window(20)
     weak[2] /= 2
-    fell = estimator.fall(strong, weak, Knowledge())
-    same = estimator.fall(strong, strong, Knowledge())
+    fell = estimator.fall(strong, weak, CalibrationUncertainty())
+    same = estimator.fall(strong, strong, CalibrationUncertainty())
     assert fell is not None
     assert same is not None
     assert fell.cohesion > 0.8
     assert 0.45 < same.cohesion < 0.55
-    assert estimator.fall(strong, np.empty((3, 0, 6)), Knowledge()) is None
+    assert estimator.fall(strong, np.empty((3, 0, 6)), CalibrationUncertainty()) is None
 
 
 @pytest.mark.parametrize(
@@ -178,4 +178,4 @@ def test_a_file_that_is_no_posterior_is_refused_with_the_cure(tmp_path: Path, na
     (tmp_path / "half.onnx").write_bytes(shipped[: len(shipped) // 2])
     (tmp_path / "terrain.onnx").write_bytes(POSTERIOR_MODEL.with_name("terrain.onnx").read_bytes())
     with pytest.raises(NetworkError, match=rf"{name}: {says}.*Train one \(`regolithd train-posterior`\)"):
-        Estimator(tmp_path / name)
+        PosteriorEstimator(tmp_path / name)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from regolithd.calibration.posterior.estimator import Estimator
+from regolithd.calibration.posterior.estimator import PosteriorEstimator
 from regolithd.calibration.validation.estimators import bias
 from regolithd.calibration.validation.estimators import change_detector as detector
 from regolithd.calibration.validation.estimators import errors_and_coverage as estimators
@@ -28,7 +28,7 @@ def test_delays_count_from_the_crossing() -> None:
 
 def test_the_posterior_is_better_than_no_data_and_covers_as_it_says() -> None:
     """On 600 new rovers: less error than the prior's mean, and 90 % intervals that hold between 86 and 94 %."""
-    found = estimators.figures(estimators.answers(600, estimators.Case(), 1, Estimator()), "")
+    found = estimators.figures(estimators.answers(600, estimators.Case(), 1, PosteriorEstimator()), "")
     assert found["posterior_rmse_cohesion_Pa"] < 0.85 * found["prior_mean_rmse_cohesion_Pa"]
     assert found["posterior_rmse_cohesion_Pa"] < 0.6 * found["paper_rmse_cohesion_Pa"]
     for target in ("cohesion", "friction_angle", "margin"):
@@ -38,7 +38,7 @@ def test_the_posterior_is_better_than_no_data_and_covers_as_it_says() -> None:
 
 def test_a_single_instant_is_told_without_bias_though_most_of_the_current_is_friction() -> None:
     """At 37 mA of no-load current, on 3000 rovers: c less than 0.2 kPa off on average, and intervals as they say."""
-    found = estimators.figures(estimators.answers(3000, estimators.CASES["instant"], 1, Estimator()), "")
+    found = estimators.figures(estimators.answers(3000, estimators.CASES["instant"], 1, PosteriorEstimator()), "")
     assert abs(found["posterior_bias_cohesion_Pa"]) < 200
     for target in ("cohesion", "friction_angle", "margin"):
         assert 0.875 < found[f"coverage_90_{target}"] < 0.925
@@ -47,6 +47,6 @@ def test_a_single_instant_is_told_without_bias_though_most_of_the_current_is_fri
 
 def test_noise_pulls_the_papers_friction_angle_down_and_leaves_the_posteriors() -> None:
     """The scatter of Table 4 lowers the paper network's mean φ by more than half a degree; ours by less than half."""
-    found = bias.figures(300, 1, Estimator())
+    found = bias.figures(300, 1, PosteriorEstimator())
     assert found["bias_paper_of_noise_deg"] < -0.5
     assert abs(found["bias_posterior_of_noise_deg"]) < 0.5

@@ -65,6 +65,13 @@ def test_a_late_message_differs_in_its_mark_alone() -> None:
         as_late(b'{"schema_version":9}')
 
 
+def test_a_stored_message_of_an_older_schema_keeps_its_version_when_it_is_marked_late() -> None:
+    """A store that an older version filled is delivered after an upgrade."""
+    assert (
+        as_late(b'{"schema_version":1,"late":false,"session":"a"}') == b'{"schema_version":1,"late":true,"session":"a"}'
+    )
+
+
 def test_every_model_written_live_can_be_marked_late() -> None:
     """The mark stands at the same place in every message."""
     state = StateMessage(
@@ -130,7 +137,7 @@ def test_every_reference_in_the_asyncapi_document_leads_somewhere() -> None:
 
 
 def test_no_message_is_taken_with_a_field_too_many() -> None:
-    """A reader of version 1 knows what it gets."""
+    """A reader of a schema version knows what it gets."""
     snapshot, _ = encode(estimate(), SESSION)
     with pytest.raises(ValidationError):
         SnapshotMessage.model_validate(json.loads(snapshot) | {"extra": 1})

@@ -8,7 +8,7 @@ from regolithd.calibration.parameters import Drivetrain
 from regolithd.calibration.posterior.estimator import PosteriorError
 from regolithd.daemon.config.configuration import Configuration
 from regolithd.daemon.pipeline.chain import Chain
-from regolithd.daemon.pipeline.posterior import belief_stage, gain_doubt
+from regolithd.daemon.pipeline.posterior import gain_relative_std, posterior_stage
 from regolithd.daemon.pipeline.snapshot import Estimate
 from regolithd.daemon.pipeline.terrain_network import Network
 
@@ -27,46 +27,46 @@ def estimates(configuration: Configuration, drive: Callable, rate_Hz: float, sna
 
 
 @pytest.mark.parametrize("rate_Hz", [2.0, 20.0])
-def test_a_calibrated_rover_believes_twice_a_second(
+def test_a_calibrated_rover_has_a_posterior_twice_a_second(
     configuration: Configuration, drive: Callable, rate_Hz: float
 ) -> None:
     """At any rate, and its intervals are in order and around something."""
     settings = changed(configuration, drivetrain=CALIBRATED, sync={"rate_Hz": rate_Hz})
     made = estimates(settings, drive, rate_Hz, int(15 * rate_Hz))
-    beliefs = [estimate.belief for estimate in made if estimate.belief is not None]
-    assert 27 <= len(beliefs) <= 30
-    last = beliefs[-1]
+    posteriors = [estimate.posterior for estimate in made if estimate.posterior is not None]
+    assert 27 <= len(posteriors) <= 30
+    last = posteriors[-1]
     assert (last.wheels, last.instants) == (6, 20)
     for interval in (last.cohesion_Pa, last.friction_angle_rad, last.drawbar_margin):
         assert interval.low_90 < interval.low_50 < interval.median < interval.high_50 < interval.high_90
     assert last.cohesion_Pa.low_90 > 0
-    width = [belief.cohesion_Pa.high_90 - belief.cohesion_Pa.low_90 for belief in (beliefs[0], last)]
+    width = [posterior.cohesion_Pa.high_90 - posterior.cohesion_Pa.low_90 for posterior in (posteriors[0], last)]
     assert width[1] < width[0]  # ten seconds say more than half a one
 
 
-def test_a_rover_that_does_not_know_its_friction_believes_nothing(
+def test_a_rover_without_a_calibrated_drivetrain_has_no_posterior(
     configuration: Configuration, drive: Callable
 ) -> None:
     """It would take the drivetrain for soil."""
-    assert belief_stage(configuration) is None
-    assert all(estimate.belief is None for estimate in estimates(configuration, drive, 2.0, 20))
+    assert posterior_stage(configuration) is None
+    assert all(estimate.posterior is None for estimate in estimates(configuration, drive, 2.0, 20))
 
 
 def test_it_can_be_switched_off(configuration: Configuration) -> None:
     """Though everything is known."""
-    assert belief_stage(changed(configuration, drivetrain=CALIBRATED, posterior={"enabled": False})) is None
+    assert posterior_stage(changed(configuration, drivetrain=CALIBRATED, posterior={"enabled": False})) is None
 
 
 def test_a_posterior_for_another_wheel_is_refused(configuration: Configuration) -> None:
     """With the cure."""
     with pytest.raises(PosteriorError, match=r"trained for wheels of 0\.075 m radius, not 0\.1 m\. Train one"):
-        belief_stage(changed(configuration, drivetrain=CALIBRATED, wheel={"radius_m": 0.1}))
+        posterior_stage(changed(configuration, drivetrain=CALIBRATED, wheel={"radius_m": 0.1}))
 
 
 def test_a_brake_says_how_well_the_gain_is_known() -> None:
     """Where a wheel had one; elsewhere, and without any, it is what was stated of Eq. 11's constants."""
-    assert gain_doubt(Drivetrain(gain_relative_std=0.05)) == pytest.approx(0.05)
+    assert gain_relative_std(Drivetrain(gain_relative_std=0.05)) == pytest.approx(0.05)
     one = Drivetrain(gain_relative_std=0.05, gain_factor=0.8, gain_factor_std=(0.008, 0, 0, 0, 0, 0))  # type: ignore[arg-type]
-    assert gain_doubt(one) == pytest.approx((0.01 + 5 * 0.05) / 6)
+    assert gain_relative_std(one) == pytest.approx((0.01 + 5 * 0.05) / 6)
     bent = Drivetrain(gain_factor_std=0.03, load_loss_std_per_Nm=0.1)  # type: ignore[arg-type]  # one value for six
-    assert gain_doubt(bent) == pytest.approx(0.03 * 2**0.5)
+    assert gain_relative_std(bent) == pytest.approx(0.03 * 2**0.5)

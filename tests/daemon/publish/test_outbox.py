@@ -13,12 +13,12 @@ from regolithd.daemon.publish.spool import Spool
 
 def message(number: int) -> bytes:
     """Return a payload that tells its number and can be marked."""
-    return write({"schema_version": 1, "late": False, "number": number})
+    return write({"schema_version": 2, "late": False, "number": number})
 
 
 def number_of(letter: Letter) -> int:
     """Return the number that a letter tells; its mark must be its payload's."""
-    assert letter.payload.startswith(b'{"schema_version":1,"late":' + (b"true" if letter.late else b"false"))
+    assert letter.payload.startswith(b'{"schema_version":2,"late":' + (b"true" if letter.late else b"false"))
     return int(letter.payload.split(b":")[-1].rstrip(b"}"))
 
 
