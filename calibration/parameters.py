@@ -1,7 +1,9 @@
-"""The tables that `rover.toml` and a simulation's TOML share: one model of each, here.
+"""Parameters of rover, wheel, drivetrain, sensors and soil: the tables that `rover.toml` and `SIM.toml` have in common.
 
-Units stand in the names. Defaults are Kapvik's (the paper, and the makers' data sheets where it is silent). A
-`…_relative_std` says how well a value is known before any recording: 0 means exactly.
+Each table is one pydantic model. Names end in their unit. Defaults are those of the micro-rover Kapvik (the paper, and
+the manufacturers' data sheets where the paper gives no value). A `…_std` is a standard deviation in the unit of its
+value, a `…_relative_std` one relative to the value; both state how well a value is known before any recording, and 0
+means exactly.
 """
 
 from __future__ import annotations
@@ -15,9 +17,12 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Efficiency = Annotated[float, Field(gt=0, le=1)]
 
+GRAVITY_M_S2 = 9.80665
+"""Standard acceleration of gravity g_n (3rd CGPM, 1901)."""
+
 
 def _one_or_six(value: object) -> object:
-    """Return six values where one was given: the same for each wheel."""
+    """Return six equal values where a single number was given."""
     return (value,) * 6 if isinstance(value, int | float) else value
 
 
@@ -29,18 +34,23 @@ SixPositive = Annotated[tuple[Positive, Positive, Positive, Positive, Positive, 
 
 
 class Table(BaseModel):
-    """A TOML table: unknown keys are errors, and nothing changes after reading."""
+    """A TOML table: unknown keys are errors, and the fields cannot be assigned."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Drivetrain(Table):
-    """Motor, planetary gear and harmonic drive, from current to torque at the wheel (Eq. 11).
+    """Motor, planetary gear and harmonic drive: the constants of Eq. 11, and four that are measured at the bench.
 
-    The last fields are what a wheels-up spin and a brake measure, one value for each wheel (or one for all): the
-    current that only turns the drivetrain, I = `no_load_current_A` + `viscous_current_A_s_per_rad` |ω_motor|, a factor
-    on the gain, and how much more current a torque takes for each newton metre of it: the efficiency at the torque T is
-    Eq. 11's × `gain_factor` / (1 + `load_loss_per_Nm` |T|). Eq. 11 has none of them; with the defaults it is Eq. 11.
+    The measured constants have one value for each wheel, or one for all six. Eq. 11 has none of them; with their
+    defaults the drivetrain is Eq. 11 (`drivetrain.torque` has the equations).
+
+    | field | symbol | meaning | measured by |
+    |---|---|---|---|
+    | `no_load_current_A` | I_c | Coulomb part of the no-load current | `regolithd calibrate wheels-up` |
+    | `viscous_current_A_s_per_rad` | b | no-load current per motor speed | `regolithd calibrate wheels-up` |
+    | `gain_factor` | f | factor on the gain of Eq. 11 | `regolithd calibrate brake` |
+    | `load_loss_per_Nm` | λ | relative increase of the current per torque | `regolithd calibrate brake` |
     """
 
     torque_constant_Nm_per_A: Positive = 0.0234
@@ -60,17 +70,17 @@ class Drivetrain(Table):
 
     @property
     def ratio(self) -> float:
-        """Motor turns per wheel turn, ζ_PG ζ_HD."""
+        """Motor turns per wheel turn, ζ_PG ζ_HD [1]."""
         return self.planetary_ratio * self.harmonic_ratio
 
     @property
     def gain_Nm_per_A(self) -> float:
-        """Wheel torque per ampere of motor current, κ ζ_PG ζ_HD η_PG η_HD (Eq. 11)."""
+        """Wheel torque per motor current, κ ζ_PG ζ_HD η_PG η_HD [N·m/A] (Eq. 11)."""
         return self.torque_constant_Nm_per_A * self.ratio * self.planetary_efficiency * self.harmonic_efficiency
 
 
 class LoadCells(Table):
-    """What the bench found of the load cells: load = `span` × (reading − `zero_N`), six values or one for all."""
+    """Calibration of the load cells: load = `span` × (reading − `zero_N`); six values, or one for all."""
 
     zero_N: SixNumbers = (0.0,) * 6
     zero_std_N: SixNotNegative = (0.0,) * 6
@@ -79,7 +89,7 @@ class LoadCells(Table):
 
 
 class Wheel(Table):
-    """A rigid, smooth wheel."""
+    """A rigid wheel without grousers."""
 
     radius_m: Positive = 0.075
     radius_std_m: NotNegative = 0.0
@@ -87,7 +97,7 @@ class Wheel(Table):
 
 
 class Rover(Table):
-    """The body that loads the six wheels."""
+    """Mass and geometry of the rover's body."""
 
     mass_kg: Positive = 30.0
     wheelbase_m: Positive = 0.65
@@ -95,9 +105,9 @@ class Rover(Table):
 
 
 class Soil(Table):
-    """One soil: Mohr–Coulomb strength, Janosi's shear modulus and Wong's pressure–sinkage constants.
+    """One soil: Mohr–Coulomb strength, shear deformation modulus (Janosi), pressure–sinkage constants (Wong).
 
-    `k_c_kN` is in kN/m^(n+1) and `k_phi_kN` in kN/m^(n+2), as Wong tabulates them.
+    `k_c_kN` is in kN/m^(n+1) and `k_phi_kN` in kN/m^(n+2), as in Wong's tables ("Theory of Ground Vehicles").
     """
 
     cohesion_Pa: NotNegative
@@ -111,7 +121,7 @@ class Soil(Table):
 
 
 class Sensors(Table):
-    """The errors of the recorded inputs, as standard deviations."""
+    """Errors of the recorded inputs, as standard deviations."""
 
     load_relative_std: NotNegative = 0.0
     ground_speed_relative_std: NotNegative = 0.0
@@ -155,4 +165,4 @@ SOILS = {
         k_phi_kN=2083,
     ),
 }
-"""Table 1 of the paper, with Wong's pressure–sinkage constants for the same soils."""
+"""The soils of the paper's Table 1, with Wong's pressure–sinkage constants for the same soils."""

@@ -1,13 +1,14 @@
-"""Thrust against resistance under a wheel, and the margin between them.
+"""Drawbar pull of a rigid wheel: thrust of the shear stress less resistance of the normal stress, and its upper bound.
 
-The stresses of Eqs 4 and 5 have, besides load and torque, a horizontal part: shear pushes the wheel forward, normal
-stress holds it back.
+The horizontal components of the stresses of Eqs 4 and 5, integrated over the contact from 0 to θ_C:
 
-    thrust = r w ∫ τ cos θ dθ,   resistance = r w ∫ σ sin θ dθ
+    thrust H = r w ∫ τ cos θ dθ,   resistance R = r w ∫ σ sin θ dθ,   drawbar pull = H − R
 
-The *drawbar margin* is what the soil under the wheel could still give if the wheel slipped until its shear strength is
-all mobilised, less the resistance, over the load. It is what may be spent on slope: a rover on a slope of angle α needs
-a margin above sin α. Nothing of the digging that much slip would bring is in it, so it is an upper bound.
+The *drawbar margin* is (H_max − R)/W, where H_max is the thrust with the shear strength fully mobilised (τ_m = c + σ_m
+tan φ). A rover on a slope of angle α needs a margin above sin α. It is an upper bound: the additional sinkage at the
+slip that would mobilise the strength is not modelled.
+
+Assumptions as in `wheel_soil`.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.terrain.wheel_soil import Array, carried_load, peak_stresses
+from regolithd.calibration.terrain.wheel_soil import Array, carried_load, peak_stresses, shear_strength
 
 if TYPE_CHECKING:
     from regolithd.calibration.parameters import Wheel
@@ -24,7 +25,24 @@ if TYPE_CHECKING:
 
 
 def thrust(contact_angle_rad: Array, peak_shear_Pa: Array, cohesion_Pa: Array | float, wheel: Wheel) -> Array:
-    """Return the horizontal force of the shear stresses [N], forward positive (Eq. 5, integrated)."""
+    """Return the horizontal force of the shear stress: H = r w ∫ τ cos θ dθ with τ of Eq. 5, in closed form.
+
+    Parameters
+    ----------
+    contact_angle_rad
+        Contact angle θ_C [rad].
+    peak_shear_Pa
+        Peak shear stress τ_m [Pa].
+    cohesion_Pa
+        Cohesion c [Pa]: the shear stress at the exit, θ = 0.
+    wheel
+        Wheel; radius r [m] and width w [m].
+
+    Returns
+    -------
+    Array
+        Thrust H [N], forward positive.
+    """
     angle, middle = contact_angle_rad, contact_angle_rad / 2
     behind = cohesion_Pa * np.sin(middle) + (peak_shear_Pa - cohesion_Pa) * (
         np.sin(middle) + (np.cos(middle) - 1) / middle
@@ -34,23 +52,67 @@ def thrust(contact_angle_rad: Array, peak_shear_Pa: Array, cohesion_Pa: Array | 
 
 
 def resistance(contact_angle_rad: Array, peak_normal_Pa: Array, wheel: Wheel) -> Array:
-    """Return the horizontal force of the normal stresses [N], backward positive (Eq. 4, integrated)."""
+    """Return the horizontal force of the normal stress: R = r w σ_m (2 sin θ_m − sin θ_C)/θ_m (Eq. 4, integrated).
+
+    Parameters
+    ----------
+    contact_angle_rad
+        Contact angle θ_C [rad].
+    peak_normal_Pa
+        Peak normal stress σ_m [Pa].
+    wheel
+        Wheel; radius r [m] and width w [m].
+
+    Returns
+    -------
+    Array
+        Compaction resistance R [N], backward positive.
+    """
     middle = contact_angle_rad / 2
     bracket = (2 * np.sin(middle) - np.sin(contact_angle_rad)) / middle
     return wheel.radius_m * wheel.width_m * peak_normal_Pa * bracket
 
 
 def drawbar_pull(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> Array:
-    """Return thrust less resistance at this slip [N]."""
+    """Return the drawbar pull at a slip: thrust less resistance, H − R.
+
+    Parameters
+    ----------
+    contact_angle_rad
+        Contact angle θ_C [rad].
+    slip
+        Slip i [1].
+    wheel, soil
+        As in `wheel_soil.peak_stresses`.
+
+    Returns
+    -------
+    Array
+        Drawbar pull [N], forward positive.
+    """
     normal, shear = peak_stresses(contact_angle_rad, slip, wheel, soil)
-    pushed = thrust(contact_angle_rad, shear, soil.cohesion_Pa, wheel)
-    return pushed - resistance(contact_angle_rad, normal, wheel)
+    forward = thrust(contact_angle_rad, shear, soil.cohesion_Pa, wheel)
+    return forward - resistance(contact_angle_rad, normal, wheel)
 
 
 def drawbar_margin(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> Array:
-    """Return the drawbar margin [1]: all the thrust that the soil has less the resistance, over the load."""
+    """Return the drawbar margin: thrust at fully mobilised shear strength less resistance, over the load.
+
+    Parameters
+    ----------
+    contact_angle_rad
+        Contact angle θ_C [rad].
+    slip
+        Slip i [1]; it enters through the load that the contact carries.
+    wheel, soil
+        As in `wheel_soil.peak_stresses`.
+
+    Returns
+    -------
+    Array
+        Drawbar margin (H_max − R)/W [1].
+    """
     normal, _ = peak_stresses(contact_angle_rad, slip, wheel, soil)
-    strength = soil.cohesion_Pa + normal * np.tan(np.radians(soil.friction_angle_deg))
-    available = thrust(contact_angle_rad, strength, soil.cohesion_Pa, wheel)
-    held = resistance(contact_angle_rad, normal, wheel)
-    return (available - held) / carried_load(contact_angle_rad, slip, wheel, soil)
+    largest = thrust(contact_angle_rad, shear_strength(normal, soil), soil.cohesion_Pa, wheel)
+    backward = resistance(contact_angle_rad, normal, wheel)
+    return (largest - backward) / carried_load(contact_angle_rad, slip, wheel, soil)

@@ -1,15 +1,26 @@
-"""A rigid wheel on deformable soil: given load, slip and soil, the contact angle and the torque.
+"""A rigid, smooth wheel on deformable soil: stresses, load, torque and contact angle from slip and soil parameters.
 
-The stresses are the paper's (Eqs 1, 6, 7); the pressure–sinkage relation closes them, which the paper lacks:
+The contact runs from θ = 0 (below the axle) to the contact angle θ_C. Normal and shear stress have their peaks σ_m and
+τ_m at θ_m = θ_C/2 and are linear on either side of it (Eqs 4 and 5). Of two relations the paper [1]_ has none, or
+another:
 
-    σ_m = (k_c/w + k_φ) (r (cos θ_m − cos θ_C))^n,   θ_m = θ_C/2
+| relation | here | in the paper |
+|---|---|---|
+| σ_m | Bernstein–Wong pressure–sinkage relation at θ_m [2]_ | none: sinkage is given |
+| j in Eq. 1 | shear displacement at θ_m, where Eq. 1 is evaluated | at the lowest point, θ = 0 (Eq. 10) |
 
-The shear displacement is taken where Eq. 1 is used, at θ_m, and not at the wheel's bottom as Eq. 10 does:
+Assumptions: quasi-static motion; no grousers; no bulldozing; the soil leaves the wheel at θ = 0.
 
-    j_m = r [(θ_C − θ_m) − (1 − i)(sin θ_C − sin θ_m)]
+Every function takes and returns arrays of one shape, or of shapes that broadcast; angles in radians, the rest in SI
+units. A soil is one `Soil`, or `Soils` whose arrays broadcast likewise.
 
-All functions take and return arrays of one shape (or what broadcasts to it); angles in radians, the rest SI. A soil is
-one, or many as arrays that broadcast likewise.
+References
+----------
+.. [1] "Estimating terrain parameters for a rigid wheeled rover using neural networks", Journal of Terramechanics 50
+   (2013) 165–174.
+.. [2] J. Y. Wong, "Theory of Ground Vehicles", 4th ed., Wiley, 2008, Sec. 2.4.
+.. [3] Z. Janosi, B. Hanamoto, "The analytical determination of drawbar pull as a function of slip for tracked vehicles
+   in deformable soils", Proc. 1st Int. Conf. on the Mechanics of Soil–Vehicle Systems, Turin, 1961.
 """
 
 from __future__ import annotations
@@ -28,34 +39,156 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 LARGEST_CONTACT_ANGLE_RAD = np.pi / 2
-"""A wheel that is in to its axle. Past it the stress model means nothing."""
+"""Contact angle of a wheel that is sunk to its axle; the stress model is not defined beyond it."""
+
+_MAX_ITERATIONS = 30
+"""Secant steps in `contact_angle`; loads that a soil can carry need fewer than ten."""
+_TOLERANCE = 1e-13
+"""Largest change of ln θ_C in the last secant step: the contact angle is then exact to its last digits."""
+
+
+def sinkage_at_peak_stress(contact_angle_rad: Array, wheel: Wheel) -> Array:
+    """Return how deep the rim is below the undisturbed surface at θ_m: r (cos θ_m − cos θ_C).
+
+    Parameters
+    ----------
+    contact_angle_rad
+        Contact angle θ_C [rad].
+    wheel
+        Wheel; its radius r [m] is used.
+
+    Returns
+    -------
+    Array
+        Sinkage of the rim at θ_m [m].
+    """
+    return wheel.radius_m * (np.cos(contact_angle_rad / 2) - np.cos(contact_angle_rad))
+
+
+def peak_normal_stress(contact_angle_rad: Array, wheel: Wheel, soil: AnySoil) -> Array:
+    """Return the peak normal stress by the Bernstein–Wong relation: σ_m = (k_c/w + k_φ) z_m^n [2]_.
+
+    Parameters
+    ----------
+    contact_angle_rad
+        Contact angle θ_C [rad].
+    wheel
+        Wheel; radius r [m] and width w [m].
+    soil
+        Soil; k_c [kN/m^(n+1)], k_φ [kN/m^(n+2)] and n [1].
+
+    Returns
+    -------
+    Array
+        Peak normal stress σ_m [Pa].
+    """
+    stiffness = 1000 * (soil.k_c_kN / wheel.width_m + soil.k_phi_kN)
+    return stiffness * sinkage_at_peak_stress(contact_angle_rad, wheel) ** soil.sinkage_exponent
 
 
 def shear_displacement(contact_angle_rad: Array, slip: Array, wheel: Wheel) -> Array:
-    """Return the shear displacement at θ_m [m], j_m."""
+    """Return the shear displacement at θ_m: j_m = r [(θ_C − θ_m) − (1 − i)(sin θ_C − sin θ_m)].
+
+    Eq. 10 with its integral ended at θ_m instead of at θ = 0.
+
+    Parameters
+    ----------
+    contact_angle_rad
+        Contact angle θ_C [rad].
+    slip
+        Slip i [1].
+    wheel
+        Wheel; its radius r [m] is used.
+
+    Returns
+    -------
+    Array
+        Shear displacement j_m [m]; negative for a wheel that is dragged.
+    """
     at = contact_angle_rad / 2
     return wheel.radius_m * (contact_angle_rad - at - (1 - slip) * (np.sin(contact_angle_rad) - np.sin(at)))
 
 
-def peak_stresses(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> tuple[Array, Array]:
-    """Return normal and shear stress at θ_m [Pa] (pressure–sinkage; Eq. 1).
+def mobilised_share(displacement_m: Array, soil: AnySoil) -> Array:
+    """Return the mobilised share of the shear strength: sign(j) (1 − e^(−|j|/K)) (Janosi and Hanamoto [3]_).
 
-    A wheel that is dragged (j_m < 0) shears the soil the other way: Eq. 1 is continued as an odd function.
+    Parameters
+    ----------
+    displacement_m
+        Shear displacement j [m]. For j < 0 (a dragged wheel) the law is continued as an odd function.
+    soil
+        Soil; its shear deformation modulus K [m] is used.
+
+    Returns
+    -------
+    Array
+        Share of the strength [1], between −1 and 1.
     """
-    sinkage_m = wheel.radius_m * (np.cos(contact_angle_rad / 2) - np.cos(contact_angle_rad))
-    stiffness = 1000 * (soil.k_c_kN / wheel.width_m + soil.k_phi_kN)
-    normal = stiffness * sinkage_m**soil.sinkage_exponent
-    displacement = shear_displacement(contact_angle_rad, slip, wheel)
-    mobilised = -np.sign(displacement) * np.expm1(-np.abs(displacement) / soil.shear_modulus_m)
-    strength = soil.cohesion_Pa + normal * np.tan(np.radians(soil.friction_angle_deg))
-    return normal, strength * mobilised
+    return -np.sign(displacement_m) * np.expm1(-np.abs(displacement_m) / soil.shear_modulus_m)
+
+
+def shear_strength(normal_Pa: Array, soil: AnySoil) -> Array:
+    """Return the Mohr–Coulomb shear strength: c + σ tan φ.
+
+    Parameters
+    ----------
+    normal_Pa
+        Normal stress σ [Pa].
+    soil
+        Soil; cohesion c [Pa] and friction angle φ [°].
+
+    Returns
+    -------
+    Array
+        Shear strength [Pa].
+    """
+    return soil.cohesion_Pa + normal_Pa * np.tan(np.radians(soil.friction_angle_deg))
+
+
+def peak_stresses(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> tuple[Array, Array]:
+    """Return the peak normal and shear stress; the shear stress is Eq. 1 at θ_m: τ_m = (c + σ_m tan φ)(1 − e^(−j_m/K)).
+
+    Parameters
+    ----------
+    contact_angle_rad
+        Contact angle θ_C [rad].
+    slip
+        Slip i [1].
+    wheel, soil
+        As in `peak_normal_stress` and `shear_displacement`.
+
+    Returns
+    -------
+    tuple of Array
+        σ_m [Pa] and τ_m [Pa].
+    """
+    normal = peak_normal_stress(contact_angle_rad, wheel, soil)
+    mobilised = mobilised_share(shear_displacement(contact_angle_rad, slip, wheel), soil)
+    return normal, shear_strength(normal, soil) * mobilised
 
 
 def carried_load(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> Array:
-    """Return the load that the contact carries [N] (Eq. 6)."""
+    """Return the load that the contact carries (Eq. 6).
+
+    W = r w / θ_C [c θ_C − 2 σ_m (1 + cos θ_C − 2 cos θ_m) − 2 τ_m (sin θ_C − 2 sin θ_m) − 2 c sin θ_m]
+
+    Parameters
+    ----------
+    contact_angle_rad
+        Contact angle θ_C [rad], positive.
+    slip
+        Slip i [1].
+    wheel, soil
+        As in `peak_stresses`.
+
+    Returns
+    -------
+    Array
+        Load W normal to the ground [N].
+    """
     theta, half = contact_angle_rad, contact_angle_rad / 2
     normal, shear = peak_stresses(theta, slip, wheel, soil)
-    # 1 + cos θ − 2 cos(θ/2) = −4 cos(θ/2) sin²(θ/4), which keeps its digits at small angles.
+    # 1 + cos θ − 2 cos(θ/2) is written as −4 cos(θ/2) sin²(θ/4): no cancellation of digits at small angles.
     bracket = (
         soil.cohesion_Pa * (theta - 2 * np.sin(half))
         + 8 * normal * np.cos(half) * np.sin(theta / 4) ** 2
@@ -65,19 +198,47 @@ def carried_load(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: AnyS
 
 
 def wheel_torque(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> Array:
-    """Return the torque at the wheel [N·m] (Eq. 7)."""
+    """Return the torque that the soil's shear stress opposes to the wheel (Eq. 7): T = ½ (τ_m + c/2) r² w θ_C.
+
+    Parameters
+    ----------
+    contact_angle_rad
+        Contact angle θ_C [rad].
+    slip
+        Slip i [1].
+    wheel, soil
+        As in `peak_stresses`.
+
+    Returns
+    -------
+    Array
+        Torque T at the wheel [N·m].
+    """
     _, shear = peak_stresses(contact_angle_rad, slip, wheel, soil)
     return 0.5 * (shear + soil.cohesion_Pa / 2) * wheel.radius_m**2 * wheel.width_m * contact_angle_rad
 
 
 def contact_angle(load_N: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> Array:
-    """Return the contact angle at which the soil carries the load [rad]: the inverse of Eq. 6.
+    """Return the contact angle at which the soil carries a load: Eq. 6 (`carried_load`) solved for θ_C.
 
-    NaN where the load is not positive, or would bury the wheel to its axle.
+    Parameters
+    ----------
+    load_N
+        Load W normal to the ground [N].
+    slip
+        Slip i [1].
+    wheel, soil
+        As in `peak_stresses`.
+
+    Returns
+    -------
+    Array
+        Contact angle θ_C [rad]; NaN where the load is not positive, is more than the soil carries at
+        `LARGEST_CONTACT_ANGLE_RAD`, or where load or slip is NaN.
 
     Notes
     -----
-    Load grows nearly as a power of the angle, so a secant in logarithms converges in a few steps.
+    Secant method on ln W against ln θ_C: the load is nearly a power of the angle, so it converges in a few steps.
     """
     load = np.asarray(load_N, np.float64)
     slip = np.asarray(slip, np.float64)
@@ -85,25 +246,30 @@ def contact_angle(load_N: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> Ar
         np.full(np.broadcast_shapes(load.shape, slip.shape), LARGEST_CONTACT_ANGLE_RAD), slip, wheel, soil
     )
     with np.errstate(invalid="ignore"):
-        known = (load > 0) & (load <= most) & np.isfinite(slip)
-    # What has no answer is solved for a load that has one, and blanked afterwards.
+        solvable = (load > 0) & (load <= most) & np.isfinite(slip)
+    # Elements without a solution are solved for 1 N at no slip, and set to NaN afterwards.
     slip = np.where(np.isfinite(slip), slip, 0.0)
-    wanted = np.log(np.where(known, load, 1.0))
+    log_load = np.log(np.where(solvable, load, 1.0))
+    log_angle = _solve_log_angle(log_load, slip, wheel, soil)
+    return np.where(solvable, np.exp(log_angle), np.nan)
+
+
+def _solve_log_angle(log_load: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> Array:
+    """Return ln θ_C for ln W, by the secant method from θ_C = 0.2 and 0.3 rad."""
 
     def excess(log_angle: Array) -> Array:
-        return np.log(carried_load(np.exp(log_angle), slip, wheel, soil)) - wanted
+        return np.log(carried_load(np.exp(log_angle), slip, wheel, soil)) - log_load
 
-    before = np.full(known.shape, np.log(0.2))
-    now = np.full(known.shape, np.log(0.3))
+    before, now = np.full(log_load.shape, np.log(0.2)), np.full(log_load.shape, np.log(0.3))
     excess_before, excess_now = excess(before), excess(now)
-    for _ in range(30):
+    for _ in range(_MAX_ITERATIONS):
         moved = now - before
         rise = excess_now - excess_before
-        # A secant that stands still has arrived; where the slope is lost to rounding, so has it.
+        # An element has converged where its last step was zero, or too small for a slope: it stays.
         step = np.divide(-excess_now * moved, rise, out=np.zeros_like(moved), where=np.abs(rise) > 1e-15)
         before, excess_before = now, excess_now
         now = np.minimum(now + np.clip(step, -1, 1), np.log(LARGEST_CONTACT_ANGLE_RAD))
         excess_now = excess(now)
-        if not step.size or np.max(np.abs(step)) < 1e-13:
+        if not step.size or np.max(np.abs(step)) < _TOLERANCE:
             break
-    return np.where(known, np.exp(now), np.nan)
+    return now

@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from regolithd.calibration.drivetrain.torque import motor_current
-from regolithd.calibration.terrain.wheel_loads import GRAVITY_M_S2, wheel_loads
+from regolithd.calibration.parameters import GRAVITY_M_S2
+from regolithd.calibration.terrain.wheel_loads import wheel_loads
 from regolithd.calibration.terrain.wheel_soil import contact_angle, wheel_torque
 from regolithd.daemon.simulator.scenario import Scenario
 from regolithd.daemon.simulator.spatial_noise import Drops, Wander

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.drivetrain.bench.efficiency import Efficiency, fit_efficiency
 from regolithd.calibration.drivetrain.bench.line import BenchError, Line, fit_line
+from regolithd.calibration.parameters import GRAVITY_M_S2
 
 Array = NDArray[np.float64]
-
-GRAVITY_M_S2 = 9.80665
 
 LOAD_CELLS = """\
 Load cells: zero and span of one wheel's cell.

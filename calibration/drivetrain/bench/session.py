@@ -13,7 +13,7 @@ from regolithd.calibration.drivetrain.bench.line import BenchError
 from regolithd.calibration.drivetrain.bench.plot import Braked, Fit, draw, draw_brake, draw_radius
 from regolithd.calibration.drivetrain.bench.toml_edit import set_value
 from regolithd.calibration.mismatch.data.recording import read_recording
-from regolithd.calibration.parameters import Drivetrain, LoadCells
+from regolithd.calibration.parameters import GRAVITY_M_S2, Drivetrain, LoadCells
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -49,7 +49,7 @@ def load_cells(recording: Path, config: Path, plot: Path | None) -> Written:
             f"wheel {wheel}: zero {found.zero_N:.2f} ± {found.zero_std_N:.2f} N, "
             f"span {found.span:.4f} ± {found.span_std:.4f}"
         )
-        drawn[wheel] = (weight * procedures.GRAVITY_M_S2, reading, found.line)
+        drawn[wheel] = (weight * GRAVITY_M_S2, reading, found.line)
     if plot:
         draw(plot, drawn, "known load [N]", "reading [N]")
     return Written(_edited(text, "load_cells", values), says)

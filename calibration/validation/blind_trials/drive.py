@@ -150,6 +150,7 @@ def temperatures(rng: Generator, t_s: Array) -> Array:
 
 def loads(rng: Generator, t_s: Array, pitch: Array, roll: Array, mass_kg: float) -> Array:
     """Return the six wheels' loads [N], (n, 6): weight, its shift on slopes, and stones under the wheels."""
+    # 9.81, not the solver's 9.80665: a change would alter the recordings of every seed.
     share = mass_kg * 9.81 / 6 * (1 + np.clip(rng.normal(0, 0.08, 6), -0.2, 0.2))
     shift = -rng.uniform(0.8, 1.3) * pitch[:, None] * FORE_AFT - rng.uniform(0.6, 1.1) * roll[:, None] * LEFT
     stones = rng.uniform(0.05, 0.09) * coloured(rng, (len(t_s), 6), t_s[1] - t_s[0], rng.uniform(0.8, 3.0))

@@ -24,7 +24,7 @@ from regolithd.calibration.paper.least_squares import least_squares
 from regolithd.calibration.parameters import SOILS, Drivetrain, Wheel
 from regolithd.calibration.posterior import simulated_rovers as simulation
 from regolithd.calibration.posterior.window import CalibrationUncertainty, reduce_windows
-from regolithd.calibration.terrain.soils import ANGLE_SPREAD_DEG, SPREAD
+from regolithd.calibration.terrain.soils import ANGLE_STD_DEG, LOG_STD
 from regolithd.calibration.terrain.wheel_soil import contact_angle, shear_displacement
 
 if TYPE_CHECKING:
@@ -189,6 +189,6 @@ def coverage(found: Answers, prefix: str) -> dict[str, float]:
 def _believed_class(found: Answers) -> NDArray[np.intp]:
     """Return the class of Table 1 that the posterior's mean is nearest to, in its classes' own spread."""
     soils = list(SOILS.values())
-    cohesion = np.log(found.methods["posterior"][:, :1] / [soil.cohesion_Pa for soil in soils]) / SPREAD
+    cohesion = np.log(found.methods["posterior"][:, :1] / [soil.cohesion_Pa for soil in soils]) / LOG_STD
     angle = np.degrees(found.methods["posterior"][:, 1:2]) - [soil.friction_angle_deg for soil in soils]
-    return np.argmin(cohesion**2 + (angle / ANGLE_SPREAD_DEG) ** 2, axis=1)
+    return np.argmin(cohesion**2 + (angle / ANGLE_STD_DEG) ** 2, axis=1)
