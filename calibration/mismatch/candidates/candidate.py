@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.simulation.problem import Problem
 
 Array = NDArray[np.float64]
-AGREES = 0.02
+SHAPE_TOLERANCE = 0.02
 """Share by which a coefficient and the same number in its column may differ."""
-UNLIKELY = 9.2
+UNLIKELY_SHAPE_PENALTY = 9.2
 """What a shape costs against which the odds are a hundred to one: twice the logarithm of that."""
 Shape = dict[str, float | str]
 """Values of the shape parameters (an onset, an order, a Stribeck speed): what enters nonlinearly."""
@@ -67,32 +67,32 @@ class Candidate:
         """Return the grid of shapes that is searched."""
         return [{}]
 
-    def reluctance(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
+    def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
         """Return what this shape costs where it contradicts what was stated, or says no more than a plainer name."""
         return 0.0
 
-    def settled(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002
+    def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002
         """Return the shape that agrees with its fitted coefficients, where a law is not linear in them."""
         return shape
 
-    def growths(self, problem: Problem) -> Sequence[Shape]:
+    def onset_profiles(self, problem: Problem) -> Sequence[Shape]:
         """Return the ways to grow after an onset: every shape but for its onset."""
         found = {tuple(sorted((k, v) for k, v in s.items() if k != "onset_s")) for s in self.shapes(problem)}
         return [dict(growth) for growth in sorted(found, key=str)]
 
-    def tried(self, problem: Problem) -> float:
+    def shape_count(self, problem: Problem) -> float:
         """Return how many different shapes were open to choice: what a choice among them must be paid for."""
         return max(len(self.shapes(problem)), 1)
 
-    def seek(self, problem: Problem, residual: Array) -> Sequence[Shape]:  # noqa: ARG002
+    def propose_shapes(self, problem: Problem, residual: Array) -> Sequence[Shape]:  # noqa: ARG002
         """Return further shapes that a residual suggests, where a grid would be too fine to search blindly."""
         return []
 
-    def memory_at(self, problem: Problem, residual: Array, shape: Shape) -> float:  # noqa: ARG002
+    def autocorrelation_time_at(self, problem: Problem, residual: Array, shape: Shape) -> float:  # noqa: ARG002
         """Return how many readings count as one for this shape's columns; infinite where only the long run is known."""
         return float("inf")
 
-    def evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array] | None:  # noqa: ARG002
+    def own_channel_evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array] | None:  # noqa: ARG002
         """Return what the fault's own channel says, for each wheel: the gain there and the coefficient; or nothing."""
         return None
 
@@ -110,12 +110,12 @@ class Candidate:
         return {**found, **{name: float(shape[name]) for name in self.free if name in shape}}
 
 
-def onsets(problem: Problem, count: int = 24) -> list[float]:
+def onset_grid(problem: Problem, count: int = 24) -> list[float]:
     """Return times at which something may begin [s]: evenly spread, not within 3 % of either end."""
     return [float(t) for t in problem.length_s * np.linspace(0.03, 0.95, count)]
 
 
-def since(problem: Problem, onset_s: float, rise_s: float) -> Array:
+def growth_since(problem: Problem, onset_s: float, rise_s: float) -> Array:
     """Return growth from 0 at the onset, shape (time, 1): a step (rise 0), an approach to 1, or a ramp (rise inf)."""
     after = np.maximum(problem.time_s - onset_s, 0.0)
     if rise_s == 0:

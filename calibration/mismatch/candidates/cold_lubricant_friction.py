@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.candidate import UNLIKELY, Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.candidate import (
+    UNLIKELY_SHAPE_PENALTY,
+    Array,
+    Candidate,
+    Coefficient,
+    Shape,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -50,9 +56,9 @@ class ColdLubricantFriction(Candidate):
             found += [{"power": power, "no_drag_above_degC": end} for end in (*ends, top + 20)]
         return found
 
-    def reluctance(self, problem: Problem, shape: Shape) -> float:
+    def prior_penalty(self, problem: Problem, shape: Shape) -> float:
         """Charge a drag that no wheel's own temperature changes: Coulomb and viscous friction are the plainer names."""
-        return 0.0 if problem.changes_within(self._growth(problem, shape)) else UNLIKELY
+        return 0.0 if problem.changes_within(self._growth(problem, shape)) else UNLIKELY_SHAPE_PENALTY
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return g(T) sign(ω)|ω|^p; g is 1 at the coldest that was driven."""

@@ -62,7 +62,7 @@ class LoadCellDrift(Candidate):
             total += weight * self._simulated(problem, here)
         return total[None]
 
-    def evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array]:  # noqa: ARG002
+    def own_channel_evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array]:  # noqa: ARG002
         """Return, for each wheel, what this drift explains of its own cell's reading, and how large it is there."""
         key = ("drift seen by the cell", 0.0)
         if key not in problem.made:

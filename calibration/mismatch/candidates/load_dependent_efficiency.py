@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.candidate import AGREES, UNLIKELY, Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.candidate import (
+    SHAPE_TOLERANCE,
+    UNLIKELY_SHAPE_PENALTY,
+    Array,
+    Candidate,
+    Coefficient,
+    Shape,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -39,18 +46,18 @@ class LoadDependentEfficiency(Candidate):
         bent: list[Shape] = [{"bent": b} for b in (-0.2, 0.0, 0.3)]
         return [*curved, *light, *bent]
 
-    def settled(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
+    def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
         """Bend the current by the fitted loss, as far as the gears keep a third of their efficiency."""
         if "bent" not in shape:
             return shape
         above = self._relative(problem)[problem.mask] - 1
         least, most = 2 / 3 / min(float(np.min(above)), -1e-9), 2 / 3 / max(float(np.max(above)), 1e-9)
         bent = float(np.clip(values[0], least, most))
-        return shape if abs(bent - float(shape["bent"])) <= AGREES * abs(bent) else {"bent": bent}
+        return shape if abs(bent - float(shape["bent"])) <= SHAPE_TOLERANCE * abs(bent) else {"bent": bent}
 
-    def reluctance(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
+    def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
         """Charge a loss in proportion: it is the stated gain far outside its own doubt."""
-        return UNLIKELY if shape.get("power") == 0.0 else 0.0
+        return UNLIKELY_SHAPE_PENALTY if shape.get("power") == 0.0 else 0.0
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the loss as a multiple of the prediction."""

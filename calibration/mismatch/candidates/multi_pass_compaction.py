@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.candidate import UNLIKELY, Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.candidate import (
+    UNLIKELY_SHAPE_PENALTY,
+    Array,
+    Candidate,
+    Coefficient,
+    Shape,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,9 +54,9 @@ class MultiPassCompaction(Candidate):
         ways += ["soil"] if {"shear_factor", "cohesion_Pa"} <= {*problem.simulation.variants(), *problem.values} else []
         return [{"kept": kept, "leads": lead, "by": way} for kept in (0.0, 0.5, 1.0) for lead in leads for way in ways]
 
-    def reluctance(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
+    def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
         """Charge three numbers for a rut where mostly one will do."""
-        return UNLIKELY if shape["by"] == "soil" else 0.0
+        return UNLIKELY_SHAPE_PENALTY if shape["by"] == "soil" else 0.0
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the prediction (or its answer to stiffer soil) times what the passes before have done."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, onsets
+from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, onset_grid
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -38,9 +38,9 @@ class SoilTransition(Candidate):
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """At each of many times: under all wheels at once, or where each wheel comes to the border in its turn."""
-        return [{"onset_s": t, **way} for t in onsets(problem, 40) for way in self.growths(problem)]
+        return [{"onset_s": t, **way} for t in onset_grid(problem, 40) for way in self.onset_profiles(problem)]
 
-    def growths(self, problem: Problem) -> Sequence[Shape]:
+    def onset_profiles(self, problem: Problem) -> Sequence[Shape]:
         """At once everywhere, or along the way: at a line, or over half a metre."""
         everywhere: Shape = {"along": "time", "of": "strength"}
         if "place" not in problem.covariates:

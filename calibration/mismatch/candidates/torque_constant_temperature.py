@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.candidate import AGREES, UNLIKELY, Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.candidate import (
+    SHAPE_TOLERANCE,
+    UNLIKELY_SHAPE_PENALTY,
+    Array,
+    Candidate,
+    Coefficient,
+    Shape,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,16 +41,18 @@ class TorqueConstantTemperature(Candidate):
         middle = float(np.nanmean(problem.covariates["temperature"][problem.mask]))
         return [{"reference_degC": t, "bent_per_K": 0.0} for t in (25.0, 20.0, 0.0, middle)]
 
-    def settled(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
+    def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
         """Bend the column by the coefficient that was fitted to it, as far as the magnets keep a third."""
         warmest = float(np.max(self._warmer(problem, shape)[problem.mask]))
         most = 2 / 3 / warmest if warmest > 0 else np.inf
         bent = float(np.clip(values[0], 0.0, most))
-        return shape if abs(bent - float(shape["bent_per_K"])) < AGREES * bent else {**shape, "bent_per_K": bent}
+        return (
+            shape if abs(bent - float(shape["bent_per_K"])) < SHAPE_TOLERANCE * bent else {**shape, "bent_per_K": bent}
+        )
 
-    def reluctance(self, problem: Problem, shape: Shape) -> float:
+    def prior_penalty(self, problem: Problem, shape: Shape) -> float:
         """Charge a factor that no wheel's own temperature changes: that is a gain that was stated wrongly."""
-        return 0.0 if problem.changes_within(self._warmer(problem, shape)) else UNLIKELY
+        return 0.0 if problem.changes_within(self._warmer(problem, shape)) else UNLIKELY_SHAPE_PENALTY
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return (T − T_0)/(1 − α (T − T_0)) times the prediction, for the α that bends it."""

@@ -40,7 +40,7 @@ class WheelAngleRipple(Candidate):
         """None: orders are sought in the residual, where thousands can be tried at once."""
         return []
 
-    def tried(self, problem: Problem) -> float:
+    def shape_count(self, problem: Problem) -> float:
         """Return the number of lines that the angle turned can resolve, of each kind.
 
         And ten times as many: of sums of twelve squares the largest is larger than two logarithms allow.
@@ -48,7 +48,7 @@ class WheelAngleRipple(Candidate):
         turns = float(np.ptp(problem.covariates["wheel_angle"])) / (2 * np.pi)
         return max(10 * 3 * HIGHEST_ORDER * turns, 1.0)
 
-    def seek(self, problem: Problem, residual: Array) -> Sequence[Shape]:
+    def propose_shapes(self, problem: Problem, residual: Array) -> Sequence[Shape]:
         """Return the strongest order of each kind, as a sine and with its overtone.
 
         The residual is summed over angle bins, and its spectrum taken.
@@ -93,15 +93,18 @@ class WheelAngleRipple(Candidate):
             return problem.covariates["direction"]
         return np.ones(problem.mask.shape) if kind == "torque" else problem.filled / problem.mean_size
 
-    def memory_at(self, problem: Problem, residual: Array, shape: Shape) -> float:
+    def autocorrelation_time_at(self, problem: Problem, residual: Array, shape: Shape) -> float:
         """Return the noise's power around this order, over that of white noise: lines stand out of their neighbours.
 
         It is the louder one's of torque and drag, so that no kind of ripple is preferred for its estimate.
         """
         kinds = ("drag", "torque") if "direction" in problem.covariates else ("torque",)
-        return max(self._memory(problem, residual * self._base(problem, kind), float(shape["order"])) for kind in kinds)
+        return max(
+            self._autocorrelation_time(problem, residual * self._base(problem, kind), float(shape["order"]))
+            for kind in kinds
+        )
 
-    def _memory(self, problem: Problem, weighted: Array, at: float) -> float:
+    def _autocorrelation_time(self, problem: Problem, weighted: Array, at: float) -> float:
         order, power = self._spectrum(problem, weighted)
         above = order - at
         # Slow noise has more power at lower orders: the louder side counts.

@@ -178,7 +178,7 @@ def _survives(search: Search, named: Fit, rival: Fit, others: Sequence[Term], te
     own = rival.terms[-1]
     candidate, shape = own.group.candidate, own.group.shape
     # What speaks against a rival beforehand is not what the recording says against it.
-    beforehand = candidate.reluctance(search.dictionary.problem, shape) if candidate else 0.0
+    beforehand = candidate.prior_penalty(search.dictionary.problem, shape) if candidate else 0.0
     lead = max(search.score(named) - search.score(rival) - beforehand - SLACK, 0.0)
     block, reach = search.beside((*others, term), own)
     values = rival.coefficients[rival.of_term(len(rival.terms) - 1)]

@@ -199,7 +199,7 @@ def _onset_bounds(search: Search, fit: Fit, index: int) -> tuple[float, float]:
     problem = search.dictionary.problem
     at, length = float(shape["onset_s"]), problem.length_s
     # How it grew after its onset is not known either: at each onset the best growth counts.
-    ways_to_grow = candidate.growths(problem)
+    ways_to_grow = candidate.onset_profiles(problem)
 
     def gain(onset_s: float) -> float:
         return max(profile({**growth, "onset_s": onset_s}) for growth in ways_to_grow)

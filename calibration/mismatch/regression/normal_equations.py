@@ -69,7 +69,7 @@ def add_candidate(
     """Add a candidate in each of these shapes; `quieter` says where there is less noise than in the long run."""
     problem, made, columns = dictionary.problem, [], []
     start = len(dictionary.columns)
-    price = 2 * float(np.log(candidate.tried(problem)))
+    price = 2 * float(np.log(candidate.shape_count(problem)))
     for shape, less in zip(shapes, quieter or [1.0] * len(shapes), strict=True):
         found = np.asarray(candidate.columns(problem, shape), np.float64)
         places = tuple(range(start, start + len(found)))
@@ -77,7 +77,7 @@ def add_candidate(
         columns += list(found)
         signs = tuple(c.sign for c in candidate.coefficients[: len(found)])
         signs += (0,) * (len(found) - len(signs))
-        paid = price + candidate.reluctance(problem, shape)
+        paid = price + candidate.prior_penalty(problem, shape)
         made.append(
             Group(
                 candidate.name,
@@ -88,7 +88,7 @@ def add_candidate(
                 candidate,
                 shape,
                 quieter=less,
-                evidence=candidate.evidence(problem, shape),
+                evidence=candidate.own_channel_evidence(problem, shape),
                 alive=np.any(np.where(problem.mask, found, 0.0) != 0, axis=1) if len(found) > 1 else None,
             )
         )

@@ -90,8 +90,10 @@ def seek_in_residual(search: Search, candidates: Sequence[Candidate], terms: Ite
     counts = np.maximum(problem.mask.sum(axis=0), 1)
     memory = float(np.median(counts / np.maximum(search.weights * np.sum(residual**2, axis=0), 1e-300)))
     for candidate in candidates:
-        if shapes := candidate.seek(problem, residual):
-            quieter = [max(memory / candidate.memory_at(problem, residual, shape), 1.0) for shape in shapes]
+        if shapes := candidate.propose_shapes(problem, residual):
+            quieter = [
+                max(memory / candidate.autocorrelation_time_at(problem, residual, shape), 1.0) for shape in shapes
+            ]
             add_candidate(search.dictionary, candidate, shapes, quieter)
     add_beat(search.dictionary, residual)
     search.refresh()

@@ -96,7 +96,7 @@ def _settled(search: Search, others: Sequence[Term], term: Term) -> Term:
         fit = search.fit((*others, term))
         scale = search.dictionary.scale[list(term.group.columns)]
         values = fit.coefficients[fit.of_term(len(others))] / scale
-        settled = candidate.settled(search.dictionary.problem, term.group.shape, values.tolist())
+        settled = candidate.self_consistent_shape(search.dictionary.problem, term.group.shape, values.tolist())
         if settled == term.group.shape:
             break
         term = _reshaped(search, term, settled)

@@ -48,7 +48,7 @@ def test_a_candidate_tells_what_it_is_and_has_finite_columns(candidate: Candidat
     """Equation, words, signature, experiment and source; columns of the recording's shape, a coefficient each."""
     for told in (candidate.equation, candidate.words, candidate.signature, candidate.experiment, candidate.source):
         assert len(told) > 5
-    shapes = [*candidate.shapes(problem), *candidate.seek(problem, np.where(problem.mask, 0.001, 0.0))]
+    shapes = [*candidate.shapes(problem), *candidate.propose_shapes(problem, np.where(problem.mask, 0.001, 0.0))]
     assert shapes or not candidate.applies(problem)
     for shape in shapes[:: max(1, len(shapes) // 5)]:
         columns = candidate.columns(problem, shape)
@@ -73,10 +73,10 @@ def test_a_temperature_that_no_wheel_changes_is_no_reason_to_call_friction_cold(
     kept = replace(problem, covariates={**problem.covariates, "temperature": steady})
     by_name = {c.name: c for c in library()}
     cold, magnets = by_name["cold-lubricant-friction"], by_name["torque-constant-temperature"]
-    assert all(cold.reluctance(kept, shape) > 5 for shape in cold.shapes(kept))
-    assert all(magnets.reluctance(kept, shape) > 5 for shape in magnets.shapes(kept))
-    assert any(cold.reluctance(problem, shape) == 0 for shape in cold.shapes(problem))
-    assert any(magnets.reluctance(problem, shape) == 0 for shape in magnets.shapes(problem))
+    assert all(cold.prior_penalty(kept, shape) > 5 for shape in cold.shapes(kept))
+    assert all(magnets.prior_penalty(kept, shape) > 5 for shape in magnets.shapes(kept))
+    assert any(cold.prior_penalty(problem, shape) == 0 for shape in cold.shapes(problem))
+    assert any(magnets.prior_penalty(problem, shape) == 0 for shape in magnets.shapes(problem))
     drag = [cold.columns(kept, shape)[0] for shape in cold.shapes(kept) if shape["power"] == 0.0]
     assert min(float(np.min(np.abs(d[kept.mask]))) for d in drag) > 0.5, "no grease loses its drag within a kelvin"
 
@@ -100,7 +100,7 @@ def test_a_torque_constant_is_bent_by_its_own_coefficient(problem: Problem, true
     for _ in range(6):
         column = np.where(cold.mask, candidate.columns(cold, shape)[0], 0.0)
         fitted = float(np.sum(column * effect) / np.sum(column**2))
-        shape = candidate.settled(cold, shape, [fitted])
+        shape = candidate.self_consistent_shape(cold, shape, [fitted])
     assert fitted == pytest.approx(true, rel=0.03)
 
 
@@ -113,7 +113,7 @@ def test_an_efficiency_that_falls_with_torque_bends_the_current(problem: Problem
     for _ in range(8):
         column = np.where(problem.mask, candidate.columns(problem, shape)[0], 0.0)
         fitted = float(np.sum(column * effect) / np.sum(column**2))
-        shape = candidate.settled(problem, shape, [fitted])
+        shape = candidate.self_consistent_shape(problem, shape, [fitted])
     assert fitted == pytest.approx(0.3, rel=0.05)
 
 
@@ -121,7 +121,9 @@ def test_no_ripple_is_sought_that_the_readings_cannot_tell_from_a_drag() -> None
     """At one speed a constant drag is the image of every ripple with a whole number of cycles between two readings."""
     steady = build_problem(recording(length_s=120.0, speed=0.4), simulation())
     candidate = next(c for c in library() if c.name == "wheel-angle-ripple")
-    cycles = [float(s["order"]) * 0.4 * 0.2 / (2 * np.pi) for s in candidate.seek(steady, 0.003 * steady.mask)]
+    cycles = [
+        float(s["order"]) * 0.4 * 0.2 / (2 * np.pi) for s in candidate.propose_shapes(steady, 0.003 * steady.mask)
+    ]
     assert max(cycles) <= 1 / 2.5
 
 
@@ -130,7 +132,7 @@ def test_a_ripple_is_found_whether_a_speed_is_of_the_instant_or_of_the_time_befo
     candidate = next(c for c in library() if c.name == "wheel-angle-ripple")
     summed = np.cumsum(problem.covariates["wheel_speed"], axis=0) * 0.2
     ripple = np.where(problem.mask, 0.004 * np.cos(16 * summed), 0.0)
-    shapes = [shape for shape in candidate.seek(problem, ripple) if shape["kind"] == "torque"]
+    shapes = [shape for shape in candidate.propose_shapes(problem, ripple) if shape["kind"] == "torque"]
     left = []
     for shape in shapes:
         columns = np.where(problem.mask, candidate.columns(problem, shape), 0.0).reshape(-1, ripple.size)
@@ -147,7 +149,7 @@ def test_a_slope_that_changes_slowly_does_not_take_a_drift_along() -> None:
     table["load_N"] = np.where(table["wheel"] == 2, table["load_N"] - 20 * share, table["load_N"])
     problem = build_problem(from_columns(table), simulation())
     candidate = next(c for c in library() if c.name == "load-cell-drift")
-    seen, _ = candidate.evidence(problem, {"relative_offset": 0.0}) or (np.zeros(6), None)
+    seen, _ = candidate.own_channel_evidence(problem, {"relative_offset": 0.0}) or (np.zeros(6), None)
     assert int(np.argmax(seen)) == 1
     assert seen[1] > 25
     assert np.all(np.delete(seen, 1) < 0.2 * seen[1])
