@@ -1,1 +1,1 @@
-"""The loop closed: a rover conceals an effect, the tool finds it, and the daemon reads the ground better."""
+"""End-to-end study: hide a drivetrain effect, find it by `mismatch`, correct `rover.toml`, compare the estimates."""

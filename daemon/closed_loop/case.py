@@ -1,7 +1,7 @@
-"""What is concealed in each run of the loop, and what its rover and its simulation are told.
+"""The cases of the study: which drivetrain effect is hidden, and what `rover.toml` and `SIM.toml` contain.
 
-A run has a world (the truth), a `rover.toml` (what the daemon knows) and a `SIM.toml` (what the simulation knows). The
-seed moves the size of what is concealed, and puts the world's gain and soil where the stated uncertainties allow.
+A case has a scenario (the ground truth), a `rover.toml` (the daemon's configuration) and a `SIM.toml` (the simulation's
+parameters). The seed draws the size of the hidden effect, and gain and soil within their stated uncertainties.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 NO_LOAD_A = 0.037
-"""Maxon RE 25: what turns the motor alone."""
+"""No-load current of the Maxon RE 25."""
 VISCOUS_A_S_PER_RAD = 4e-5
-SIZE_WITHIN = 0.15
+SIZE_SPREAD = 0.15
+"""The hidden effect's size is drawn within this fraction of its nominal value."""
 STATED_STD = 0.03
-"""How well gain, cohesion and friction angle are known before: relative."""
+"""Relative standard deviations of gain, cohesion and friction angle, as stated before the comparison."""
 NO_LOAD_STD_A = 0.001
-"""How well a wheels-up spin tells the no-load current."""
+"""Standard deviation of a no-load current from a wheels-up spin."""
 KNOWN_SOIL = "sandy-loam"
 OTHER_SOILS = ("lete-sand", "clayey-soil", "medium-soil")
 STRETCH_M = 4.5
@@ -32,7 +33,19 @@ STRETCH_M = 4.5
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One run. `hidden` names the drivetrain terms that neither `rover.toml` nor `SIM.toml` has, with their size."""
+    """One case.
+
+    Attributes
+    ----------
+    name, title
+        For figures and folders; for people.
+    known
+        Keys of `[drivetrain]` that `rover.toml` and `SIM.toml` contain.
+    hidden
+        Keys of `[drivetrain]` that only the scenario contains.
+    names
+        The effects that the comparison should name.
+    """
 
     name: str
     title: str
@@ -42,33 +55,33 @@ class Case:
 
 
 def cases(seed: int) -> tuple[Case, ...]:
-    """Return constant friction concealed, viscous friction concealed, and nothing."""
+    """Return the three cases: constant friction hidden, viscous friction hidden, nothing hidden."""
     random = np.random.default_rng([seed, 3])
-    constant, viscous = 1 + SIZE_WITHIN * random.uniform(-1, 1, 2)
+    constant, viscous = 1 + SIZE_SPREAD * random.uniform(-1, 1, 2)
     bench = {"no_load_current_A": NO_LOAD_A, "no_load_current_std_A": NO_LOAD_STD_A}
     return (
         Case(
             "coulomb",
-            "constant friction concealed",
+            "constant friction hidden",
             {},
             {"no_load_current_A": NO_LOAD_A * constant},
             ("coulomb-friction",),
         ),
         Case(
             "viscous",
-            "viscous friction concealed",
+            "viscous friction hidden",
             bench,
             {"viscous_current_A_s_per_rad": VISCOUS_A_S_PER_RAD * viscous},
             ("viscous-friction",),
         ),
-        Case("nothing", "nothing concealed", bench, {}, ()),
+        Case("nothing", "nothing hidden", bench, {}, ()),
     )
 
 
-def world(case: Case, seed: int) -> Scenario:
-    """Return the world of the first drive: one known soil, gentle slopes up and down.
+def first_scenario(case: Case, seed: int) -> Scenario:
+    """Return the scenario of the first drive: one known soil, slopes of a few degrees.
 
-    The wheel–soil model has no weight along the slope, so the world has none here: one thing is concealed at a time.
+    The wheel–soil model has no grade resistance, so it is 0 here: only the case's effect is hidden.
     """
     moved = np.clip(np.random.default_rng([seed, 4]).standard_normal(3), -2, 2) * STATED_STD + 1
     stated = SOILS[KNOWN_SOIL]
@@ -88,8 +101,8 @@ def world(case: Case, seed: int) -> Scenario:
     )
 
 
-def elsewhere(first: Scenario, stretch_m: float = STRETCH_M) -> Scenario:
-    """Return the world of the second drive: the same rover on soils that the first has not."""
+def second_scenario(first: Scenario, stretch_m: float = STRETCH_M) -> Scenario:
+    """Return the scenario of the second drive: the same rover on three other soils, `stretch_m` each."""
     ends = [stretch_m * (k + 1) for k in range(len(OTHER_SOILS) - 1)]
     stretches = tuple(
         Stretch(soil=SOILS[name], until_m=end) for name, end in zip(OTHER_SOILS, [*ends, None], strict=True)
@@ -99,15 +112,15 @@ def elsewhere(first: Scenario, stretch_m: float = STRETCH_M) -> Scenario:
 
 
 def rover_toml(case: Case) -> str:
-    """Return what the daemon is told."""
+    """Return the daemon's configuration."""
     return "\n".join(
         [
-            "# The virtual rover, as its daemon knows it before the comparison.",
+            "# Configuration of the virtual rover before the comparison.",
             "[nodes]",
             "inclinometer = 21",
             "ground_speed = 22",
             "",
-            "[drivetrain]                # Eq. 11 has the defaults' constants",
+            "[drivetrain]                # constants of Eq. 11: the defaults",
             f"gain_relative_std = {STATED_STD}",
             *(f"{name} = {value}" for name, value in case.known.items()),
             "",
@@ -116,7 +129,7 @@ def rover_toml(case: Case) -> str:
 
 
 def sim_toml(case: Case) -> str:
-    """Return what the simulation is told: the same drivetrain, and the known soil."""
+    """Return the simulation's parameters: the same drivetrain, and the known soil."""
     soil = SOILS[KNOWN_SOIL].model_dump() | {
         "cohesion_relative_std": STATED_STD,
         "friction_angle_relative_std": STATED_STD,

@@ -1,4 +1,4 @@
-"""One picture of the loop: a row for each run – what was concealed and found, and the ground read before and after."""
+"""Draw the study: one row for each case, with drag current, estimates before and after, and errors."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from regolithd.calibration.drivetrain.torque import no_load_current
 from regolithd.calibration.parameters import SOILS, Drivetrain
 from regolithd.daemon.closed_loop.case import OTHER_SOILS
-from regolithd.daemon.closed_loop.reading import UNITS, figures
-from regolithd.daemon.closed_loop.summary import concealed, found
+from regolithd.daemon.closed_loop.soil_estimates import UNITS, figures
+from regolithd.daemon.closed_loop.summary import found_effect, hidden_effect
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from regolithd.daemon.closed_loop.close import Closed
-    from regolithd.daemon.closed_loop.reading import Reading
+    from regolithd.daemon.closed_loop.run import LoopResult
+    from regolithd.daemon.closed_loop.soil_estimates import SoilEstimates
 
 TRUTH, BEFORE, AFTER = "#1a1a1a", "#8c96a0", "#c0392b"
 STYLE: Any = {
@@ -36,31 +36,31 @@ STYLE: Any = {
 }
 SPEEDS_RAD_S = np.linspace(0.0, 0.45, 50)
 HIGHEST, HIGHEST_ERROR = (12.5, 45.0), (6.8, 12.5)
-"""Of the axes of cohesion [kPa] and friction angle [°]."""
+"""Upper limits of the axes for cohesion [kPa] and friction angle [°]."""
 POINTS = 100
-"""Of a trace: as many as the eye tells apart, since a window of 10 s moves little from one half second to the next."""
+"""Points of a trace: a window of 10 s changes little from one half second to the next."""
 SYMBOLS = (("c", "kPa"), ("φ", "°"))
-TITLE = "Friction concealed in the drivetrain, found by one drive on a known soil – then the same rover on other soils"
+TITLE = "Friction hidden in the drivetrain, found by one drive on a known soil – then the same rover on other soils"
 CAPTION = (
     "Lines: posterior mean of the last 10 s, six wheels; bands: its 90 % interval, wide for φ because one torque does "
     "not tell c and φ apart. Errors: rms while the window is on one soil.\nThe paper's network does not gain: it was "
-    "trained on 50–100 mA, all of it soil, and less current lies outside what it knows."
+    "trained on 50–100 mA, all of it from soil, and less current lies outside its training range."
 )
 
 
-def draw(runs: Sequence[Closed], path: Path) -> None:
-    """Draw the runs, one below the other; the same numbers give the same bytes."""
+def draw(runs: Sequence[LoopResult], path: Path) -> None:
+    """Draw the cases, one below the other; equal results give equal bytes."""
     with mpl.rc_context(STYLE):
         made = Figure(figsize=(16, 1.5 + 2.6 * len(runs)), layout="constrained")
         made.suptitle(TITLE, x=0.008, ha="left", fontsize=14, fontweight="bold")
         rows = made.subfigures(len(runs), 1, squeeze=False)[:, 0]
-        for closed, row in zip(runs, rows, strict=True):
-            row.suptitle(_headline(closed), x=0.008, ha="left", fontsize=11.5)
+        for result, row in zip(runs, rows, strict=True):
+            row.suptitle(_headline(result), x=0.008, ha="left", fontsize=11.5)
             panels = row.subplots(1, 5, width_ratios=(0.85, 1.9, 1.9, 0.8, 0.8))
-            _drag(panels[0], closed)
+            _drag(panels[0], result)
             for k, label in enumerate(("cohesion c [kPa]", "friction angle φ [°]")):
-                _trace(panels[1 + k], closed, k, label)
-                _errors(panels[3 + k], closed, k)
+                _trace(panels[1 + k], result, k, label)
+                _errors(panels[3 + k], result, k)
             panels[0].legend(fontsize=8.5, loc="lower right")
             panels[1].legend(fontsize=8.5, loc="upper left", ncols=3)
         rows[0].axes[3].legend(fontsize=8.5, loc="upper right")
@@ -69,65 +69,67 @@ def draw(runs: Sequence[Closed], path: Path) -> None:
         made.savefig(path, dpi=130, metadata={"Date": None} if path.suffix == ".svg" else {})
 
 
-def _headline(closed: Closed) -> str:
-    """Return what happened, in one line."""
-    if not closed.names:
-        return f"Concealed: {concealed(closed)}.   Found: {found(closed)}.   rover.toml stays as it was."
-    before, after = figures(closed.before), figures(closed.after)
+def _headline(result: LoopResult) -> str:
+    """Return hidden effect, named effects and errors in one line."""
+    if not result.names:
+        return f"Hidden: {hidden_effect(result)}.   Found: {found_effect(result)}.   rover.toml unchanged."
+    before, after = figures(result.before), figures(result.after)
     errors = ", ".join(
         f"{symbol} {before[f'posterior_rmse_{name}']:.1f} → {after[f'posterior_rmse_{name}']:.1f} {unit}"
         for name, (symbol, unit) in zip(UNITS, SYMBOLS, strict=True)
     )
-    return f"Concealed: {concealed(closed)}.   Found: {found(closed)}.   Error of the posterior: {errors}."
+    return f"Hidden: {hidden_effect(result)}.   Found: {found_effect(result)}.   Error of the posterior: {errors}."
 
 
-def _drag(panel: Axes, closed: Closed) -> None:
-    """Draw what turning the drivetrain alone takes, over wheel speed: true, known before, known after."""
-    known = {name: value for name, value in closed.case.known.items() if not name.endswith("_std_A")}
+def _drag(panel: Axes, result: LoopResult) -> None:
+    """Draw the no-load current over wheel speed: true, and of `rover.toml` before and after."""
+    known = {name: value for name, value in result.case.known.items() if not name.endswith("_std_A")}
     lines = (
-        (Drivetrain.model_validate({**known, **closed.case.hidden}), TRUTH, "-", 2.5, "true"),
+        (Drivetrain.model_validate({**known, **result.case.hidden}), TRUTH, "-", 2.5, "true"),
         (Drivetrain.model_validate(known), BEFORE, "-", 1.8, "rover.toml before"),
-        (closed.configuration.drivetrain, AFTER, "--", 1.8, "rover.toml after"),
+        (result.configuration.drivetrain, AFTER, "--", 1.8, "rover.toml after"),
     )
     for drivetrain, colour, dashes, width, label in lines:
         current = no_load_current(np.maximum(SPEEDS_RAD_S, 1e-6)[:, None] * drivetrain.ratio, drivetrain)[:, 0]
         panel.plot(SPEEDS_RAD_S, 1e3 * current, dashes, color=colour, linewidth=width, label=label)
-    panel.set(
-        ylim=(-2, 72), xlabel="wheel speed [rad/s]", ylabel="drag current [mA]", title="the drivetrain's own drag"
-    )
+    panel.set(ylim=(-2, 72), xlabel="wheel speed [rad/s]", ylabel="drag current [mA]", title="drivetrain drag")
 
 
-def _trace(panel: Axes, closed: Closed, k: int, label: str) -> None:
-    """Draw cohesion or friction angle along the second drive."""
-    withheld = "" if any(name.startswith("no_load") for name in closed.case.known) else " (the daemon withholds it)"
-    shown = [(closed.before, BEFORE, f"before{withheld}"), (closed.after, AFTER, "after")]
-    for reading, colour, name in shown if closed.says else [(closed.before, AFTER, "before and after")]:
-        there = np.flatnonzero(np.isfinite(reading.mean[:, k]))
+def _trace(panel: Axes, result: LoopResult, k: int, label: str) -> None:
+    """Draw cohesion (k = 0) or friction angle (k = 1) along the second drive."""
+    withheld = "" if any(name.startswith("no_load") for name in result.case.known) else " (the daemon withholds it)"
+    shown = [(result.before, BEFORE, f"before{withheld}"), (result.after, AFTER, "after")]
+    for estimates, colour, name in shown if result.changes else [(result.before, AFTER, "before and after")]:
+        there = np.flatnonzero(np.isfinite(estimates.mean[:, k]))
         at = there[:: max(1, len(there) // POINTS)]
-        time, values = reading.time_s[at], [each[at, k] for each in (reading.low, reading.mean, reading.high)]
+        time, values = estimates.time_s[at], [each[at, k] for each in (estimates.low, estimates.mean, estimates.high)]
         panel.fill_between(time, values[0], values[2], color=colour, alpha=0.18, linewidth=0)
         panel.plot(time, values[1], color=colour, linewidth=1.3, label=name)
-    panel.plot(closed.before.time_s, closed.before.truth[:, k], color=TRUTH, linewidth=2, label="true")
-    panel.set(ylim=(0, HIGHEST[k]), xlim=(0, closed.before.time_s[-1]), xlabel="time of the second drive [s]")
+    panel.plot(result.before.time_s, result.before.truth[:, k], color=TRUTH, linewidth=2, label="true")
+    panel.set(ylim=(0, HIGHEST[k]), xlim=(0, result.before.time_s[-1]), xlabel="time of the second drive [s]")
     panel.set_title(label)
-    _name_soils(panel, closed.before)
+    _name_soils(panel, result.before)
 
 
-def _name_soils(panel: Axes, reading: Reading) -> None:
-    """Write the soils' names where all wheels are on them."""
+def _name_soils(panel: Axes, estimates: SoilEstimates) -> None:
+    """Write each soil's name over the time that all wheels are on it."""
     for name in OTHER_SOILS:
-        there = reading.time_s[np.isclose(reading.truth[:, 0], SOILS[name].cohesion_Pa / 1e3)]
+        there = estimates.time_s[np.isclose(estimates.truth[:, 0], SOILS[name].cohesion_Pa / 1e3)]
         if there.size:
             panel.text(float(there.mean()), 0.25, name, ha="center", va="bottom", fontsize=8.5, color="#555555")
 
 
-def _errors(panel: Axes, closed: Closed, k: int) -> None:
+def _errors(panel: Axes, result: LoopResult, k: int) -> None:
     """Draw the root mean square errors of the posterior and of the paper's network."""
     symbol, unit = SYMBOLS[k]
-    readings = (("before", closed.before, BEFORE), ("after", closed.after, AFTER), ("drag known", closed.told, TRUTH))
-    for step, (label, reading, colour) in enumerate(readings):
-        found_here = figures(reading)
-        values = [found_here[f"{who}_rmse_{UNITS[k]}"] for who in ("posterior", "network")]
+    bars = (
+        ("before", result.before, BEFORE),
+        ("after", result.after, AFTER),
+        ("true drivetrain", result.with_true_drivetrain, TRUTH),
+    )
+    for step, (label, estimates, colour) in enumerate(bars):
+        found_here = figures(estimates)
+        values = [found_here[f"{estimator}_rmse_{UNITS[k]}"] for estimator in ("posterior", "network")]
         places = [step, step + 4]
         panel.bar(places, values, color=colour, width=0.85, alpha=0.85, label=label)
         for at, value in zip(places, values, strict=True):

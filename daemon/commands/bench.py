@@ -1,4 +1,4 @@
-"""`regolithd bench` puts the virtual rover on a bus; `regolithd bench-tell` makes something wrong with it."""
+"""`regolithd bench`: run the virtual rover on a CAN bus; `regolithd bench-fault`: inject a fault into it."""
 
 from __future__ import annotations
 
@@ -14,30 +14,35 @@ if TYPE_CHECKING:
 
 _CONTROL = Path(tempfile.gettempdir()) / "regolithd-bench.sock"
 
-Control = Annotated[Path, typer.Option(help="UNIX socket through which `regolithd bench-tell` commands it.")]
+Control = Annotated[Path, typer.Option(help="UNIX socket on which `regolithd bench-fault` reaches the virtual rover.")]
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    app.command()(bench)
-    app.command(name="bench-tell")(bench_tell)
+    app.command("bench")(bench)
+    app.command("bench-fault")(bench_fault)
 
 
 def bench(
     *,
-    channel: Annotated[str, typer.Option(help="Such as vcan0 or can0.")] = "vcan0",
-    interface: Annotated[str, typer.Option(help="Any interface of python-can.")] = "socketcan",
-    scenario: Annotated[Path | None, typer.Option(help="TOML: soils along the way, noise, friction, seed.")] = None,
-    config: Annotated[Path | None, typer.Option(help="A rover.toml: the nodes that it names are on the bus.")] = None,
-    soil: Annotated[list[str] | None, typer.Option(help="A soil, or several 5 m each; instead of the file's.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Same seed, same ground and noise.")] = None,
-    even: Annotated[bool, typer.Option("--even", help="No noise at all.")] = False,
-    seconds: Annotated[float, typer.Option(help="End by itself; 0: run until interrupted.")] = 0.0,
+    channel: Annotated[str, typer.Option(help="CAN interface, such as vcan0 or can0.")] = "vcan0",
+    interface: Annotated[str, typer.Option(help="python-can's name of the interface type.")] = "socketcan",
+    scenario: Annotated[
+        Path | None,
+        typer.Option(help="Scenario file (TOML): soils, noise, friction, seed; see docs/virtual-rover.toml."),
+    ] = None,
+    config: Annotated[Path | None, typer.Option(help="A rover.toml: simulate its nodes instead of Kapvik's.")] = None,
+    soil: Annotated[
+        list[str] | None, typer.Option(help="Name of a soil; repeated: several, 5 m each. Overrides the scenario file.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of terrain and noise.")] = None,
+    no_noise: Annotated[bool, typer.Option("--no-noise", help="Noise-free sensors, no terrain roughness.")] = False,
+    seconds: Annotated[float, typer.Option(help="Duration in s; 0: run until interrupted.")] = 0.0,
     control: Control = _CONTROL,
 ) -> None:
-    """Run the virtual rover – six drives, six load cells, inclinometer, ground speed – on a CAN bus.
+    """Run the virtual rover on a CAN bus: six drives, six load cells, inclinometer, ground-speed sensor.
 
-    Says `ready` once all nodes have power. At its end it prints, as one line of JSON, what each node saw and sent.
+    Prints `ready` once all nodes are on the bus. At its end it prints each node's counters as one line of JSON.
     """
     import asyncio
     import json
@@ -48,7 +53,7 @@ def bench(
     from regolithd.drivers.virtual import KAPVIK, VirtualRover
     from regolithd.drivers.virtual.control_socket import ControlError
 
-    settings = _scenario(scenario, soil or [], seed, even=even)
+    settings = _scenario(scenario, soil or [], seed, no_noise=no_noise)
     nodes = KAPVIK if config is None else configuration_or_exit(config).nodes.described()
     try:
         counts = asyncio.run(_run(interface, channel, VirtualRover(VirtualWorld(settings), nodes), control, seconds))
@@ -58,15 +63,15 @@ def bench(
     typer.echo(json.dumps(counts))
 
 
-def bench_tell(
-    words: Annotated[list[str], typer.Argument(help="A command, such as `off 3`; `help` lists them all.")],
+def bench_fault(
+    fault: Annotated[list[str], typer.Argument(help="A fault and its node, such as `off 3`; `help` lists all.")],
     control: Control = _CONTROL,
 ) -> None:
-    """Tell the running virtual rover what shall go wrong: `regolithd bench-tell off 3`."""
+    """Inject a fault into the running virtual rover, such as `regolithd bench-fault off 3`."""
     from regolithd.drivers.virtual.control_socket import ControlError, ask
 
     try:
-        answer = ask(control, " ".join(words))
+        answer = ask(control, " ".join(fault))
     except ControlError as error:
         answer = f"error: {error}"
     typer.echo(answer)
@@ -74,11 +79,11 @@ def bench_tell(
         raise typer.Exit(1)
 
 
-def _scenario(path: Path | None, soils: list[str], seed: int | None, *, even: bool) -> Scenario:
-    """Return the scenario of the file with the options' changes, or exit 78 with everything that is wrong."""
+def _scenario(path: Path | None, soils: list[str], seed: int | None, *, no_noise: bool) -> Scenario:
+    """Return the scenario of the file with the options' changes, or exit with 78 and a list of all errors."""
     from pydantic import ValidationError
 
-    from regolithd.daemon.simulator.scenario import Noise, Scenario, read_scenario
+    from regolithd.daemon.simulator.scenario import Scenario, SensorNoise, read_scenario
 
     try:
         scenario = Scenario() if path is None else read_scenario(path)
@@ -89,8 +94,8 @@ def _scenario(path: Path | None, soils: list[str], seed: int | None, *, even: bo
             changes["ground"] = scenario.ground.model_dump() | {"stretches": stretches}
         if seed is not None:
             changes["seed"] = seed
-        if even:
-            changes["noise"] = Noise.none()
+        if no_noise:
+            changes["noise"] = SensorNoise.none()
         return Scenario.model_validate(scenario.model_dump() | changes)
     except ValidationError as error:
         for problem in error.errors():

@@ -1,4 +1,4 @@
-"""`regolithd loop`: conceal an effect, find it, correct the daemon, and see whether it reads the ground better."""
+"""`regolithd loop`: hide a drivetrain effect in a virtual rover, find it, correct `rover.toml`, compare estimates."""
 
 from __future__ import annotations
 
@@ -18,36 +18,42 @@ def register(app: typer.Typer) -> None:
 
 
 def loop(
-    seed: Annotated[int, typer.Option(min=0, help="of what is concealed, and of both drives")] = 1,
-    out: Annotated[Path, typer.Option(help="recordings, simulations, configurations and the picture")] = Path(
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the hidden effect's size and of both drives.")] = 1,
+    out: Annotated[Path, typer.Option(help="Folder for recordings, simulations, configurations and picture.")] = Path(
         "build/loop"
     ),
-    figures: Annotated[Path, typer.Option(help="the figures, one flat JSON object")] = Path("build/figures/loop.json"),
-    picture: Annotated[Path | None, typer.Option(help="the picture; loop.svg in --out without it")] = None,
-    case: Annotated[list[str] | None, typer.Option(help="coulomb, viscous or nothing alone")] = None,
-    short: Annotated[bool, typer.Option("--short", help="short drives: to see that it runs")] = False,
+    figures: Annotated[Path, typer.Option(help="Write the figures here, as one JSON object.")] = Path(
+        "build/figures/loop.json"
+    ),
+    picture: Annotated[Path | None, typer.Option(help="Draw the picture here (default: loop.svg in --out).")] = None,
+    case: Annotated[list[str] | None, typer.Option(help="Only this case: coulomb, viscous or nothing.")] = None,
+    short: Annotated[bool, typer.Option("--short", help="Short drives: a test run.")] = False,
 ) -> None:
-    """Close the loop: a virtual rover with a concealed drivetrain effect, found, corrected, and driven elsewhere."""
+    """Run the closed-loop study: hide a drivetrain effect, find it, correct rover.toml, compare the soil estimates.
+
+    A virtual rover drives on a known soil; `regolithd mismatch` names what its simulation leaves out; the corrected
+    configuration is tested on other soils. Takes some minutes.
+    """
     import json
 
     from rich.console import Console
 
     from regolithd.calibration.models import TERRAIN_MODEL
     from regolithd.daemon.closed_loop.case import cases
-    from regolithd.daemon.closed_loop.close import Lengths, close
     from regolithd.daemon.closed_loop.picture import draw
+    from regolithd.daemon.closed_loop.run import DriveLengths, run_case
     from regolithd.daemon.closed_loop.summary import figures_of, sentence
     from regolithd.daemon.pipeline.terrain_network import Network
 
-    lengths = Lengths(first_s=400.0, second_s=180.0, stretch_m=1.1) if short else Lengths()
+    lengths = DriveLengths(first_s=400.0, second_s=180.0, stretch_m=1.1) if short else DriveLengths()
     chosen = [each for each in cases(seed) if not case or each.name in case]
     network = Network(TERRAIN_MODEL)
     console = Console()
     done = []
     with Console(stderr=True).status("") as status:
         for each in chosen:
-            say = partial(_say, status, each.title)
-            done.append(close(each, seed, out / each.name, network, lengths, say))
+            show = partial(_show, status, each.title)
+            done.append(run_case(each, seed, out / each.name, network, lengths, show))
             console.print(sentence(done[-1]), highlight=False, soft_wrap=True)
     figures.parent.mkdir(parents=True, exist_ok=True)
     figures.write_text(json.dumps({"seed": seed, **figures_of(done)}, indent=1) + "\n", encoding="utf-8")
@@ -58,5 +64,5 @@ def loop(
     )
 
 
-def _say(status: Status, title: str, doing: str) -> None:
-    status.update(f"{title}: the rover {doing}")
+def _show(status: Status, title: str, step: str) -> None:
+    status.update(f"{title}: {step}")

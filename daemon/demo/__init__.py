@@ -1,1 +1,1 @@
-"""`make demo`: virtual rover, daemon, broker and subscriber in one process, for half a minute, nothing installed."""
+"""The demo (`make demo`): virtual rover, daemon, MQTT broker and subscriber in one process, for 30 s."""

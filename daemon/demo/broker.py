@@ -1,4 +1,4 @@
-"""An MQTT broker in this process, for the demo alone; a rover has mosquitto."""
+"""An MQTT broker (amqtt) inside the demo's process; on a rover the broker is mosquitto."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @asynccontextmanager
 async def embedded_broker() -> AsyncIterator[int]:
-    """Run a broker on this computer alone for the time of the context; its port is a free one."""
+    """Run a broker on a free port of the loopback interface while the context lasts; yield the port."""
     from amqtt.broker import Broker  # noqa: PLC0415  # an optional dependency, and slow to import
 
     logging.getLogger("amqtt").setLevel(logging.ERROR)

@@ -1,4 +1,4 @@
-"""Writes down, for each estimate, what really was: possible only because the rover is virtual."""
+"""Keep each estimate of the daemon beside the ground truth of the virtual rover at that moment."""
 
 from __future__ import annotations
 
@@ -11,35 +11,37 @@ import numpy as np
 if TYPE_CHECKING:
     from regolithd.calibration.posterior.estimator import Posterior
     from regolithd.daemon.pipeline.snapshot import Array, Estimate
-    from regolithd.daemon.simulator.virtual_rover import Truth, VirtualWorld
+    from regolithd.daemon.simulator.virtual_rover import GroundTruth, VirtualWorld
     from regolithd.drivers.master.events import NetworkEvent
 
+    Record = tuple[Estimate, GroundTruth]
 
-class Witness:
-    """An outlet that keeps estimates beside the truth."""
+
+class GroundTruthLog:
+    """A sink of the service that keeps estimates beside the ground truth."""
 
     def __init__(self, world: VirtualWorld) -> None:
         self._world = world
-        self.seen: list[tuple[Estimate, Truth]] = []
+        self.records: list[Record] = []
         self.events: list[NetworkEvent] = []
 
     def estimate(self, estimate: Estimate) -> None:
-        """Keep it with what is true now."""
+        """Keep the estimate with the present ground truth."""
         if self._world.truth is not None:
-            self.seen.append((estimate, self._world.truth))
+            self.records.append((estimate, self._world.truth))
 
     def event(self, event: NetworkEvent) -> None:
-        """Keep it."""
+        """Keep the event."""
         self.events.append(event)
 
     async def run(self) -> None:
-        """Wait for the end: there is nothing to do."""
+        """Wait until cancelled; nothing runs in the background."""
         await asyncio.Event().wait()
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
-    """One wheel on one soil: means over the time that it was on it, after the filter had settled."""
+class WheelOnSoil:
+    """Means of one wheel's estimates and of the ground truth while it was on one soil, after the filter had settled."""
 
     wheel: int
     soil: str
@@ -50,30 +52,30 @@ class Stretch:
     true_cohesion_Pa: float
     friction_angle_rad: float
     true_friction_angle_rad: float
-    outside: float  # share of the records with an input outside the training range
+    outside: float  # fraction of the records with an input outside the training range
 
 
-def stretches(seen: list[tuple[Estimate, Truth]], settle_s: float) -> list[Stretch]:
-    """Return the means for each wheel on each soil, in the order driven, leaving out `settle_s` after each change."""
+def wheels_on_soils(records: list[Record], settle_s: float) -> list[WheelOnSoil]:
+    """Return the means of each wheel on each soil, in the order driven, leaving out `settle_s` after each change."""
     found = []
     for wheel in range(6):
-        driven = [(estimate, truth) for estimate, truth in seen if estimate.valid[wheel]]
+        driven = [(estimate, truth) for estimate, truth in records if estimate.valid[wheel]]
         soils = list(dict.fromkeys(truth.soils[wheel] for _, truth in driven))
         for soil in soils:
             on_it = [(estimate, truth) for estimate, truth in driven if truth.soils[wheel] == soil]
             begun = on_it[0][1].time_s
             settled = [pair for pair in on_it if pair[1].time_s - begun >= settle_s]
             if settled:
-                found.append(_stretch(wheel, soil, settled))
+                found.append(_means(wheel, soil, settled))
     return found
 
 
-def _stretch(wheel: int, soil: str, pairs: list[tuple[Estimate, Truth]]) -> Stretch:
+def _means(wheel: int, soil: str, pairs: list[Record]) -> WheelOnSoil:
     def mean(values: list[Array]) -> float:
         return float(np.mean([value[wheel] for value in values]))
 
     estimates, truths = [estimate for estimate, _ in pairs], [truth for _, truth in pairs]
-    return Stretch(
+    return WheelOnSoil(
         wheel=wheel + 1,
         soil=soil,
         records=len(pairs),
@@ -88,8 +90,8 @@ def _stretch(wheel: int, soil: str, pairs: list[tuple[Estimate, Truth]]) -> Stre
 
 
 @dataclass(frozen=True, slots=True)
-class Ground:
-    """The last posterior while all six wheels were on one soil, and that soil's true values."""
+class PosteriorOnSoil:
+    """The last posterior of all six wheels while all were on one soil, and that soil's true values."""
 
     soil: str
     posterior: Posterior
@@ -97,12 +99,12 @@ class Ground:
     true_friction_angle_rad: float
 
 
-def grounds(seen: list[tuple[Estimate, Truth]]) -> list[Ground]:
+def posteriors_on_soils(records: list[Record]) -> list[PosteriorOnSoil]:
     """Return the last posterior on each soil that was under all six wheels, in the order driven."""
-    last: dict[str, Ground] = {}
-    for estimate, truth in seen:
+    last: dict[str, PosteriorOnSoil] = {}
+    for estimate, truth in records:
         if estimate.posterior is not None and len(set(truth.soils)) == 1:
             soil = truth.soils[0]
             angle = float(truth.friction_angle_rad[0])
-            last[soil] = Ground(soil, estimate.posterior, float(truth.cohesion_Pa[0]), angle)
+            last[soil] = PosteriorOnSoil(soil, estimate.posterior, float(truth.cohesion_Pa[0]), angle)
     return list(last.values())

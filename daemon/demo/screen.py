@@ -1,4 +1,4 @@
-"""Where the live table goes: redrawn in place on a terminal, a line now and then elsewhere."""
+"""Print the live table: redrawn in place on a terminal, every 5 s where the output is not a terminal."""
 
 from __future__ import annotations
 
@@ -16,40 +16,40 @@ if TYPE_CHECKING:
 
     from rich.console import Console, RenderableType
 
-    from regolithd.daemon.demo.viewer import Viewer
+    from regolithd.daemon.demo.live_table import LiveTable
 
 TITLE = "regolithd · a virtual rover on an in-process CAN bus, seen over MQTT"
 PLAIN_EVERY_S = 5.0
 
 
 @contextmanager
-def screen(console: Console, seconds: float) -> Iterator[Callable[[Viewer, float], None]]:
-    """Give a function that shows what the viewer knows at a time."""
+def screen(console: Console, seconds: float) -> Iterator[Callable[[LiveTable, float], None]]:
+    """Yield a function that shows the table at an elapsed time [s]; the run takes `seconds`."""
     if not console.is_terminal:
         yield _plain(console, seconds)
         return
     with Live(Text(TITLE, style="bold"), console=console, auto_refresh=False) as live:
-        yield lambda viewer, elapsed: live.update(frame(viewer, elapsed, seconds), refresh=True)
+        yield lambda table, elapsed: live.update(frame(table, elapsed, seconds), refresh=True)
 
 
-def frame(viewer: Viewer, elapsed: float, seconds: float) -> RenderableType:
-    """Return the whole screen at one moment."""
+def frame(table: LiveTable, elapsed: float, seconds: float) -> RenderableType:
+    """Return title, progress bar and table."""
     progress = Table.grid(padding=(0, 2))
     bar = ProgressBar(total=seconds, completed=elapsed, width=40)
     progress.add_row(Text("driving", style="dim"), bar, Text(f"{elapsed:.0f} of {seconds:.0f} s", style="dim"))
-    return Group(Text(TITLE, style="bold"), Text(), progress, viewer.render())
+    return Group(Text(TITLE, style="bold"), Text(), progress, table.render())
 
 
-def _plain(console: Console, seconds: float) -> Callable[[Viewer, float], None]:
+def _plain(console: Console, seconds: float) -> Callable[[LiveTable, float], None]:
     console.print(TITLE)
     due = PLAIN_EVERY_S
 
-    def show(viewer: Viewer, elapsed: float) -> None:
+    def show(table: LiveTable, elapsed: float) -> None:
         nonlocal due
         if elapsed < due:
             return
         due += PLAIN_EVERY_S
         console.print(f"\n{elapsed:.0f} of {seconds:.0f} s")
-        console.print(viewer.render())
+        console.print(table.render())
 
     return show

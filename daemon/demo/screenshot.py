@@ -1,4 +1,4 @@
-"""The demo's live screen as the README's picture: `python -m regolithd.daemon.demo.screenshot docs/demo.svg`."""
+"""Draw the demo's screen as an SVG, for the README: `python -m regolithd.daemon.demo.screenshot docs/demo.svg`."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from regolithd.daemon.demo.drive import drive
+from regolithd.daemon.demo.run import run_demo
 from regolithd.daemon.demo.screen import frame
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from regolithd.daemon.demo.viewer import Viewer
+    from regolithd.daemon.demo.live_table import LiveTable
 
 SECONDS = 30.0
 AT_S = 20.0
 COLUMNS = 84
 
 
-def photograph(to: Path) -> None:
-    """Drive the demo, and write its screen of one moment as an SVG that fetches nothing."""
-    seen: list[RenderableType] = []
+def screenshot(to: Path) -> None:
+    """Run the demo, and write its screen after 20 s as an SVG without web fonts."""
+    frames: list[RenderableType] = []
 
-    def show(viewer: Viewer, elapsed: float) -> None:
-        if elapsed >= AT_S and not seen:
-            seen.append(frame(viewer, elapsed, SECONDS))
+    def show(table: LiveTable, elapsed: float) -> None:
+        if elapsed >= AT_S and not frames:
+            frames.append(frame(table, elapsed, SECONDS))
 
     with tempfile.TemporaryDirectory() as folder:
-        asyncio.run(drive(Path(folder), SECONDS, show))
+        asyncio.run(run_demo(Path(folder), SECONDS, show))
     console = Console(record=True, width=COLUMNS, force_terminal=True, file=io.StringIO())
-    console.print(seen[0])
+    console.print(frames[0])
     svg = console.export_svg(title="make demo")
     to.write_text(re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    photograph(Path(sys.argv[1]))
+    screenshot(Path(sys.argv[1]))

@@ -1,1 +1,1 @@
-"""The virtual rover's world: scenario, wheels on soil, sensor noise."""
+"""Simulator of the virtual rover: scenario file, wheel–soil physics, sensor noise, ground truth."""

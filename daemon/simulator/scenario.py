@@ -1,4 +1,4 @@
-"""What the virtual rover drives on, what it is made of, and how badly it measures: one TOML file, all of it optional.
+"""The scenario file (TOML) of the virtual rover: soils, motion, sensor noise, hidden effects. Every key is optional.
 
     seed = 7
     [[ground.stretches]]
@@ -9,7 +9,7 @@
     [noise]
     drops_per_s = 0.0
 
-Tables that `rover.toml` has too are the same models. The defaults are Kapvik on its field trip.
+Tables that `rover.toml` also has are the same models. The defaults are Kapvik on its field trial.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ WheelNumber = Annotated[int, Field(ge=1, le=6)]
 
 
 def _named_soil(value: object) -> object:
-    """Return the soil of that name; a whole table is taken as it is."""
+    """Return the soil of this name; a table is returned unchanged."""
     if not isinstance(value, str):
         return value
     if value not in SOILS:
@@ -49,14 +49,14 @@ def _named_soil(value: object) -> object:
 
 
 class Stretch(Table):
-    """The ground up to a place, in metres from where the rover's middle starts; the last stretch has no end."""
+    """A soil up to a distance [m] from where the rover's middle axle starts; the last stretch has no end."""
 
     soil: Annotated[Soil, BeforeValidator(_named_soil)]
     until_m: float | None = None
 
     @property
     def name(self) -> str:
-        """The soil's name in Table 1, or what it consists of."""
+        """The soil's name in Table 1, or its cohesion and friction angle."""
         for name, soil in SOILS.items():
             if soil == self.soil:
                 return name
@@ -64,7 +64,7 @@ class Stretch(Table):
 
 
 class Ground(Table):
-    """`[ground]`: soils along the way, and the way's slope: a constant one with gentle waves on it."""
+    """`[ground]`: soils along the path, and its slope: a constant one plus a sine wave."""
 
     stretches: Annotated[tuple[Stretch, ...], Field(min_length=1)] = (Stretch(soil=SOILS["sandy-loam"]),)
     pitch_deg: Annotated[float, Field(ge=-30, le=30)] = 0.0
@@ -82,9 +82,9 @@ class Ground(Table):
 
 
 class Motion(Table):
-    """`[motion]`: how the rover slips. Prescribed, not solved from the drawbar pull, which the wheel model leaves open.
+    """`[motion]`: the wheels' slip, prescribed: it is not solved from the drawbar pull.
 
-    `slip` is on the level; `slip_per_grade` times the sine of the pitch comes on top.
+    `slip` applies on level ground; `slip_per_grade` times the sine of the pitch is added.
     """
 
     slip: Annotated[float, Field(gt=-0.5, lt=0.9)] = 0.025
@@ -92,18 +92,18 @@ class Motion(Table):
     centre_of_mass_m: Positive = 0.2
 
 
-class Noise(Table):
-    """`[noise]`: the relative standard deviations of Tables 4 and 6 (prepared ground), as totals of their parts.
+class SensorNoise(Table):
+    """`[noise]`: total relative standard deviations of Tables 4 and 6 (prepared ground), and how they divide.
 
-    A current varies because the load does, by `drops_per_s` momentary drops, and by the rest. A load varies with the
-    ground (`terrain_share` of its variance, which the wheel feels) and by the sensor's own noise (which it does not).
+    A current varies with the load, by momentary drops (`drops_per_s`), and by a correlated remainder. A load varies
+    with the terrain (`terrain_share` of its variance, which changes the torque) and by sensor noise (which does not).
     """
 
     current_relative_std: SixNotNegative = (0.312, 0.388, 0.313, 0.365, 0.312, 0.351)
     load_relative_std: SixNotNegative = (0.142, 0.119, 0.096, 0.070, 0.067, 0.072)
     terrain_share: Fraction = 0.5
     terrain_length_m: Positive = 0.05
-    slip_std: NotNegative = 0.002  # of the slip itself, with the ground
+    slip_std: NotNegative = 0.002  # of the slip, varying with the terrain
     current_correlation_s: Positive = 0.2
     drops_per_s: NotNegative = 0.15
     drop_duration_s: Positive = 0.3
@@ -114,8 +114,8 @@ class Noise(Table):
     yaw_rate_std_deg_s: NotNegative = 0.02
 
     @classmethod
-    def none(cls) -> Noise:
-        """Return perfect sensors on perfectly even ground."""
+    def none(cls) -> SensorNoise:
+        """Return noise-free sensors on terrain without roughness."""
         return cls.model_validate(
             {name: 0.0 for name in cls.model_fields if name.endswith(("_std", "_std_A", "_std_deg", "_std_deg_s"))}
             | {"drops_per_s": 0.0}
@@ -123,7 +123,7 @@ class Noise(Table):
 
 
 class BearingDrag(Table):
-    """One wheel's bearing that drags from some time on."""
+    """Additional current of one wheel's bearing from a time on."""
 
     wheel: WheelNumber
     from_s: NotNegative
@@ -131,22 +131,22 @@ class BearingDrag(Table):
 
 
 class LoadDrift(Table):
-    """One load cell that wanders."""
+    """Linear drift of one load cell's reading."""
 
     wheel: WheelNumber
     newton_per_s: float
 
 
 class Hidden(Table):
-    """`[hidden]`: physics that no configuration tells the daemon; 0 where there is none.
+    """`[hidden]`: effects that are in no configuration of the daemon; 0: absent.
 
-    Constant and speed-dependent friction stand in `[drivetrain]` as `no_load_current_A` and
+    Constant and viscous friction are in `[drivetrain]` as `no_load_current_A` and
     `viscous_current_A_s_per_rad`.
     """
 
     grade_resistance: NotNegative = 1.0
-    cold_drag_A: NotNegative = 0.0  # at 0 °C; falls by e every 10 °C
-    torque_constant_per_degC: float = 0.0  # from 20 °C on
+    cold_drag_A: NotNegative = 0.0  # at 0 °C; decreases by a factor e every 10 °C
+    torque_constant_per_degC: float = 0.0  # relative change per degree, 0 at 20 °C
     ripple_A: NotNegative = 0.0
     ripple_order: Positive = 2.0  # cycles per wheel turn
     bearing_drag: BearingDrag | None = None
@@ -154,13 +154,13 @@ class Hidden(Table):
 
 
 class Scenario(Table):
-    """The whole file."""
+    """The scenario file."""
 
     seed: int = 1
     ambient_degC: float = 15.0
     ground: Ground = Ground()
     motion: Motion = Motion()
-    noise: Noise = Noise()
+    noise: SensorNoise = SensorNoise()
     hidden: Hidden = Hidden()
     drivetrain: Drivetrain = Drivetrain(no_load_current_A=(0.037,) * 6, viscous_current_A_s_per_rad=(4e-5,) * 6)
     wheel: Wheel = Wheel()
@@ -173,6 +173,6 @@ def read_scenario(path: Path) -> Scenario:
     Raises
     ------
     OSError, tomllib.TOMLDecodeError, pydantic.ValidationError
-        The file cannot be read, is no TOML, or says what cannot be.
+        The file cannot be read, is not TOML, or has invalid keys or values.
     """
     return Scenario.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))

@@ -1,7 +1,7 @@
-"""Noise that is a function of where or when, and of a seed: asked twice at one place, it says the same.
+"""Random functions of place or time: repeated evaluation at one place returns the same value.
 
-Both kinds are drawn on a grid, in order, as far as somebody has asked. So the same seed gives the same numbers however
-often, and at whatever instants, the grid is read.
+Values are drawn on a grid, in order, as far as they are needed. Hence the same seed gives the same values wherever and
+however often the function is evaluated.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ if TYPE_CHECKING:
 _BLOCK = 256
 
 
-class Wander:
-    """Gaussian noise of unit variance with exponential correlation, several channels; linear between grid points.
+class CorrelatedNoise:
+    """Gaussian noise of unit variance with exponential autocorrelation (Ornstein–Uhlenbeck), several channels.
 
-    `length` is the correlation length, in whatever unit `at` is asked in; a quarter of it is the grid. With `keeps` the
-    noise may be asked for at a place long past – a rover turns back – else only what is recent is kept.
+    `length` is the correlation length, in the unit of `at`'s argument; the grid spacing is a quarter of it, and values
+    between grid points are interpolated. With `keeps` the whole history is kept, so that a rover that turns back finds
+    the same terrain; without it, only the last two blocks of 256 grid points.
     """
 
     def __init__(self, seed: np.random.SeedSequence, channels: int, length: float, *, keeps: bool = False) -> None:
@@ -36,20 +37,20 @@ class Wander:
         self._blocks: list[Array | None] = []
 
     def at(self, place: float) -> Array:
-        """Return all channels at `place`; what lies before 0 is as at 0."""
+        """Return all channels, shape (channels,), at `place` ≥ 0; a negative place gives the value at 0."""
         position = max(place, 0.0) / self._step
         below = int(position)
         share = position - below
-        # Between two correlated values the variance sags; the factor holds it at one.
-        sag = math.sqrt((1 - share) ** 2 + share**2 + 2 * share * (1 - share) * self._keep)
-        return ((1 - share) * self._row(below) + share * self._row(below + 1)) / sag
+        # Interpolation reduces the variance between grid points; dividing by its root restores unit variance.
+        std = math.sqrt((1 - share) ** 2 + share**2 + 2 * share * (1 - share) * self._keep)
+        return ((1 - share) * self._row(below) + share * self._row(below + 1)) / std
 
     def _row(self, number: int) -> Array:
         while number >= _BLOCK * len(self._blocks):
             self._extend()
         block = self._blocks[number // _BLOCK]
         if block is None:
-            raise ValueError("this noise is only known from now on")
+            raise ValueError("this part of the noise is no longer kept (keeps=False)")
         return block[number % _BLOCK]
 
     def _extend(self) -> None:
@@ -62,8 +63,11 @@ class Wander:
             self._blocks[-3] = None
 
 
-class Drops:
-    """Momentary drops, independent for each channel: 1 while one lasts, else 0."""
+class MomentaryDrops:
+    """Momentary drops, independent for each channel, as a function of time [s].
+
+    Pauses and durations are exponentially distributed, with means 1 / `per_s` and `duration_s`; `per_s` = 0: no drops.
+    """
 
     def __init__(self, seed: np.random.SeedSequence, channels: int, per_s: float, duration_s: float) -> None:
         self._randoms = [np.random.Generator(np.random.PCG64(child)) for child in seed.spawn(channels)]
@@ -73,7 +77,7 @@ class Drops:
         self._ends = [[-math.inf] for _ in self._randoms]
 
     def at(self, time_s: float) -> Array:
-        """Return 1 for each channel that drops at this time."""
+        """Return 1 for each channel that is in a drop at this time, else 0; shape (channels,)."""
         return np.array([self._drops(channel, time_s) for channel in range(len(self._randoms))])
 
     def _drops(self, channel: int, time_s: float) -> float:

@@ -1,10 +1,10 @@
-"""The world of the virtual rover: six driven wheels on soil, and what the sensors make of it.
+"""Simulated world of the virtual rover: six driven wheels on soil, and the readings of its sensors.
 
     motor speed ▸ wheel speed ▸ slip ─┐
     slope ▸ loads ────────────────────┴▸ soil under the wheel ▸ torque (Eqs 1, 6, 7) ▸ current (Eq. 11 inverted) ▸ noise
 
-It is the `Plant` of `drivers.virtual`, and the only place that knows both. `truth` says what no sensor does: which soil
-is under which wheel, and what its torque really is.
+It implements the `Plant` of `drivers.virtual`. `truth` holds what no sensor measures: the soil under each wheel and the
+true load, slip and torque.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from regolithd.calibration.parameters import GRAVITY_M_S2
 from regolithd.calibration.terrain.wheel_loads import wheel_loads
 from regolithd.calibration.terrain.wheel_soil import contact_angle, wheel_torque
 from regolithd.daemon.simulator.scenario import Scenario
-from regolithd.daemon.simulator.spatial_noise import Drops, Wander
+from regolithd.daemon.simulator.spatial_noise import CorrelatedNoise, MomentaryDrops
 from regolithd.drivers.virtual.plant import WHEELS, Array, Measurement
 
 STANDSTILL_RAD_S = 0.05
-"""Below this wheel speed the wheel–soil model says nothing; the torque is faded out."""
-STALL_CURRENT_A = 1.0  # what a motor draws whose wheel is in to its axle; the EPOS 24/1 limits it there
-WARMING_degC_per_A = 120.0  # motor and gears above ambient, per ampere, after long driving
+"""Below this wheel speed the wheel–soil model is undefined; torque and slip are faded to 0."""
+STALL_CURRENT_A = 1.0  # current of a wheel that has sunk to its axle: the current limit of the EPOS 24/1
+WARMING_degC_per_A = 120.0  # steady-state temperature rise of motor and gears above ambient
 WARMING_TIME_S = 600.0
 SUPPLY_V, SUPPLY_OHM = 24.6, 0.8
-SENSOR_CORRELATION_S = 0.05  # of the sensors' own noise: white, for whoever samples slower
-SKID_STEERING = 0.6  # how much of the sides' difference in speed turns the rover; the rest is scrub
+SENSOR_CORRELATION_S = 0.05  # of the sensor noise: white at sampling rates below 20 Hz
+SKID_STEERING = 0.6  # fraction of the speed difference between the sides that becomes yaw rate; the rest is slip
 
-AHEAD = np.array([1, 1, 0, 0, -1, -1]) / 2  # of the middle axle, in wheelbases; wheels 1–6
-RIGHT = np.array([-1, 1, -1, 1, -1, 1]) / 2  # of the middle, in tracks
+AHEAD = np.array([1, 1, 0, 0, -1, -1]) / 2  # position ahead of the middle axle, in wheelbases; wheels 1–6
+RIGHT = np.array([-1, 1, -1, 1, -1, 1]) / 2  # position right of the centre line, in track widths
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Truth:
-    """What really is, at one instant; arrays of shape (6,), SI. `soils` are names."""
+class GroundTruth:
+    """True state at one instant; arrays of shape (6,), SI units. `soils`: name of the soil under each wheel."""
 
     time_s: float
     distance_m: float
@@ -49,20 +49,25 @@ class Truth:
 
 
 class VirtualWorld:
-    """Drives the wheels as fast as the motors turn. Same scenario, same calls: same numbers.
+    """Moves the rover according to its motor speeds; deterministic: same scenario and same calls give the same numbers.
 
-    `changes` keeps the truth at the start and at each change of soil under any wheel.
+    Attributes
+    ----------
+    truth
+        Ground truth of the last `measure`; None before the first.
+    changes
+        Ground truth at the start and at each change of soil under any wheel.
     """
 
     def __init__(self, scenario: Scenario | None = None) -> None:
         self.scenario = scenario = scenario or Scenario()
         terrain, load, current, drops, slow, white = np.random.SeedSequence(scenario.seed).spawn(6)
         noise = scenario.noise
-        self._terrain = Wander(terrain, WHEELS + 1, noise.terrain_length_m, keeps=True)
-        self._load = Wander(load, WHEELS, SENSOR_CORRELATION_S)
-        self._current = Wander(current, WHEELS, noise.current_correlation_s)
-        self._drops = Drops(drops, WHEELS, noise.drops_per_s, noise.drop_duration_s)
-        self._sensors = Wander(slow, 5 + WHEELS, SENSOR_CORRELATION_S)
+        self._terrain = CorrelatedNoise(terrain, WHEELS + 1, noise.terrain_length_m, keeps=True)
+        self._load = CorrelatedNoise(load, WHEELS, SENSOR_CORRELATION_S)
+        self._current = CorrelatedNoise(current, WHEELS, noise.current_correlation_s)
+        self._drops = MomentaryDrops(drops, WHEELS, noise.drops_per_s, noise.drop_duration_s)
+        self._sensors = CorrelatedNoise(slow, 5 + WHEELS, SENSOR_CORRELATION_S)
         self._wave_phase = np.random.Generator(np.random.PCG64(white)).uniform(0, 2 * np.pi, 2)
         self._names = tuple(stretch.name for stretch in scenario.ground.stretches)
         self._ends = [stretch.until_m for stretch in scenario.ground.stretches if stretch.until_m is not None]
@@ -71,11 +76,14 @@ class VirtualWorld:
         self._temperature = np.full(WHEELS, scenario.ambient_degC)
         self._distance_m = 0.0
         self._speed_m_s = 0.0
-        self.truth: Truth | None = None
-        self.changes: list[Truth] = []
+        self.truth: GroundTruth | None = None
+        self.changes: list[GroundTruth] = []
 
     def measure(self, time_s: float, motor_speed_rad_s: Array) -> Measurement:
-        """Move the world on to `time_s` and return what the sensors read (`drivers.virtual.plant.Plant`)."""
+        """Advance to `time_s` and return the sensors' readings (see `drivers.virtual.plant.Plant`).
+
+        `motor_speed_rad_s` has shape (6,).
+        """
         scenario, noise = self.scenario, self.scenario.noise
         elapsed_s, self._time_s = time_s - self._time_s, time_s
         wheel_speed = motor_speed_rad_s / scenario.drivetrain.ratio
@@ -89,7 +97,7 @@ class VirtualWorld:
         level = wheel_loads(np.array(pitch), np.array(roll), scenario.rover, scenario.motion.centre_of_mass_m)
         load = level * (1 + load_std * np.sqrt(noise.terrain_share) * terrain[:-1])
         torque, numbers = self._torque(np.maximum(load, 0.1), slip, wheel_speed, pitch)
-        self._remember(numbers, load, slip, torque)
+        self._update_truth(numbers, load, slip, torque)
         steady = self._steady_current(torque, motor_speed_rad_s)
         current = self._noisy_current(steady)
         self._warm(steady, elapsed_s)
@@ -110,7 +118,7 @@ class VirtualWorld:
         )
 
     def _slope(self) -> tuple[float, float]:
-        """Return pitch and roll [rad] where the rover stands."""
+        """Return pitch and roll [rad] at the present distance."""
         ground = self.scenario.ground
         phase = 2 * np.pi * self._distance_m / ground.wave_length_m
         pitch, roll = np.radians([ground.pitch_deg, ground.roll_deg]) + np.radians(ground.wave_deg) * np.sin(
@@ -118,10 +126,10 @@ class VirtualWorld:
         )
         return float(pitch), float(roll)
 
-    def _motion(self, wheel_speed: Array, pitch_rad: float, wander: float) -> tuple[float, float, Array]:
+    def _motion(self, wheel_speed: Array, pitch_rad: float, slip_noise: float) -> tuple[float, float, Array]:
         """Return speed over ground [m/s], yaw rate [rad/s] and each hub's speed [m/s]."""
         motion, rover, radius = self.scenario.motion, self.scenario.rover, self.scenario.wheel.radius_m
-        slip = motion.slip + motion.slip_per_grade * np.sin(pitch_rad) + self.scenario.noise.slip_std * wander
+        slip = motion.slip + motion.slip_per_grade * np.sin(pitch_rad) + self.scenario.noise.slip_std * slip_noise
         if not np.any(np.abs(wheel_speed) > 0):
             return 0.0, 0.0, np.zeros(WHEELS)
         rim = radius * wheel_speed
@@ -130,14 +138,14 @@ class VirtualWorld:
         return speed, yaw_rate, speed + yaw_rate * rover.track_m * RIGHT
 
     def _slip(self, wheel_speed: Array, hub_speed: Array) -> Array:
-        """Return each wheel's slip, i = 1 − V/(r ω); 0 at standstill, where it means nothing."""
+        """Return each wheel's slip, i = 1 − V/(r ω); 0 at standstill, where it is undefined."""
         rim = self.scenario.wheel.radius_m * wheel_speed
         turning = np.abs(wheel_speed) >= STANDSTILL_RAD_S
         ratio = np.divide(hub_speed, rim, out=np.ones(WHEELS), where=turning)
         return np.clip(1 - ratio, -0.9, 0.9)
 
     def _torque(self, load_N: Array, slip: Array, wheel_speed: Array, pitch_rad: float) -> tuple[Array, list[int]]:
-        """Return each wheel's torque [N·m], signed like its speed, and which stretch it is on."""
+        """Return each wheel's torque [N·m], signed like its speed, and the index of the stretch under it."""
         scenario = self.scenario
         numbers = [self._stretch(self._distance_m + ahead * scenario.rover.wheelbase_m) for ahead in AHEAD]
         torque = np.full(WHEELS, np.nan)
@@ -156,7 +164,7 @@ class VirtualWorld:
         return int(np.searchsorted(self._ends, place_m, side="right"))
 
     def _steady_current(self, torque_Nm: Array, motor_speed_rad_s: Array) -> Array:
-        """Return the motors' currents [A] without noise: Eq. 11 inverted, and what is hidden from it."""
+        """Return the motors' currents [A] without noise: Eq. 11 inverted, plus the hidden effects."""
         hidden, direction = self.scenario.hidden, np.sign(motor_speed_rad_s)
         magnet = 1 + hidden.torque_constant_per_degC * (self._temperature - 20)
         current = motor_current(torque_Nm / magnet, motor_speed_rad_s, self.scenario.drivetrain)
@@ -168,11 +176,11 @@ class VirtualWorld:
         return current
 
     def _noisy_current(self, steady_A: Array) -> Array:
-        """Return the currents as they fluctuate: drops, and what Table 4 leaves after drops and loads."""
+        """Return the currents [A] with drops and correlated noise; the total standard deviation is Table 4's."""
         noise = self.scenario.noise
         dropping = noise.drops_per_s * noise.drop_duration_s / (1 + noise.drops_per_s * noise.drop_duration_s)
         by_drops = noise.drop_depth * np.sqrt(dropping * (1 - dropping))
-        # A load's variation moves the soil's part of the current about half as much again, and that part is a quarter.
+        # Relative sensitivity of the current to the load: 1.5 in the soil's part, which is a quarter of the current.
         by_load = 0.4 * np.array(noise.load_relative_std) * np.sqrt(noise.terrain_share)
         rest = np.sqrt(np.maximum(np.array(noise.current_relative_std) ** 2 - by_drops**2 - by_load**2, 0))
         fluctuating = 1 + rest * self._current.at(self._time_s)
@@ -184,14 +192,14 @@ class VirtualWorld:
 
     def _load_drift(self) -> Array:
         drift = np.zeros(WHEELS)
-        if (wandering := self.scenario.hidden.load_drift) is not None:
-            drift[wandering.wheel - 1] = wandering.newton_per_s * self._time_s
+        if (cell := self.scenario.hidden.load_drift) is not None:
+            drift[cell.wheel - 1] = cell.newton_per_s * self._time_s
         return drift
 
-    def _remember(self, numbers: list[int], load_N: Array, slip: Array, torque_Nm: Array) -> None:
+    def _update_truth(self, numbers: list[int], load_N: Array, slip: Array, torque_Nm: Array) -> None:
         names = tuple(self._names[number] for number in numbers)
         soils = [self.scenario.ground.stretches[number].soil for number in numbers]
-        self.truth = Truth(
+        self.truth = GroundTruth(
             time_s=self._time_s,
             distance_m=self._distance_m,
             soils=names,

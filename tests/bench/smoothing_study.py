@@ -12,7 +12,7 @@ import numpy as np
 from regolithd.daemon.config.configuration import Smoothing
 from regolithd.daemon.pipeline.smooth import Smoother
 from regolithd.daemon.pipeline.snapshot import Array
-from regolithd.daemon.simulator.spatial_noise import Drops, Wander
+from regolithd.daemon.simulator.spatial_noise import CorrelatedNoise, MomentaryDrops
 
 Filter = Callable[[Array, float], Array]
 RELATIVE_STD, CORRELATION_S = 0.31, 0.2
@@ -23,7 +23,7 @@ SEEDS = range(30)
 def series(seed: int, rate_Hz: float, step: float, drops_per_s: float, drop_s: float, depth: float) -> Array:
     """Return a current of 1 with noise, drops, and a step that stays; shape (time, 6)."""
     noise_seed, drop_seed = np.random.SeedSequence(seed).spawn(2)
-    noise, drops = Wander(noise_seed, 6, CORRELATION_S), Drops(drop_seed, 6, drops_per_s, drop_s)
+    noise, drops = CorrelatedNoise(noise_seed, 6, CORRELATION_S), MomentaryDrops(drop_seed, 6, drops_per_s, drop_s)
     times = np.arange(int(SECONDS * rate_Hz)) / rate_Hz
     level = np.where(times >= STEP_AT_S, 1 + step, 1.0)
     return np.stack(

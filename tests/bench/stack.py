@@ -88,7 +88,7 @@ group = "{os.getgid()}"
     def start_rover(self) -> None:
         """Put the virtual rover on the bus."""
         control = str(self.folder / "rover.sock")
-        self.spawn("rover", "bench", "--channel", self.channel, "--even", "--control", control)
+        self.spawn("rover", "bench", "--channel", self.channel, "--no-noise", "--control", control)
         until(lambda: "ready" in self.said("rover"), "the virtual rover is ready")
 
     def tell_rover(self, words: str) -> None:

@@ -62,7 +62,7 @@ async def test_a_node_is_switched_off_and_on_from_outside(tmp_path: Path) -> Non
             )
             for word, told in (("off", NodeLost), ("on", NodeBooted)):
                 events.clear()
-                teller = await regolithd("bench-tell", *control, word, "3")
+                teller = await regolithd("bench-fault", *control, word, "3")
                 assert (await teller.communicate())[0] == b"ok\n"
                 await until(lambda told=told: [e for e in events if isinstance(e, told) and e.node_id == 3], word)
             running.cancel()

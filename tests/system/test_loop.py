@@ -1,4 +1,4 @@
-"""`regolithd loop`, shortened: what was concealed is found, and the corrected daemon reads other soils better."""
+"""The closed-loop study (`regolithd loop --short`): the hidden effect is found and the estimates improve."""
 
 import json
 import subprocess
@@ -12,8 +12,8 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.timeout(600)
-def test_a_concealed_friction_is_found_and_taken_out(tmp_path: Path) -> None:
-    """Named, written into rover.toml, consistent then; and cohesion of unseen soils has at most half the error."""
+def test_a_hidden_friction_is_found_and_corrected(tmp_path: Path) -> None:
+    """Constant friction is named and written into rover.toml, and halves the cohesion error on other soils."""
     command = [sys.executable, "-m", "regolithd", "loop", "--short", "--case", "coulomb", "--seed", "5"]
     figures = tmp_path / "loop.json"
     done = subprocess.run(
@@ -27,11 +27,11 @@ def test_a_concealed_friction_is_found_and_taken_out(tmp_path: Path) -> None:
     found = json.loads(figures.read_text())
     assert found["coulomb_named"] == "coulomb-friction"
     assert found["coulomb_corrected_simulation_verdict"] == "consistent"
-    concealed = found["coulomb_concealed_no_load_current_A"]
-    assert found["coulomb_found_no_load_current_A"] == pytest.approx(concealed, rel=0.15)
+    hidden = found["coulomb_hidden_no_load_current_A"]
+    assert found["coulomb_found_no_load_current_A"] == pytest.approx(hidden, rel=0.15)
     rover = tomllib.loads((tmp_path / "loop/coulomb/rover.toml").read_text())
     assert rover["drivetrain"]["no_load_current_A"] == pytest.approx(found["coulomb_found_no_load_current_A"])
     before, after = (found[f"coulomb_{when}_posterior_rmse_cohesion_kPa"] for when in ("before", "after"))
     assert after < 0.5 * before
     assert (tmp_path / "loop/loop.svg").stat().st_size > 10_000
-    assert "Concealed" in done.stdout
+    assert "Hidden" in done.stdout

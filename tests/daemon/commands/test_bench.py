@@ -1,4 +1,4 @@
-"""`regolithd bench` runs the virtual rover, obeys `regolithd bench-tell`, and says at its end what it did."""
+"""`regolithd bench` runs the virtual rover, obeys `regolithd bench-fault`, and says at its end what it did."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def bench(*options: str, channel: str = "bench") -> Iterator[subprocess.Popen[st
 
 def tell(control: Path, *words: str) -> subprocess.CompletedProcess[str]:
     """Command the rover."""
-    line = command("bench-tell", "--control", str(control), *words)
+    line = command("bench-fault", "--control", str(control), *words)
     return subprocess.run(line, capture_output=True, text=True, env=ENVIRONMENT, check=False, timeout=60)
 
 
@@ -77,7 +77,7 @@ def test_two_do_not_share_a_socket(tmp_path: Path) -> None:
 
 
 def test_nobody_listens(tmp_path: Path) -> None:
-    """`bench-tell` says what to do."""
+    """`bench-fault` says what to do."""
     answer = tell(tmp_path / "nothing.sock", "off", "3")
     assert answer.returncode == 1
     assert "Is `regolithd bench` running" in answer.stdout
@@ -111,7 +111,7 @@ def test_it_may_have_other_nodes(tmp_path: Path) -> None:
 
 def test_it_ends_by_itself(tmp_path: Path) -> None:
     """With `--seconds`, on the soils that it was given."""
-    options = ["--soil", "lete-sand", "--soil", "clayey-soil", "--seed", "5", "--even", "--seconds", "0.2"]
+    options = ["--soil", "lete-sand", "--soil", "clayey-soil", "--seed", "5", "--no-noise", "--seconds", "0.2"]
     with bench(*options, "--control", str(tmp_path / "bench.sock")) as process:
         output, _ = process.communicate(timeout=60)
         assert process.returncode == 0

@@ -1,4 +1,4 @@
-"""The virtual rover's world: the paper's noise, the wheel–soil model underneath, and the same numbers every time."""
+"""The simulated world: the paper's noise statistics, the wheel–soil model, determinism, the scenario file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from regolithd.calibration.drivetrain.torque import wheel_torque
 from regolithd.calibration.parameters import SOILS
 from regolithd.calibration.terrain.wheel_soil import contact_angle
 from regolithd.calibration.terrain.wheel_soil import wheel_torque as soil_torque
-from regolithd.daemon.simulator.scenario import Ground, Hidden, Motion, Noise, Scenario, read_scenario
+from regolithd.daemon.simulator.scenario import Ground, Hidden, Motion, Scenario, SensorNoise, read_scenario
 from regolithd.daemon.simulator.virtual_rover import VirtualWorld
 
 if TYPE_CHECKING:
@@ -33,11 +33,11 @@ def drive(world: VirtualWorld, samples: int, speed: np.ndarray = FIELD_SPEED) ->
 def even(**tables: object) -> VirtualWorld:
     """Return a world without noise and without waves."""
     ground = {"wave_deg": 0.0} | dict(tables.pop("ground", {}))  # type: ignore[call-overload]
-    return VirtualWorld(Scenario.model_validate({"noise": Noise.none(), "ground": ground} | tables))
+    return VirtualWorld(Scenario.model_validate({"noise": SensorNoise.none(), "ground": ground} | tables))
 
 
 def test_the_same_seed_gives_the_same_numbers() -> None:
-    """To the last bit; another seed gives others."""
+    """Two worlds of one seed agree to the last bit, and another seed gives different numbers."""
     first, second, other = (drive(VirtualWorld(Scenario(seed=seed)), 50) for seed in (3, 3, 4))
     for a, b, c in zip(first, second, other, strict=True):
         for field in fields(a):
@@ -45,9 +45,9 @@ def test_the_same_seed_gives_the_same_numbers() -> None:
         assert not np.array_equal(a.motor_current_A, c.motor_current_A)
 
 
-def test_noise_is_what_the_paper_measured() -> None:
+def test_noise_has_the_standard_deviations_of_the_paper() -> None:
     """%RSD of current and load for each wheel as in Table 4 (prepared ground), over the paper's 909 records."""
-    noise = Noise()
+    noise = SensorNoise()
     records = drive(VirtualWorld(), 909)[2:]
     for values, expected in (
         (np.array([record.motor_current_A for record in records]), noise.current_relative_std),
@@ -59,13 +59,13 @@ def test_noise_is_what_the_paper_measured() -> None:
 
 
 def test_the_current_is_near_the_papers() -> None:
-    """50–100 mA, most of it the drivetrain's own friction, as the paper's motors suggest."""
+    """The mean current of each wheel is 50–100 mA."""
     mean = np.mean([record.motor_current_A for record in drive(VirtualWorld(), 909)[2:]], axis=0)
     assert np.all((mean > 0.05) & (mean < 0.1))
 
 
 def test_without_noise_the_current_is_the_models() -> None:
-    """Eq. 11 inverted of Eq. 7's torque, at the load and slip that the sensors say."""
+    """Eq. 11 inverts to Eq. 7's torque at the measured load and slip."""
     world = even()
     record = drive(world, 20)[-1]
     slip = 1 - record.hub_speed_m_s / (world.scenario.wheel.radius_m * FIELD_SPEED / 1400)
@@ -78,7 +78,7 @@ def test_without_noise_the_current_is_the_models() -> None:
 
 
 def test_the_loads_carry_the_rover() -> None:
-    """They add up to the weight; nose up loads the rear, right side down the right."""
+    """The loads add up to the weight; pitching up loads the rear wheels, rolling right the right ones."""
     weight = 30 * 9.80665
     assert np.sum(drive(even(), 2)[-1].load_N) == pytest.approx(weight)
     up = drive(even(ground={"pitch_deg": 10.0}), 2)[-1]
@@ -91,7 +91,7 @@ def test_the_loads_carry_the_rover() -> None:
 
 
 def test_uphill_costs_current() -> None:
-    """And downhill saves some."""
+    """The current rises uphill and falls downhill."""
     down, level, up = (drive(even(ground={"pitch_deg": p}), 20)[-1].motor_current_A for p in (-10.0, 0.0, 10.0))
     assert np.all(down < level)
     assert np.all(level < up)
@@ -115,8 +115,8 @@ def test_the_front_wheels_reach_new_soil_first() -> None:
     assert world.changes[-1].cohesion_Pa == pytest.approx(4120)
 
 
-def test_backwards_everything_has_the_other_sign() -> None:
-    """And a rover that stands draws nothing."""
+def test_backwards_currents_and_speeds_are_negative() -> None:
+    """Driving backwards reverses the sign of current and speed, and standing still draws no current."""
     world = even()
     forward = world.measure(0.0, FIELD_SPEED).motor_current_A
     backward = world.measure(0.5, -FIELD_SPEED)
@@ -125,8 +125,8 @@ def test_backwards_everything_has_the_other_sign() -> None:
     assert world.measure(1.0, np.zeros(6)).motor_current_A == pytest.approx(0)
 
 
-def test_faster_wheels_on_one_side_turn_it() -> None:
-    """Right faster than left: to the left, which is positive; the hubs say so too."""
+def test_faster_wheels_on_one_side_turn_the_rover() -> None:
+    """Right wheels faster than left ones give a positive yaw rate, and faster hubs on the right."""
     record = even().measure(0.0, FIELD_SPEED * np.array([0.9, 1.1] * 3))
     assert record.yaw_rate_rad_s > 0
     assert np.all(record.hub_speed_m_s[1::2] > record.hub_speed_m_s[::2])
@@ -141,23 +141,23 @@ def test_faster_wheels_on_one_side_turn_it() -> None:
         ({"ripple_A": 0.01}, [0, 1, 2, 3, 4, 5]),
     ],
 )
-def test_what_is_hidden_shows_in_the_current(hidden: dict[str, object], wheels: list[int]) -> None:
-    """Of the wheels that it is about, and of no other."""
+def test_a_hidden_effect_changes_the_current(hidden: dict[str, object], wheels: list[int]) -> None:
+    """Only the current of the wheels concerned changes."""
     with_it, without = drive(even(hidden=hidden), 30)[-1], drive(even(), 30)[-1]
     moved = np.flatnonzero(~np.isclose(with_it.motor_current_A, without.motor_current_A))
     assert moved.tolist() == wheels
 
 
 def test_a_load_cell_may_drift() -> None:
-    """The reading, not the load."""
+    """The drift changes the reading and leaves the true load unchanged."""
     world = even(hidden={"load_drift": {"wheel": 2, "newton_per_s": 0.1}})
     record = drive(world, 21)[-1]
     assert world.truth is not None
     assert record.load_N - world.truth.load_N == pytest.approx([0, 1, 0, 0, 0, 0])
 
 
-def test_a_wheel_that_digs_itself_in_stalls() -> None:
-    """No number that is not finite reaches a sensor."""
+def test_a_wheel_that_sinks_to_its_axle_stalls() -> None:
+    """Where the wheel–soil model has no solution, the current is finite and near the stall current."""
     soup = {"cohesion_Pa": 10, "friction_angle_deg": 5, "shear_modulus_m": 0.05, "sinkage_exponent": 1.0}
     soup |= {"k_c_kN": 0.1, "k_phi_kN": 1.0}
     record = drive(even(ground={"stretches": [{"soil": soup}]}), 3)[-1]
@@ -165,8 +165,8 @@ def test_a_wheel_that_digs_itself_in_stalls() -> None:
     assert np.all(record.motor_current_A > 0.9)
 
 
-def test_a_scenario_is_a_file(tmp_path: Path) -> None:
-    """Soils by name or by their constants; everything else has its default."""
+def test_a_scenario_file_may_name_soils(tmp_path: Path) -> None:
+    """Soils are given by name, and missing keys have their defaults."""
     path = tmp_path / "scenario.toml"
     path.write_text(
         "seed = 9\n"
@@ -179,13 +179,13 @@ def test_a_scenario_is_a_file(tmp_path: Path) -> None:
 
 
 def test_the_annotated_scenario_is_the_default_one() -> None:
-    """`docs/virtual-rover.toml` says what a missing line means, all of it."""
+    """`docs/virtual-rover.toml` lists every key with its default."""
     path = Path(__file__).resolve().parents[3] / "docs" / "virtual-rover.toml"
     assert read_scenario(path) == Scenario()
-    told = set(re.findall(r"^#? ?(\w+) =", path.read_text(), re.MULTILINE))
-    tables = [Scenario, Ground, Motion, Noise, Hidden]
+    listed = set(re.findall(r"^#? ?(\w+) =", path.read_text(), re.MULTILINE))
+    tables = [Scenario, Ground, Motion, SensorNoise, Hidden]
     inner = {name for table in tables for name in table.model_fields} - set(Scenario.model_fields) - {"stretches"}
-    assert inner <= told
+    assert inner <= listed
 
 
 @pytest.mark.parametrize(
@@ -205,6 +205,6 @@ def test_the_annotated_scenario_is_the_default_one() -> None:
     ],
 )
 def test_an_impossible_ground_is_refused(ground: dict[str, object]) -> None:
-    """Unknown soils, and stretches in no order."""
+    """Unknown soils and unordered stretches are validation errors."""
     with pytest.raises(ValidationError):
         Scenario.model_validate({"ground": ground})

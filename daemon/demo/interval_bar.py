@@ -1,4 +1,4 @@
-"""An interval as a line of text: what is 90 % sure, what is 50 % sure, and the median."""
+"""A posterior's interval as one line of text: a bar with 90 % interval, 50 % interval and median."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ WIDTH = 34
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """What is shown, in which unit (SI × `factor`), from where to where, with how many digits."""
+    """A quantity of the posterior message, its displayed unit (SI × `factor`), axis limits and number of digits."""
 
     key: str
     label: str
@@ -33,9 +33,9 @@ SCALES = (
 )
 
 
-def interval_line(scale: Scale, interval: Mapping[str, Any]) -> Text:
-    """Return label, bar and numbers; thin is the 90 % interval, thick the 50 %."""
-    at = {name: float(value) * scale.factor for name, value in interval.items()}
+def interval_bar(scale: Scale, interval: Mapping[str, Any]) -> Text:
+    """Return label, bar and numbers; the thin line is the 90 % interval, the thick one the 50 % interval."""
+    shown = {name: float(value) * scale.factor for name, value in interval.items()}
 
     def column(value: float) -> int:
         share = (value - scale.low) / (scale.high - scale.low)
@@ -43,11 +43,11 @@ def interval_line(scale: Scale, interval: Mapping[str, Any]) -> Text:
 
     bar = [" "] * WIDTH
     for name, mark in (("90", "─"), ("50", "━")):
-        for place in range(column(at[f"low_{name}"]), column(at[f"high_{name}"]) + 1):
+        for place in range(column(shown[f"low_{name}"]), column(shown[f"high_{name}"]) + 1):
             bar[place] = mark
-    bar[column(at["median"])] = "●"
-    numbers = f"{at['median']:.{scale.digits}f} {scale.unit}".rjust(8)
-    between = f"{at['low_90']:.{scale.digits}f} … {at['high_90']:.{scale.digits}f}"
+    bar[column(shown["median"])] = "●"
+    numbers = f"{shown['median']:.{scale.digits}f} {scale.unit}".rjust(8)
+    between = f"{shown['low_90']:.{scale.digits}f} … {shown['high_90']:.{scale.digits}f}"
     return Text.assemble(
         (f"{scale.label:17}", "dim"), ("│", "dim"), ("".join(bar), "bold magenta"), ("│", "dim"), numbers, "  ", between
     )

@@ -1,4 +1,4 @@
-"""The live table: what an MQTT subscriber knows, and nothing else."""
+"""The demo's live table, filled from MQTT messages alone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from regolithd.calibration.posterior.window import INTERVAL_S
-from regolithd.daemon.demo.interval import SCALES, interval_line
+from regolithd.daemon.demo.interval_bar import SCALES, interval_bar
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 PLACES = ("front left", "front right", "middle left", "middle right", "rear left", "rear right")
 HISTORY = 12
 BLOCKS = "▁▂▃▄▅▆▇█"
-MEANING = "outside: load W, slip i or current I is not in the network's training range"
+LEGEND = "outside: load W, slip i or current I is not in the network's training range"
 SYMBOLS = {"load_N": "W", "slip": "i", "motor_current_A": "I", "wheel_torque_Nm": "T", "wheel_speed_rad_s": "ω"}
 
 
 @dataclass(slots=True)
-class Viewer:
-    """The newest message of each wheel, a little history, and how many there were."""
+class LiveTable:
+    """The newest message of each wheel, the recent torques, posterior and alarms, and the number of messages."""
 
     prefix: str
     wheels: dict[int, dict[str, Any]] = field(default_factory=dict)
@@ -41,7 +41,7 @@ class Viewer:
     alarms: dict[str, str] = field(default_factory=dict)
 
     def take(self, topic: str, payload: bytes) -> None:
-        """Take one message."""
+        """Take in one message."""
         self.messages += 1
         match topic.removeprefix(self.prefix + "/").split("/"):
             case ["wheel", number]:
@@ -67,7 +67,7 @@ class Viewer:
             self.alarms[name] = message["text"]
 
     def render(self) -> RenderableType:
-        """Return the table with a line of state beneath."""
+        """Return the table of the wheels, the posterior, and a line with state and alarms."""
         table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 2, 0, 0))
         table.add_column("wheel", no_wrap=True)
         for name in ("load\nN", "slip\n%", "torque\nN·m"):
@@ -79,17 +79,17 @@ class Viewer:
         top = max([0.1, *(max(values) for values in self.torque.values() if values)])
         for wheel in range(1, 7):
             table.add_row(*self._row(wheel, top))
-        return Group(table, Text(MEANING, style="dim"), Text(), *self._posterior(), Text(), self._footer())
+        return Group(table, Text(LEGEND, style="dim"), Text(), *self._posterior_lines(), Text(), self._footer())
 
-    def _posterior(self) -> list[Text]:
-        """Return what the six wheels say together."""
+    def _posterior_lines(self) -> list[Text]:
+        """Return title and one interval bar for each quantity of the posterior."""
         if self.posterior is None:
-            return [Text("the ground under all six wheels: nothing to go by yet", style="dim"), *[Text()] * len(SCALES)]
+            return [Text("posterior of all six wheels: not enough data yet", style="dim"), *[Text()] * len(SCALES)]
         seconds = self.posterior["instants"] * INTERVAL_S
         title = Text.assemble(
-            ("the ground, by all six wheels over the last ", "dim"), f"{seconds:g} s", (" (90 % sure)", "dim")
+            ("posterior of all six wheels over the last ", "dim"), f"{seconds:g} s", (" (90 % interval)", "dim")
         )
-        return [title, *(interval_line(scale, self.posterior[scale.key]) for scale in SCALES)]
+        return [title, *(interval_bar(scale, self.posterior[scale.key]) for scale in SCALES)]
 
     def _row(self, wheel: int, top: float) -> tuple[RenderableType, ...]:
         name = Text.assemble((f"{wheel} ", "bold"), (PLACES[wheel - 1], "dim"))
@@ -98,15 +98,15 @@ class Viewer:
             return (name, *[Text("–", style="dim")] * 3, "", "–", "–", Text("waiting", style="dim"))
         history = Text(sparkline(self.torque.get(wheel, ()), top).ljust(HISTORY), style="cyan")
         angle = message["friction_angle_rad"]
-        good = "bold green" if message["valid"] and not message["outside_training_range"] else "yellow"
+        colour = "bold green" if message["valid"] and not message["outside_training_range"] else "yellow"
         return (
             name,
             _number(message["smoothed_load_N"], 1),
             _number(message["slip"], 1, 100),
             _number(message["smoothed_torque_Nm"], 2, style="bold cyan"),
             history,
-            _number(message["cohesion_Pa"], 2, 1e-3, style=good),
-            _number(math.degrees(angle) if angle is not None else None, 1, style=good),
+            _number(message["cohesion_Pa"], 2, 1e-3, style=colour),
+            _number(math.degrees(angle) if angle is not None else None, 1, style=colour),
             _verdict(message),
         )
 
@@ -124,7 +124,7 @@ class Viewer:
 
 
 def sparkline(values: Any, top: float) -> str:  # noqa: ANN401  # any numbers in a row
-    """Return values between 0 and `top` as a row of blocks."""
+    """Return values between 0 and `top` as a row of block characters."""
     return "".join(BLOCKS[min(len(BLOCKS) - 1, max(0, int(value / top * len(BLOCKS))))] for value in values)
 
 

@@ -1,4 +1,4 @@
-"""What fourteen nodes put on the bus at one SYNC, as frames: the sensors' words with all their rounding."""
+"""The PDO frames that all nodes send after one SYNC, with measurements rounded to the objects' resolution."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 SYNC_ID = 0x080
 OPERATION_ENABLED = 0x1237
 FRAME_NS = 130_000
-"""How long a full frame occupies a bus of 1 Mbit/s, stuffing included."""
+"""Duration of a full frame on a bus of 1 Mbit/s, stuff bits included."""
 
 
 def frames(
     nodes: Iterable[NodeDescription], sync_ns: int, motor_speed_rad_s: Array, read: Measurement
 ) -> Iterator[Frame]:
-    """Yield the SYNC and every node's answer to it, in the order of their priority on the bus."""
+    """Yield the SYNC and every node's TPDOs, in the order of arbitration (lowest COB-ID first)."""
     known = _quantities(motor_speed_rad_s, read)
     answers = [
         (pdo.cob_id(node.node_id), pdo.pack(*[_raw(meaning, known, node.wheel or 0) for meaning in pdo.meanings]))
@@ -61,5 +61,5 @@ def _quantities(motor_speed_rad_s: Array, read: Measurement) -> dict[Quantity, A
 
 
 def _raw(meaning: Meaning | Validity | None, known: Mapping[Quantity, Array], wheel: int) -> int:
-    """Return an object's raw value; what tells of validity is 0, all well."""
+    """Return an object's raw value; a validity object is 0 (valid)."""
     return round(known[meaning.quantity][wheel] / meaning.factor) if isinstance(meaning, Meaning) else 0

@@ -1,4 +1,4 @@
-"""What the drive came to: per wheel and soil, the estimate beside the truth."""
+"""The tables that the demo prints at its end: estimates beside the ground truth, by wheel and by soil."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from rich import box
 from rich.table import Table
 
 if TYPE_CHECKING:
-    from regolithd.daemon.demo.ground_truth_log import Ground, Stretch
+    from regolithd.daemon.demo.ground_truth_log import PosteriorOnSoil, WheelOnSoil
 
 
-def summary(stretches: list[Stretch]) -> Table:
-    """Return the table: estimated, and true in brackets."""
-    table = _titled("By each wheel alone, the paper's network: mean over each soil (true)")
+def wheel_table(wheels: list[WheelOnSoil]) -> Table:
+    """Return the table of each wheel's means on each soil, true values in brackets."""
+    table = _titled("Each wheel alone, the paper's network: mean over each soil (true value)")
     table.add_column("\nwheel", justify="right")
     table.add_column("\nsoil")
     for name in ("torque\nN·m", "c\nkPa", "φ\n°"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("outside\ntraining", justify="right")
     wheel = 0
-    for each in stretches:
+    for each in wheels:
         table.add_row(
             str(each.wheel) if each.wheel != wheel else "",
             each.soil,
@@ -34,13 +34,13 @@ def summary(stretches: list[Stretch]) -> Table:
     return table
 
 
-def ground_summary(grounds: list[Ground]) -> Table:
-    """Return the table of what the posterior said where all six wheels were on one soil: 90 % intervals, and true."""
-    table = _titled("By all six wheels together: median, 90 % interval (true)")
+def posterior_table(posteriors: list[PosteriorOnSoil]) -> Table:
+    """Return the table of the posterior on each soil: median and 90 % interval, true values in brackets."""
+    table = _titled("Posterior of all six wheels: median, 90 % interval (true value)")
     table.add_column("\nsoil")
     table.add_column("c\nkPa", justify="right", no_wrap=True)
     table.add_column("φ\n°", justify="right", no_wrap=True)
-    for each in grounds:
+    for each in posteriors:
         cohesion, angle = each.posterior.cohesion_Pa, each.posterior.friction_angle_rad
         table.add_row(
             each.soil,
