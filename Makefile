@@ -6,7 +6,7 @@ export PYTHON
 
 RECORDINGS ?= ../shared/recordings
 
-.PHONY: demo test check sizing reproduce evaluate loop pictures prove real scaling picture frames install uninstall clean
+.PHONY: demo test check sizing reproduce evaluate loop pictures prove real scaling mutants picture frames install uninstall clean
 
 demo: $(VENV)/demo.ready
 	$(BIN)/regolithd demo
@@ -54,6 +54,10 @@ real: $(VENV)/dev.ready
 # How time and memory of a comparison grow with rows and candidates.
 scaling: $(VENV)/dev.ready
 	$(BIN)/python -m regolithd.calibration.validation.blind_trials.scaling build/figures/scaling.json docs/mismatch-scaling.svg
+
+# Mutation testing on a random sample; hours. SEED=… COUNT=… ONLY=drivers/can narrows it.
+mutants: $(VENV)/dev.ready
+	$(BIN)/python tests/mutation/sample.py --seed $(or $(SEED),1) --count $(or $(COUNT),200) $(if $(ONLY),--only $(ONLY))
 
 # What a frame costs, beside python-can and canopen, on vcan; and docs/bus.md as the code has it.
 frames: $(VENV)/dev.ready
