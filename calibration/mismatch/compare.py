@@ -24,7 +24,7 @@ from regolithd.calibration.mismatch.inference.held_out import HeldOut, hold_out
 from regolithd.calibration.mismatch.inference.identifiability import confusions
 from regolithd.calibration.mismatch.inference.intervals import parameters_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
-from regolithd.calibration.mismatch.regression.design_matrix import Dictionary
+from regolithd.calibration.mismatch.regression.design_matrix import Dictionary, Group
 from regolithd.calibration.mismatch.regression.noise import Noise, blocks_of_time, estimate_noise, folds_of_blocks
 from regolithd.calibration.mismatch.regression.normal_equations import (
     NOT_FOR_CURVES,
@@ -87,7 +87,7 @@ def compare(
     decision = decide(Search(dictionary, nuisance, noise.weights), fitting)
     blocks = blocks_of_time(problem, decision.noise)
     progress("measuring on held-out blocks")
-    sought = [g for g in dictionary.groups if g in grid or g.name == "wheel-angle-ripple"]
+    sought = [g for g in dictionary.groups if g in grid or _only_proposed(problem, g)]
     held = hold_out(decision.search, decision.named, decision.noise, sought)
     progress("weighing rivals")
     answer = Answer(
@@ -104,6 +104,11 @@ def compare(
         ),
     )
     return Comparison(answer, _evidence(decision))
+
+
+def _only_proposed(problem: Problem, group: Group) -> bool:
+    """Return whether a candidate's shapes come from a residual alone, so that the grid has none of them."""
+    return group.candidate is not None and not group.candidate.shapes(problem)
 
 
 def _verdict(decision: Decision) -> Verdict:

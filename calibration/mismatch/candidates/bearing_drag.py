@@ -27,7 +27,7 @@ class BearingDrag(Candidate):
     equation = "ΔI = I_b g(t − t_0) sign(ω)"
     words = "drag that was not there before"
     signature = "one wheel's residual along sign(ω), none before its onset, growing after"
-    experiment = "lift the wheels, spin all six at one speed and compare their currents"
+    experiment = "drive back over the same ground, and lift the wheels and spin all six at one speed"
     source = "seal and bearing failures: from percents of rated current to stalling"
     requires = ("direction",)
     coefficients: ClassVar = (Coefficient("drag_current", "{unit}"),)

@@ -1,4 +1,9 @@
-"""What a candidate is: a term with unit, sign and shape, where it acts, and the drive that shows it alone."""
+"""The interface of a candidate: one physical effect that a simulation may leave out.
+
+An effect is modelled as Σ coefficient × column, added to the predicted channel. The coefficients are fitted; the
+columns are computed from the recording. What enters nonlinearly (an onset, a Stribeck speed) is a *shape parameter*:
+the engine searches a grid of shapes and then optimises the continuous ones.
+"""
 
 from __future__ import annotations
 
@@ -15,17 +20,29 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 SHAPE_TOLERANCE = 0.02
-"""Share by which a coefficient and the same number in its column may differ."""
+"""Relative difference below which a fitted coefficient and the same number in its column agree (a choice: a fifth of
+the usual 90 % interval; a smaller one costs iterations)."""
 UNLIKELY_SHAPE_PENALTY = 9.2
-"""What a shape costs against which the odds are a hundred to one: twice the logarithm of that."""
+"""Δχ² charged for a shape that has odds of one in a hundred before the recording: 2 ln 100."""
+ONSET_COUNT = 24
+"""Onsets in the grid of a candidate (a choice: one in each 4 % of the recording, refined later)."""
+EARLIEST_ONSET, LATEST_ONSET = 0.03, 0.95
+"""Ends of that grid, as shares of the recording: what is before and after an onset must both be seen (a choice)."""
 Shape = dict[str, float | str]
-"""Values of the shape parameters (an onset, an order, a Stribeck speed): what enters nonlinearly."""
+"""Values of the shape parameters by name. Numbers may be continuous (`free`), strings are kinds."""
 Sharing = Literal["all", "one"]
 
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A factor that is fitted: its name, unit ({unit} is the predicted channel's) and sign (0: either)."""
+    """A linear factor that is fitted.
+
+    Attributes
+    ----------
+    name: as the answer's `parameters` has it
+    unit: of the coefficient; `{unit}` stands for the unit of the predicted channel
+    sign: +1 or −1 where physics allows one sign only, 0 for either
+    """
 
     name: str
     unit: str = "{unit}"
@@ -33,90 +50,149 @@ class Coefficient:
 
 
 class Candidate:
-    """One effect: subclass it, say what it is, and return its columns.
+    """One effect. Subclass it in a file of its own in this folder; nothing else has to be changed.
 
-    The effect is Σ coefficient × column, added to the prediction.
+    The least that a subclass states: `name`, `covariate`, `equation`, `words`, `signature`, `experiment`, `source`,
+    `coefficients` and `columns`. The other attributes and methods have defaults that suit a linear law.
     """
 
     name: ClassVar[str]
+    """Identifier in the answer, in `[[effects]]` and in the documentation: lower case, words joined by hyphens."""
     covariate: ClassVar[str]
+    """The quantity that the effect depends on: a key of `Problem.covariates` (`direction`, `wheel_speed`,
+    `wheel_acceleration`, `wheel_angle`, `torque`, `time`, and what the simulation's `covariates` returns, such as
+    `temperature`), `wheel_row`, or `none` for a constant. The report plots the residual against it; `experiment` has
+    to vary it."""
     equation: ClassVar[str]
-    signature: ClassVar[str]
-    """What it looks like in a recording."""
-    experiment: ClassVar[str]
-    """The drive that excites it alone."""
-    source: ClassVar[str]
-    """Where form and size come from."""
-    requires: ClassVar[tuple[str, ...]] = ()
-    """Covariates without which it cannot be told."""
-    coefficients: ClassVar[tuple[Coefficient, ...]]
-    sharing: ClassVar[tuple[Sharing, ...]] = ("all", "one")
-    """Which wheels may have it: all alike, or one alone."""
-    channel: ClassVar[str | None] = None
-    """Where the fault is, if not in the predicted channel."""
-    free: ClassVar[Mapping[str, tuple[float, float]]] = {}
-    """Shape parameters that are continuous, with their least and greatest value."""
+    """The law, as text, for the answer and the report."""
     words: ClassVar[str]
-    """What it is, in a sentence after 'there is'."""
+    """A noun phrase in lower case that begins the answer's sentence: "drag that grows with the wheel's speed"."""
+    signature: ClassVar[str]
+    """What the effect looks like in a residual, for the documentation."""
+    experiment: ClassVar[str]
+    """An instruction in the imperative, lower case, without a full stop: the drive that varies `covariate` and nothing
+    else. The answer gives it where this effect cannot be told from another."""
+    source: ClassVar[str]
+    """Where the form of the law and the usual size come from: author and year, data sheet, or the law of physics."""
+    coefficients: ClassVar[tuple[Coefficient, ...]]
+    """One for each column, in the order of the columns; `columns` may return fewer, where the machine lacks one."""
+
+    label: ClassVar[str] = ""
+    """The name as text for people; by default `name` with its last hyphen as a space: "multi-pass compaction"."""
+    parameter_labels: ClassVar[Mapping[str, str]] = {}
+    """Labels for the report's table of parameters; by default a parameter's name with spaces."""
+    requires: ClassVar[tuple[str, ...]] = ()
+    """Covariates that must have been recorded and vary; without them the candidate is not looked for."""
+    sharing: ClassVar[tuple[Sharing, ...]] = ("all", "one")
+    """Wheels that may have the effect: `all` with the same coefficients, or `one` alone."""
+    channel: ClassVar[str | None] = None
+    """The faulty channel, where that is not the predicted one (a load cell); None: the predicted channel."""
+    along_motion: ClassVar[bool] = True
+    """Whether the effect changes sign with the direction of motion, as a drag does. The report multiplies the residual
+    by the sign of the speed if it does, and shows it as it is otherwise."""
+    free: ClassVar[Mapping[str, tuple[float, float]]] = {}
+    """Continuous shape parameters with their least and greatest value. The ending of the name is the unit: `_s`, `_K`,
+    `_degC`, `_rad_s`; without one of these it has none. `onset_s` is the time at which an effect begins."""
+    experiment_minutes: ClassVar[tuple[int, int]] = (10, 120)
+    """The least and the most minutes that the experiment may be asked to last (a choice: a drive has to settle, and a
+    rover's battery lasts some two hours)."""
+    acts_unloaded: ClassVar[bool] = True
+    """Whether the effect is there with the wheels lifted, where soil and load have no part in the channel."""
+
+    def __init_subclass__(cls) -> None:
+        """Derive the label from the name."""
+        super().__init_subclass__()
+        if "name" in vars(cls) and "label" not in vars(cls):
+            cls.label = " ".join(cls.name.rsplit("-", 1)).replace("_", " ")
 
     def applies(self, problem: Problem) -> bool:
-        """Say whether this recording and simulation can have it at all."""
+        """Return whether this recording and simulation allow the effect at all."""
         return problem.has(*self.requires)
 
-    def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002  # subclasses look
-        """Return the grid of shapes that is searched."""
+    def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002  # subclasses use it
+        """Return the grid of shapes to search; empty where shapes come from `propose_shapes` alone."""
         return [{}]
 
-    def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
-        """Return what this shape costs where it contradicts what was stated, or says no more than a plainer name."""
-        return 0.0
-
-    def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002
-        """Return the shape that agrees with its fitted coefficients, where a law is not linear in them."""
-        return shape
-
-    def onset_profiles(self, problem: Problem) -> Sequence[Shape]:
-        """Return the ways to grow after an onset: every shape but for its onset."""
-        found = {tuple(sorted((k, v) for k, v in s.items() if k != "onset_s")) for s in self.shapes(problem)}
-        return [dict(growth) for growth in sorted(found, key=str)]
-
-    def shape_count(self, problem: Problem) -> float:
-        """Return how many different shapes were open to choice: what a choice among them must be paid for."""
-        return max(len(self.shapes(problem)), 1)
-
-    def propose_shapes(self, problem: Problem, residual: Array) -> Sequence[Shape]:  # noqa: ARG002
-        """Return further shapes that a residual suggests, where a grid would be too fine to search blindly."""
-        return []
-
-    def autocorrelation_time_at(self, problem: Problem, residual: Array, shape: Shape) -> float:  # noqa: ARG002
-        """Return how many readings count as one for this shape's columns; infinite where only the long run is known."""
-        return float("inf")
-
-    def own_channel_evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array] | None:  # noqa: ARG002
-        """Return what the fault's own channel says, for each wheel: the gain there and the coefficient; or nothing."""
-        return None
-
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return the columns, shape (coefficient, time, wheel), in the predicted channel's unit per coefficient."""
+        """Return the columns for one shape.
+
+        Parameters
+        ----------
+        problem: recording, calibrated prediction (`problem.filled`) and covariates, each of shape (time, wheel)
+        shape: one of `shapes`, or one with its `free` parameters moved within `bounds`
+
+        Returns
+        -------
+        Array of shape (column, time, wheel), finite wherever `problem.mask` is set: the change of the predicted
+        channel for a coefficient of 1. One column for each of `coefficients`.
+        """
         raise NotImplementedError
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
-        """Return the free shape parameters' range in this recording."""
+        """Return the range of each free shape parameter that this recording can tell; by default `free`.
+
+        A free parameter that is not a key of `shape` is left alone.
+        """
         return self.free
 
     def parameters(self, shape: Shape, values: Sequence[float]) -> dict[str, float]:
-        """Return what the answer reports: coefficients and free shape parameters by name."""
-        found = {c.name: float(v) for c, v in zip(self.coefficients, values, strict=False)}
+        """Return what the answer reports, by name: the coefficients' values and the free shape parameters.
+
+        Raises
+        ------
+        ValueError
+            When there are more columns than coefficients.
+        """
+        names = [coefficient.name for coefficient in self.coefficients[: len(values)]]
+        found = {name: float(value) for name, value in zip(names, values, strict=True)}
         return {**found, **{name: float(shape[name]) for name in self.free if name in shape}}
 
+    def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
+        """Return the Δχ² that a shape must gain beyond others, for contradicting what was stated before."""
+        return 0.0
 
-def onset_grid(problem: Problem, count: int = 24) -> list[float]:
-    """Return times at which something may begin [s]: evenly spread, not within 3 % of either end."""
-    return [float(t) for t in problem.length_s * np.linspace(0.03, 0.95, count)]
+    def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002
+        """Return the shape that agrees with its fitted coefficients `values`, where the law is not linear in them.
+
+        The engine alternates this with the fit until the shape stays the same.
+        """
+        return shape
+
+    def onset_profiles(self, problem: Problem) -> Sequence[Shape]:
+        """Return how the effect may develop after its onset: every distinct shape without its `onset_s`."""
+        found = {tuple(sorted((k, v) for k, v in s.items() if k != "onset_s")) for s in self.shapes(problem)}
+        return [dict(profile) for profile in sorted(found, key=str)]
+
+    def shape_count(self, problem: Problem) -> float:
+        """Return how many distinct shapes the search chooses from: 2 ln of it is the penalty for that choice."""
+        return max(len(self.shapes(problem)), 1)
+
+    def propose_shapes(self, problem: Problem, residual: Array) -> Sequence[Shape]:  # noqa: ARG002
+        """Return shapes suggested by a residual [time, wheel], where a grid would have to be too fine."""
+        return []
+
+    def autocorrelation_time_at(self, problem: Problem, residual: Array, shape: Shape) -> float:  # noqa: ARG002
+        """Return the noise's autocorrelation time [readings] at the frequencies of this shape's columns.
+
+        Infinite where only that of slow changes is known, which is the default.
+        """
+        return float("inf")
+
+    def own_channel_evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array] | None:  # noqa: ARG002
+        """Return Δχ² and coefficient of the fault in its own `channel`, shape (wheel,) each; None: there is no such."""
+        return None
+
+
+def onset_grid(problem: Problem, count: int = ONSET_COUNT) -> list[float]:
+    """Return times at which something may begin [s], evenly spread over the recording without its ends."""
+    return [float(t) for t in problem.length_s * np.linspace(EARLIEST_ONSET, LATEST_ONSET, count)]
 
 
 def growth_since(problem: Problem, onset_s: float, rise_s: float) -> Array:
-    """Return growth from 0 at the onset, shape (time, 1): a step (rise 0), an approach to 1, or a ramp (rise inf)."""
+    """Return growth from 0 at the onset, shape (time, 1).
+
+    A step (`rise_s` 0), an exponential approach to 1 with that time constant, or a ramp to 1 at the end (`rise_s` inf).
+    """
     after = np.maximum(problem.time_s - onset_s, 0.0)
     if rise_s == 0:
         return (problem.time_s >= onset_s).astype(np.float64)

@@ -20,9 +20,10 @@ class CoulombFriction(Candidate):
     equation = "ΔI = I_c sign(ω)"
     words = "constant drag against rotation (no-load current)"
     signature = "a residual of constant size that changes sign with the direction of rotation"
-    experiment = "drive the same level stretch forwards and backwards at one speed, then lift the wheels and spin them"
+    experiment = "drive the same stretch forwards and backwards at one speed"
     source = "Maxon RE 25: no-load current about 37 mA; harmonic drives add their starting torque"
     requires = ("direction",)
+    label = "Coulomb friction"
     coefficients: ClassVar = (Coefficient("coulomb_current", "{unit}"),)
 
     def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002

@@ -20,8 +20,9 @@ class CurrentSensorBias(Candidate):
     equation = "ΔI = I_0"
     words = "an offset of one reading, whatever the direction"
     signature = "one wheel's residual is constant and keeps its sign when the wheel reverses"
-    experiment = "stand still with the motors unpowered, and drive one stretch both ways"
+    experiment = "stand still with the motors unpowered, then drive one stretch both ways"
     source = "shunt amplifiers: offsets of milliamperes"
+    along_motion = False
     coefficients: ClassVar = (Coefficient("offset", "{unit}", 0),)
     sharing: ClassVar = ("one",)
 

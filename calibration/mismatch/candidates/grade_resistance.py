@@ -25,6 +25,8 @@ class GradeResistance(Candidate):
     experiment = "drive one slope up and down, forwards and backwards"
     source = "statics: at most weight × radius / gain"
     requires = ("pitch",)
+    along_motion = False
+    acts_unloaded = False
     coefficients: ClassVar = (Coefficient("grade_current", "{unit}"),)
     sharing: ClassVar = ("all",)
 

@@ -36,9 +36,10 @@ class LoadCellDrift(Candidate):
     equation = "W = W_cell − D(t);  ΔI = −(∂I/∂W) D(t)"
     words = "a load cell that wanders"
     signature = "one wheel's load leaves what pitch and roll explain, and its current does not follow"
-    experiment = "park on level ground at intervals and compare the six cells' sum with the rover's weight"
+    experiment = "drive back over the same ground, and lift the wheels and spin all six at one speed"
     source = "strain-gauge creep and temperature: percents of full scale per hour when faulty"
     requires = ("load", "pitch", "roll")
+    acts_unloaded = False
     coefficients: ClassVar = (Coefficient("drift_as_the_cell_shows_it", "1", 1),)
     sharing: ClassVar = ("one",)
     free: ClassVar = {"relative_offset": (-3.0, 0.85)}

@@ -34,7 +34,7 @@ class LoadDependentEfficiency(Candidate):
     equation = "ΔI = a I_sim |I_sim/Ī|^p,  or I_sim (1/(1 − a x) − 1) with x = |I_sim|/Ī − 1"
     words = "a loss that depends on the torque carried"
     signature = "a residual along the predicted current, curved against it"
-    experiment = "drive one speed with and without ballast, and up and down slopes, at one temperature"
+    experiment = "repeat at one speed with and without ballast, and up and down a slope"
     source = "CSF-11 efficiency over load (maker's chart): 0.3 to 0.7 from a tenth of rated torque to rated"
     requires = ("torque",)
     coefficients: ClassVar = (Coefficient("relative_loss", "1", 0),)

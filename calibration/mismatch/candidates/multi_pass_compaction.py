@@ -32,9 +32,10 @@ class MultiPassCompaction(Candidate):
     equation = "ΔI = p(row) (a I_sim),  or p(row) Σ a_k ∂I_sim/∂ln k over the soil's stiffness, shear modulus, cohesion"
     words = "soil that earlier wheels have compacted for later ones"
     signature = "a residual along the predicted current that is the same for both wheels of a row and differs by row"
-    experiment = "drive the same virgin lane forwards, then backwards in the same ruts, then a third time"
+    experiment = "drive one virgin lane, then twice more in the same ruts"
     source = "multi-pass tests on sand: most of the compaction in the first pass"
     requires = ("torque",)
+    acts_unloaded = False
     coefficients: ClassVar = (
         Coefficient("relative_change_per_pass", "1", 0),
         Coefficient("relative_shear_modulus_per_pass", "1", 0),

@@ -29,9 +29,10 @@ class RotorInertia(Candidate):
     equation = "ΔI(t) = (J/k) dω/dt (t − lag)"
     words = "current that goes into accelerating rotor and wheel"
     signature = "short residuals at each change of speed, with the acceleration's sign"
-    experiment = "start, stop and reverse sharply, many times, on level ground"
+    experiment = "start, stop and reverse sharply, twenty times"
     source = "RE 25 rotor 10 g cm²; through 1400:1 about 2 kg m² at the wheel"
     requires = ("wheel_acceleration",)
+    along_motion = False
     coefficients: ClassVar = (Coefficient("inertia_current", "{unit} s²/rad"),)
     free: ClassVar = {"lag_s": (0.0, 1.0)}
 

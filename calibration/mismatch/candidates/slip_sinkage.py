@@ -22,9 +22,10 @@ class SlipSinkage(Candidate):
     equation = "z_SS = z (1 + s ((1 + i)/(1 − i/2) − 1))  (Eqs 8, 9)"
     words = "extra sinkage with slip"
     signature = "a residual along the predicted current that grows with slip and vanishes without it"
-    experiment = "pull a sledge of several weights on level ground: slip at constant load and speed"
+    experiment = "pull a sledge of several weights on level ground, so that slip changes at constant load"
     source = "Lyasko (2010), Eq. 8 of the paper: s = 1"
     requires = ("slip",)
+    acts_unloaded = False
     coefficients: ClassVar = (Coefficient("strength", "1"),)
     sharing: ClassVar = ("all",)
 

@@ -30,9 +30,10 @@ class StribeckFriction(Candidate):
     equation = "ΔI = I_s sign(ω) exp(−(|ω|/ω_s)^δ), or I_s sign(ω) / (1 + (ω/ω_s)²)"
     words = "extra drag near standstill that fades with speed"
     signature = "a residual along sign(ω) that is largest at the slowest speeds"
-    experiment = "creep: a staircase of very slow constant speeds on level ground, both ways"
+    experiment = "drive a staircase of at least four constant speeds, from creeping to full speed, both ways"
     source = "Armstrong-Hélouvry, Dupont and Canudas de Wit (1994): δ from 1 to 2; Hess and Soom (1990): the quotient"
     requires = ("wheel_speed",)
+    label = "Stribeck friction"
     coefficients: ClassVar = (Coefficient("stribeck_current", "{unit}"),)
     free: ClassVar = {"stribeck_speed_rad_s": (0.0, np.inf)}
 

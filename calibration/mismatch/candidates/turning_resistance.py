@@ -25,9 +25,10 @@ class TurningResistance(Candidate):
     equation = "ΔI = a g(|ψ̇|) sign(ω) + m g(|ψ̇|) sign(ψ̇) side,  g rising"
     words = "scrub while the rover turns"
     signature = "a residual only while turning: alike on all wheels (drag) or opposite on the two sides (moment)"
-    experiment = "turn on the spot and along arcs of several radii, both ways, on level ground"
+    experiment = "turn on the spot and along arcs of several radii, both ways"
     source = "skid-steer terramechanics: lateral friction saturates within a few degrees of side slip"
     requires = ("yaw_rate", "direction")
+    acts_unloaded = False
     coefficients: ClassVar = (Coefficient("drag", "{unit}", 0), Coefficient("moment", "{unit}", 0))
     sharing: ClassVar = ("all",)
 

@@ -62,6 +62,24 @@ class RoverWheel(Simulation):
         "friction_angle_deg": "soil-friction-angle",
     }
 
+    unloaded_experiment = "lift the wheels and spin all six at several speeds, both ways"
+    covariate_labels: ClassVar = {
+        "wheel_speed": "wheel speed (rad/s)",
+        "direction": "direction of rotation",
+        "temperature": "motor temperature (°C)",
+        "torque": "predicted motor current (A)",
+        "wheel_acceleration": "wheel acceleration (rad/s²)",
+        "wheel_angle": "wheel angle (rad)",
+        "pitch": "pitch (rad, nose up)",
+        "roll": "roll (rad, right side down)",
+        "yaw_rate": "yaw rate (rad/s, to the left)",
+        "slip": "slip",
+        "load": "load (N)",
+        "voltage": "bus voltage (V)",
+        "wheel_row": "wheel row (front to rear)",
+        "place": "distance along the track (m)",
+    }
+
     def __init__(self, tables: RoverWheelTables) -> None:
         self.tables = tables
         self.parameters = _priors(tables)

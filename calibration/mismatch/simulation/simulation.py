@@ -71,6 +71,10 @@ class Simulation:
     """Parameters in which wheels differ: beside the common error each has one of its own, a third as large."""
     parameter_effects: ClassVar[Mapping[str, str]] = {}
     """Names of parameters as effects, for saying what a wrong parameter could be mistaken for."""
+    covariate_labels: ClassVar[Mapping[str, str]] = {}
+    """Axis labels with units for the report, by covariate: {"wheel_speed": "carriage speed (m/s)"}."""
+    unloaded_experiment: ClassVar[str] = ""
+    """How to run the machine without its load, as an instruction: what free parameters of the load hide shows there."""
     sensors: Mapping[str, SensorError] = {}
     """The errors of the recorded inputs, by column."""
 
