@@ -6,12 +6,12 @@
 |---|---|
 | network | the bus: reads it, boots and supervises the nodes, sends SYNC and heartbeat |
 | recording | the files |
-| each outlet | its connection, or its socket |
+| each sink | its connection, or its socket |
 | watchdog | systemd's attention: fed only while all others answer |
 
 What comes from the bus goes through the whole pipeline within the network's task, a few hundred microseconds for each
 SYNC, so nothing can fall behind or overtake. To stop is to be cancelled: the drives stop first, then the recording is
-closed and the outlets say goodbye.
+closed and the sinks say goodbye.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from dataclasses import asdict
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Protocol
 
-from regolithd.daemon.health.liveness import Pulses
+from regolithd.daemon.health.liveness import TaskLiveness
 from regolithd.daemon.health.sd_notify import READY, STOPPING, WATCHDOG, notify, watchdog_period_s
 from regolithd.daemon.pipeline.chain import Chain
 from regolithd.daemon.recording.recorder import FLUSH_S, Recorder
@@ -37,8 +37,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.daemon.config.configuration import Configuration
+    from regolithd.daemon.pipeline.onnx_models import OnnxModels
     from regolithd.daemon.pipeline.snapshot import Estimate
-    from regolithd.daemon.pipeline.terrain_network import Network as TerrainNetwork
+    from regolithd.daemon.pipeline.terrain_network import TerrainNetwork
     from regolithd.drivers.can.bus import Bus
     from regolithd.drivers.can.frame import Frame
     from regolithd.drivers.master.events import NetworkEvent
@@ -46,12 +47,12 @@ if TYPE_CHECKING:
 _log = logging.getLogger(__name__)
 
 NETWORK, RECORDING = "network", "recording"
-PATIENCE_S = 5.0
+TASK_TIMEOUT_S = 5.0
 WATCH_S = 0.5
 BUS_RETRY_S = 2.0
 
 
-class Outlet(Protocol):
+class Sink(Protocol):
     """Where estimates and events go. Neither call may block; `run` does what takes time, and beats its pulse."""
 
     def estimate(self, estimate: Estimate) -> None:
@@ -65,30 +66,30 @@ class Outlet(Protocol):
 
 
 class Service:
-    """Everything that runs for one rover. `outlets` may be added until `run`.
+    """Everything that runs for one rover. `sinks` may be added until `run`.
 
     Attributes
     ----------
-    configuration, terrain
+    configuration, models
         What it was started with.
     chain
         From frames to estimates, with its counters.
     recorder
         The recording, or None where it is switched off.
-    pulses
+    liveness
         Who has answered lately.
     bus_trouble
         Why the bus cannot be opened; empty where it is open.
     """
 
-    def __init__(self, configuration: Configuration, terrain: TerrainNetwork) -> None:
+    def __init__(self, configuration: Configuration, models: OnnxModels) -> None:
         self.configuration = configuration
-        self.terrain = terrain
-        self.chain = Chain(configuration, terrain)
-        self.recorder = _recorder(configuration, terrain) if configuration.recording.enabled else None
-        self.pulses = Pulses()
+        self.models = models
+        self.chain = Chain(configuration, models)
+        self.recorder = _recorder(configuration, models.terrain) if configuration.recording.enabled else None
+        self.liveness = TaskLiveness()
         self.bus_trouble = ""
-        self.outlets: list[Outlet] = []
+        self.sinks: list[Sink] = []
         self._network: Network | None = None
         self._opened = asyncio.Event()
         self._syncs_tried = -1
@@ -105,10 +106,10 @@ class Service:
         return self._network
 
     async def run(self) -> None:
-        """Run until cancelled; then stop the drives, let the outlets say goodbye, and close the recording."""
+        """Run until cancelled; then stop the drives, let the sinks say goodbye, and close the recording."""
         try:
             async with asyncio.TaskGroup() as group:
-                tasks = [group.create_task(outlet.run()) for outlet in self.outlets]
+                tasks = [group.create_task(sink.run()) for sink in self.sinks]
                 if self.recorder:
                     tasks.append(group.create_task(self._record(self.recorder)))
                 tasks.append(group.create_task(self._watch()))
@@ -148,26 +149,26 @@ class Service:
                 return bus
 
     def _take_frames(self, batch: Sequence[Frame]) -> None:
-        self.pulses.beat(NETWORK)
+        self.liveness.beat(NETWORK)
         if self.recorder:
             self.recorder.frames(batch)
         for estimate in self.chain.feed(batch):
             if self.recorder:
                 self.recorder.estimate(estimate)
-            for outlet in self.outlets:
-                outlet.estimate(estimate)
+            for sink in self.sinks:
+                sink.estimate(estimate)
 
     def _take_event(self, event: NetworkEvent) -> None:
         if self.recorder:
             self.recorder.event(event.time_ns, event_json(event))
-        for outlet in self.outlets:
-            outlet.event(event)
+        for sink in self.sinks:
+            sink.event(event)
 
     async def _record(self, recorder: Recorder) -> None:
-        self.pulses.expect(RECORDING, PATIENCE_S)
+        self.liveness.expect(RECORDING, TASK_TIMEOUT_S)
         while True:
             recorder.flush()
-            self.pulses.beat(RECORDING)
+            self.liveness.beat(RECORDING)
             await asyncio.sleep(FLUSH_S)
 
     async def _watch(self) -> None:
@@ -179,11 +180,11 @@ class Service:
                 # systemd shall wait for the bus, however long it takes, and show why.
                 notify(f"EXTEND_TIMEOUT_USEC=10000000\nSTATUS=waiting for the bus. {self.bus_trouble}")
                 await asyncio.sleep(pause_s)
-            self.pulses.expect(NETWORK, PATIENCE_S)
+            self.liveness.expect(NETWORK, TASK_TIMEOUT_S)
             notify(f"{READY}\nSTATUS=acquiring at {self.configuration.sync.rate_Hz:g} Hz")
             while True:
-                self._feel_network(self._network)
-                if silent := self.pulses.silent():
+                self._check_sync_progress(self._network)
+                if silent := self.liveness.silent():
                     notify(f"STATUS=no answer from {', '.join(silent)}")
                 elif period_s is not None:
                     notify(WATCHDOG)
@@ -191,13 +192,13 @@ class Service:
         finally:
             notify(STOPPING)
 
-    def _feel_network(self, network: Network) -> None:
+    def _check_sync_progress(self, network: Network) -> None:
         """Take the network for alive while it tries to send SYNCs: a dead link brings no frames."""
         sync = network.counters.sync
         tried = sync.produced + sync.failed + sync.skipped
         if tried != self._syncs_tried:
             self._syncs_tried = tried
-            self.pulses.beat(NETWORK)
+            self.liveness.beat(NETWORK)
 
 
 def network_settings(configuration: Configuration) -> NetworkSettings:

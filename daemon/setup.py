@@ -1,4 +1,4 @@
-"""What a command does first: read the configuration, load the network – or say what is wrong; status 78."""
+"""What a command does first: read the configuration, load the ONNX models; on an error, print it and exit with 78."""
 
 from __future__ import annotations
 
@@ -6,19 +6,17 @@ from typing import TYPE_CHECKING, NoReturn
 
 import typer
 
-from regolithd.calibration.models import TERRAIN_MODEL
-from regolithd.calibration.models.onnx_session import NetworkError
+from regolithd.calibration.models.onnx_session import ModelError
 from regolithd.daemon.config.configuration import Configuration
 from regolithd.daemon.config.reader import EXIT_STATUS, ConfigurationError, read_configuration
-from regolithd.daemon.pipeline.posterior import posterior_stage
-from regolithd.daemon.pipeline.terrain_network import Network
+from regolithd.daemon.pipeline.onnx_models import OnnxModels, load_models
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
 def configuration_or_exit(path: Path | None) -> Configuration:
-    """Return the configuration of a file, or the defaults; end with all its problems where there are any."""
+    """Return the configuration of a file, or the defaults; print all problems and exit where there are any."""
     if path is None:
         return Configuration()
     try:
@@ -27,12 +25,11 @@ def configuration_or_exit(path: Path | None) -> Configuration:
         _end([str(problem) for problem in error.problems])
 
 
-def network_or_exit(configuration: Configuration) -> Network:
-    """Return the terrain network that the configuration names; end with what does not fit, the posterior's included."""
+def models_or_exit(configuration: Configuration) -> OnnxModels:
+    """Return the ONNX models that the configuration names; print why and exit where one cannot be used."""
     try:
-        posterior_stage(configuration)  # not kept: the pipeline makes its own, but what does not fit shall show now
-        return Network(configuration.estimator.model or TERRAIN_MODEL)
-    except NetworkError as error:
+        return load_models(configuration)
+    except ModelError as error:
         _end([str(error)])
 
 

@@ -1,11 +1,11 @@
-"""What a service is equipped with before it runs: its outlets to the broker and to the control socket."""
+"""Connects a service to its sinks: the MQTT publisher and the control socket."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from regolithd.daemon.control.server import ControlOutlet
-from regolithd.daemon.publish.mqtt_sink import PATIENCE_S, PUBLISHING, MqttOutlet
+from regolithd.daemon.control.server import ControlSink
+from regolithd.daemon.publish.mqtt_sink import PUBLISHING, MqttSink
 from regolithd.daemon.publish.publisher import Publisher
 from regolithd.daemon.publish.spool import Spool
 
@@ -13,26 +13,28 @@ if TYPE_CHECKING:
     from regolithd.daemon.service import Service
 
 CONTROL = "control"
+CONTROL_TIMEOUT_S = 10.0
+"""The control task counts as hung when it has not reported for this long."""
 _MEGABYTE = 1_000_000
 
 
-def equip(service: Service) -> None:
-    """Give a service everything that it has on a rover.
+def connect_sinks(service: Service) -> None:
+    """Add the MQTT sink and the control sink to a service.
 
     Raises
     ------
     SpoolError
         The store of what is to be published cannot be used.
     """
-    configuration, pulses = service.configuration, service.pulses
+    configuration, liveness = service.configuration, service.liveness
     mqtt = configuration.mqtt
     spool = Spool(mqtt.spool_directory, int(mqtt.spool_limit_MB * _MEGABYTE))
-    publisher = Publisher(configuration, spool, beat=lambda: pulses.beat(PUBLISHING))
-    control = ControlOutlet(
+    publisher = Publisher(configuration, spool, beat=lambda: liveness.beat(PUBLISHING))
+    control = ControlSink(
         configuration,
         lambda: service.network,
         broker=lambda: publisher.problem or ("connected" if publisher.connected else "connecting"),
-        beat=lambda: pulses.beat(CONTROL),
+        beat=lambda: liveness.beat(CONTROL),
     )
-    pulses.expect(CONTROL, PATIENCE_S)
-    service.outlets += [MqttOutlet(service, publisher, control_trouble=lambda: control.problem), control]
+    liveness.expect(CONTROL, CONTROL_TIMEOUT_S)
+    service.sinks += [MqttSink(service, publisher, control_trouble=lambda: control.problem), control]

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-class NetworkError(Exception):
+class ModelError(Exception):
     """A network cannot be used; the message says which file, what is wrong with it, and the cure."""
 
 
@@ -19,11 +19,11 @@ def open_session(path: Path, cure: str) -> onnxruntime.InferenceSession:
 
     Raises
     ------
-    NetworkError
+    ModelError
         There is no such file, or it is damaged or no network; the message ends with `cure`.
     """
     if not path.is_file():
-        raise NetworkError(f"{path}: no such file. {cure}")
+        raise ModelError(f"{path}: no such file. {cure}")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
@@ -32,4 +32,4 @@ def open_session(path: Path, cure: str) -> onnxruntime.InferenceSession:
     try:
         return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime's errors have no common class
-        raise NetworkError(f"{path}: damaged, or not an ONNX model ({error}). {cure}") from error
+        raise ModelError(f"{path}: damaged, or not an ONNX model ({error}). {cure}") from error

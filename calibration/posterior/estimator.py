@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.models import POSTERIOR_MODEL
-from regolithd.calibration.models.onnx_session import NetworkError, open_session
+from regolithd.calibration.models.onnx_session import ModelError, open_session
 from regolithd.calibration.posterior.mixture import TARGETS, Mixture, unpack
 from regolithd.calibration.posterior.window import (
     INTERVAL_S,
@@ -48,7 +48,7 @@ _SEED = 20
 CURE = "Train one (`regolithd train-posterior`), or mend [posterior] model."
 
 
-class PosteriorError(NetworkError):
+class PosteriorModelError(ModelError):
     """A file's network is not a posterior as the daemon needs it."""
 
 
@@ -76,7 +76,7 @@ class Posterior:
 
 
 @dataclass(frozen=True, slots=True)
-class Fall:
+class FallProbability:
     """How likely it is that each quantity fell between two windows: the evidence of an alarm."""
 
     cohesion: float
@@ -134,18 +134,18 @@ class PosteriorEstimator:
     def __init__(self, path: Path = POSTERIOR_MODEL) -> None:
         self._session = open_session(path, CURE)
         if {each.name: each.shape[-1] for each in self._session.get_inputs()}.get("known") != KNOWN:
-            raise PosteriorError(f"{path}: was trained with other inputs. {CURE}")
+            raise PosteriorModelError(f"{path}: was trained with other inputs. {CURE}")
         metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
         try:
             targets = json.loads(metadata["regolithd.targets"])
             self.version = metadata["regolithd.version"]
             self.radius_m = float(metadata["regolithd.radius_m"])
             if tuple(target["name"] for target in targets) != TARGETS:
-                raise PosteriorError(f"{path}: its targets are not {', '.join(TARGETS)}, in this order. {CURE}")
+                raise PosteriorModelError(f"{path}: its targets are not {', '.join(TARGETS)}, in this order. {CURE}")
             self._centre = np.array([float(target["centre"]) for target in targets])
             self._unit = np.array([float(target["unit"]) for target in targets])
         except (KeyError, ValueError, TypeError) as error:
-            raise PosteriorError(f"{path}: its metadata are not a posterior's: {error}. {CURE}") from error
+            raise PosteriorModelError(f"{path}: its metadata are not a posterior's: {error}. {CURE}") from error
 
     def mixtures(self, windows: Windows) -> Mixture:
         """Return the posterior of each window."""
@@ -153,7 +153,9 @@ class PosteriorEstimator:
         (raw,) = self._session.run(None, {name: value.astype(np.float32) for name, value in inputs.items()})
         return unpack(raw, self._centre, self._unit)
 
-    def fall(self, before: Array, after: Array, uncertainty: CalibrationUncertainty) -> Fall | None:
+    def fall_probability(
+        self, before: Array, after: Array, uncertainty: CalibrationUncertainty
+    ) -> FallProbability | None:
         """Return how likely each quantity fell from one window, (3, instants, 6), to another; None if either is empty.
 
         The two windows share the errors of gain and no-load current, which are counted in each as if they were not
@@ -165,7 +167,7 @@ class PosteriorEstimator:
             self.mixtures(self._reduce(window, uncertainty)).sample(_SAMPLES, np.random.default_rng(_SEED + k))[0]
             for k, window in enumerate((before, after))
         ]
-        return Fall(*np.mean(samples[1] < samples[0], axis=0).tolist())
+        return FallProbability(*np.mean(samples[1] < samples[0], axis=0).tolist())
 
     def estimate(self, window: Array, uncertainty: CalibrationUncertainty) -> Posterior | None:
         """Return the posterior given a window of shape (3, instants, 6); None where no wheel was measured."""

@@ -10,7 +10,7 @@ from regolithd.daemon.check.bus import check_bus
 from regolithd.daemon.check.clock import check_clock
 from regolithd.daemon.check.control import check_control, running_daemon
 from regolithd.daemon.check.disk import check_disks
-from regolithd.daemon.check.models import check_network
+from regolithd.daemon.check.models import check_models
 from regolithd.daemon.control.protocol import Status
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ async def check_everything(configuration: Configuration) -> list[Finding]:
     status = running if isinstance(running, Status) else None
     parts = await asyncio.gather(
         check_bus(configuration, status),
-        check_network(configuration),
+        check_models(configuration),
         check_broker(configuration),
         check_disks(configuration),
         check_clock(),

@@ -1,33 +1,30 @@
-"""The terrain network: whether it loads, fits and runs."""
+"""Checks the ONNX models: whether they load, fit this rover, and run."""
 
 from __future__ import annotations
 
 import asyncio
 from typing import TYPE_CHECKING
 
-from regolithd.calibration.models import TERRAIN_MODEL
-from regolithd.calibration.models.onnx_session import NetworkError
+from regolithd.calibration.models.onnx_session import ModelError
 from regolithd.daemon.check.finding import Finding, good, warning, wrong
-from regolithd.daemon.pipeline.posterior import posterior_stage
-from regolithd.daemon.pipeline.terrain_network import Network
+from regolithd.daemon.pipeline.onnx_models import load_posterior, load_terrain_network
 
 if TYPE_CHECKING:
     from regolithd.calibration.models.card import ModelCard
     from regolithd.daemon.config.configuration import Configuration
 
 
-async def check_network(configuration: Configuration) -> list[Finding]:
-    """Load it, run it once, and compare it with the rover."""
-    path = configuration.estimator.model or TERRAIN_MODEL
+async def check_models(configuration: Configuration) -> list[Finding]:
+    """Load both models, run the terrain network once, and compare them with the rover."""
     try:
-        network = await asyncio.to_thread(Network, path)  # it reads a file and runs the network
-    except NetworkError as error:
+        network = await asyncio.to_thread(load_terrain_network, configuration)  # it reads a file and runs the network
+    except ModelError as error:
         return [wrong("model", str(error), "")]
     try:
-        stage = await asyncio.to_thread(posterior_stage, configuration)
-    except NetworkError as error:
+        posterior = await asyncio.to_thread(load_posterior, configuration)
+    except ModelError as error:
         return [judge_card(network.card, configuration), wrong("posterior", str(error), "")]
-    return [judge_card(network.card, configuration), judge_posterior(configuration, there=stage is not None)]
+    return [judge_card(network.card, configuration), judge_posterior(configuration, there=posterior is not None)]
 
 
 def judge_posterior(configuration: Configuration, *, there: bool) -> Finding:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from regolithd.daemon.closed_loop.case import Case
     from regolithd.daemon.config.configuration import Configuration
-    from regolithd.daemon.pipeline.terrain_network import Network
+    from regolithd.daemon.pipeline.terrain_network import TerrainNetwork
 
 COMPARISON_TIMEOUT_S = 1800.0
 
@@ -75,7 +75,7 @@ class LoopResult:
 
 
 def run_case(
-    case: Case, seed: int, folder: Path, network: Network, lengths: DriveLengths, progress: Callable[[str], None]
+    case: Case, seed: int, folder: Path, network: TerrainNetwork, lengths: DriveLengths, progress: Callable[[str], None]
 ) -> LoopResult:
     """Run one case; its files stay in `folder`. `progress` is called with a line of text for each step."""
     shutil.rmtree(folder, ignore_errors=True)

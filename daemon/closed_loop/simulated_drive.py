@@ -9,6 +9,7 @@ import numpy as np
 
 from regolithd.daemon.closed_loop.pdo_frames import frames
 from regolithd.daemon.pipeline.chain import Chain
+from regolithd.daemon.pipeline.onnx_models import OnnxModels, load_posterior
 from regolithd.daemon.recording.recorder import Recorder
 from regolithd.daemon.simulator.virtual_rover import GroundTruth, VirtualWorld
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from regolithd.daemon.closed_loop.speed_profile import SpeedProfile
     from regolithd.daemon.config.configuration import Configuration
     from regolithd.daemon.pipeline.snapshot import Estimate
-    from regolithd.daemon.pipeline.terrain_network import Network
+    from regolithd.daemon.pipeline.terrain_network import TerrainNetwork
     from regolithd.daemon.simulator.scenario import Scenario
     from regolithd.drivers.can.frame import Frame
 
@@ -48,14 +49,14 @@ def simulate(scenario: Scenario, configuration: Configuration, profile: SpeedPro
     return SimulatedDrive(tuple(batches), tuple(truth))
 
 
-def estimates(drive: SimulatedDrive, configuration: Configuration, network: Network) -> Iterator[Estimate]:
+def estimates(drive: SimulatedDrive, configuration: Configuration, network: TerrainNetwork) -> Iterator[Estimate]:
     """Yield one estimate for each SYNC, as the daemon with this configuration computes it."""
-    chain = Chain(configuration, network)
+    chain = Chain(configuration, OnnxModels(network, load_posterior(configuration)))
     for batch in drive.frames:
         yield from chain.feed(batch)
 
 
-def record(drive: SimulatedDrive, configuration: Configuration, network: Network, folder: Path) -> Path:
+def record(drive: SimulatedDrive, configuration: Configuration, network: TerrainNetwork, folder: Path) -> Path:
     """Record a drive as the daemon does, and return the path of its MCAP file."""
     settings = configuration.recording.model_copy(update={"directory": folder})
     recorder = Recorder(settings, configuration.bus.channel, {"rover": configuration.rover.name}, lambda: START_NS)

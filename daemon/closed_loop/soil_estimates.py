@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from regolithd.daemon.closed_loop.simulated_drive import SimulatedDrive
     from regolithd.daemon.config.configuration import Configuration
-    from regolithd.daemon.pipeline.terrain_network import Network
+    from regolithd.daemon.pipeline.terrain_network import TerrainNetwork
 
     Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ class SoilEstimates:
     network: Array
 
 
-def soil_estimates(drive: SimulatedDrive, configuration: Configuration, network: Network) -> SoilEstimates:
+def soil_estimates(drive: SimulatedDrive, configuration: Configuration, network: TerrainNetwork) -> SoilEstimates:
     """Return what the daemon with this configuration estimates over a drive."""
     made = list(estimates(drive, with_posterior_enabled(configuration), network))
     truth = drive.truth[: len(made)]

@@ -43,11 +43,11 @@ def loop(
     from regolithd.daemon.closed_loop.picture import draw
     from regolithd.daemon.closed_loop.run import DriveLengths, run_case
     from regolithd.daemon.closed_loop.summary import figures_of, sentence
-    from regolithd.daemon.pipeline.terrain_network import Network
+    from regolithd.daemon.pipeline.terrain_network import TerrainNetwork
 
     lengths = DriveLengths(first_s=400.0, second_s=180.0, stretch_m=1.1) if short else DriveLengths()
     chosen = [each for each in cases(seed) if not case or each.name in case]
-    network = Network(TERRAIN_MODEL)
+    network = TerrainNetwork(TERRAIN_MODEL)
     console = Console()
     done = []
     with Console(stderr=True).status("") as status:

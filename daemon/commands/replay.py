@@ -23,14 +23,14 @@ def replay(
     """Print what came of it; status 1 where a number is not the same as then."""
     from regolithd.daemon.recording.progress import open_text
     from regolithd.daemon.recording.replay import replay_logs
-    from regolithd.daemon.setup import configuration_or_exit, network_or_exit, recorded_configuration
+    from regolithd.daemon.setup import configuration_or_exit, models_or_exit, recorded_configuration
 
     beside = logs[0].with_suffix(".mcap")
     configuration = configuration_or_exit(config) if config else recorded_configuration(beside)
     if model is not None:
         estimator = configuration.estimator.model_copy(update={"model": model})
         configuration = configuration.model_copy(update={"estimator": estimator})
-    result = replay_logs(logs, configuration, network_or_exit(configuration), open_text)
+    result = replay_logs(logs, configuration, models_or_exit(configuration), open_text)
     typer.echo(f"frames     {result.frames}")
     typer.echo(f"snapshots  {result.digest.count}")
     if result.counters:

@@ -9,7 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
-    from regolithd.daemon.pipeline.terrain_network import Network
+    from regolithd.daemon.pipeline.onnx_models import OnnxModels
 
 
 def register(app: typer.Typer) -> None:
@@ -25,24 +25,24 @@ def run(
     import asyncio
     import logging
 
-    from regolithd.daemon.setup import configuration_or_exit, network_or_exit
+    from regolithd.daemon.setup import configuration_or_exit, models_or_exit
 
     logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     configuration = configuration_or_exit(config)
-    asyncio.run(_run(configuration, network_or_exit(configuration)))
+    asyncio.run(_run(configuration, models_or_exit(configuration)))
 
 
-async def _run(configuration: Configuration, terrain: Network) -> None:
+async def _run(configuration: Configuration, models: OnnxModels) -> None:
     import asyncio
     import signal
 
     from regolithd.daemon.publish.spool import SpoolError
     from regolithd.daemon.service import Service
-    from regolithd.daemon.wiring import equip
+    from regolithd.daemon.wiring import connect_sinks
 
-    service = Service(configuration, terrain)
+    service = Service(configuration, models)
     try:
-        equip(service)
+        connect_sinks(service)
     except SpoolError as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error

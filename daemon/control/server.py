@@ -1,4 +1,4 @@
-"""The daemon's end of the control socket: an outlet of the service that also lets something in.
+"""The daemon's end of the control socket: a sink of the service that also lets something in.
 
 It alone commands the wheels. One traverse at a time; when the connection that commanded it is closed, when a node is
 lost, when a drive faults or when the daemon stops, the wheels are stopped.
@@ -58,7 +58,7 @@ class Rover(Wheels, Protocol):
         """What is known of each node."""
 
 
-class ControlOutlet:
+class ControlSink:
     """Takes commands from the socket, and what the bus says from the service.
 
     Parameters

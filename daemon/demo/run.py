@@ -13,17 +13,16 @@ from typing import TYPE_CHECKING
 
 import aiomqtt
 
-from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.calibration.parameters import SOILS
 from regolithd.daemon.config.configuration import Configuration
 from regolithd.daemon.demo.broker import embedded_broker
 from regolithd.daemon.demo.ground_truth_log import GroundTruthLog
 from regolithd.daemon.demo.live_table import LiveTable
-from regolithd.daemon.pipeline.terrain_network import Network as TerrainNetwork
+from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.service import Service
 from regolithd.daemon.simulator.scenario import Ground, Scenario, Stretch
 from regolithd.daemon.simulator.virtual_rover import VirtualWorld
-from regolithd.daemon.wiring import equip
+from regolithd.daemon.wiring import connect_sinks
 from regolithd.drivers.can.open_bus import open_bus
 from regolithd.drivers.master.network import NodePhase
 from regolithd.drivers.virtual import VirtualRover
@@ -89,9 +88,9 @@ async def run_demo(folder: Path, seconds: float, show: Callable[[LiveTable, floa
         configuration = demo_configuration(folder, temporary, port)
         prefix = f"{configuration.mqtt.prefix}/{configuration.rover.name}"
         table = LiveTable(prefix)
-        service = Service(configuration, TerrainNetwork(TERRAIN_MODEL))
-        equip(service)
-        service.outlets.append(ground_truth)
+        service = Service(configuration, load_models(configuration))
+        connect_sinks(service)
+        service.sinks.append(ground_truth)
         subscribed = asyncio.Event()
         background = [
             tasks.create_task(VirtualRover(world).run(rover_bus)),

@@ -1,4 +1,4 @@
-"""What is wrong at this moment, told from the facts alone: the same facts, the same alarms."""
+"""What is wrong at this moment, told from the inputs alone: the same inputs, the same alarms."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Alarm:
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
+class AlarmInputs:
     """What alarms are told from. Empty texts mean that all is well; counts are since the start."""
 
     nodes: Mapping[int, NodeStatus] = field(default_factory=dict)
@@ -50,9 +50,9 @@ class Facts:
     stuck: tuple[tuple[Quantity, int], ...] = ()
 
 
-def current_alarms(facts: Facts) -> dict[str, Alarm]:
+def current_alarms(inputs: AlarmInputs) -> dict[str, Alarm]:
     """Return what is wrong, by name."""
-    found = [*_node_alarms(facts.nodes.values()), *_bus_alarms(facts), *_own_alarms(facts)]
+    found = [*_node_alarms(inputs.nodes.values()), *_bus_alarms(inputs), *_own_alarms(inputs)]
     return {alarm.name: alarm for alarm in found}
 
 
@@ -81,38 +81,38 @@ def _node_alarms(nodes: Iterable[NodeStatus]) -> Iterable[Alarm]:
         yield Alarm(f"node-{status.node.node_id}", severity, what, cure)
 
 
-def _bus_alarms(facts: Facts) -> Iterable[Alarm]:
-    if facts.bus_trouble:
-        yield Alarm("bus", Severity.CRITICAL, facts.bus_trouble, "`regolithd check` says more.")
-    elif severity := _BUS_SEVERITY.get(facts.bus_state):
+def _bus_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
+    if inputs.bus_trouble:
+        yield Alarm("bus", Severity.CRITICAL, inputs.bus_trouble, "`regolithd check` says more.")
+    elif severity := _BUS_SEVERITY.get(inputs.bus_state):
         cure = "Look at cable, termination (120 Ω at both ends) and bit rate; `ip -details link` shows the counters."
-        yield Alarm("bus", severity, f"the bus is in state {facts.bus_state.value}", cure)
-    if facts.kernel_drops:
+        yield Alarm("bus", severity, f"the bus is in state {inputs.bus_state.value}", cure)
+    if inputs.kernel_drops:
         cure = "The computer is too busy, or the bus too full: lower [sync] rate_Hz, or stop what else runs."
-        yield Alarm("kernel", Severity.ERROR, f"the kernel dropped {facts.kernel_drops} frames in this run", cure)
+        yield Alarm("kernel", Severity.ERROR, f"the kernel dropped {inputs.kernel_drops} frames in this run", cure)
 
 
-def _own_alarms(facts: Facts) -> Iterable[Alarm]:
-    if facts.store_dropped:
-        text = f"{facts.store_dropped} messages were lost: the store was full, or could not be read"
+def _own_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
+    if inputs.store_dropped:
+        text = f"{inputs.store_dropped} messages were lost: the store was full, or could not be read"
         yield Alarm("store", Severity.ERROR, text, "Bring the broker back, or raise [mqtt] spool_limit_MB.")
-    elif facts.store_unstored:
-        text = f"the disk refused {facts.store_unstored} messages; they waited in memory alone"
+    elif inputs.store_unstored:
+        text = f"the disk refused {inputs.store_unstored} messages; they waited in memory alone"
         yield Alarm("store", Severity.WARNING, text, "Make room on the disk of [mqtt] spool_directory.")
-    if facts.recording_trouble:
-        yield Alarm("recording", Severity.ERROR, facts.recording_trouble, "Make room, or mend [recording] directory.")
-    if facts.control_trouble:
-        yield Alarm("control", Severity.WARNING, facts.control_trouble, "Until then the rover cannot be commanded.")
-    if facts.stuck:
-        which = ", ".join(f"{quantity.value} of wheel {wheel}" for quantity, wheel in facts.stuck)
+    if inputs.recording_trouble:
+        yield Alarm("recording", Severity.ERROR, inputs.recording_trouble, "Make room, or mend [recording] directory.")
+    if inputs.control_trouble:
+        yield Alarm("control", Severity.WARNING, inputs.control_trouble, "Until then the rover cannot be commanded.")
+    if inputs.stuck:
+        which = ", ".join(f"{quantity.value} of wheel {wheel}" for quantity, wheel in inputs.stuck)
         text = f"{which}: the same to the last digit for seconds, while other wheels' readings change"
         cure = "Do not trust it: switch the node off and on, look at its plug, exchange it."
         yield Alarm("sensor", Severity.ERROR, text, cure)
-    if facts.soil_change:
+    if inputs.soil_change:
         cure = "Stop and look before the wheels dig in: less slip, another way, or back."
-        yield Alarm("soil-change", Severity.WARNING, facts.soil_change, cure)
-    if facts.clock_jump_s:
-        text = f"the clock jumped by {facts.clock_jump_s:+.3f} s: times before and after do not fit together"
+        yield Alarm("soil-change", Severity.WARNING, inputs.soil_change, cure)
+    if inputs.clock_jump_s:
+        text = f"the clock jumped by {inputs.clock_jump_s:+.3f} s: times before and after do not fit together"
         yield Alarm(
             "clock", Severity.WARNING, text, "Let it be synchronised before the daemon starts (time-sync.target)."
         )

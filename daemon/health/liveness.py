@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 
-class Pulses:
+class TaskLiveness:
     """The last beat of each task, by name.
 
     `expect` once what shall beat, and how long it may be silent; `beat` from the task itself, at each round of its

@@ -20,7 +20,7 @@ OTHERS = 3
 """So many other wheels' readings must have changed meanwhile."""
 
 
-class StuckWatch:
+class StuckSensorDetector:
     """Feed it every snapshot; `stuck` says which sensors repeat themselves."""
 
     def __init__(self) -> None:

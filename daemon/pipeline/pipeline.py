@@ -11,32 +11,32 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.drivetrain.torque import wheel_torque
-from regolithd.daemon.pipeline.posterior import posterior_stage
+from regolithd.daemon.pipeline.posterior import PosteriorStage
 from regolithd.daemon.pipeline.slip import choose_slip, wheel_slip
 from regolithd.daemon.pipeline.smooth import Smoother
 from regolithd.daemon.pipeline.snapshot import WHEELS, Estimate
 
 if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
+    from regolithd.daemon.pipeline.onnx_models import OnnxModels
     from regolithd.daemon.pipeline.snapshot import Array, Snapshot
-    from regolithd.daemon.pipeline.terrain_network import Network
 
 
 class Pipeline:
     """The stages after acquisition, for one rover."""
 
-    def __init__(self, configuration: Configuration, network: Network) -> None:
+    def __init__(self, configuration: Configuration, models: OnnxModels) -> None:
         self._drivetrain = configuration.drivetrain
         self._load_zero_N = np.array(configuration.load_cells.zero_N)
         self._load_span = np.array(configuration.load_cells.span)
         self._radius_m = configuration.wheel.radius_m
         self._slip = configuration.slip
-        self._network = network
+        self._terrain_network = models.terrain
         smoothing = configuration.smoothing
         rate = configuration.sync.rate_Hz
         self._smoother = Smoother(rate, smoothing.window_s, smoothing.threshold, smoothing.time_constant_s)
         self._direction = np.zeros(WHEELS)
-        self._posterior = posterior_stage(configuration)
+        self._posterior = PosteriorStage(models.posterior, configuration) if models.posterior else None
 
     def step(self, snapshot: Snapshot) -> Estimate:
         """Return what the stages make of the next snapshot."""
@@ -54,7 +54,7 @@ class Pipeline:
         posterior, alarm = None, None
         if self._posterior:
             posterior, alarm = self._posterior.step(snapshot.time_ns, load, raw_slip, driving, sources)
-        terrain = self._network.estimate(self._inputs(smoothed.torque, smoothed.load, slip, np.abs(speed)))
+        terrain = self._terrain_network.estimate(self._inputs(smoothed.torque, smoothed.load, slip, np.abs(speed)))
         return Estimate(
             snapshot=snapshot,
             wheel_torque_Nm=torque,
@@ -65,9 +65,9 @@ class Pipeline:
             cohesion_Pa=terrain.cohesion_Pa,
             friction_angle_rad=terrain.friction_angle_rad,
             valid=np.isfinite(terrain.cohesion_Pa) & np.isfinite(terrain.friction_angle_rad),
-            input_names=self._network.input_names,
+            input_names=self._terrain_network.input_names,
             outside=terrain.outside,
-            model_version=self._network.card.version,
+            model_version=self._terrain_network.card.version,
             posterior=posterior,
             soil_change=alarm,
         )
@@ -83,7 +83,7 @@ class Pipeline:
         return {
             "load_N": load_N,
             "slip": slip,
-            "motor_current_A": driving_torque_Nm / self._network.card.gain_Nm_per_A,
+            "motor_current_A": driving_torque_Nm / self._terrain_network.card.gain_Nm_per_A,
             "wheel_torque_Nm": driving_torque_Nm,
             "wheel_speed_rad_s": speed,
         }

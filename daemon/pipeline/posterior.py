@@ -8,16 +8,14 @@ calibrated: an unknown no-load current would be taken for soil.
 from __future__ import annotations
 
 from collections import deque
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.models import POSTERIOR_MODEL
-from regolithd.calibration.posterior.estimator import Buffer, Posterior, PosteriorError, PosteriorEstimator
+from regolithd.calibration.posterior.estimator import Buffer, Posterior, PosteriorEstimator
 from regolithd.calibration.posterior.window import INTERVAL_S, LONGEST, CalibrationUncertainty, USUAL_TORQUE_Nm
-from regolithd.daemon.pipeline.snapshot import ChangeOfSoil, SlipSource
-from regolithd.daemon.pipeline.soil_change import SoilChange
+from regolithd.daemon.pipeline.snapshot import SlipSource, SoilChange
+from regolithd.daemon.pipeline.soil_change import SoilChangeDetector
 
 if TYPE_CHECKING:
     from regolithd.calibration.parameters import Drivetrain
@@ -26,9 +24,6 @@ if TYPE_CHECKING:
 
 SLIP_STD_MEASURED = 0.005
 SLIP_STD_GUESSED = 0.03
-RADIUS_WITHIN = 0.02
-"""Relative: a wheel that differs by more from the one that the posterior was trained for needs its own."""
-
 HISTORY = 400
 """Half seconds that are kept to compare before and after a change."""
 
@@ -45,11 +40,11 @@ class PosteriorStage:
         self._no_load_A = float(np.mean(drivetrain.no_load_current_A))
         self._soil = settings.soil
         self._history: deque[Array] = deque(maxlen=HISTORY)
-        self._change = SoilChange(configuration) if configuration.change.enabled else None
+        self._change = SoilChangeDetector(configuration) if configuration.change.enabled else None
 
     def step(
         self, time_ns: int, load_N: Array, slip: Array, driving_torque_Nm: Array, sources: tuple[SlipSource, ...]
-    ) -> tuple[Posterior | None, ChangeOfSoil | None]:
+    ) -> tuple[Posterior | None, SoilChange | None]:
         """Return a posterior when a half second has closed, and an alarm when the soil has changed.
 
         Arrays have shape (6,), unsmoothed, NaN where a wheel stands.
@@ -62,7 +57,7 @@ class PosteriorStage:
         uncertainty = self._uncertainty(sources)
         return self._estimator.estimate(window, uncertainty), self._watch(time_ns, window[:, -1], uncertainty)
 
-    def _watch(self, time_ns: int, means: Array, uncertainty: CalibrationUncertainty) -> ChangeOfSoil | None:
+    def _watch(self, time_ns: int, means: Array, uncertainty: CalibrationUncertainty) -> SoilChange | None:
         """Return the alarm, if any, with how likely each quantity fell between before its onset and since."""
         if self._change is None:
             return None
@@ -73,8 +68,8 @@ class PosteriorStage:
         past = np.stack(self._history, axis=1)
         since = max(1, round((alarm.time_ns - alarm.onset_ns) / (INTERVAL_S * 1e9)))
         before, after = past[:, :-since][:, -LONGEST:], past[:, -since:][:, -LONGEST:]
-        fall = self._estimator.fall(before, after, uncertainty) if before.size else None
-        return ChangeOfSoil(alarm, fall)
+        fall = self._estimator.fall_probability(before, after, uncertainty) if before.size else None
+        return SoilChange(alarm, fall)
 
     def _uncertainty(self, sources: tuple[SlipSource, ...]) -> CalibrationUncertainty:
         guessed = SlipSource.CONFIGURED in sources
@@ -95,25 +90,3 @@ def gain_relative_std(drivetrain: Drivetrain) -> float:
     factor, std = np.array(drivetrain.gain_factor), np.array(drivetrain.gain_factor_std)
     braked = np.hypot(std / factor, USUAL_TORQUE_Nm * np.array(drivetrain.load_loss_std_per_Nm))
     return float(np.mean(np.where(braked > 0, braked, drivetrain.gain_relative_std)))
-
-
-def posterior_stage(configuration: Configuration) -> PosteriorStage | None:
-    """Return the stage, or None where it is switched off or the drivetrain's no-load current is not known.
-
-    Raises
-    ------
-    NetworkError
-        The posterior network cannot be used, or (`PosteriorError`) was trained for another wheel.
-    """
-    settings, drivetrain = configuration.posterior, configuration.drivetrain
-    if not settings.enabled or not any(drivetrain.no_load_current_A):
-        return None
-    path = settings.model or Path(POSTERIOR_MODEL)
-    estimator = PosteriorEstimator(path)
-    radius_m = configuration.wheel.radius_m
-    if abs(radius_m / estimator.radius_m - 1) > RADIUS_WITHIN:
-        raise PosteriorError(
-            f"{path}: trained for wheels of {estimator.radius_m} m radius, not {radius_m} m. "
-            "Train one for this rover (`regolithd train-posterior`), or set [posterior] enabled = false."
-        )
-    return PosteriorStage(estimator, configuration)

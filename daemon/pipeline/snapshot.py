@@ -17,7 +17,7 @@ from regolithd.drivers.signals import Quantity
 
 if TYPE_CHECKING:
     from regolithd.calibration.posterior.change_detection import Alarm
-    from regolithd.calibration.posterior.estimator import Fall, Posterior
+    from regolithd.calibration.posterior.estimator import FallProbability, Posterior
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -130,11 +130,11 @@ class SlipSource(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class ChangeOfSoil:
+class SoilChange:
     """An alarm, and how likely it is that each quantity fell; `fall` is None where too little was measured before."""
 
     alarm: Alarm
-    fall: Fall | None
+    fall: FallProbability | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,7 +180,7 @@ class Estimate:
     outside: Mask
     model_version: str
     posterior: Posterior | None = None
-    soil_change: ChangeOfSoil | None = None
+    soil_change: SoilChange | None = None
 
     def outside_inputs(self, wheel: int) -> tuple[str, ...]:
         """Return the names of the inputs of one wheel (0–5) that lie outside the training range."""

@@ -10,13 +10,13 @@ from regolithd.calibration.terrain.wheel_soil import contact_angle, wheel_torque
 
 if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
-    from regolithd.daemon.pipeline.snapshot import Array, ChangeOfSoil
+    from regolithd.daemon.pipeline.snapshot import Array, SoilChange
 
 REFERENCE = SOILS["sandy-loam"]
 """How torque follows load and slip; how large it is, the detector learns on the way."""
 
 
-class SoilChange:
+class SoilChangeDetector:
     """The detector for one rover. After an alarm it begins anew: what it knew was of the old soil."""
 
     def __init__(self, configuration: Configuration) -> None:
@@ -35,7 +35,7 @@ class SoilChange:
         return alarm
 
 
-def change_text(changed: ChangeOfSoil) -> str:
+def change_text(changed: SoilChange) -> str:
     """Return an alarm with its evidence, in one sentence."""
     alarm = changed.alarm
     what = "gives way: torque fell" if alarm.direction == "fall" else "resists more: torque rose"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.models.card import ModelCard, ModelCardError, read_card
-from regolithd.calibration.models.onnx_session import NetworkError, open_session
+from regolithd.calibration.models.onnx_session import ModelError, open_session
 from regolithd.daemon.pipeline.snapshot import WHEELS, Array, Mask
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 CURE = "Train one (`regolithd train`), or mend [estimator] model."
 
 
-class ModelError(NetworkError):
+class TerrainModelError(ModelError):
     """A file's network is not a terrain network as the daemon needs it."""
 
 
@@ -36,7 +36,7 @@ class Terrain:
     outside: Mask
 
 
-class Network:
+class TerrainNetwork:
     """A terrain network, ready to run."""
 
     def __init__(self, path: Path) -> None:
@@ -74,16 +74,18 @@ class Network:
         try:
             answer = self._run(middle)
         except Exception as error:  # onnxruntime's errors have no common class
-            raise ModelError(f"{self.path}: does not run on a batch of six: {error}") from error
+            raise TerrainModelError(f"{self.path}: does not run on a batch of six: {error}") from error
         if not np.isfinite(answer).all():
-            raise ModelError(f"{self.path}: gives no finite numbers in the middle of its own training range")
+            raise TerrainModelError(f"{self.path}: gives no finite numbers in the middle of its own training range")
 
 
 def _card(path: Path, session: onnxruntime.InferenceSession) -> ModelCard:
     try:
         card = read_card(session.get_modelmeta().custom_metadata_map)
     except ModelCardError as error:
-        raise ModelError(f"{path}: its metadata do not fit: {error}. Train it with `regolithd train`.") from error
+        raise TerrainModelError(
+            f"{path}: its metadata do not fit: {error}. Train it with `regolithd train`."
+        ) from error
     wrong = [
         f"its {what} has shape {tensors[0].shape} and type {tensors[0].type}, expected (N, {len(variables)}) of floats"
         for what, tensors, variables in (
@@ -93,7 +95,7 @@ def _card(path: Path, session: onnxruntime.InferenceSession) -> ModelCard:
         if len(tensors) != 1 or not _fits(tensors[0], len(variables))
     ]
     if wrong:
-        raise ModelError(f"{path}: {'; '.join(wrong)}. Its metadata and its layers disagree: train it anew.")
+        raise TerrainModelError(f"{path}: {'; '.join(wrong)}. Its metadata and its layers disagree: train it anew.")
     return card
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from regolithd.daemon.config.configuration import Mqtt
-    from regolithd.daemon.publish.outbox import Letter, Outbox
+    from regolithd.daemon.publish.outbox import Outbox, OutgoingMessage
 
 WINDOW = 64
 """How many stored messages may be on their way unacknowledged: a broker 50 ms away then takes 1280 a second."""
@@ -38,7 +38,7 @@ _AT_LEAST_ONCE = 1
 _LATE_BATCH = 20
 
 
-class Words(Protocol):
+class StateMessages(Protocol):
     """What is said at the beginning and the end of a connection; payloads of the `state` topic."""
 
     def birth(self) -> bytes:
@@ -48,14 +48,16 @@ class Words(Protocol):
         """Return `offline`."""
 
 
-class Link:
+class Connection:
     """One connection. `run` returns when `stop` is set and everything is sent; raises `MqttError` when it is lost."""
 
-    def __init__(self, settings: Mqtt, root: str, outbox: Outbox, words: Words, stop: asyncio.Event) -> None:
+    def __init__(
+        self, settings: Mqtt, root: str, outbox: Outbox, state_messages: StateMessages, stop: asyncio.Event
+    ) -> None:
         self._settings = settings
         self._root = root
         self._outbox = outbox
-        self._words = words
+        self._state_messages = state_messages
         self._stop = stop
         self._window = asyncio.Semaphore(WINDOW)
         self.up = False
@@ -83,7 +85,9 @@ class Link:
             username=settings.username,
             password=password,
             identifier=f"regolithd-{self._root.replace('/', '-')}",
-            will=Will(f"{self._root}/state", self._words.death("connection-lost"), qos=_AT_LEAST_ONCE, retain=True),
+            will=Will(
+                f"{self._root}/state", self._state_messages.death("connection-lost"), qos=_AT_LEAST_ONCE, retain=True
+            ),
             clean_session=True,
             keepalive=settings.keepalive_s,
             timeout=ACKNOWLEDGE_WITHIN_S,
@@ -95,7 +99,7 @@ class Link:
         return client
 
     async def _be_born(self, client: Client) -> None:
-        await self._publish(client, "state", self._words.birth(), retain=True)
+        await self._publish(client, "state", self._state_messages.birth(), retain=True)
         for topic, payload in self._outbox.connected().items():
             await self._publish(client, topic, payload, retain=True)
 
@@ -132,20 +136,20 @@ class Link:
     async def _send_stored(self, client: Client, tasks: asyncio.TaskGroup) -> None:
         late = 0
         while not (self._stop.is_set() and not self._outbox.spool.queued):
-            for letter in self._outbox.waiting():
+            for message in self._outbox.waiting():
                 await self._window.acquire()
-                self._outbox.sent(letter)
-                tasks.create_task(self._deliver(client, letter))
-                late += letter.late
+                self._outbox.sent(message)
+                tasks.create_task(self._deliver(client, message))
+                late += message.late
                 if late >= _LATE_BATCH:
                     late = 0
                     await asyncio.sleep(_LATE_BATCH / LATE_PER_S)
             await self._outbox.arrived.wait()
 
-    async def _deliver(self, client: Client, letter: Letter) -> None:
+    async def _deliver(self, client: Client, message: OutgoingMessage) -> None:
         try:
-            await self._publish(client, letter.topic, letter.payload, retain=letter.retain)
-            self._outbox.acknowledged(letter)
+            await self._publish(client, message.topic, message.payload, retain=message.retain)
+            self._outbox.acknowledged(message)
         finally:
             self._window.release()
         if self._stop.is_set():
@@ -164,7 +168,7 @@ class Link:
     async def _say_death(self, client: Client, reason: str) -> None:
         with suppress(MqttError, TimeoutError):
             async with asyncio.timeout(FAREWELL_WITHIN_S):
-                await self._publish(client, "state", self._words.death(reason), retain=True)
+                await self._publish(client, "state", self._state_messages.death(reason), retain=True)
 
 
 def tls_context(settings: Mqtt) -> ssl.SSLContext | None:

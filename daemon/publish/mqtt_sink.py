@@ -10,8 +10,8 @@ import time
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from regolithd.daemon.health.alarms import Alarm, Facts, current_alarms, known_names
-from regolithd.daemon.health.stuck_sensor import StuckWatch
+from regolithd.daemon.health.alarms import Alarm, AlarmInputs, current_alarms, known_names
+from regolithd.daemon.health.stuck_sensor import StuckSensorDetector
 from regolithd.daemon.messages.models import (
     AcquisitionReport,
     AlarmMessage,
@@ -46,12 +46,12 @@ JUMP_NS = 500_000_000
 JUMP_SHOWN_S = 60.0
 SOIL_CHANGE_SHOWN_S = 120.0
 PUBLISHING = "publishing"
-PATIENCE_S = 10.0
+PUBLISHING_TIMEOUT_S = 10.0
 _PAGE_MB = resource.getpagesize() / 1e6
 
 
-class MqttOutlet:
-    """An outlet of the service, over MQTT.
+class MqttSink:
+    """A sink of the service, over MQTT.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ class MqttOutlet:
         self._jump_until_ns = 0
         self._soil_change = ""
         self._soil_change_until_ns = 0
-        self._stuck = StuckWatch()
+        self._stuck = StuckSensorDetector()
 
     def estimate(self, estimate: Estimate) -> None:
         """Publish one SYNC."""
@@ -104,7 +104,7 @@ class MqttOutlet:
 
     async def run(self) -> None:
         """Deliver until cancelled, and tell health meanwhile."""
-        self._service.pulses.expect(PUBLISHING, PATIENCE_S)
+        self._service.liveness.expect(PUBLISHING, PUBLISHING_TIMEOUT_S)
         async with asyncio.TaskGroup() as tasks:
             telling = tasks.create_task(self._tell())
             try:
@@ -128,7 +128,7 @@ class MqttOutlet:
             if self._told_nodes.get(node_id) != told:
                 self._told_nodes[node_id] = told
                 self.publisher.say(f"node/{node_id}", NodeMessage, **fields)
-        active = current_alarms(self._facts())
+        active = current_alarms(self._alarm_inputs())
         for name in known_names(node.node_id for node in self._service.configuration.nodes.described()):
             alarm = active.get(name)
             if name not in self._told_alarms or self._told_alarms[name] != alarm:
@@ -152,10 +152,10 @@ class MqttOutlet:
             self._jump_s = 0.0
         self._offset_ns = offset
 
-    def _facts(self) -> Facts:
+    def _alarm_inputs(self) -> AlarmInputs:
         service = self._service
         network, recorder, report = service.network, service.recorder, self.publisher.report
-        return Facts(
+        return AlarmInputs(
             nodes=network.status if network is not None else {},
             bus_trouble=service.bus_trouble,
             bus_state=network.bus.state if network is not None else BusState.ACTIVE,
@@ -182,7 +182,7 @@ class MqttOutlet:
             "acquisition": AcquisitionReport(**asdict(service.chain.acquisition.counters)),
             "publishing": self.publisher.report,
             "recording": _recording_report(service),
-            "tasks": service.pulses.ages_s(),
+            "tasks": service.liveness.ages_s(),
         }
 
     def _emergency_fields(self, event: NodeEmergency) -> dict[str, Any]:

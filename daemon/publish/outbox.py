@@ -32,7 +32,7 @@ def is_retained(topic: str) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Letter:
+class OutgoingMessage:
     """A message on its way; `index` is its place in the store."""
 
     index: int
@@ -93,20 +93,20 @@ class Outbox:
         self._live.clear()
         return {topic: as_late(payload) for topic, (index, payload) in self._current.items() if index < self._position}
 
-    def waiting(self) -> Iterator[Letter]:
+    def waiting(self) -> Iterator[OutgoingMessage]:
         """Yield what is to be sent next, in order, as long as something is at hand. Each must be taken by `sent`.
 
         Whether one is late is decided when it is asked for: the one before may have waited long for its turn.
         """
         self.arrived.clear()
         for record in self.spool.read(self._position):
-            yield self._letter(record)
+            yield self._outgoing(record)
 
-    def _letter(self, record: Record) -> Letter:
+    def _outgoing(self, record: Record) -> OutgoingMessage:
         retained = is_retained(record.topic)
         current = retained and self._current.get(record.topic, (-1, b""))[0] == record.index
         late = self._is_late(record)
-        return Letter(
+        return OutgoingMessage(
             record.index,
             record.topic,
             as_late(record.payload) if late else record.payload,
@@ -119,17 +119,17 @@ class Outbox:
             return True
         return time.monotonic_ns() - record.stored_ns > LIVE_WITHIN_NS
 
-    def sent(self, letter: Letter) -> None:
+    def sent(self, message: OutgoingMessage) -> None:
         """Note that this one is on its way."""
-        self.repeated += letter.index < self._sent_to
-        self._position = letter.index + 1
+        self.repeated += message.index < self._sent_to
+        self._position = message.index + 1
         self._sent_to = max(self._sent_to, self._position)
-        self._flights.append(_Flight(letter.index))
+        self._flights.append(_Flight(message.index))
 
-    def acknowledged(self, letter: Letter) -> None:
+    def acknowledged(self, message: OutgoingMessage) -> None:
         """Note that the broker has it. The store forgets it once it has everything before it as well."""
         for flight in self._flights:
-            if flight.index == letter.index:
+            if flight.index == message.index:
                 flight.acknowledged = True
                 break
         done = 0

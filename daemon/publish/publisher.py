@@ -23,7 +23,7 @@ from aiomqtt import MqttError
 
 from regolithd.daemon.messages.models import CHANNELS, Header, Presence, PublishingReport, StateMessage, iso_time
 from regolithd.daemon.publish.backoff import Backoff
-from regolithd.daemon.publish.connection import Link
+from regolithd.daemon.publish.connection import Connection
 from regolithd.daemon.publish.connection_errors import reason_of
 from regolithd.daemon.publish.encode import encode
 from regolithd.daemon.publish.outbox import Outbox
@@ -95,7 +95,7 @@ class Publisher:
         self.session = new_session(clock_ns())
         self._version = software_version()
         self._stop = asyncio.Event()
-        self._link: Link | None = None
+        self._connection: Connection | None = None
         self._connections = 0
         self._sequences: Counter[str] = Counter()
         self._problem = ""
@@ -105,7 +105,7 @@ class Publisher:
     @property
     def connected(self) -> bool:
         """Whether the broker is there, and has acknowledged our birth."""
-        return self._link is not None and self._link.up
+        return self._connection is not None and self._connection.up
 
     @property
     def problem(self) -> str:
@@ -193,9 +193,9 @@ class Publisher:
         """Connect again and again; return once stopped."""
         while not self._stop.is_set():
             self._connections += 1
-            self._link = Link(self._settings, self._root, self._outbox, self, self._stop)
+            self._connection = Connection(self._settings, self._root, self._outbox, self, self._stop)
             try:
-                await self._link.run(self._say_up, self._beat)
+                await self._connection.run(self._say_up, self._beat)
             except (MqttError, OSError) as error:  # OSError: the password file, the certificates
                 self._say_down(error)
                 await self._pause(self._backoff.next())

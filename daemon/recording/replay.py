@@ -6,9 +6,10 @@ import json
 from dataclasses import dataclass, field
 from typing import IO, TYPE_CHECKING, Any
 
-from regolithd.daemon.pipeline.chain import Chain, Digest
+from regolithd.daemon.pipeline.chain import Chain
 from regolithd.daemon.recording.candump import open_log, read_log
 from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, estimate_json, snapshot_json, with_current_names
+from regolithd.daemon.recording.digest import Digest
 from regolithd.daemon.recording.mcap_file import read_messages
 
 if TYPE_CHECKING:
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from regolithd.daemon.config.configuration import Configuration
+    from regolithd.daemon.pipeline.onnx_models import OnnxModels
     from regolithd.daemon.pipeline.snapshot import AcquisitionCounters, Estimate
-    from regolithd.daemon.pipeline.terrain_network import Network
     from regolithd.drivers.can.frame import Frame
 
 BATCH = 256
@@ -40,7 +41,7 @@ class Replayed:
 def replay_logs(
     logs: Iterable[Path],
     configuration: Configuration,
-    network: Network,
+    models: OnnxModels,
     opening: Callable[[Path], AbstractContextManager[IO[str]]] = open_log,
 ) -> Replayed:
     """Feed the logs through the pipeline, in their order; compare with the recordings beside them, where there are any.
@@ -48,7 +49,7 @@ def replay_logs(
     `opening` opens a log; it may show how far the reading is.
     """
     result = Replayed()
-    chain = Chain(configuration, network)
+    chain = Chain(configuration, models)
     recorded: dict[tuple[str, int], dict[str, Any]] = {}
     for log in logs:
         recorded |= _recorded(log.with_suffix(".mcap"))

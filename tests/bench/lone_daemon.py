@@ -12,17 +12,17 @@ import signal
 import sys
 from pathlib import Path
 
-from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.daemon.config.reader import read_configuration
-from regolithd.daemon.pipeline.terrain_network import Network
+from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.service import Service
-from regolithd.daemon.wiring import equip
+from regolithd.daemon.wiring import connect_sinks
 
 
 async def main(path: Path) -> None:
     """Run until SIGTERM."""
-    service = Service(read_configuration(path), Network(TERRAIN_MODEL))
-    equip(service)
+    configuration = read_configuration(path)
+    service = Service(configuration, load_models(configuration))
+    connect_sinks(service)
     task = asyncio.create_task(service.run())
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
     await asyncio.wait([task])

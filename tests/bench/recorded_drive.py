@@ -9,10 +9,9 @@ import asyncio
 import sys
 from pathlib import Path
 
-from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.pipeline.snapshot import Estimate
-from regolithd.daemon.pipeline.terrain_network import Network
 from regolithd.daemon.service import Service
 from regolithd.drivers.can.open_bus import open_bus
 from regolithd.drivers.master.events import NetworkEvent
@@ -20,7 +19,7 @@ from regolithd.drivers.virtual import Bench, VirtualRover
 
 
 class Printer:
-    """An outlet to standard output."""
+    """A sink to standard output."""
 
     def estimate(self, estimate: Estimate) -> None:
         """Say which snapshot was handed to the recording."""
@@ -44,8 +43,8 @@ async def main(folder: Path, rate_Hz: float) -> None:
         }
     )
     async with open_bus("virtual", "killed") as bus, asyncio.TaskGroup() as tasks:
-        service = Service(configuration, Network(TERRAIN_MODEL))
-        service.outlets.append(Printer())
+        service = Service(configuration, load_models(configuration))
+        service.sinks.append(Printer())
         tasks.create_task(VirtualRover(Bench()).run(bus))
         tasks.create_task(service.run())
 

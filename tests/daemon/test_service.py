@@ -14,9 +14,9 @@ from typer.testing import CliRunner
 
 from regolithd.daemon.cli import app
 from regolithd.daemon.config.configuration import Configuration
-from regolithd.daemon.pipeline.chain import Digest
+from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.pipeline.snapshot import Estimate
-from regolithd.daemon.pipeline.terrain_network import Network
+from regolithd.daemon.recording.digest import Digest
 from regolithd.daemon.recording.export import HEADER, ExportError, export
 from regolithd.daemon.recording.mcap_file import read_messages
 from regolithd.daemon.service import Service, event_json
@@ -28,7 +28,7 @@ from regolithd.drivers.virtual import Bench, VirtualRover
 
 @dataclass
 class Listener:
-    """An outlet that remembers."""
+    """A sink that remembers."""
 
     digest: Digest = field(default_factory=Digest)
     valid: list[list[bool]] = field(default_factory=list)
@@ -78,8 +78,8 @@ def running(tmp_path: Path, configuration: Configuration) -> Callable:
             open_bus(bus.interface, bus.channel) as theirs,
             asyncio.TaskGroup() as tasks,
         ):
-            service = Service(changed, Network(changed.estimator.model))
-            service.outlets.append(listener)
+            service = Service(changed, load_models(changed))
+            service.sinks.append(listener)
             virtual = tasks.create_task(rover.run(theirs))
             task = tasks.create_task(service.run())
             network = await service.opened()
@@ -166,7 +166,7 @@ async def test_a_slow_task_starves_the_watchdog(running: Callable, monkeypatch: 
     monkeypatch.delenv("WATCHDOG_PID", raising=False)
     async with running() as (service, listener, _):
         await listener.until(lambda: "WATCHDOG=1" in told)
-        service.pulses.expect("stuck", 0.1)
+        service.liveness.expect("stuck", 0.1)
         await listener.until(lambda: "STATUS=no answer from stuck" in told)
         fed = told.count("WATCHDOG=1")
         await listener.until(lambda: told.count("STATUS=no answer from stuck") > 3)

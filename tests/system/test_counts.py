@@ -22,10 +22,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.daemon.config.configuration import Configuration
 from regolithd.daemon.pipeline.acquire import MEMORY, SYNCHRONOUS_WINDOW
-from regolithd.daemon.pipeline.terrain_network import Network as TerrainNetwork
+from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.recording.candump import read_log
 from regolithd.daemon.service import Service
 from regolithd.drivers.master.network import NodePhase
@@ -47,7 +46,7 @@ WHEEL = np.arange(1, 7)
 
 
 class Keep:
-    """An outlet that keeps what it gets."""
+    """A sink that keeps what it gets."""
 
     def __init__(self) -> None:
         self.snapshots: list[Snapshot] = []
@@ -114,8 +113,8 @@ async def run_for_a_minute(recording: Path) -> Minute:
     )
     keep, rover = Keep(), dict[str, dict[str, int]]()
     async with counting_rover(rover):
-        service = Service(configuration, TerrainNetwork(TERRAIN_MODEL))
-        service.outlets.append(keep)
+        service = Service(configuration, load_models(configuration))
+        service.sinks.append(keep)
         running = asyncio.ensure_future(service.run())
         network = await service.opened()
         async with asyncio.timeout(90):

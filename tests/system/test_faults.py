@@ -17,12 +17,11 @@ import pytest
 import pytest_asyncio
 from broker import Mosquitto, mosquitto_program
 
-from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.daemon.config.configuration import Configuration
-from regolithd.daemon.pipeline.terrain_network import Network as TerrainNetwork
+from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.service import Service
 from regolithd.daemon.simulator.virtual_rover import VirtualWorld
-from regolithd.daemon.wiring import equip
+from regolithd.daemon.wiring import connect_sinks
 from regolithd.drivers.can.open_bus import open_bus
 from regolithd.drivers.virtual import VirtualRover
 from regolithd.drivers.virtual.fault_injection import COMMANDS
@@ -140,8 +139,8 @@ async def daemon(broker: Mosquitto, tmp_path_factory: pytest.TempPathFactory) ->
             "control": {"socket": folder / "control.sock"},
         }
     )
-    service = Service(configuration, TerrainNetwork(TERRAIN_MODEL))
-    equip(service)
+    service = Service(configuration, load_models(configuration))
+    connect_sinks(service)
     rig, ended = Rig(VirtualRover(VirtualWorld()), service), asyncio.Event()
     # One task owns all contexts: pytest begins and ends a fixture in two different ones.
     living = asyncio.ensure_future(live(rig, broker.port, ended))

@@ -11,13 +11,12 @@ import pytest
 from typer.testing import CliRunner
 
 from regolithd.calibration.drivetrain.torque import motor_current, wheel_torque
-from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.calibration.parameters import Drivetrain, LoadCells
 from regolithd.daemon.cli import app
 from regolithd.daemon.config.configuration import Configuration, Smoothing
+from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.pipeline.pipeline import Pipeline
 from regolithd.daemon.pipeline.snapshot import QUANTITIES, ROW, Snapshot
-from regolithd.daemon.pipeline.terrain_network import Network
 from regolithd.drivers.signals import Quantity
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -137,5 +136,5 @@ def test_the_daemon_corrects_loads_by_what_the_bench_found() -> None:
     values[ROW[Quantity.LOAD]] = 52.0
     values[ROW[Quantity.MOTOR_CURRENT]] = 0.08
     values[ROW[Quantity.MOTOR_SPEED]] = 400.0
-    estimate = Pipeline(configuration, Network(TERRAIN_MODEL)).step(Snapshot(0, 10**18, values))
+    estimate = Pipeline(configuration, load_models(configuration)).step(Snapshot(0, 10**18, values))
     np.testing.assert_allclose(estimate.smoothed_load_N, 55.0)

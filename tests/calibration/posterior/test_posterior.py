@@ -7,7 +7,7 @@ import onnxruntime
 import pytest
 
 from regolithd.calibration.models import POSTERIOR_MODEL
-from regolithd.calibration.models.onnx_session import NetworkError
+from regolithd.calibration.models.onnx_session import ModelError
 from regolithd.calibration.parameters import Drivetrain, Wheel
 from regolithd.calibration.posterior.estimator import Buffer, PosteriorEstimator
 from regolithd.calibration.posterior.mixture import PARAMETERS, unpack
@@ -155,13 +155,13 @@ def test_a_fall_is_told_by_its_probability(estimator: PosteriorEstimator) -> Non
     """Half the torque at the same load and slip: cohesion fell, likely; the same window again: nobody knows."""
     strong, weak = window(20), window(20)
     weak[2] /= 2
-    fell = estimator.fall(strong, weak, CalibrationUncertainty())
-    same = estimator.fall(strong, strong, CalibrationUncertainty())
+    fell = estimator.fall_probability(strong, weak, CalibrationUncertainty())
+    same = estimator.fall_probability(strong, strong, CalibrationUncertainty())
     assert fell is not None
     assert same is not None
     assert fell.cohesion > 0.8
     assert 0.45 < same.cohesion < 0.55
-    assert estimator.fall(strong, np.empty((3, 0, 6)), CalibrationUncertainty()) is None
+    assert estimator.fall_probability(strong, np.empty((3, 0, 6)), CalibrationUncertainty()) is None
 
 
 @pytest.mark.parametrize(
@@ -177,5 +177,5 @@ def test_a_file_that_is_no_posterior_is_refused_with_the_cure(tmp_path: Path, na
     shipped = POSTERIOR_MODEL.read_bytes()
     (tmp_path / "half.onnx").write_bytes(shipped[: len(shipped) // 2])
     (tmp_path / "terrain.onnx").write_bytes(POSTERIOR_MODEL.with_name("terrain.onnx").read_bytes())
-    with pytest.raises(NetworkError, match=rf"{name}: {says}.*Train one \(`regolithd train-posterior`\)"):
+    with pytest.raises(ModelError, match=rf"{name}: {says}.*Train one \(`regolithd train-posterior`\)"):
         PosteriorEstimator(tmp_path / name)

@@ -18,7 +18,7 @@ from regolithd.daemon.check.clock import Discipline, check_clock, judge_clock, k
 from regolithd.daemon.check.control import check_control, running_daemon
 from regolithd.daemon.check.disk import check_folder
 from regolithd.daemon.check.finding import Verdict
-from regolithd.daemon.check.models import check_network, judge_card
+from regolithd.daemon.check.models import check_models, judge_card
 from regolithd.daemon.config.configuration import Bus, Configuration, Control, Estimator, Mqtt
 from regolithd.daemon.control.client import ControlError
 from regolithd.daemon.control.protocol import NodeLine, Status
@@ -261,9 +261,9 @@ async def test_a_network_that_does_not_suit_the_rover_is_told(tmp_path: Path) ->
     card = ModelCard("small-1", (Variable("load_N", "N", 1.0, 10.0),), (), 1.0)
     assert judge_card(card, Configuration()).verdict is Verdict.WARNING
     (tmp_path / "broken.onnx").write_bytes(b"no network")
-    (finding,) = await check_network(Configuration(estimator=Estimator(model=tmp_path / "broken.onnx")))
+    (finding,) = await check_models(Configuration(estimator=Estimator(model=tmp_path / "broken.onnx")))
     assert finding.verdict is Verdict.WRONG
-    finding, _ = await check_network(Configuration())
+    finding, _ = await check_models(Configuration())
     assert finding.verdict is Verdict.GOOD
 
 
@@ -291,5 +291,5 @@ async def test_a_drivetrain_that_nobody_calibrated_means_no_intervals_and_a_know
         Verdict.WRONG: Configuration.model_validate({"drivetrain": known, "wheel": {"radius_m": 0.2}}),
     }
     for verdict, configuration in cases.items():
-        _, finding = await check_network(configuration)
+        _, finding = await check_models(configuration)
         assert (finding.subject, finding.verdict) == ("posterior", verdict)

@@ -24,7 +24,7 @@ from listener import until
 from regolithd.daemon.config.configuration import Configuration, Control
 from regolithd.daemon.control.client import ControlError, conversation
 from regolithd.daemon.control.protocol import LINE_LIMIT, REPLY, Accepted, Ended, Progress, Refused, StatusRequest
-from regolithd.daemon.control.server import ControlOutlet
+from regolithd.daemon.control.server import ControlSink
 from regolithd.daemon.control.socket import ControlSocketError, open_control_socket
 from regolithd.daemon.pipeline.snapshot import Snapshot
 from regolithd.drivers.errors import DriveError
@@ -73,23 +73,23 @@ class Rover:
 
 
 @asynccontextmanager
-async def serving(folder: Path, rover: Rover | None, **control: Any) -> AsyncIterator[tuple[ControlOutlet, Path]]:
+async def serving(folder: Path, rover: Rover | None, **control: Any) -> AsyncIterator[tuple[ControlSink, Path]]:
     """Serve a rover whose wheels stand still."""
     path = folder / "control.sock"
     configuration = Configuration(control=Control.model_validate({"socket": path, "group": GROUP} | control))
-    outlet = ControlOutlet(configuration, lambda: rover)
-    task = asyncio.create_task(outlet.run())
+    sink = ControlSink(configuration, lambda: rover)
+    task = asyncio.create_task(sink.run())
 
     async def measure() -> None:
         while True:
             still = np.zeros((10, 6))
-            outlet.estimate(estimate_of(Snapshot(0, 0, still)))
+            sink.estimate(estimate_of(Snapshot(0, 0, still)))
             await asyncio.sleep(0.01)
 
     measuring = asyncio.create_task(measure())
     try:
         await until(path.exists)
-        yield outlet, path
+        yield sink, path
     finally:
         for each in (measuring, task):
             each.cancel()
@@ -242,10 +242,10 @@ async def test_anybody_in_the_group_may_stop_it(tmp_path: Path, quick: bool, end
 
 async def test_a_lost_node_ends_it(tmp_path: Path) -> None:
     """The network has stopped the wheels already; the client learns why."""
-    async with serving(tmp_path, Rover()) as (outlet, path):
+    async with serving(tmp_path, Rover()) as (sink, path):
         client = await Client.to(path)
         await client.ask(LONG)
-        outlet.event(MotionStopped(0, 3, "motion stopped: node 3 is silent"))
+        sink.event(MotionStopped(0, 3, "motion stopped: node 3 is silent"))
         end = await client.hear_end()
         assert (end.ending, end.text) == ("quick-stopped", "motion stopped: node 3 is silent")
 
@@ -307,8 +307,8 @@ async def test_nonsense_is_refused_and_the_connection_goes_on(tmp_path: Path, li
 @given(st.binary(max_size=200))
 def test_no_line_ever_raises_anything(line: bytes) -> None:
     """Whatever is sent, the answer is one of the protocol's."""
-    outlet = ControlOutlet(Configuration(), lambda: None)
-    reply = asyncio.run(outlet._answer(line, None))  # type: ignore[arg-type]
+    sink = ControlSink(Configuration(), lambda: None)
+    reply = asyncio.run(sink._answer(line, None))  # type: ignore[arg-type]
     assert REPLY.validate_json(reply.line()) == reply
 
 
@@ -341,9 +341,9 @@ async def test_the_socket_of_a_killed_daemon_is_taken_over(tmp_path: Path) -> No
 async def test_a_socket_that_cannot_be_made_is_told_and_the_rest_goes_on(tmp_path: Path) -> None:
     """It is tried again."""
     configuration = Configuration(control=Control(socket=tmp_path / "control.sock", group="no-such-group"))
-    outlet = ControlOutlet(configuration, lambda: None)
-    task = asyncio.create_task(outlet.run())
-    await until(lambda: "no-such-group" in outlet.problem)
+    sink = ControlSink(configuration, lambda: None)
+    task = asyncio.create_task(sink.run())
+    await until(lambda: "no-such-group" in sink.problem)
     assert not task.done()
     task.cancel()
     with suppress(asyncio.CancelledError):

@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from regolithd.daemon.health.alarms import Facts, current_alarms, known_names
+from regolithd.daemon.health.alarms import AlarmInputs, current_alarms, known_names
 from regolithd.daemon.messages.models import Severity
 from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.master.status import NodePhase, NodeStatus
@@ -31,13 +31,13 @@ TROUBLES = [
 def test_all_is_well() -> None:
     """Then nothing is said; a node that boots is no alarm yet."""
     nodes = {13: NodeStatus(CELL, NodePhase.BOOTING), 22: NodeStatus(SPEED, NodePhase.OPERATIONAL)}
-    assert current_alarms(Facts(nodes=nodes)) == {}
+    assert current_alarms(AlarmInputs(nodes=nodes)) == {}
 
 
 @pytest.mark.parametrize(("fact", "value", "name", "severity"), TROUBLES)
 def test_each_trouble_is_one_alarm_with_its_cure(fact: str, value: object, name: str, severity: Severity) -> None:
     """Under a name that is known, so that it can be ended."""
-    alarms = current_alarms(dataclasses.replace(Facts(), **{fact: value}))
+    alarms = current_alarms(dataclasses.replace(AlarmInputs(), **{fact: value}))
     assert list(alarms) == [name]
     assert alarms[name].severity is severity
     assert alarms[name].text
@@ -49,7 +49,7 @@ def test_each_trouble_is_one_alarm_with_its_cure(fact: str, value: object, name:
 def test_a_node_that_is_missing_is_an_alarm_of_its_own(phase: NodePhase) -> None:
     """One that need not be there is a warning."""
     nodes = {13: NodeStatus(CELL, phase, text="silent"), 22: NodeStatus(SPEED, phase)}
-    alarms = current_alarms(Facts(nodes=nodes))
+    alarms = current_alarms(AlarmInputs(nodes=nodes))
     assert {name: alarm.severity for name, alarm in alarms.items()} == {
         "node-13": Severity.ERROR,
         "node-22": Severity.WARNING,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from regolithd.daemon.health.liveness import Pulses
+from regolithd.daemon.health.liveness import TaskLiveness
 from regolithd.daemon.health.sd_notify import READY, notify, watchdog_period_s
 
 
@@ -45,13 +45,13 @@ def test_the_watchdog_is_fed_twice_as_often_as_asked_and_only_by_whom_it_concern
 def test_a_task_that_is_silent_for_too_long_is_named() -> None:
     """Each has its own patience."""
     now = 0
-    pulses = Pulses(lambda: now)
-    pulses.expect("bus", 1.0)
-    pulses.expect("recording", 3.0)
+    liveness = TaskLiveness(lambda: now)
+    liveness.expect("bus", 1.0)
+    liveness.expect("recording", 3.0)
     now = 2_000_000_000
-    assert pulses.silent() == ["bus"]
-    pulses.beat("bus")
-    assert pulses.silent() == []
+    assert liveness.silent() == ["bus"]
+    liveness.beat("bus")
+    assert liveness.silent() == []
     now = 4_000_000_000
-    assert pulses.silent() == ["bus", "recording"]
-    assert pulses.ages_s() == {"bus": 2.0, "recording": 4.0}
+    assert liveness.silent() == ["bus", "recording"]
+    assert liveness.ages_s() == {"bus": 2.0, "recording": 4.0}

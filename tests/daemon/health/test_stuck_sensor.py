@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from regolithd.daemon.health.stuck_sensor import StuckWatch
+from regolithd.daemon.health.stuck_sensor import StuckSensorDetector
 from regolithd.daemon.pipeline.snapshot import QUANTITIES, ROW, Snapshot
 from regolithd.drivers.signals import Quantity
 
@@ -29,7 +29,7 @@ def snapshots(
 
 def watch(*drives: list[Snapshot]) -> tuple[tuple[Quantity, int], ...]:
     """Return what is found stuck at the end."""
-    watching = StuckWatch()
+    watching = StuckSensorDetector()
     for drive in drives:
         for snapshot in drive:
             watching.step(snapshot)

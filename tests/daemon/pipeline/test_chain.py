@@ -9,11 +9,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.daemon.config.configuration import Configuration, Recording
 from regolithd.daemon.pipeline.chain import Chain
+from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.pipeline.snapshot import SlipSource
-from regolithd.daemon.pipeline.terrain_network import Network
 from regolithd.daemon.publish.encode import encode
 from regolithd.daemon.recording.recorder import Recorder
 from regolithd.drivers.can.frame import Frame
@@ -24,7 +23,7 @@ KAPVIK = {
 }
 NODES = (*range(1, 7), *range(11, 17), 21, 22)
 IDENTIFIERS = st.sampled_from([0x080, 0x080, 0x080, *(base + node for base in (0x180, 0x280) for node in NODES)])
-NETWORK = Network(TERRAIN_MODEL)
+MODELS = load_models(Configuration.model_validate(KAPVIK))
 
 
 @st.composite
@@ -45,7 +44,7 @@ def traffic(draw: st.DrawFn) -> list[Frame]:
 @given(traffic())
 def test_no_frame_makes_it_raise_and_every_reading_is_accounted_for(frames: list[Frame]) -> None:
     """Any content, any order, clocks that jump: an estimate for each snapshot, each of which can be written down."""
-    chain = Chain(Configuration.model_validate(KAPVIK), NETWORK)
+    chain = Chain(Configuration.model_validate(KAPVIK), MODELS)
     estimates = chain.feed(frames)
     counters = chain.acquisition.counters
     assert counters.snapshots == len(estimates)
@@ -58,13 +57,13 @@ def test_no_frame_makes_it_raise_and_every_reading_is_accounted_for(frames: list
 
 def test_slip_is_measured_configured_or_none(drive: Callable, configuration: Configuration) -> None:
     """From ground speed; from the configuration where its node is silent; none where the wheel stands."""
-    network = Network(configuration.estimator.model)  # type: ignore[arg-type]
-    rolling = Chain(configuration, network).feed(drive().frames(10))[-1]
+    models = load_models(configuration)
+    rolling = Chain(configuration, models).feed(drive().frames(10))[-1]
     assert set(rolling.slip_source) == {SlipSource.MEASURED}
     rolled_m_s = 0.075 * 3915 * 2 * np.pi / 60 / 1400
     assert rolling.slip == pytest.approx([1 - 0.02145 / rolled_m_s] * 6)
 
-    blind = Chain(configuration, network).feed(drive(nodes_silent=frozenset({22})).frames(10))[-1]
+    blind = Chain(configuration, models).feed(drive(nodes_silent=frozenset({22})).frames(10))[-1]
     assert set(blind.slip_source) == {SlipSource.CONFIGURED}
     assert blind.slip.tolist() == [0.025] * 6
     assert blind.valid.all()
@@ -72,7 +71,7 @@ def test_slip_is_measured_configured_or_none(drive: Callable, configuration: Con
     def stopped(frame: Frame) -> Frame:
         return frame._replace(data=frame.data[:4] + bytes(4)) if 0x181 <= frame.can_id <= 0x186 else frame
 
-    standing = Chain(configuration, network).feed([stopped(frame) for frame in drive().frames(10)])[-1]
+    standing = Chain(configuration, models).feed([stopped(frame) for frame in drive().frames(10)])[-1]
     assert set(standing.slip_source) == {SlipSource.NONE}
     assert not standing.valid.any()
     assert np.isnan(standing.slip).all()
@@ -80,7 +79,7 @@ def test_slip_is_measured_configured_or_none(drive: Callable, configuration: Con
 
 def test_backward_is_as_forward_with_the_signs_turned(drive: Callable, configuration: Configuration) -> None:
     """Torque changes its sign; slip, cohesion and friction angle do not."""
-    network = Network(configuration.estimator.model)  # type: ignore[arg-type]
+    models = load_models(configuration)
 
     def turned(frame: Frame) -> Frame:
         if 0x181 <= frame.can_id <= 0x186:
@@ -90,8 +89,8 @@ def test_backward_is_as_forward_with_the_signs_turned(drive: Callable, configura
             return frame._replace(data=np.int32(-np.frombuffer(frame.data[:4], "<i4")[0]).tobytes() + b"\0")
         return frame
 
-    forward = Chain(configuration, network).feed(drive().frames(20))[-1]
-    backward = Chain(configuration, network).feed([turned(frame) for frame in drive().frames(20)])[-1]
+    forward = Chain(configuration, models).feed(drive().frames(20))[-1]
+    backward = Chain(configuration, models).feed([turned(frame) for frame in drive().frames(20)])[-1]
     np.testing.assert_allclose(backward.wheel_torque_Nm, -forward.wheel_torque_Nm)
     np.testing.assert_allclose(backward.smoothed_torque_Nm, -forward.smoothed_torque_Nm)
     np.testing.assert_allclose(backward.slip, forward.slip)
@@ -103,7 +102,7 @@ def test_at_100_Hz_everything_from_frame_to_message_and_file_takes_less_than_a_f
 ) -> None:
     """Processor time, not wall time: 2 ms for each snapshot, where 0.5 ms were measured on two shared cores."""
     configuration = Configuration.model_validate(KAPVIK | {"sync": {"rate_Hz": 100.0}})
-    chain = Chain(configuration, NETWORK)
+    chain = Chain(configuration, MODELS)
     recorder = Recorder(Recording(directory=tmp_path), "can0", {})
     frames = list(drive(rate_Hz=100.0).frames(500))
     begun = time.process_time()

@@ -5,12 +5,12 @@ from collections.abc import Callable
 import pytest
 
 from regolithd.calibration.parameters import Drivetrain
-from regolithd.calibration.posterior.estimator import PosteriorError
+from regolithd.calibration.posterior.estimator import PosteriorModelError
 from regolithd.daemon.config.configuration import Configuration
 from regolithd.daemon.pipeline.chain import Chain
-from regolithd.daemon.pipeline.posterior import gain_relative_std, posterior_stage
+from regolithd.daemon.pipeline.onnx_models import load_models, load_posterior
+from regolithd.daemon.pipeline.posterior import gain_relative_std
 from regolithd.daemon.pipeline.snapshot import Estimate
-from regolithd.daemon.pipeline.terrain_network import Network
 
 CALIBRATED = {"no_load_current_A": 0.037, "no_load_current_std_A": 0.001, "gain_relative_std": 0.03}
 
@@ -22,8 +22,8 @@ def changed(configuration: Configuration, **tables: dict[str, object]) -> Config
 
 def estimates(configuration: Configuration, drive: Callable, rate_Hz: float, snapshots: int) -> list[Estimate]:
     """Return what the chain makes of a straight drive."""
-    network = Network(configuration.estimator.model)  # type: ignore[arg-type]
-    return Chain(configuration, network).feed(drive(rate_Hz=rate_Hz).frames(snapshots))
+    models = load_models(configuration)
+    return Chain(configuration, models).feed(drive(rate_Hz=rate_Hz).frames(snapshots))
 
 
 @pytest.mark.parametrize("rate_Hz", [2.0, 20.0])
@@ -48,19 +48,19 @@ def test_a_rover_without_a_calibrated_drivetrain_has_no_posterior(
     configuration: Configuration, drive: Callable
 ) -> None:
     """It would take the drivetrain for soil."""
-    assert posterior_stage(configuration) is None
+    assert load_posterior(configuration) is None
     assert all(estimate.posterior is None for estimate in estimates(configuration, drive, 2.0, 20))
 
 
 def test_it_can_be_switched_off(configuration: Configuration) -> None:
     """Though everything is known."""
-    assert posterior_stage(changed(configuration, drivetrain=CALIBRATED, posterior={"enabled": False})) is None
+    assert load_posterior(changed(configuration, drivetrain=CALIBRATED, posterior={"enabled": False})) is None
 
 
 def test_a_posterior_for_another_wheel_is_refused(configuration: Configuration) -> None:
     """With the cure."""
-    with pytest.raises(PosteriorError, match=r"trained for wheels of 0\.075 m radius, not 0\.1 m\. Train one"):
-        posterior_stage(changed(configuration, drivetrain=CALIBRATED, wheel={"radius_m": 0.1}))
+    with pytest.raises(PosteriorModelError, match=r"trained for wheels of 0\.075 m radius, not 0\.1 m\. Train one"):
+        load_posterior(changed(configuration, drivetrain=CALIBRATED, wheel={"radius_m": 0.1}))
 
 
 def test_a_brake_says_how_well_the_gain_is_known() -> None:

@@ -2,15 +2,14 @@
 
 import numpy as np
 
-from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.calibration.parameters import SOILS
 from regolithd.calibration.posterior.change_detection import Alarm
-from regolithd.calibration.posterior.estimator import Fall
+from regolithd.calibration.posterior.estimator import FallProbability
 from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.pipeline.pipeline import Pipeline
-from regolithd.daemon.pipeline.snapshot import QUANTITIES, ChangeOfSoil, Snapshot
-from regolithd.daemon.pipeline.soil_change import SoilChange, change_text
-from regolithd.daemon.pipeline.terrain_network import Network
+from regolithd.daemon.pipeline.snapshot import QUANTITIES, Snapshot, SoilChange
+from regolithd.daemon.pipeline.soil_change import SoilChangeDetector, change_text
 from regolithd.daemon.simulator.scenario import Ground, Scenario, Stretch
 from regolithd.daemon.simulator.virtual_rover import VirtualWorld
 
@@ -19,7 +18,7 @@ HALF_SECOND_NS = 500_000_000
 
 def watch(torque: np.ndarray) -> list[Alarm]:
     """Return the alarms of a level drive; torque in half seconds, shape (time, 6)."""
-    detector = SoilChange(Configuration())
+    detector = SoilChangeDetector(Configuration())
     load, slip = np.full(6, 49.0), np.full(6, 0.025)
     found = [detector.step(k * HALF_SECOND_NS, load, slip, row) for k, row in enumerate(torque)]
     return [alarm for alarm in found if alarm is not None]
@@ -38,7 +37,7 @@ def test_a_fall_of_torque_raises_one_alarm_within_fifteen_seconds() -> None:
     assert alarm.direction == "fall"
     assert 0 < alarm.time_ns / HALF_SECOND_NS - 480 <= 30
     assert 0.1 < alarm.torque_ratio < 0.8
-    text = change_text(ChangeOfSoil(alarm, Fall(0.97, 0.6, 0.9)))
+    text = change_text(SoilChange(alarm, FallProbability(0.97, 0.6, 0.9)))
     assert text.startswith("the soil gives way: torque fell to ")
     assert "alarm at 10.8); that it fell is 97 % likely of the cohesion" in text
 
@@ -58,7 +57,8 @@ def test_through_the_whole_pipeline_the_alarm_says_how_likely_the_soil_is_weaker
     scenario = Scenario(ground=Ground(stretches=stretches))
     world = VirtualWorld(scenario)
     known = scenario.drivetrain.model_dump() | {"no_load_current_std_A": 0.001, "gain_relative_std": 0.03}
-    pipeline = Pipeline(Configuration.model_validate({"drivetrain": known}), Network(TERRAIN_MODEL))
+    configuration = Configuration.model_validate({"drivetrain": known})
+    pipeline = Pipeline(configuration, load_models(configuration))
     speed = np.full(6, 0.05 / 0.075 * scenario.drivetrain.ratio)
     changes = []
     for k in range(420):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.models.card import ModelCard, ModelCardError, Variable, read_card
-from regolithd.calibration.models.onnx_session import NetworkError
-from regolithd.daemon.pipeline.terrain_network import ModelError, Network
+from regolithd.calibration.models.onnx_session import ModelError
+from regolithd.daemon.pipeline.terrain_network import TerrainModelError, TerrainNetwork
 
 KNOWN = {
     "load_N": np.array([30.0, 40.0, 50.0, 60.0, 70.0, 90.0]),
@@ -22,7 +22,7 @@ def test_six_wheels_are_estimated_and_what_is_outside_the_training_range_is_mark
     make_network: Callable[..., Path],
 ) -> None:
     """Wheel 3 lacks its slip; 4, 5 and 6 each have one input outside."""
-    terrain = Network(make_network()).estimate(KNOWN)
+    terrain = TerrainNetwork(make_network()).estimate(KNOWN)
     np.testing.assert_allclose(terrain.cohesion_Pa, [3000, 4000, np.nan, 6000, 7000, 9000], rtol=1e-6)
     tangent = KNOWN["slip"] + 5 * KNOWN["motor_current_A"]
     np.testing.assert_allclose(np.tan(terrain.friction_angle_rad), tangent, rtol=1e-6)
@@ -54,27 +54,27 @@ def test_everything_wrong_with_a_card_is_told_at_once(card: ModelCard) -> None:
 
 def test_a_network_without_a_card_is_refused(make_network: Callable[..., Path]) -> None:
     """Numbers of unknown unit are worse than none."""
-    with pytest.raises(ModelError, match=r"network.onnx: its metadata do not fit: regolithd.inputs is missing"):
-        Network(make_network(metadata={}))
+    with pytest.raises(TerrainModelError, match=r"network.onnx: its metadata do not fit: regolithd.inputs is missing"):
+        TerrainNetwork(make_network(metadata={}))
 
 
 def test_a_network_whose_layers_disagree_with_its_card_is_refused(make_network: Callable[..., Path]) -> None:
     """Four columns in, three named."""
-    with pytest.raises(ModelError, match=r"expected \(N, 3\) of floats"):
-        Network(make_network(weights=np.ones((4, 2))))
+    with pytest.raises(TerrainModelError, match=r"expected \(N, 3\) of floats"):
+        TerrainNetwork(make_network(weights=np.ones((4, 2))))
 
 
 def test_a_network_that_gives_no_numbers_is_refused(make_network: Callable[..., Path]) -> None:
     """It is run once before it is trusted."""
-    with pytest.raises(ModelError, match="no finite numbers"):
-        Network(make_network(weights=np.full((3, 2), np.nan)))
+    with pytest.raises(TerrainModelError, match="no finite numbers"):
+        TerrainNetwork(make_network(weights=np.full((3, 2), np.nan)))
 
 
 def test_a_missing_or_broken_file_is_refused(tmp_path: Path) -> None:
     """With its path, and the cure."""
-    with pytest.raises(NetworkError, match=r"absent.onnx: no such file. Train one \(`regolithd train`\)"):
-        Network(tmp_path / "absent.onnx")
+    with pytest.raises(ModelError, match=r"absent.onnx: no such file. Train one \(`regolithd train`\)"):
+        TerrainNetwork(tmp_path / "absent.onnx")
     broken = tmp_path / "broken.onnx"
     broken.write_bytes(b"not a model")
-    with pytest.raises(NetworkError, match=r"broken.onnx: damaged, or not an ONNX model .*Train one"):
-        Network(broken)
+    with pytest.raises(ModelError, match=r"broken.onnx: damaged, or not an ONNX model .*Train one"):
+        TerrainNetwork(broken)

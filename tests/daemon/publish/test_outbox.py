@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from regolithd.daemon.publish.encode import write
-from regolithd.daemon.publish.outbox import LIVE_WITHIN_NS, Letter, Outbox, is_retained
+from regolithd.daemon.publish.outbox import LIVE_WITHIN_NS, Outbox, OutgoingMessage, is_retained
 from regolithd.daemon.publish.spool import Spool
 
 
@@ -16,7 +16,7 @@ def message(number: int) -> bytes:
     return write({"schema_version": 2, "late": False, "number": number})
 
 
-def number_of(letter: Letter) -> int:
+def number_of(letter: OutgoingMessage) -> int:
     """Return the number that a letter tells; its mark must be its payload's."""
     assert letter.payload.startswith(b'{"schema_version":2,"late":' + (b"true" if letter.late else b"false"))
     return int(letter.payload.split(b":")[-1].rstrip(b"}"))
@@ -29,7 +29,7 @@ class World:
         self.folder = folder
         self.stored = 0
         self.arrived: list[tuple[int, bool]] = []
-        self.flying: list[Letter] = []
+        self.flying: list[OutgoingMessage] = []
         self.is_connected = False
         self.boot()
 

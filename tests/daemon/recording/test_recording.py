@@ -12,10 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from regolithd.daemon.config.configuration import Configuration, Recording
-from regolithd.daemon.pipeline.chain import Chain, Digest
-from regolithd.daemon.pipeline.terrain_network import Network
+from regolithd.daemon.pipeline.chain import Chain
+from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.recording.candump import frame_line, parse_line, read_log
 from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, snapshot_from_json
+from regolithd.daemon.recording.digest import Digest
 from regolithd.daemon.recording.mcap_file import read_messages, read_metadata
 from regolithd.daemon.recording.recorder import Recorder
 from regolithd.drivers.can.frame import Frame
@@ -76,7 +77,7 @@ def recorded(folder: Path, frames: list[Frame], configuration: Configuration) ->
     recorder = Recorder(Recording(directory=folder), "can0", {"configuration": configuration.model_dump_json()})
     paths = recorder.paths
     assert paths is not None
-    chain, digest = Chain(configuration, Network(configuration.estimator.model)), Digest()  # type: ignore[arg-type]
+    chain, digest = Chain(configuration, load_models(configuration)), Digest()
     for start in range(0, len(frames), 64):
         batch = frames[start : start + 64]
         recorder.frames(batch)
@@ -93,7 +94,7 @@ def test_a_replayed_log_gives_the_same_numbers_to_the_last_bit(
 ) -> None:
     """Live and replayed differ only in where the frames come from."""
     _, log, live = recorded(tmp_path, list(drive(nodes_silent=frozenset({3})).frames(50)), configuration)
-    chain, replayed = Chain(configuration, Network(configuration.estimator.model)), Digest()  # type: ignore[arg-type]
+    chain, replayed = Chain(configuration, load_models(configuration)), Digest()
     for estimate in chain.feed(read_log(log)):
         replayed.add(estimate)
     assert live.count == replayed.count == 50
@@ -102,11 +103,11 @@ def test_a_replayed_log_gives_the_same_numbers_to_the_last_bit(
 
 def test_the_digest_sees_a_change_of_one_bit(drive: Callable, configuration: Configuration) -> None:
     """Else equal digests would prove nothing."""
-    network = Network(configuration.estimator.model)  # type: ignore[arg-type]
+    models = load_models(configuration)
     digests = []
     for seed in (1, 1, 2):
         digest = Digest()
-        for estimate in Chain(configuration, network).feed(drive(seed=seed).frames(5)):
+        for estimate in Chain(configuration, models).feed(drive(seed=seed).frames(5)):
             digest.add(estimate)
         digests.append(str(digest))
     assert digests[0] == digests[1] != digests[2]
@@ -116,7 +117,7 @@ def test_snapshots_read_back_to_the_last_bit(tmp_path: Path, drive: Callable, co
     """JSON keeps every digit, and null stays NaN."""
     frames = list(drive(nodes_silent=frozenset({2})).frames(10))
     mcap, _, _ = recorded(tmp_path, frames, configuration)
-    chain = Chain(configuration, Network(configuration.estimator.model))  # type: ignore[arg-type]
+    chain = Chain(configuration, load_models(configuration))
     expected = [estimate.snapshot.values for estimate in chain.feed(frames)]
     found = [snapshot_from_json(each.content).values for each in read_messages(mcap) if each.topic == SNAPSHOT]
     np.testing.assert_array_equal(np.stack(found), np.stack(expected))
