@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from regolithd.daemon.messages.models import Severity
+from regolithd.daemon.messages.alarm import Severity
 from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.master.status import NodePhase
 

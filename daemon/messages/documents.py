@@ -1,7 +1,7 @@
-"""What is written down about the messages for those who read them, made from `daemon.messages.models`.
+"""The documents in `docs/messages`, generated from the message models in `daemon/messages`.
 
 `documents()` returns file name → text: a JSON Schema for each message, an AsyncAPI 3 document, and a table in Markdown.
-`regolithd schema --write docs/messages` puts them there; a test holds that they are fresh.
+`regolithd schema --write docs/messages` writes them; a test fails while they differ from the models.
 """
 
 from __future__ import annotations
@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic.json_schema import models_json_schema
 
+from regolithd.daemon.messages.channels import CHANNELS, QoS
 from regolithd.daemon.messages.examples import example
-from regolithd.daemon.messages.models import CHANNELS, SCHEMA_VERSION, QoS
+from regolithd.daemon.messages.header import SCHEMA_VERSION
 
 if TYPE_CHECKING:
-    from regolithd.daemon.messages.models import Channel
+    from regolithd.daemon.messages.channels import Channel
 
 _PARAMETERS = {
     "wheel": {
@@ -25,7 +26,7 @@ _PARAMETERS = {
         "enum": list("123456"),
     },
     "node_id": {"description": "The CANopen node-ID, 1 to 127."},
-    "name": {"description": "What the alarm is about."},
+    "name": {"description": "Name of the alarm."},
     "rover": {"description": "[rover] name in rover.toml."},
 }
 _QOS_WORDS = {QoS.AT_MOST_ONCE: "0, at most once", QoS.AT_LEAST_ONCE: "1, acknowledged"}
@@ -58,7 +59,7 @@ def asyncapi() -> dict[str, Any]:
         "info": {
             "title": "regolithd",
             "version": f"{SCHEMA_VERSION}",
-            "description": "What the daemon publishes. It subscribes to nothing: nothing can be commanded over MQTT.",
+            "description": "What the daemon publishes. It subscribes to no topic and cannot be commanded over MQTT.",
         },
         "defaultContentType": "application/json",
         "servers": {
@@ -117,11 +118,11 @@ def _message(channel: Channel) -> dict[str, Any]:
 def table() -> str:
     """Return the message table in Markdown."""
     rows = [
-        "| topic `regolith/<rover>/…` | what | when | QoS | retained | broker away |",
+        "| topic `regolith/<rover>/…` | content | published | QoS | retained | while disconnected |",
         "|---|---|---|---|---|---|",
     ]
     for channel in CHANNELS:
-        away = "kept, sent late" if channel.stored else "the current one at birth" if channel.retain else "not sent"
+        away = "stored, sent late" if channel.stored else "sent at the next birth" if channel.retain else "not sent"
         rows.append(
             f"| [`{channel.address.replace('{', '<').replace('}', '>')}`]({channel.name}.schema.json) "
             f"| {_summary(channel)} | {channel.when} | {_QOS_WORDS[channel.qos]} "
@@ -134,20 +135,21 @@ def _readme() -> str:
     return f"""\
 # Messages
 
-Made from `daemon/messages/models.py` by `regolithd schema --write docs/messages`; do not edit. The same as an
+Generated from the models in `daemon/messages/` by `regolithd schema --write docs/messages`; do not edit. The same as an
 AsyncAPI 3 document: [asyncapi.json](asyncapi.json).
 
 {table()}
 
-Every message is one JSON object and begins with `schema_version`, `late`, `session`, `sequence` and `time`. Names end
-in their unit; `null` means that it was not measured or could not be estimated. Lists of six belong to wheels 1 to 6.
+Every message is one JSON object and begins with `schema_version`, `late`, `session`, `sequence` and `time`. Names of
+numbers end in their unit; `null` means not measured, or no estimate. Lists of six belong to wheels 1 to 6.
 
-- `session` is one run of the daemon; `(session, sequence)` is unique on a topic. A message with `late: true` comes from
-  the store, after the broker had been away, and may repeat one that was received before: compare the two.
+- `session` identifies one run of the daemon; `(session, sequence)` is unique on a topic. A message with `late: true`
+  comes from the store, because the broker could not be reached when it was created. It may repeat one that was
+  received before: compare `session` and `sequence`.
 - `state` is `online` from birth to death. An `offline` ends the `online` of the same `session` and `sequence`, and no
-  other. While `state` is `offline`, every retained message tells of the past.
-- `snapshot` is complete and in order; `wheel/…` shows the newest without waiting, and is not kept
-  while the broker is away.
+  other. While `state` is `offline`, retained messages may be out of date.
+- `snapshot` is complete and in order. `wheel/…` carries the newest values without waiting for older ones, and is not
+  stored while the broker cannot be reached.
 
 ## Examples
 

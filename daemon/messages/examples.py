@@ -1,11 +1,11 @@
-"""One example of each message, for the documents: numbers as the paper has them, each checked by its model."""
+"""One example of each message, for the documents, with numbers like the paper's; its model validates it."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from regolithd.daemon.messages.models import Channel
+    from regolithd.daemon.messages.channels import Channel
 
 _HEADER = {
     "late": False,

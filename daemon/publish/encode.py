@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic_core import to_json
 
-from regolithd.daemon.messages.models import SCHEMA_VERSION, iso_time
+from regolithd.daemon.messages.header import SCHEMA_VERSION, iso_time
 from regolithd.daemon.pipeline.snapshot import ROW, WHEELS
 from regolithd.drivers.signals import Quantity
 

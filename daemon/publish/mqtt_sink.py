@@ -12,20 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from regolithd.daemon.health.alarms import Alarm, AlarmInputs, current_alarms, known_names
 from regolithd.daemon.health.stuck_sensor import StuckSensorDetector
-from regolithd.daemon.messages.models import (
-    AcquisitionReport,
-    AlarmMessage,
-    EmergencyMessage,
-    EventMessage,
-    HealthMessage,
-    IdentityReport,
-    NodeMessage,
-    PosteriorMessage,
-    RecordingReport,
-    Severity,
-    SyncReport,
-    iso_time,
-)
+from regolithd.daemon.messages.alarm import AlarmMessage, Severity
+from regolithd.daemon.messages.bus import EmergencyMessage, EventMessage, IdentityReport, NodeMessage
+from regolithd.daemon.messages.header import iso_time
+from regolithd.daemon.messages.health import AcquisitionReport, HealthMessage, RecordingReport, SyncReport
+from regolithd.daemon.messages.posterior import PosteriorMessage
 from regolithd.daemon.pipeline.soil_change import change_text
 from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.canopen.emcy import register_bits

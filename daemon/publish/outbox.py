@@ -11,7 +11,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from regolithd.daemon.messages.models import CHANNELS
+from regolithd.daemon.messages.channels import CHANNELS
 from regolithd.daemon.publish.encode import as_late
 
 if TYPE_CHECKING:

@@ -21,7 +21,10 @@ from typing import TYPE_CHECKING, Any
 
 from aiomqtt import MqttError
 
-from regolithd.daemon.messages.models import CHANNELS, Header, Presence, PublishingReport, StateMessage, iso_time
+from regolithd.daemon.messages.channels import CHANNELS
+from regolithd.daemon.messages.header import Header, iso_time
+from regolithd.daemon.messages.health import PublishingReport
+from regolithd.daemon.messages.state import Presence, StateMessage
 from regolithd.daemon.publish.backoff import Backoff
 from regolithd.daemon.publish.connection import Connection
 from regolithd.daemon.publish.connection_errors import reason_of

@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from regolithd.daemon.health.alarms import AlarmInputs, current_alarms, known_names
-from regolithd.daemon.messages.models import Severity
+from regolithd.daemon.messages.alarm import Severity
 from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.master.status import NodePhase, NodeStatus
 from regolithd.drivers.signals import NodeDescription, NodeKind

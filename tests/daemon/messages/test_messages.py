@@ -9,8 +9,11 @@ import pytest
 from estimates import estimate
 from pydantic import ValidationError
 
+from regolithd.daemon.messages.channels import CHANNELS
 from regolithd.daemon.messages.documents import documents
-from regolithd.daemon.messages.models import CHANNELS, SnapshotMessage, StateMessage, WheelMessage, iso_time
+from regolithd.daemon.messages.header import iso_time
+from regolithd.daemon.messages.measurements import SnapshotMessage, WheelMessage
+from regolithd.daemon.messages.state import StateMessage
 from regolithd.daemon.publish.encode import as_late, encode, write
 
 DOCS = Path(__file__).resolve().parents[3] / "docs" / "messages"

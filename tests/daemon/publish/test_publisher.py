@@ -16,7 +16,7 @@ from estimates import estimate
 from listener import Subscriber, assert_complete, listening, until
 
 from regolithd.daemon.config.configuration import Configuration, Mqtt
-from regolithd.daemon.messages.models import EventMessage, NodeMessage
+from regolithd.daemon.messages.bus import EventMessage, NodeMessage
 from regolithd.daemon.publish.backoff import Backoff
 from regolithd.daemon.publish.publisher import Publisher
 from regolithd.daemon.publish.spool import Spool
