@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Contribution, Effect
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.simulation.simulation import own_name
+from regolithd.calibration.mismatch.problem.prior import own_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Problem
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate
+    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]
@@ -144,9 +145,9 @@ def stated_effects(tables: Mapping[str, Any]) -> tuple[Contribution, ...]:
     return tuple(found)
 
 
-def effect_of(problem: Problem, effects: Sequence[Contribution]) -> Array:
+def effect_of(problem: Problem, candidates: Sequence[Candidate], effects: Sequence[Contribution]) -> Array:
     """Return what stated effects add to the prediction, shape (time, wheel)."""
-    known = {candidate.name: candidate for candidate in problem.simulation.candidates()}
+    known = {candidate.name: candidate for candidate in candidates}
     total = np.zeros(problem.mask.shape)
     for effect in effects:
         if effect.name not in known:

@@ -9,7 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Answer
-    from regolithd.calibration.mismatch.compare import Comparison
+    from regolithd.calibration.mismatch.comparison import Comparison
     from regolithd.calibration.mismatch.data.recording import Recording
 
 EXIT_DATA = 65
@@ -44,9 +44,9 @@ def register(app: typer.Typer) -> None:
 def _run(recording: Path, simulation: Path, json: Path | None, report: Path | None, corrected: Path | None) -> None:
     from rich.console import Console
 
-    from regolithd.calibration.mismatch.compare import compare
+    from regolithd.calibration.mismatch.comparison import compare
     from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects, to_toml
-    from regolithd.calibration.mismatch.simulation.simulation import load_simulation
+    from regolithd.calibration.mismatch.simulation.load import load_simulation
 
     tables = _tables(simulation)
     simulated = load_simulation(tables, beside=simulation.resolve().parent)

@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 
 from regolithd.calibration.mismatch.data.recording import read_recording
-from regolithd.calibration.mismatch.simulation.problem import build_problem
-from regolithd.calibration.mismatch.simulation.simulation import load_simulation
+from regolithd.calibration.mismatch.problem.problem import build_problem
+from regolithd.calibration.mismatch.simulation.load import load_simulation
 
 HERE = Path(__file__).resolve().parent
 PROJECT = HERE.parent.parent

@@ -16,7 +16,7 @@ from regolithd.calibration.mismatch.candidates.candidate import (
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Problem
+    from regolithd.calibration.mismatch.problem.problem import Problem
 
 
 class BearingDrag(Candidate):

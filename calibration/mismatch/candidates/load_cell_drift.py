@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
-from regolithd.calibration.mismatch.regression.hat_basis import broken_lines
-from regolithd.calibration.mismatch.regression.noise import estimate_noise
-from regolithd.calibration.mismatch.simulation.errors_in_variables import known_mean
+from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
+from regolithd.calibration.mismatch.signal.hat_basis import broken_lines
+from regolithd.calibration.mismatch.signal.noise import estimate_noise
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Problem
+    from regolithd.calibration.mismatch.problem.problem import Problem
 
 WANDER_KNOTS, POSTURE_KNOTS = 24, 4
 """Of the line that a drift follows; and of the one that is fitted beside what pitch and roll say."""

@@ -18,7 +18,7 @@ from regolithd.calibration.mismatch.candidates.candidate import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.simulation.problem import Problem
+    from regolithd.calibration.mismatch.problem.problem import Problem
 
 
 class TorqueConstantTemperature(Candidate):

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.regression.design_matrix import Group
-    from regolithd.calibration.mismatch.regression.noise import Noise
+    from regolithd.calibration.mismatch.signal.noise import Noise
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from regolithd.calibration.mismatch.selection.subset_selection import Term
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.candidates import Candidate
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.selection.subset_selection import Fit, Search
 
 NINE_IN_TEN = 1.2816

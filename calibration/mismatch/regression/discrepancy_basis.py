@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.hat_basis import broken_lines
 from regolithd.calibration.mismatch.regression.residuals import contribution
+from regolithd.calibration.mismatch.signal.hat_basis import broken_lines
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.selection.subset_selection import Fit, Search

@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.problem.prior import own_name
 from regolithd.calibration.mismatch.regression.design_matrix import Dictionary, Group
-from regolithd.calibration.mismatch.regression.hat_basis import broken_lines
-from regolithd.calibration.mismatch.regression.spectrum import padded_length, power_of_sums
-from regolithd.calibration.mismatch.simulation.simulation import own_name
+from regolithd.calibration.mismatch.signal.hat_basis import broken_lines
+from regolithd.calibration.mismatch.signal.spectrum import padded_length, power_of_sums
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.candidates import Candidate, Shape
-    from regolithd.calibration.mismatch.candidates.candidate import Sharing
-    from regolithd.calibration.mismatch.simulation.problem import Problem
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape, Sharing
+    from regolithd.calibration.mismatch.problem.problem import Problem
 
 Array = NDArray[np.float64]
 

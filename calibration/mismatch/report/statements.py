@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.answer import Parameter
-    from regolithd.calibration.mismatch.candidates import Candidate
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate
 
 
 def wheels_in_words(wheels: Sequence[int], of: int, kind: str = "wheel") -> str:

@@ -8,18 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.noise import Noise, blocks_of_time, estimate_noise
+from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.normal_equations import add_beat, add_candidate
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.selection.best_subsets import UNNAMED_BY, best_named, enough
 from regolithd.calibration.mismatch.selection.cross_validation import that_transfer
 from regolithd.calibration.mismatch.selection.sign_flip_test import naming_threshold
 from regolithd.calibration.mismatch.selection.smooth_terms import without_a_name
+from regolithd.calibration.mismatch.signal.noise import Noise, estimate_noise
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from regolithd.calibration.mismatch.candidates import Candidate
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.selection.subset_selection import Fit, Search, Term
 
 Array = NDArray[np.float64]

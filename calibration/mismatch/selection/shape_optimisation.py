@@ -13,7 +13,7 @@ from regolithd.calibration.mismatch.selection.subset_selection import Search, Te
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from regolithd.calibration.mismatch.candidates import Candidate, Shape
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
 
 Array = NDArray[np.float64]
 

@@ -1,1 +1,1 @@
-"""What a simulation states about itself, the built-in rover wheel, and the problem posed with a recording."""
+"""What a simulation states about itself, how SIM.toml names one, and the built-in rover wheel."""

@@ -10,9 +10,10 @@ from pydantic import Field, ValidationError
 
 from regolithd.calibration.drivetrain.torque import motor_current
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.simulation.errors_in_variables import known_mean
+from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
+from regolithd.calibration.mismatch.problem.prior import Prior, SensorError, own_name
 from regolithd.calibration.mismatch.simulation.open_circuit_voltage import open_circuit_voltage
-from regolithd.calibration.mismatch.simulation.simulation import Prior, SensorError, Simulation, own_name
+from regolithd.calibration.mismatch.simulation.simulation import Simulation
 from regolithd.calibration.parameters import Drivetrain, Rover, Sensors, Soil, Table, Wheel
 from regolithd.calibration.terrain.wheel_soil import LARGEST_CONTACT_ANGLE_RAD, contact_angle, wheel_torque
 

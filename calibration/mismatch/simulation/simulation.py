@@ -18,9 +18,7 @@ tables of SIM.toml arrive in `from_tables`, whose default lets `[parameters]` re
 
 from __future__ import annotations
 
-import importlib
-import sys
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -30,29 +28,12 @@ from regolithd.calibration.mismatch.errors import SimulationError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
-    from regolithd.calibration.mismatch.candidates import Candidate
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.problem.prior import Prior, SensorError
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Prior:
-    """How well a parameter is known before the recording: a normal density; a `std` of 0 means exactly."""
-
-    value: float
-    std: float = 0.0
-    unit: str = "1"
-
-
-@dataclass(frozen=True)
-class SensorError:
-    """A recorded input's standard error: a fraction of the reading plus a constant, new with each reading."""
-
-    relative: float = 0.0
-    absolute: float = 0.0
 
 
 class Simulation:
@@ -118,11 +99,12 @@ class Simulation:
         """Return parameters outside the priors that candidates may move, with their neutral values."""
         return {}
 
-    def candidates(self) -> Sequence[Candidate]:
-        """Return the physics to look for: by default the whole library, of which what fits the covariates is used."""
-        from regolithd.calibration.mismatch.candidates import library  # noqa: PLC0415  # the library knows simulations
+    def candidates(self, library: Sequence[Candidate]) -> Sequence[Candidate]:
+        """Return the physics to look for: by default the whole library, of which what fits the covariates is used.
 
-        return library()
+        Add your own with `(*library, MyCandidate())`; leave out what the machine cannot have.
+        """
+        return library
 
     def corrected_tables(self, values: Mapping[str, float]) -> dict[str, Any]:
         """Return SIM.toml's tables with the parameters at the values that the recording gave them."""
@@ -131,45 +113,3 @@ class Simulation:
                 name: {"value": float(values[name]), "std": prior.std} for name, prior in self.parameters.items()
             }
         }
-
-
-def own_name(parameter: str, wheel: int | str) -> str:
-    """Return what a wheel's own part of a parameter is called among the values that a recording gave."""
-    return f"{parameter} of {wheel}"
-
-
-def load_simulation(tables: Mapping[str, Any], *, beside: Path | None = None) -> Simulation:
-    """Return the simulation that SIM.toml's tables name.
-
-    A user's module is looked for beside the TOML file too.
-
-    Raises
-    ------
-    SimulationError
-        When the model is unknown, or its tables are wrong.
-    """
-    model = tables.get("simulation", {}).get("model")
-    if model == "rover-wheel":
-        from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel  # noqa: PLC0415  # a user's own needs none of it
-
-        return RoverWheel.from_tables(tables)
-    if not isinstance(model, str) or ":" not in model:
-        raise SimulationError(f'[simulation] model must be "rover-wheel" or "package.module:ClassName", not {model!r}')
-    module_name, class_name = model.split(":", 1)
-    if beside is not None and str(beside) not in sys.path:
-        sys.path.insert(0, str(beside))
-    try:
-        found = getattr(importlib.import_module(module_name), class_name)
-    except (ImportError, AttributeError) as error:
-        raise SimulationError(f"the simulation {model} cannot be imported: {error}") from error
-    if not (isinstance(found, type) and issubclass(found, Simulation)):
-        raise SimulationError(
-            f"{model} is not a subclass of regolithd.calibration.mismatch.simulation.simulation.Simulation"
-        )
-    return found.from_tables(tables)
-
-
-def complete_inputs(recording: Recording) -> dict[str, Array]:
-    """Return every channel and `t_s`, all of shape (time, wheel)."""
-    time_s = np.broadcast_to(recording.time_s[:, None], recording.shape)
-    return {**recording.channels, "t_s": time_s}

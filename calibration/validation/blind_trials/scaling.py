@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 import regolithd
-from regolithd.calibration.mismatch.candidates import library
 from regolithd.calibration.mismatch.report.axes import Panel, axes, box, line, svg, text
 from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel
 from regolithd.calibration.validation.blind_trials.errors import ProofError
@@ -29,7 +28,7 @@ from regolithd.calibration.validation.blind_trials.generator import Plan, make_t
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.candidates import Candidate
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate
 
 DURATIONS_S = (300.0, 600.0, 1200.0, 1800.0, 3600.0)
 COUNTS = (2, 4, 8, 16)
@@ -47,9 +46,9 @@ class Fewer(RoverWheel):
 
     count: ClassVar[int] = 16
 
-    def candidates(self) -> Sequence[Candidate]:
+    def candidates(self, library: Sequence[Candidate]) -> Sequence[Candidate]:
         """Return the first `count`."""
-        return library()[: self.count]
+        return library[: self.count]
 
 
 class Two(Fewer):

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates import Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch import Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.simulation.problem import Problem
-    from regolithd.calibration.mismatch.simulation.simulation import Array
+    from regolithd.calibration.mismatch import Array, Problem
 
 
 def sideways(travel_mm_s: Array, rim_mm_s: Array, slip_angle_rad: Array) -> Array:

@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from side_forces import CANDIDATES, sideways
 
-from regolithd.calibration.mismatch.simulation.simulation import Prior, Simulation
+from regolithd.calibration.mismatch import Prior, Simulation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.candidates import Candidate
-    from regolithd.calibration.mismatch.data.recording import Recording
-    from regolithd.calibration.mismatch.simulation.simulation import Array
+    from regolithd.calibration.mismatch import Array, Candidate, Recording
 
 LONGITUDINAL = 1
 SLIP = np.array([-1.0, -0.7, -0.5, -0.2, 0.0, 0.23, 0.5, 0.75, 0.9])
@@ -47,6 +45,6 @@ class SingleWheel(Simulation):
         side = sideways(inputs["travel_mm_s"], inputs["rim_mm_s"], angle)
         return {**{name: inputs[column] for name, column in names.items()}, "slip_angle": angle, "sideways": side}
 
-    def candidates(self) -> Sequence[Candidate]:
+    def candidates(self, library: Sequence[Candidate]) -> Sequence[Candidate]:  # noqa: ARG002  # a rover's
         """Return this domain's own: none of a rover's drivetrain is here."""
         return CANDIDATES

@@ -9,8 +9,7 @@ from regolithd.calibration.mismatch.candidates.viscous_friction import ViscousFr
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.candidates import Shape
-    from regolithd.calibration.mismatch.simulation.problem import Problem
+    from regolithd.calibration.mismatch import Problem, Shape
 
 
 class LinearFriction(ViscousFriction):

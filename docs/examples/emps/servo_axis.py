@@ -9,15 +9,12 @@ from asymmetric_friction import AsymmetricFriction
 from linear_friction import LinearFriction
 from scipy.signal import butter, sosfiltfilt
 
-from regolithd.calibration.mismatch.candidates import library
-from regolithd.calibration.mismatch.simulation.simulation import Prior, Simulation
+from regolithd.calibration.mismatch import Prior, Simulation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.candidates import Candidate
-    from regolithd.calibration.mismatch.data.recording import Recording
-    from regolithd.calibration.mismatch.simulation.simulation import Array
+    from regolithd.calibration.mismatch import Array, Candidate, Recording
 
 FORCE_PER_VOLT = 35.15
 CUTOFF_HZ = 20.0
@@ -55,10 +52,10 @@ class ServoAxis(Simulation):
         """Return what the residual may be ordered by."""
         return {"time": inputs["t_s"], "wheel_speed": inputs["speed_m_s"], "position": inputs["position_m"]}
 
-    def candidates(self) -> Sequence[Candidate]:
+    def candidates(self, library: Sequence[Candidate]) -> Sequence[Candidate]:
         """Return the library without what this machine cannot have, and two effects as its literature has them.
 
         A slide has no wheel angle, and the voltage is the controller's own command: no sensor reads it with an offset.
         """
         foreign = {"wheel-angle-ripple", "current-sensor-bias", "viscous-friction"}
-        return (*(c for c in library() if c.name not in foreign), LinearFriction(), AsymmetricFriction())
+        return (*(c for c in library if c.name not in foreign), LinearFriction(), AsymmetricFriction())

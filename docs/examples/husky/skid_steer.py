@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.simulation.simulation import Prior, Simulation
+from regolithd.calibration.mismatch import Prior, Simulation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.simulation.simulation import Array
+    from regolithd.calibration.mismatch import Array
 
 GRAVITY_M_S2 = 9.81
 CREEPING_M_S = 0.02

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-from regolithd.calibration.mismatch.simulation.simulation import Prior, Simulation
+from regolithd.calibration.mismatch import Prior, Simulation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from drives import TABLES, columns, simulation
 
-from regolithd.calibration.mismatch.compare import Comparison, compare
+from regolithd.calibration.mismatch.comparison import Comparison, compare
 from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects, to_toml
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel

@@ -11,7 +11,7 @@ from drives import columns, simulation
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from regolithd.calibration.mismatch.compare import compare
+from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.data.recording import from_columns
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from regolithd.calibration.mismatch.compare import compare
+from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.data.recording import read_recording
-from regolithd.calibration.mismatch.simulation.simulation import load_simulation
+from regolithd.calibration.mismatch.simulation.load import load_simulation
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from drives import columns, recording, simulation
 
-from regolithd.calibration.mismatch.candidates import Candidate, Shape, library
+from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.data.recording import from_columns
-from regolithd.calibration.mismatch.simulation.problem import Problem, build_problem
+from regolithd.calibration.mismatch.problem.problem import Problem, build_problem
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
 
 CONTRACT = {
     "coulomb-friction": "direction",

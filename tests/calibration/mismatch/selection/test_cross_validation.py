@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.compare import compare
+from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.data.recording import from_columns
-from regolithd.calibration.mismatch.simulation.simulation import Prior, Simulation
+from regolithd.calibration.mismatch.problem.prior import Prior
+from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,7 +8,7 @@ import numpy as np
 from drives import columns, simulation
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.compare import compare
+from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.data.recording import from_columns
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from regolithd.calibration.mismatch.simulation.errors_in_variables import conditional_expectation
+from regolithd.calibration.mismatch.problem.errors_in_variables import conditional_expectation
 
 START = np.array([0])
 

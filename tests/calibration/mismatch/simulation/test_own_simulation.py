@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from regolithd.calibration.mismatch.compare import compare
+from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
-from regolithd.calibration.mismatch.simulation.simulation import load_simulation
+from regolithd.calibration.mismatch.simulation.load import load_simulation
 
 HERE = Path(__file__).parent
 TABLES = {"simulation": {"model": "servo:ServoAxis"}, "parameters": {"mass_kg": {"value": 96.0, "std": 1.0}}}

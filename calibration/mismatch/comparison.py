@@ -19,13 +19,15 @@ from regolithd.calibration.mismatch.answer import (
     Unexplained,
     Verdict,
 )
+from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.corrected import effect_of
 from regolithd.calibration.mismatch.inference.held_out import HeldOut, hold_out
 from regolithd.calibration.mismatch.inference.identifiability import confusions
 from regolithd.calibration.mismatch.inference.intervals import parameters_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
+from regolithd.calibration.mismatch.problem.problem import Problem, build_problem
+from regolithd.calibration.mismatch.regression.blocks import blocks_of_time, folds_of_blocks
 from regolithd.calibration.mismatch.regression.design_matrix import Dictionary, Group
-from regolithd.calibration.mismatch.regression.noise import Noise, blocks_of_time, estimate_noise, folds_of_blocks
 from regolithd.calibration.mismatch.regression.normal_equations import (
     NOT_FOR_CURVES,
     add_candidates,
@@ -36,11 +38,12 @@ from regolithd.calibration.mismatch.regression.residuals import contribution, re
 from regolithd.calibration.mismatch.report.statements import statement
 from regolithd.calibration.mismatch.selection.decision import Decision, decide
 from regolithd.calibration.mismatch.selection.subset_selection import Search, Term
-from regolithd.calibration.mismatch.simulation.problem import Problem, build_problem
+from regolithd.calibration.mismatch.signal.noise import Noise, estimate_noise
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
@@ -73,14 +76,15 @@ def compare(
     """
     progress("simulating")
     problem = build_problem(recording, simulation)
+    candidates = simulation.candidates(library())
     if effects:
-        problem = replace(problem, prediction=problem.prediction + effect_of(problem, effects))
+        problem = replace(problem, prediction=problem.prediction + effect_of(problem, candidates, effects))
     noise = estimate_noise(np.where(problem.mask, problem.measured - problem.filled, 0.0), problem.mask)
     blocks = blocks_of_time(problem, noise)
     dictionary = Dictionary(problem, folds_of_blocks(problem, blocks))
     nuisance = add_nuisance(dictionary)
     progress("building what could be missing")
-    fitting = add_candidates(dictionary, simulation.candidates())
+    fitting = add_candidates(dictionary, candidates)
     add_curves(dictionary)
     grid = tuple(dictionary.groups)
     progress("searching")
@@ -95,12 +99,12 @@ def compare(
         _effects(decision, held, blocks),
         tuple(_unexplained(decision, term) for term in decision.unnamed),
         confusions(decision.search, decision.named, decision.whole),
-        sensitivities(decision.search, decision.whole, simulation.candidates()),
+        sensitivities(decision.search, decision.whole, candidates),
         FitImprovement(simulation.channel, held.before, held.after, _floor(decision)),
         (
             *problem.recording.notes,
             *_about_the_mask(problem),
-            *_not_looked_for(problem, simulation, [c.name for c in fitting]),
+            *_not_looked_for(problem, candidates, [c.name for c in fitting]),
         ),
     )
     return Comparison(answer, _evidence(decision))
@@ -191,9 +195,9 @@ def _about_the_mask(problem: Problem) -> list[str]:
     return told
 
 
-def _not_looked_for(problem: Problem, simulation: Simulation, fitting: Sequence[str]) -> list[str]:
+def _not_looked_for(problem: Problem, candidates: Sequence[Candidate], fitting: Sequence[str]) -> list[str]:
     told = []
-    for candidate in simulation.candidates():
+    for candidate in candidates:
         if candidate.name not in fitting:
             lacking = ", ".join(n for n in candidate.requires if n not in problem.covariates)
             told.append(f"{candidate.name} was not looked for: it needs {lacking or 'another simulation'}.")

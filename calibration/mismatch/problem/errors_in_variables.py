@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from regolithd.calibration.mismatch.data.recording import Recording
-    from regolithd.calibration.mismatch.simulation.simulation import SensorError
+    from regolithd.calibration.mismatch.problem.prior import SensorError
 
 Array = NDArray[np.float64]
 

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import RecordingError
-from regolithd.calibration.mismatch.simulation.errors_in_variables import expected_inputs
-from regolithd.calibration.mismatch.simulation.simulation import complete_inputs
+from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
+from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from regolithd.calibration.mismatch.data.recording import Recording
-    from regolithd.calibration.mismatch.simulation.simulation import Simulation
+    from regolithd.calibration.mismatch.problem.predictor import Predictor
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ class Problem:
     """
 
     recording: Recording
-    simulation: Simulation
+    simulation: Predictor
     values: Mapping[str, float]
     measured: Array
     prediction: Array
@@ -124,7 +124,7 @@ class Problem:
         return np.where(self.mask, self.prediction, 0.0)
 
 
-def build_problem(recording: Recording, simulation: Simulation, values: Mapping[str, float] | None = None) -> Problem:
+def build_problem(recording: Recording, simulation: Predictor, values: Mapping[str, float] | None = None) -> Problem:
     """Simulate the recording.
 
     Raises
@@ -172,7 +172,7 @@ def _spikes(residual: Array) -> NDArray[np.bool_]:
 
 
 def _covariates(
-    recording: Recording, simulation: Simulation, inputs: Mapping[str, Array], prediction: Array
+    recording: Recording, simulation: Predictor, inputs: Mapping[str, Array], prediction: Array
 ) -> dict[str, Array]:
     """Return what was measured, and what follows from it; what was never measured or never varies is left out."""
     found = dict(simulation.covariates(inputs))

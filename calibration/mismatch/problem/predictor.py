@@ -1,0 +1,80 @@
+"""What the engine needs of a simulation: its channel, priors and sensor errors, and a prediction from inputs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.problem.prior import Prior, SensorError
+
+Array = NDArray[np.float64]
+
+
+class Predictor(Protocol):
+    """A simulation as a problem sees it; `simulation.Simulation` is the class to derive from, and documents each."""
+
+    @property
+    def channel(self) -> str:
+        """The recorded column that is predicted."""
+
+    @property
+    def unit(self) -> str:
+        """The predicted channel's unit."""
+
+    @property
+    def wheel_column(self) -> str:
+        """The column that tells wheels (axes, sides, bodies) apart."""
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Columns without which nothing can be predicted."""
+
+    @property
+    def parameters(self) -> Mapping[str, Prior]:
+        """Every parameter's prior, by name."""
+
+    @property
+    def own_to_each_wheel(self) -> frozenset[str]:
+        """Parameters of which each wheel has a deviation of its own."""
+
+    @property
+    def parameter_effects(self) -> Mapping[str, str]:
+        """Names of parameters as effects."""
+
+    @property
+    def sensors(self) -> Mapping[str, SensorError]:
+        """The errors of the recorded inputs, by column."""
+
+    @property
+    def unloaded_experiment(self) -> str:
+        """How to run the machine without its load, as an instruction; empty where that cannot be done."""
+
+    def prepare(self, recording: Recording) -> Recording:
+        """Return the recording with the channels that the prediction needs."""
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the predicted channel, shape (time, wheel)."""
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return what a residual may be ordered by, each of shape (time, wheel)."""
+
+    def side(self, wheels: Sequence[int]) -> Array | None:
+        """Return −1 for wheels on the left, +1 on the right."""
+
+    def row(self, wheels: Sequence[int]) -> Array | None:
+        """Return each wheel's place along the machine, front 0."""
+
+    def variants(self) -> Mapping[str, float]:
+        """Return parameters outside the priors that candidates may move, with their neutral values."""
+
+
+def complete_inputs(recording: Recording) -> dict[str, Array]:
+    """Return every channel and `t_s`, all of shape (time, wheel)."""
+    time_s = np.broadcast_to(recording.time_s[:, None], recording.shape)
+    return {**recording.channels, "t_s": time_s}

@@ -1,0 +1,27 @@
+"""How well a simulation's parameters and a recording's inputs are known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A parameter's normal prior density; a `std` of 0 means that the value is exact."""
+
+    value: float
+    std: float = 0.0
+    unit: str = "1"
+
+
+@dataclass(frozen=True)
+class SensorError:
+    """A recorded input's standard error: a fraction of the reading plus a constant, independent for each reading."""
+
+    relative: float = 0.0
+    absolute: float = 0.0
+
+
+def own_name(parameter: str, wheel: int | str) -> str:
+    """Return the name of a wheel's own deviation of a parameter among the values estimated from a recording."""
+    return f"{parameter} of {wheel}"
