@@ -6,7 +6,7 @@ export PYTHON
 
 RECORDINGS ?= ../shared/recordings
 
-.PHONY: demo test check sizing reproduce evaluate loop pictures prove real scaling mutants picture frames install uninstall clean
+.PHONY: demo test check docs sizing reproduce evaluate loop pictures prove real scaling mutants picture frames install uninstall clean
 
 demo: $(VENV)/demo.ready
 	$(BIN)/regolithd demo
@@ -20,6 +20,10 @@ check: $(VENV)/dev.ready
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The documentation site in build/site: open build/site/index.html. A warning or a broken link is an error.
+docs: $(VENV)/dev.ready
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 # The paper's sizing study, all of it: minutes. Interrupted, it goes on where it was.
 sizing: $(VENV)/dev.ready
