@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-import typer
 from typer.main import get_command
 
 from regolithd.daemon.cli import app
@@ -13,7 +12,7 @@ from regolithd.daemon.cli import app
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from typer.core import TyperGroup
+    from typer.core import TyperArgument, TyperGroup, TyperOption
 
 MARK = "<!-- commands -->"
 
@@ -42,7 +41,7 @@ def _commands(group: TyperGroup, path: str) -> Iterator[tuple[str, TyperGroup]]:
             yield f"{path} {name}", command
 
 
-def _row(parameter: typer.core.TyperOption | typer.core.TyperArgument) -> str:
+def _row(parameter: TyperOption | TyperArgument) -> str:
     if "--help" in parameter.opts or getattr(parameter, "hidden", False):
         return ""
     is_option = parameter.param_type_name == "option"
