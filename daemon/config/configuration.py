@@ -1,7 +1,7 @@
-"""`rover.toml`: everything that can differ from rover to rover, as one frozen model.
+"""The model of `rover.toml`: everything that can differ from rover to rover, as one frozen object.
 
-The tables that a simulation's TOML has too come from `calibration.parameters`; the others are here. Reading finds every
-problem at once: `ConfigurationError.problems` names file, key, what was expected and the cure.
+The tables that a simulation's TOML also has come from `calibration.parameters`; the others are here. `reader` reads the
+file. Every relative path is relative to the file's folder.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ NodeId = Annotated[int, Field(ge=1, le=126, strict=True)]
 WheelNumber = Annotated[int, Field(ge=1, le=6, strict=True)]
 SixNodes = Annotated[tuple[NodeId, ...], Field(min_length=6, max_length=6)]
 MASTER_NODE = 127
-"""The daemon's own node number: its heartbeat is what keeps the drives alive."""
+"""The daemon's own node-ID: the drives consume its heartbeat, and stop without it."""
 
 
 class Identity(Table):
-    """`[rover]`: its name and its body."""
+    """`[rover]`: name, mass and dimensions."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")] = "kapvik"
     mass_kg: Positive = 30.0
@@ -31,12 +31,12 @@ class Identity(Table):
 
     @property
     def body(self) -> Rover:
-        """The body alone, as the simulation knows it."""
+        """Mass and dimensions, as the simulation takes them."""
         return Rover(mass_kg=self.mass_kg, wheelbase_m=self.wheelbase_m, track_m=self.track_m)
 
 
 class Bus(Table):
-    """`[bus]`: the CAN interface, in python-can's words."""
+    """`[bus]`: the CAN interface, with python-can's names."""
 
     interface: Literal["socketcan", "virtual", "slcan", "kvaser", "pcan", "udp_multicast"] = "socketcan"
     channel: Annotated[str, Field(min_length=1)] = "can0"
@@ -44,13 +44,13 @@ class Bus(Table):
 
 
 class SyncTiming(Table):
-    """`[sync]`: how often everything is sampled."""
+    """`[sync]`: the SYNC rate, at which every node samples."""
 
     rate_Hz: Annotated[float, Field(ge=1, le=200)] = 2.0
 
 
 class Nodes(Table):
-    """`[nodes]`: who is on the bus; the k-th number of a list of six belongs to wheel k."""
+    """`[nodes]`: node-IDs on the bus, and heartbeat times; the k-th number of a list of six belongs to wheel k."""
 
     motors: SixNodes = (1, 2, 3, 4, 5, 6)
     load_cells: SixNodes = (11, 12, 13, 14, 15, 16)
@@ -62,7 +62,7 @@ class Nodes(Table):
     heartbeat_timeout_ms: Annotated[int, Field(ge=50, le=30_000)] = 600
 
     def described(self) -> tuple[NodeDescription, ...]:
-        """Return every node in the vocabulary of the drivers."""
+        """Return the description of every node, as the drivers take it."""
         wheels = [
             NodeDescription(
                 node,
@@ -83,7 +83,7 @@ class Nodes(Table):
 
 
 class Slip(Table):
-    """`[slip]`: what to take where nobody measures the ground speed."""
+    """`[slip]`: the slip where the ground speed is not measured, and the speed below which a wheel stands still."""
 
     constant: Annotated[float, Field(gt=-1, lt=1)] = 0.025
     standstill_rad_s: Positive = 0.05
@@ -98,13 +98,13 @@ class Smoothing(Table):
 
 
 class Estimator(Table):
-    """`[estimator]`: which network."""
+    """`[estimator]`: the terrain network's file; without it, the network that comes with regolithd."""
 
     model: Path | None = None
 
 
 class PosteriorSettings(Table):
-    """`[posterior]`: intervals of the soil under the rover; needs a calibrated drivetrain."""
+    """`[posterior]`: credible intervals of the soil under the rover; needs a calibrated drivetrain."""
 
     enabled: bool = True
     model: Path | None = None
@@ -113,14 +113,14 @@ class PosteriorSettings(Table):
 
 
 class Change(Table):
-    """`[change]`: the alarm when the soil changes; needs a calibrated drivetrain, and `[posterior]`."""
+    """`[change]`: the soil-change alarm; needs a calibrated drivetrain, and `[posterior]`."""
 
     enabled: bool = True
     threshold: Annotated[float, Field(ge=3, le=100)] = 10.8
 
 
 class Recording(Table):
-    """`[recording]`: where everything that was acquired is kept, and how much of it."""
+    """`[recording]`: folder, size limit and file length of the recordings."""
 
     directory: Path = Path("/var/lib/regolithd/recordings")
     limit_MB: Annotated[float, Field(ge=1)] = 4000.0
@@ -129,7 +129,7 @@ class Recording(Table):
 
 
 class Mqtt(Table):
-    """`[mqtt]`: the broker, and what is kept for it while it is away."""
+    """`[mqtt]`: the broker, and the store for messages that it has not acknowledged."""
 
     host: Annotated[str, Field(min_length=1)] = "localhost"
     port: Annotated[int, Field(ge=1, le=65_535)] = 1883
@@ -144,7 +144,7 @@ class Mqtt(Table):
 
 
 class Control(Table):
-    """`[control]`: the local socket over which the rover is commanded."""
+    """`[control]`: the local socket that takes commands, and the limits of a traverse."""
 
     socket: Path = Path("/run/regolithd/control.sock")
     group: str = "regolithd"
@@ -153,7 +153,7 @@ class Control(Table):
 
 
 class Configuration(Table):
-    """The whole of `rover.toml`; every table may be left out, and has Kapvik's values then."""
+    """The whole of `rover.toml`; a table that is left out has Kapvik's values."""
 
     rover: Identity = Identity()
     bus: Bus = Bus()

@@ -1,9 +1,9 @@
-"""Reads `rover.toml` and says everything that is wrong with it at once.
+"""Reads `rover.toml` and reports every problem in it at once.
 
     configuration = read_configuration(Path("rover.toml"))
 
-raises `ConfigurationError`, which holds one `Problem` for each mistake: a table that does not parse, an unknown key, a
-value out of range, and what only shows when tables are looked at together.
+raises `ConfigurationError`, which holds one `Problem` for each mistake: TOML that does not parse, an unknown key, a
+value out of range, and values that are valid alone but not together (for example one node-ID used twice).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import difflib
 import re
 import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
@@ -20,17 +21,16 @@ from regolithd.daemon.config.configuration import Configuration, Nodes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
-    from pathlib import Path
 
     from pydantic_core import ErrorDetails
 
 EXIT_STATUS = 78
-"""EX_CONFIG of sysexits.h: systemd does not restart a service that ends with it, when told so."""
+"""EX_CONFIG of sysexits.h; the systemd unit has it in RestartPreventExitStatus."""
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One thing that is wrong: where, what was expected, what stands there, and how to mend it."""
+    """One mistake: its place, the expected and the found value, and how to correct it."""
 
     file: str
     line: int | None
@@ -54,7 +54,7 @@ class ConfigurationError(Exception):
 
 
 def read_configuration(path: Path) -> Configuration:
-    """Read a `rover.toml`; relative paths in it are relative to the file's folder."""
+    """Read a `rover.toml`. A relative path in it, under whichever key, is relative to the file's folder."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -64,7 +64,7 @@ def read_configuration(path: Path) -> Configuration:
 
 
 def parse_configuration(text: str, path: Path) -> Configuration:
-    """Return what the TOML text says, or raise with all its problems. `path` is for messages and relative paths."""
+    """Return the configuration of a TOML text, or raise with all its problems. `path` is the file that it came from."""
     try:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -73,11 +73,11 @@ def parse_configuration(text: str, path: Path) -> Configuration:
         configuration = Configuration.model_validate(tables)
     except ValidationError as error:
         found = [_problem(details, text, path) for details in error.errors()]
-        # The other tables may hold mistakes that only show together: look at those that are sound on their own.
-        raise ConfigurationError(found + _problems_together(_sound_part(tables), text, path)) from error
+        # Tables that are valid alone may still contradict each other: report that in the same run.
+        raise ConfigurationError(found + _problems_together(_valid_tables(tables), text, path)) from error
     if problems := _problems_together(configuration, text, path):
         raise ConfigurationError(problems)
-    return _with_absolute_paths(configuration, path.parent)
+    return _with_absolute_paths(configuration, path.absolute().parent)
 
 
 def _whole_file(path: Path, reason: str) -> Problem:
@@ -91,16 +91,16 @@ def _syntax_problem(path: Path, error: tomllib.TOMLDecodeError) -> Problem:
     return Problem(str(path), line, "syntax", "valid TOML", f'"{what}"', "Mend this line; the rest was not read.")
 
 
-def _sound_part(tables: Mapping[str, Any]) -> Configuration:
-    sound: dict[str, BaseModel] = {}
+def _valid_tables(tables: Mapping[str, Any]) -> Configuration:
+    valid: dict[str, BaseModel] = {}
     for name, field in Configuration.model_fields.items():
         table = field.annotation
         if name in tables and isinstance(table, type) and issubclass(table, BaseModel):
             try:
-                sound[name] = table.model_validate(tables[name])
+                valid[name] = table.model_validate(tables[name])
             except ValidationError:
-                continue  # its own problems are told already
-    return Configuration.model_validate(sound)
+                continue  # its own problems are already in the list
+    return Configuration.model_validate(valid)
 
 
 def _problem(details: ErrorDetails, text: str, path: Path) -> Problem:
@@ -185,11 +185,12 @@ def _shared_node_ids(nodes: Nodes) -> Iterator[tuple[str, str, str, str]]:
 
 
 def _with_absolute_paths(configuration: Configuration, folder: Path) -> Configuration:
+    """Return the configuration with every path in it absolute; a relative one is relative to `folder`."""
     changed: dict[str, BaseModel] = {}
-    for name in ("estimator", "posterior"):
-        table = getattr(configuration, name)
-        if table.model is not None:
-            changed[name] = table.model_copy(update={"model": folder / table.model})
+    for name, table in configuration:
+        paths = {key: folder / value for key, value in table if isinstance(value, Path)}
+        if paths:
+            changed[name] = table.model_copy(update=paths)
     return configuration.model_copy(update=changed)
 
 

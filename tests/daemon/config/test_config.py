@@ -77,8 +77,47 @@ def test_a_missing_file_is_a_problem_like_any_other(tmp_path: Path) -> None:
         read_configuration(tmp_path / "absent.toml")
 
 
-def test_model_paths_are_relative_to_the_file(tmp_path: Path) -> None:
-    """A configuration and its network may be moved together."""
-    path = tmp_path / "rover.toml"
-    path.write_text('[estimator]\nmodel = "mine.onnx"\n')
-    assert read_configuration(path).estimator.model == tmp_path / "mine.onnx"
+PATH_KEYS = (
+    "estimator.model",
+    "posterior.model",
+    "recording.directory",
+    "mqtt.password_file",
+    "mqtt.ca_file",
+    "mqtt.spool_directory",
+    "control.socket",
+)
+
+
+def test_every_path_of_the_model_is_in_the_list_of_path_keys() -> None:
+    """A new key whose value is a path is tested below like the others."""
+    found = {
+        f"{name}.{key}"
+        for name, table in Configuration.model_fields.items()
+        for key, field in table.annotation.model_fields.items()  # type: ignore[union-attr]
+        if "Path" in str(field.annotation)
+    }
+    assert found == set(PATH_KEYS)
+
+
+@pytest.mark.parametrize("name", PATH_KEYS)
+def test_a_relative_path_is_relative_to_the_folder_of_the_file(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A configuration and the files it names may be moved together, and it is read from any working directory."""
+    table, key = name.split(".")
+    username = 'username = "somebody"\n' if key == "password_file" else ""
+    file = tmp_path / "rover" / "rover.toml"
+    file.parent.mkdir()
+    file.write_text(f'[{table}]\n{key} = "below/mine"\n{username}')
+    monkeypatch.chdir(tmp_path)
+    for given in (file, Path("rover/rover.toml")):
+        assert getattr(getattr(read_configuration(given), table), key) == file.parent / "below" / "mine"
+
+
+@pytest.mark.parametrize("name", PATH_KEYS)
+def test_an_absolute_path_is_not_changed(name: str) -> None:
+    """The folder of the file does not matter then."""
+    table, key = name.split(".")
+    text = f'[{table}]\n{key} = "/some/where"\n' + ('username = "x"\n' if key == "password_file" else "")
+    read = parse_configuration(text, Path("/etc/regolithd/rover.toml"))
+    assert getattr(getattr(read, table), key) == Path("/some/where")
