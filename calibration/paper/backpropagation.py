@@ -1,11 +1,15 @@
-"""Backpropagation with momentum and an adaptive learning rate (Sec. 2.4), compiled: 20 µs an epoch and core.
+"""Backpropagation with momentum and an adaptive learning rate (Sec. 2.4), compiled with numba.
 
-The rules, those of MATLAB's `traingdx` with its defaults: each epoch takes all pairs; a step is the momentum-weighted
-last step and gradient; when it makes the error more than 4 % worse it is taken back, the rate falls to 0.7 of itself
-and the momentum is forgotten; when the error falls, the rate grows by 5 %. It ends at the goal or the last epoch.
+The rules are those of MATLAB's `traingdx` with its defaults:
 
-One network's activations (64 × 504 in float32) fit into a core's own cache, and stay there for its whole training:
-that, and no array operation between loops, is what makes it fast. Networks are independent; threads share them out.
+- full batch: each epoch uses all pairs;
+- step = 0.9 × last step − 0.1 × rate × gradient;
+- a step that increases the MSE by more than 4 % is rejected, the rate is multiplied by 0.7, and the last step is reset;
+- a step that decreases the MSE is accepted and the rate multiplied by 1.05;
+- training ends at the goal or after the last epoch.
+
+An epoch takes about 20 µs on one core: the activations of one network (64 × 504 float32) stay in the core's cache, and
+no array operation allocates memory between the loops. Networks are independent and are trained in parallel threads.
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.paper.network import OUTPUT_UNIT, OUTPUTS, Network, nguyen_widrow, scale, unpack
+from regolithd.calibration.paper.perceptron import OUTPUT_UNIT, OUTPUTS, Perceptron, nguyen_widrow, scale, unpack
 
 if TYPE_CHECKING:
     from regolithd.calibration.paper.training_set import TrainingSet
@@ -27,10 +31,12 @@ Single = NDArray[np.float32]
 GOAL_MSE = 0.005
 EPOCHS = 10_000
 
-_ZERO, _HALF, _ONE, _FAR = np.float32(0), np.float32(0.5), np.float32(1), np.float32(8)
-_MOMENTUM, _RATE, _FASTER, _SLOWER, _WORST = (np.float32(x) for x in (0.9, 0.01, 1.05, 0.7, 1.04))
-# tanh y = y P(y²)/Q(y²) to 2·10⁻⁷ for |y| ≤ 8: a minimax fit of our own, since a compiled loop of additions and
-# multiplications runs sixteen at a time, and the library's tanh does not.
+_ZERO, _HALF, _ONE, _SATURATION = np.float32(0), np.float32(0.5), np.float32(1), np.float32(8)
+_MOMENTUM, _INITIAL_RATE, _RATE_INCREASE, _RATE_DECREASE, _MAX_ERROR_RATIO = (
+    np.float32(x) for x in (0.9, 0.01, 1.05, 0.7, 1.04)
+)
+# tanh y ≈ y P(y²)/Q(y²), error below 2·10⁻⁷ for |y| ≤ 8 (minimax fit): unlike a call of the library's tanh, additions
+# and multiplications are vectorised by the compiler.
 _P0, _P1, _P2, _P3, _P4 = (
     np.float32(x) for x in (9.99999065e-01, 1.26997812e-01, 2.68449466e-03, 7.08344560e-06, -6.01998644e-09)
 )
@@ -42,10 +48,10 @@ _inline = numba.njit(fastmath=True, error_model="numpy", nogil=True, cache=True,
 
 @_inline
 def _sigmoid(x: np.float32) -> np.float32:
-    y = min(max(_HALF * x, -_FAR), _FAR)
+    y = min(max(_HALF * x, -_SATURATION), _SATURATION)
     u = y * y
-    above = _P0 + u * (_P1 + u * (_P2 + u * (_P3 + u * _P4)))
-    return _HALF + _HALF * y * above / (_ONE + u * (_Q1 + u * (_Q2 + u * _Q3)))
+    numerator = _P0 + u * (_P1 + u * (_P2 + u * (_P3 + u * _P4)))
+    return _HALF + _HALF * y * numerator / (_ONE + u * (_Q1 + u * (_Q2 + u * _Q3)))
 
 
 @_compile
@@ -104,11 +110,11 @@ def _backward(inputs: Single, weights: Single, neurons: int, hidden: Single, del
 def _train(
     inputs: Single, targets: Single, weights: Single, neurons: int, epochs: int, goal: float
 ) -> tuple[float, int]:
-    """Train `weights` in place; return the MSE reached and the epochs it took."""
+    """Train `weights` in place; return the MSE that is reached and the number of epochs."""
     hidden = np.empty((neurons, inputs.shape[1]), np.float32)
     delta = np.empty((OUTPUTS, inputs.shape[1]), np.float32)
     gradient, step, trial = np.empty_like(weights), np.zeros_like(weights), np.empty_like(weights)
-    rate = _RATE
+    rate = _INITIAL_RATE
     error = _forward(inputs, targets, weights, neurons, hidden, delta)
     _backward(inputs, weights, neurons, hidden, delta, gradient)
     epoch = 0
@@ -118,12 +124,12 @@ def _train(
             step[k] = _MOMENTUM * step[k] - (_ONE - _MOMENTUM) * rate * gradient[k]
             trial[k] = weights[k] + step[k]
         tried = _forward(inputs, targets, trial, neurons, hidden, delta)
-        if tried > _WORST * error:
-            rate *= _SLOWER
+        if tried > _MAX_ERROR_RATIO * error:
+            rate *= _RATE_DECREASE
             step[:] = _ZERO
             continue
         if tried < error:
-            rate *= _FASTER
+            rate *= _RATE_INCREASE
         error = tried
         weights[:] = trial
         _backward(inputs, weights, neurons, hidden, delta, gradient)
@@ -132,9 +138,9 @@ def _train(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Training:
-    """What one training came to."""
+    """Result of one training: the perceptron, its MSE, and the epochs that were run."""
 
-    network: Network
+    perceptron: Perceptron
     mse: float
     epochs: int
 
@@ -142,7 +148,7 @@ class Training:
 def train(
     pairs: TrainingSet, neurons: int, rng: np.random.Generator, epochs: int = EPOCHS, goal: float = GOAL_MSE
 ) -> Training:
-    """Train one network from new initial weights; releases the interpreter lock while it does."""
+    """Train one perceptron from new initial weights; the global interpreter lock is released meanwhile."""
     low, high = pairs.inputs.min(axis=0), pairs.inputs.max(axis=0)
     inputs = np.ascontiguousarray(scale(pairs.inputs, low, high).T, np.float32)
     targets = np.ascontiguousarray((pairs.outputs / OUTPUT_UNIT).T, np.float32)

@@ -1,7 +1,7 @@
-"""The sizing study (Sec. 2.3): sizes 59–84 × 100 trainings × up to 10 000 epochs; the lowest mean MSE wins.
+"""The sizing study (Sec. 2.3): 59–84 hidden neurons × 100 trainings × up to 10 000 epochs; the lowest mean MSE is best.
 
-Each training has a seed of its own, from its size and number, so that it comes out the same wherever and whenever it
-runs. What is done is appended to a log, one JSON line a training: an interrupted study goes on from there.
+Each training is seeded by study, size and number, so its result does not depend on the order or the machine. Results
+are appended to a log, one JSON line for each training, from which an interrupted study resumes.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ PAPER_MSE = 0.0251
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Which trainings to do."""
+    """Settings of a study: sizes, trainings of each size, largest number of epochs, seed."""
 
     sizes: tuple[int, ...] = SIZES
     trainings: int = TRAININGS
@@ -41,7 +41,7 @@ class Study:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """One training of the study."""
+    """Result of one training."""
 
     neurons: int
     number: int
@@ -51,7 +51,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class SizeSummary:
-    """All trainings of one size."""
+    """Summary of all trainings of one size; MSE in units of (10 kPa, 1)."""
 
     neurons: int
     mean_mse: float
@@ -60,24 +60,25 @@ class SizeSummary:
 
 
 class DifferentStudyError(ValueError):
-    """The log on disk belongs to a study with other settings."""
+    """The log belongs to a study with other settings."""
 
 
 def floating_point_operations(study: Study, pairs: int = 504) -> float:
-    """Return what the study costs at the most: 28 multiply–adds' worth for each pair, neuron and epoch, and a sigmoid.
+    """Return the largest number of floating-point operations of a study.
 
-    Forward 3 + 2 and backward 2 + 3 + 2 multiply–adds and two for the biases, about 20 operations for the sigmoid.
+    For each pair, hidden neuron and epoch: 14 multiply–adds (forward 3 + 2, backward 2 + 3 + 2, biases 2), which are 28
+    operations, and about 20 for the sigmoid.
     """
     return float(pairs * sum(study.sizes) * study.trainings * study.epochs * (28 + 20))
 
 
 def resume(log: Path, study: Study) -> list[Outcome]:
-    """Return what the log holds of this study, and start the log where there is none.
+    """Return the outcomes in the log; create the log if there is none.
 
     Raises
     ------
     DifferentStudyError
-        The log belongs to another study.
+        The log belongs to a study with other settings.
     """
     header = json.dumps(asdict(study))
     if not log.exists():
@@ -86,8 +87,10 @@ def resume(log: Path, study: Study) -> list[Outcome]:
     text = log.read_text(encoding="utf-8")
     first, *lines = text.splitlines()
     if first != header:
-        raise DifferentStudyError(f"{log} holds another study: {first}. Move it away, or ask for the same again")
-    # A line that a kill cut short is not a training that was done.
+        raise DifferentStudyError(
+            f"{log} belongs to a study with other settings: {first}. Move it, or use these settings"
+        )
+    # A last line without a line end is incomplete: the process was killed while it wrote.
     whole = lines if text.endswith("\n") else lines[:-1]
     if whole != lines:
         log.write_text("\n".join([first, *whole]) + "\n", encoding="utf-8")
@@ -95,7 +98,7 @@ def resume(log: Path, study: Study) -> list[Outcome]:
 
 
 def run(study: Study, pairs: TrainingSet, done: Iterable[Outcome], log: Path, threads: int) -> Iterator[Outcome]:
-    """Train what is not done yet on `threads` cores; yield each outcome after it is in the log."""
+    """Run the trainings that are not in `done` on `threads` threads; yield each outcome after it was logged."""
     known = {(each.neurons, each.number) for each in done}
     tasks = (task for task in product(study.sizes, range(study.trainings)) if task not in known)
 
@@ -133,5 +136,5 @@ def best_size(outcomes: Iterable[Outcome]) -> SizeSummary:
 
 
 def cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of CPU cores that this process may use."""
     return len(os.sched_getaffinity(0))

@@ -1,6 +1,7 @@
-"""The paper's 504 pairs (Sec. 3.1, Steps 1–15): inputs [W, i, I], outputs [c, tan φ].
+"""The paper's training set of 504 pairs (Sec. 3.1, Steps 1–15): inputs [W, i, I], outputs [c, tan φ].
 
-Sinkage is drawn independently of load: Step 14 takes what load then follows, and many of those no 30 kg rover has.
+The grid varies soil, current, slip and sinkage independently; the load then follows from Eq. 14 (Step 14). Most of the
+loads are therefore outside what a 30 kg rover can have on one wheel (`docs/reproduction.md`).
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.paper import equations
+from regolithd.calibration.paper.load_from_current import load_from_current
 from regolithd.calibration.parameters import SOILS, Drivetrain, Wheel
 
 Array = NDArray[np.float64]
@@ -23,7 +24,7 @@ SINKAGES_M = (0.005, 0.0075, 0.010, 0.0125, 0.015, 0.0175, 0.020)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrainingSet:
-    """Pairs in rows.
+    """The pairs, one in each row.
 
     Attributes
     ----------
@@ -34,7 +35,7 @@ class TrainingSet:
     soil
         Shape (pairs,): index into `SOILS`.
     gain_Nm_per_A
-        The gain of Eq. 11 that the loads were computed with.
+        Gain of Eq. 11 that the loads were computed with [N·m/A].
     """
 
     inputs: Array
@@ -44,7 +45,7 @@ class TrainingSet:
 
 
 def training_set(drivetrain: Drivetrain, wheel: Wheel, rng: np.random.Generator | None = None) -> TrainingSet:
-    """Return the 504 pairs; in the order of the tables, or shuffled where `rng` is given (Step 15)."""
+    """Return the 504 pairs: in the order of the grid, or shuffled if `rng` is given (Step 15)."""
     soils = list(SOILS.values())
     grid = np.array(list(itertools.product(range(len(soils)), CURRENTS_A, SLIPS, SINKAGES_M)))
     soil = grid[:, 0].astype(np.intp)
@@ -52,7 +53,7 @@ def training_set(drivetrain: Drivetrain, wheel: Wheel, rng: np.random.Generator 
     cohesion = np.array([each.cohesion_Pa for each in soils], np.float64)[soil]
     tangent = np.tan(np.radians([each.friction_angle_deg for each in soils]))[soil]
     modulus = np.array([each.shear_modulus_m for each in soils])[soil]
-    load = equations.load_from_current(
+    load = load_from_current(
         current,
         slip,
         sinkage,

@@ -1,4 +1,4 @@
-"""`regolithd reproduce`: the paper's figures, computed again, on one page."""
+"""`regolithd reproduce`: recompute the paper's results and write them beside the published ones."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command(help="Compute the paper's figures again and write the page that compares them.")(reproduce)
+    app.command(help="Recompute the paper's results and write the page that compares them.")(reproduce)
 
 
 def reproduce(
@@ -28,8 +28,7 @@ def reproduce(
     from rich.progress import Progress
 
     from regolithd.calibration.parameters import Drivetrain, Wheel
-    from regolithd.calibration.validation.reproduction import page, pictures, published
-    from regolithd.calibration.validation.reproduction import recomputation as again
+    from regolithd.calibration.validation.reproduction import page, pictures, published, recomputation
     from regolithd.calibration.validation.reproduction.scalings import scalings
 
     sized = json.loads(sizing.read_text(encoding="utf-8")) if sizing.is_file() else None
@@ -39,20 +38,22 @@ def reproduce(
         def tick() -> None:
             progress.advance(task)
 
-        pairs, done = again.trained(Drivetrain(), Wheel(), trainings, tick=tick)
-        withheld = again.withheld(max(2, trainings // 4), tick)
-    network = min(done, key=lambda training: training.mse).network
-    traverses = [again.traverse(network, ground, np.random.default_rng(7)) for ground in published.COHESION_PA]
-    record = again.record_500(done)
-    clean = again.current_sweep(network, np.array([published.SET_500["motor_current_A"]]))[0]
+        pairs, done = recomputation.trained(Drivetrain(), Wheel(), trainings, tick=tick)
+        unpublished = recomputation.unpublished_constants(max(2, trainings // 4), tick)
+    perceptron = min(done, key=lambda training: training.mse).perceptron
+    traverses = [
+        recomputation.traverse(perceptron, ground, np.random.default_rng(7)) for ground in published.COHESION_PA
+    ]
+    record = recomputation.record_500(done)
+    noise_free = recomputation.current_sweep(perceptron, np.array([published.SET_500["motor_current_A"]]))[0]
     results = page.Results(
         trainings=trainings,
-        loads=again.load_ranges(pairs),
-        scalings=scalings(pairs, network(pairs.inputs)),
+        loads=recomputation.load_ranges(pairs),
+        scalings=scalings(pairs, perceptron(pairs.inputs)),
         record=record,
-        withheld=withheld,
+        unpublished=unpublished,
         traverses=traverses,
-        clean=(float(clean[0]), float(clean[1])),
+        noise_free=(float(noise_free[0]), float(noise_free[1])),
         sizing=sized,
     )
     docs.mkdir(parents=True, exist_ok=True)

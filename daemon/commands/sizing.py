@@ -18,7 +18,7 @@ def sizing(
     log: Annotated[Path, typer.Option(help="what is done so far")] = Path("build/sizing/outcomes.jsonl"),
     trainings: Annotated[int, typer.Option(min=2, help="of each size")] = 100,
     epochs: Annotated[int, typer.Option(min=1, help="the most epochs of one training")] = 10_000,
-    race_epochs: Annotated[int, typer.Option(min=1, help="of the slice timed against scikit-learn")] = 1000,
+    timing_epochs: Annotated[int, typer.Option(min=1, help="epochs timed, ours and scikit-learn's")] = 1000,
 ) -> None:
     """Train, log, summarise, and time a slice of it against scikit-learn."""
     import json
@@ -35,7 +35,7 @@ def sizing(
     )
 
     from regolithd.calibration.paper import sizing as study_of
-    from regolithd.calibration.paper.sizing_race import figures, race
+    from regolithd.calibration.paper.sizing_speed import compare_speed, figures
     from regolithd.calibration.paper.training_set import training_set
     from regolithd.calibration.parameters import Drivetrain, Wheel
 
@@ -59,7 +59,7 @@ def sizing(
         raise typer.Exit(130) from None
     seconds = time.perf_counter() - start
     typer.echo("timing a slice against scikit-learn …")
-    speed = race(pairs, log.parent, race_epochs)
+    speed = compare_speed(pairs, log.parent, timing_epochs)
     best = study_of.best_size(outcomes)
     found = figures(study, outcomes, speed)
     found |= {"seconds_this_run": seconds, "trainings_this_run": len(outcomes) - resumed}

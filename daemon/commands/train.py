@@ -29,7 +29,7 @@ def train(
     from rich.progress import track
 
     from regolithd.calibration.paper import backpropagation
-    from regolithd.calibration.paper.freeze import card, freeze
+    from regolithd.calibration.paper.onnx_export import export_onnx, model_card
     from regolithd.calibration.paper.training_set import training_set
     from regolithd.calibration.parameters import Drivetrain, Wheel
 
@@ -43,7 +43,7 @@ def train(
     ]
     best = min(done, key=lambda training: training.mse)
     out.parent.mkdir(parents=True, exist_ok=True)
-    onnx.save(freeze(best.network, pairs), out)
+    onnx.save(export_onnx(best.perceptron, pairs), out)
     mean = float(np.mean([training.mse for training in done]))
-    typer.echo(f"{card(best.network, pairs).version}: MSE {best.mse:.4f} after {best.epochs} epochs")
+    typer.echo(f"{model_card(best.perceptron, pairs).version}: MSE {best.mse:.4f} after {best.epochs} epochs")
     typer.echo(f"mean MSE of {trainings}: {mean:.4f} (the paper: 0.0251). Wrote {out}.")

@@ -1,1 +1,1 @@
-"""The paper's figures beside ours: what can be computed again, computed again (`regolithd reproduce`)."""
+"""Reproduction of the paper: its published results beside recomputed ones (`regolithd reproduce`)."""

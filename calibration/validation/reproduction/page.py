@@ -1,4 +1,4 @@
-"""The page: the paper's figure, ours, and the difference, for everything that can be computed again."""
+"""`docs/reproduction.md`: each of the paper's results that can be recomputed, beside our recomputation."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.paper.sizing import PAPER_MSE, PAPER_SIZE
-from regolithd.calibration.validation.reproduction import published
-from regolithd.calibration.validation.reproduction import recomputation as again
+from regolithd.calibration.validation.reproduction import published, recomputation
+from regolithd.calibration.validation.reproduction.recomputation import relative_std
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -19,15 +19,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Results:
-    """Everything that the page tells."""
+    """Everything that the page shows.
+
+    `unpublished` holds the estimate of record 500 for each unpublished constant and value; `noise_free` is the estimate
+    [Pa, °] at the mean load and current; `sizing` holds the figures of `regolithd sizing`, if it was run.
+    """
 
     trainings: int
-    loads: Sequence[again.LoadRange]
+    loads: Sequence[recomputation.LoadRange]
     scalings: Sequence[Scaling]
-    record: again.Estimate
-    withheld: Mapping[tuple[str, float], again.Estimate]
-    traverses: Sequence[again.Traverse]
-    clean: tuple[float, float]
+    record: recomputation.RecordEstimate
+    unpublished: Mapping[tuple[str, float], recomputation.RecordEstimate]
+    traverses: Sequence[recomputation.SyntheticTraverse]
+    noise_free: tuple[float, float]
     sizing: Mapping[str, float] | None
 
 
@@ -51,13 +55,13 @@ def page(results: Results) -> str:
 
 
 _HEAD = """\
-# The paper, computed again
+# Reproduction of the paper
 
 *Written by `make reproduce`; do not edit.*
 
 "Estimating terrain parameters for a rigid wheeled rover using neural networks", Journal of Terramechanics 50 (2013)
 165–174. Wheel radius and width, the gain of the drivetrain, and the scaling of the network's outputs are not in the
-paper; ours are r = 75 mm, w = 70 mm, 16.05 N·m/A and c in units of 10 kPa."""
+paper. Here r = 75 mm, w = 70 mm, the gain is 16.05 N·m/A, and cohesion is scaled to units of 10 kPa."""
 
 
 def _pairs(results: Results) -> str:
@@ -76,20 +80,20 @@ def _pairs(results: Results) -> str:
     return f"""\
 ## The training set (Steps 1–15)
 
-{published.PAIRS} pairs, as in the paper. Their loads, which Step 14 computes and which the paper does not list:
+{published.PAIRS} pairs, as in the paper. Their loads, which Step 14 computes and the paper does not list:
 
 {table}
 
-A 30 kg rover puts about 49 N on each wheel. Sinkage is drawn without regard to load, and so only
-{100 * possible:.0f} % of the pairs lie where a wheel of this rover can be, most of them LETE sand and medium soil.
-Which pairs these are hangs on the gain: with less torque for the same current, the loads fall in proportion.
+On level ground each wheel of a 30 kg rover carries about 49 N. The grid varies sinkage independently of load: only
+{100 * possible:.0f} % of the pairs have a load that a wheel of this rover can carry, most of them LETE sand and
+medium soil. A smaller gain lowers the loads nearly in proportion, and brings other pairs into that range.
 
 ![Loads of the 504 pairs](training-set.svg)"""
 
 
 def _sizes(results: Results) -> str:
     if results.sizing is None:
-        return "## Size of the network\nNot run yet: `make sizing`, then `make reproduce` again."
+        return "## Size of the network\nNot run yet: `make sizing`, then `make reproduce` recomputation."
     figures = results.sizing
     best, mean = int(figures["best_size"]), figures["best_mean_mse"]
     means = [value for key, value in figures.items() if key.startswith("mean_mse_")]
@@ -110,8 +114,8 @@ def _sizes(results: Results) -> str:
 {_table(["", "paper", "ours", "difference"], rows)}
 
 The means of all 26 sizes lie between {min(means):.5f} and {max(means):.5f}, with standard errors of about {error:.5f}:
-the differences are hardly more than chance, and far less than what one training differs from the next. Of
-{figures["trainings"]:.0f} trainings {figures["reached_goal"]:.0f} reached the goal of 0.005.
+the differences between sizes are hardly larger than chance, and much smaller than the differences between
+trainings of one size. Of {figures["trainings"]:.0f} trainings {figures["reached_goal"]:.0f} reached the goal of 0.005.
 
 ![MSE by size](sizing.svg)"""
 
@@ -124,16 +128,16 @@ def _mse(results: Results) -> str:
     share = 100 * PAPER_MSE / results.scalings[0].variance
     table = _table(["scaling of the outputs", "variance of the outputs", "our MSE", "explained"], rows)
     return f"""\
-## What the MSE says
+## Scaling of the outputs and the MSE
 
-The paper does not say in which units its MSE is. Ours, with the same networks, in each that is likely:
+The paper does not state the units of its MSE. Ours, for the same networks, in each plausible scaling:
 
 {table}
 
-Only in the first does 0.0251 come near; and there it is {share:.0f} % of the outputs' variance: [W, i, I] explain
-little of [c, tan φ] in this training set, whatever the network, because sinkage is free in it. What such a network
-returns is mostly the mean of its four soils (3.7 kPa, 24.8°), bent a little by load and current. The paper's estimates
-in the field lie there: 3.6–3.9 kPa and 26–28° for every wheel and both grounds."""
+Only in the first scaling is the MSE near 0.0251, which is {share:.0f} % of the outputs' variance: in this training
+set [W, i, I] explain little of [c, tan φ] for any network, because sinkage varies independently. Such a network
+returns nearly the mean of its four soils (3.7 kPa, 24.8°), with a small dependence on load and current. The paper's
+estimates in the field are close to it: 3.6–3.9 kPa and 26–28° for every wheel and both grounds."""
 
 
 def _record(results: Results) -> str:
@@ -155,19 +159,19 @@ def _record(results: Results) -> str:
     names = {"radius_m": "r = {:g} m", "width_m": "w = {:g} m", "gain_factor": "gain × {:g}"}
     moved = [
         [names[name].format(value), f"{each.cohesion_Pa:.0f}", f"{each.angle_deg:.1f}", f"{each.mse:.4f}"]
-        for (name, value), each in results.withheld.items()
+        for (name, value), each in results.unpublished.items()
     ]
     return f"""\
 ## Record 500, wheel 5: 80 mA, 31.6 N, slip 0.025
 
 {_table(["", "paper", f"ours (mean ± deviation of {results.trainings} trainings)", "difference"], rows)}
 
-How the answer moves over what the paper withholds:
+Sensitivity to constants that the paper does not publish:
 
 {_table(["", "c (Pa)", "φ (°)", "mean MSE"], moved)}
 
-K of the field is not an input of the network: it is one of the four of Table 1, and which one is what the network
-guesses."""
+The shear modulus K of the test field is not an input of the network; the training set holds only the four values of
+Table 1."""
 
 
 def _tables(results: Results) -> str:
@@ -183,12 +187,12 @@ def _tables(results: Results) -> str:
                 [
                     str(k + 1),
                     f"{said_c} ({published.COHESION_RSD[ground][k]:.1f})",
-                    f"{mean_c:.0f} ({again.relative_std(cohesion)[k]:.1f})",
+                    f"{mean_c:.0f} ({relative_std(cohesion)[k]:.1f})",
                     f"{100 * (mean_c / said_c - 1):+.0f} %",
                     f"{said_a:.1f} ({published.ANGLE_RSD[ground][k]:.1f})",
-                    f"{mean_a:.1f} ({again.relative_std(angle)[k]:.1f})",
+                    f"{mean_a:.1f} ({relative_std(angle)[k]:.1f})",
                     f"{mean_a - said_a:+.1f}",
-                    f"{again.relative_std(each.current_A)[k]:.1f} / {again.relative_std(each.load_N)[k]:.1f}",
+                    f"{relative_std(each.current_A)[k]:.1f} / {relative_std(each.load_N)[k]:.1f}",
                 ]
             )
         head = ["wheel", "c paper (Pa, %RSD)", "c ours", "diff.", "φ paper (°, %RSD)", "φ ours", "diff.", "I / W %RSD"]
@@ -196,10 +200,10 @@ def _tables(results: Results) -> str:
     return f"""\
 ## The traverse (Tables 3–6, Figs 6–9)
 
-909 records over 454.54 s at 2 Hz, as the paper drove; the measurements themselves were not published. These are
-synthetic: each wheel has the load and current of record 500 on average, scattered as the paper's Tables 4 and 6 say for
-that wheel, one record in twenty with a momentary drop of current. So the means can only tell about that record, and
-what is reproduced is how scatter of current and load becomes scatter of c and φ.
+909 records over 454.54 s at 2 Hz, as in the paper, whose measurements were not published. This traverse is synthetic:
+each wheel has the mean load and current of record 500 with the relative standard deviations of the paper's Tables 4 and
+6 for that wheel, and one record in twenty has a momentary drop of current. It therefore reproduces how the scatter of
+current and load propagates to c and φ, and not the differences between the means of the wheels.
 
 {parts[0]}
 
@@ -209,32 +213,33 @@ what is reproduced is how scatter of current and load becomes scatter of c and �
 
 
 def _bias(results: Results) -> str:
-    clean_c, clean_a = results.clean
+    cohesion, angle = results.noise_free
     both = np.mean([each.angle_deg.mean() for each in results.traverses])
     lowest = min(float(np.quantile(each.angle_deg, 0.01)) for each in results.traverses)
     return f"""\
 ## Momentary drops and the friction angle
 
-At the mean load and current the network says φ = {clean_a:.1f}° (c = {clean_c:.0f} Pa); averaged over the noisy records
-it says {both:.1f}°, and in one record of a hundred less than {lowest:.0f}°. The curve of φ against current bends
-downwards, so that a drop pulls it towards clay and a rise does not push it back. This is the paper's observation, and
-it reproduces. What remains of it with the posterior is in `build/figures/evaluate.json` (`make evaluate`)."""
+At the mean load and current the network estimates φ = {angle:.1f}° (c = {cohesion:.0f} Pa).
+Averaged over the noisy records φ is {both:.1f}°, and in one record of a hundred it is below {lowest:.0f}°.
+φ is a concave function of current: a drop of current lowers it more than an equal rise increases it. The paper's
+observation is reproduced. The bias that remains with the posterior is in
+`build/figures/evaluate.json` (`make evaluate`)."""
 
 
 _NOT = """\
 ## What does not reproduce, and why
 
-- **The best size.** It is a matter of chance (above).
-- **MSE of 0.0251.** We come close in the only units in which it is possible; the rest may be the constants that are
-  withheld, or the toolbox's rules of stopping and scaling.
-- **Means of Tables 3 and 5.** The recorded currents and loads were not published, so that they cannot be computed.
-- **Differences between wheels.** They come from loads and currents that differ between wheels, which are not known.
-- **What the estimates mean.** Eq. 11 reads a motor's no-load current (about 37 mA of the 50–100 mA recorded) as torque
-  from the soil. With our constants, wheels on any of the four soils of Table 1 take 9 to 27 mA at 49 N and a slip of
-  0.025 by the wheel–soil model: most of what was recorded is likely to be the drivetrain.
+- **The best size.** The differences between sizes are within chance (above).
+- **MSE of 0.0251.** It is nearly reached in the only scaling in which it is possible; the difference may come from the
+  unpublished constants, or from the toolbox's stopping and scaling rules.
+- **Means of Tables 3 and 5.** The recorded currents and loads were not published, so they cannot be recomputed.
+- **Differences between wheels.** They follow from the loads and currents of each wheel, which were not published.
+- **Interpretation of the estimates.** Eq. 11 attributes a motor's no-load current (about 37 mA of the 50–100 mA
+  recorded) to the soil. With our constants, the wheel–soil model needs 9 to 27 mA at 49 N and a slip of 0.025 on the
+  four soils of Table 1: most of the recorded current is probably drivetrain friction.
 - **Slip of 0.025 on level ground.** With the stresses of Eqs 4 and 5 a smooth wheel at that slip pulls less than its
-  own resistance on each of the four soils; the rover cannot have driven so. Grousers, which the equations do not have,
-  are a likely reason."""
+  own resistance on each of the four soils and could not have driven. Grousers, which the equations do not model, are a
+  likely reason."""
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -252,7 +257,7 @@ def figures(results: Results) -> dict[str, float]:
         "mean_mse_64": results.record.mse,
         "mean_mse_paper": PAPER_MSE,
         "possible_share_of_pairs": float(np.mean([each.possible_share for each in results.loads])),
-        "noise_free_friction_angle_deg": results.clean[1],
+        "noise_free_friction_angle_deg": results.noise_free[1],
     }
     for each in results.loads:
         found[f"highest_load_{each.soil}_N"] = each.highest_N
@@ -260,7 +265,7 @@ def figures(results: Results) -> dict[str, float]:
         for k in range(6):
             name = f"{drive.ground}_wheel_{k + 1}"
             found[f"{name}_cohesion_Pa"] = float(drive.cohesion_Pa[:, k].mean())
-            found[f"{name}_cohesion_rsd"] = float(again.relative_std(drive.cohesion_Pa)[k])
+            found[f"{name}_cohesion_rsd"] = float(relative_std(drive.cohesion_Pa)[k])
             found[f"{name}_friction_angle_deg"] = float(drive.angle_deg[:, k].mean())
-            found[f"{name}_friction_angle_rsd"] = float(again.relative_std(drive.angle_deg)[k])
+            found[f"{name}_friction_angle_rsd"] = float(relative_std(drive.angle_deg)[k])
     return found

@@ -1,4 +1,4 @@
-"""Pictures for `docs/`, of the reproduction and of what goes beyond it: functions of numbers that were computed."""
+"""Figures of the reproduction for `docs/`, and the style that the figures of the evaluation share."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from regolithd.calibration.paper.training_set import TrainingSet
-    from regolithd.calibration.validation.reproduction.recomputation import Traverse
+    from regolithd.calibration.validation.reproduction.recomputation import SyntheticTraverse
 
     Array = NDArray[np.float64]
 
@@ -39,16 +39,16 @@ STYLE: Any = {
 
 
 EVERY = 3
-"""Of a traverse's records one in so many is drawn, and all are in the mean: more do not show at this width."""
+"""Every third record of a traverse is drawn; the mean is over all records."""
 
 
 def figure(width: float, height: float) -> Figure:
-    """Return an empty figure."""
+    """Return an empty figure of this size [in]."""
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def save(made: Figure, path: Path) -> None:
-    """Write a picture; the same numbers give the same bytes."""
+    """Write a figure; the same numbers give the same bytes."""
     path.parent.mkdir(parents=True, exist_ok=True)
     metadata = {"Date": None} if path.suffix == ".svg" else {}
     made.savefig(path, dpi=150, metadata=metadata)
@@ -63,34 +63,32 @@ def sizing(figures: Mapping[str, float], path: Path) -> None:
         made = figure(9, 4)
         panel = made.subplots()
         panel.errorbar(
-            sizes, mean, error, fmt="o", color=OURS, capsize=2, label="ours: mean of 100 trainings, ± 2 s.e."
+            sizes, mean, error, fmt="o", color=OURS, capsize=2, label="recomputed: mean of 100 trainings, ± 2 s.e."
         )
         panel.plot([PAPER_SIZE], [PAPER_MSE], "D", color=PAPER, markersize=9, label="the paper's best: 64, 0.0251")
-        panel.set(
-            xlabel="hidden neurons", ylabel="MSE (10 kPa, 1)", title="26 sizes, 26 million epochs: size does not matter"
-        )
+        panel.set(xlabel="hidden neurons", ylabel="MSE (10 kPa, 1)", title="Mean MSE of 26 sizes, 26 million epochs")
         panel.legend()
         save(made, path)
 
 
 def training_set(pairs: TrainingSet, path: Path) -> None:
-    """Draw the pairs' loads by current, and which of them a rover can have."""
+    """Draw the pairs' loads against current, and the range of loads of a 30 kg rover."""
     with mpl.rc_context(STYLE):
         made = figure(9, 4.2)
         panel = made.subplots()
-        panel.axhspan(*ROVER_LOADS_N, color="#27ae60", alpha=0.15, label="what a wheel of 30 kg can carry")
+        panel.axhspan(*ROVER_LOADS_N, color="#27ae60", alpha=0.15, label="range for a 30 kg rover")
         for index, (name, colour) in enumerate(zip(SOILS, SOIL_COLOURS, strict=True)):
             mine = pairs.soil == index
             aside = (index - 1.5) * 1.6
             panel.plot(1e3 * pairs.inputs[mine, 2] + aside, pairs.inputs[mine, 0], ".", color=colour, label=name)
         panel.set(yscale="log", xlabel="motor current (mA)", ylabel="load by Step 14 (N)")
-        panel.set_title("Most of the 504 pairs have loads that no 30 kg rover has")
+        panel.set_title("Most of the 504 pairs have loads outside the range of a 30 kg rover")
         panel.legend(loc="upper left", bbox_to_anchor=(1, 1))
         save(made, path)
 
 
-def traverse(traverses: Sequence[Traverse], path: Path, wheel: int = 5) -> None:
-    """Draw c and φ of one wheel along the synthetic traverse: what Figs 6–9 show."""
+def traverse(traverses: Sequence[SyntheticTraverse], path: Path, wheel: int = 5) -> None:
+    """Draw c and φ of one wheel along the synthetic traverse, as in the paper's Figs 6–9."""
     time = np.arange(published.RECORDS) / 2
     with mpl.rc_context(STYLE):
         made = figure(11, 6)

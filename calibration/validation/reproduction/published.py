@@ -1,4 +1,4 @@
-"""What the paper reports, as numbers: its Tables 3–6, its network, its one worked record."""
+"""The paper's published results: Tables 3–6, the network's size and MSE, record 500."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ DURATION_S = 454.54
 SLIP = 0.025
 
 SET_500 = {"load_N": 31.6, "slip": SLIP, "motor_current_A": 0.080, "cohesion_Pa": 3352.0, "friction_angle_deg": 28.6}
-"""Record 500 of wheel 5, prepared ground."""
+"""Record 500 of wheel 5 on prepared ground: inputs and the paper's estimate."""
 
 WHEELS = np.arange(1, 7)
 COHESION_PA = {"prepared": (3832, 3849, 3726, 3644, 3641, 3737), "unprepared": (3861, 3931, 3722, 3693, 3632, 3711)}

@@ -1,4 +1,4 @@
-"""In which units the MSE of 0.0251 can have been: our networks read in other scalings of the outputs."""
+"""MSE of our perceptrons in several scalings of the outputs: which of them allows the paper's 0.0251."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Scaling:
-    """One way to scale the outputs, the outputs' variance in it, and the MSE that explains as much as ours does."""
+    """A scaling of the outputs, the variance of the outputs in it, and our MSE in it."""
 
     name: str
     variance: float
@@ -24,18 +24,18 @@ class Scaling:
 
 
 def scalings(pairs: TrainingSet, estimates: Array) -> list[Scaling]:
-    """Return our networks' MSE in each scaling of the outputs; `estimates` has the shape of the pairs' outputs.
+    """Return the MSE of `estimates` (shape as the pairs' outputs) in each scaling of the outputs.
 
-    Each scaling is linear in c and in tan φ, so that one network's errors can be read in all of them.
+    Each scaling is linear in c and in tan φ, so the errors of one network can be converted to all of them.
     """
     outputs = pairs.outputs
     span = outputs.max(axis=0) - outputs.min(axis=0)
     units = {
-        "c in 10 kPa, tan φ as it is": np.array([10_000.0, 1.0]),
-        "both brought to [0, 1]": span,
-        "both brought to [−1, 1]": span / 2,
-        "c in kPa, tan φ as it is": np.array([1000.0, 1.0]),
-        "c in Pa, tan φ as it is": np.array([1.0, 1.0]),
+        "c in 10 kPa, tan φ unscaled": np.array([10_000.0, 1.0]),
+        "both scaled to [0, 1]": span,
+        "both scaled to [−1, 1]": span / 2,
+        "c in kPa, tan φ unscaled": np.array([1000.0, 1.0]),
+        "c in Pa, tan φ unscaled": np.array([1.0, 1.0]),
     }
     error = estimates - outputs
     return [

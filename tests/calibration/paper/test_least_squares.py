@@ -1,4 +1,4 @@
-"""Iagnemma's least squares is right where its assumptions hold."""
+"""The least-squares estimator of Iagnemma et al. is exact where its assumptions hold."""
 
 import numpy as np
 import pytest

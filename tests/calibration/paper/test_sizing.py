@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.paper import sizing
-from regolithd.calibration.paper.sizing_race import figures, race
 from regolithd.calibration.paper.training_set import TrainingSet, training_set
 from regolithd.calibration.parameters import Drivetrain, Wheel
 
@@ -47,12 +46,3 @@ def test_sizes_are_summarised_by_their_mean() -> None:
     steady = [sizing.Outcome(6, 0, 0.2, 9), sizing.Outcome(6, 1, 0.2, 9)]
     best = min(sizing.summarise(lucky + steady), key=lambda each: each.mean_mse)
     assert (best.neurons, best.mean_mse) == (6, pytest.approx(0.2))
-
-
-def test_the_race_times_both_and_its_ratios_are_of_what_it_timed(tmp_path: Path, pairs: TrainingSet) -> None:
-    """A few epochs of each give positive times, and figures that name the paper's size beside the best."""
-    speed = race(pairs, tmp_path, epochs=3, trainings=1)
-    assert min(speed.ours_s, speed.ours_cpu_s, speed.scikit_learn_s, speed.scikit_learn_cpu_s) > 0
-    assert speed.ratio_cpu == pytest.approx(speed.scikit_learn_cpu_s / speed.ours_cpu_s)
-    found = figures(STUDY, [sizing.Outcome(5, 0, 0.1, 20), sizing.Outcome(6, 0, 0.2, 20)], speed)
-    assert (found["best_size"], found["paper_size"], found["reached_goal"]) == (5, 64, 0)

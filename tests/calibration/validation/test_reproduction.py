@@ -1,4 +1,4 @@
-"""The page of the reproduction tells what was computed, and the traverse has the scatter that the paper published."""
+"""The reproduction page shows what was computed, and the synthetic traverse has the published scatter."""
 
 import numpy as np
 import pytest
@@ -6,21 +6,20 @@ import pytest
 from regolithd.calibration.paper.backpropagation import Training, train
 from regolithd.calibration.paper.training_set import TrainingSet, training_set
 from regolithd.calibration.parameters import Drivetrain, Wheel
-from regolithd.calibration.validation.reproduction import page, published
-from regolithd.calibration.validation.reproduction import recomputation as again
+from regolithd.calibration.validation.reproduction import page, published, recomputation
 from regolithd.calibration.validation.reproduction.scalings import scalings
 
 
 @pytest.fixture(scope="module")
 def trained() -> tuple[TrainingSet, list[Training]]:
-    """Return the pairs and two briefly trained networks."""
+    """Return the pairs and two briefly trained perceptrons."""
     pairs = training_set(Drivetrain(), Wheel())
     return pairs, [train(pairs, 64, np.random.default_rng(seed), epochs=2000) for seed in range(2)]
 
 
 def test_record_500_comes_out_near_the_papers(trained: tuple[TrainingSet, list[Training]]) -> None:
     """With guessed constants, c is within a quarter of 3352 Pa and φ within 4° of 28.6°."""
-    found = again.record_500(trained[1])
+    found = recomputation.record_500(trained[1])
     assert found.cohesion_Pa == pytest.approx(3352, rel=0.25)
     assert found.angle_deg == pytest.approx(28.6, abs=4)
 
@@ -28,35 +27,37 @@ def test_record_500_comes_out_near_the_papers(trained: tuple[TrainingSet, list[T
 def test_the_synthetic_traverse_scatters_as_published(trained: tuple[TrainingSet, list[Training]]) -> None:
     """Currents and loads have the relative standard deviations of Tables 4 and 6, wheel by wheel."""
     for ground in published.CURRENT_RSD:
-        drive = again.traverse(trained[1][0].network, ground, np.random.default_rng(0))
+        drive = recomputation.traverse(trained[1][0].perceptron, ground, np.random.default_rng(0))
         assert drive.load_N.shape == (909, 6)
-        np.testing.assert_allclose(again.relative_std(drive.current_A), published.CURRENT_RSD[ground], rtol=0.12)
-        np.testing.assert_allclose(again.relative_std(drive.load_N), published.LOAD_RSD[ground], rtol=0.12)
+        np.testing.assert_allclose(
+            recomputation.relative_std(drive.current_A), published.CURRENT_RSD[ground], rtol=0.12
+        )
+        np.testing.assert_allclose(recomputation.relative_std(drive.load_N), published.LOAD_RSD[ground], rtol=0.12)
 
 
 def test_drops_of_current_pull_the_friction_angle_down(trained: tuple[TrainingSet, list[Training]]) -> None:
-    """At a quarter of its current, record 500 is read as a soil of less friction: the paper's observation."""
-    usual, dropped = again.current_sweep(trained[1][0].network, np.array([0.080, 0.020]))
+    """At a quarter of its current, record 500 is estimated with a smaller friction angle, as the paper observed."""
+    usual, dropped = recomputation.current_sweep(trained[1][0].perceptron, np.array([0.080, 0.020]))
     assert dropped[1] < usual[1] - 2
 
 
 def test_most_pairs_are_beyond_the_rover(trained: tuple[TrainingSet, list[Training]]) -> None:
     """Fewer than half of the pairs have a load that a wheel of 30 kg can carry."""
-    shares = [each.possible_share for each in again.load_ranges(trained[0])]
+    shares = [each.possible_share for each in recomputation.load_ranges(trained[0])]
     assert 0 < np.mean(shares) < 0.5
 
 
-def test_the_page_tells_the_numbers(trained: tuple[TrainingSet, list[Training]]) -> None:
-    """What was computed stands on the page beside the paper's, and its tables are whole."""
+def test_the_page_shows_the_computed_values(trained: tuple[TrainingSet, list[Training]]) -> None:
+    """The page holds the recomputed values beside the published ones, and the rows of each table have equal cells."""
     pairs, done = trained
     results = page.Results(
         trainings=2,
-        loads=again.load_ranges(pairs),
-        scalings=scalings(pairs, done[0].network(pairs.inputs)),
-        record=again.record_500(done),
-        withheld={("radius_m", 0.06): again.record_500(done)},
-        traverses=[again.traverse(done[0].network, "prepared", np.random.default_rng(0))] * 2,
-        clean=(3000.0, 30.0),
+        loads=recomputation.load_ranges(pairs),
+        scalings=scalings(pairs, done[0].perceptron(pairs.inputs)),
+        record=recomputation.record_500(done),
+        unpublished={("radius_m", 0.06): recomputation.record_500(done)},
+        traverses=[recomputation.traverse(done[0].perceptron, "prepared", np.random.default_rng(0))] * 2,
+        noise_free=(3000.0, 30.0),
         sizing=None,
     )
     text = page.page(results)

@@ -1,8 +1,8 @@
-"""The sizing study's speed against scikit-learn's MLPRegressor, on a slice of it, one after the other on this machine.
+"""Speed of the sizing study compared with scikit-learn's MLPRegressor, on some of its sizes, on this machine.
 
-The same pairs, scaling, sizes, epochs and activation; stochastic gradient descent with momentum 0.9 on the full batch
-and an adaptive rate is the nearest solver that it has. It is timed as a user would run it: in double precision, its
-threads as they are by default, one training after another; and ours as the study runs, on all cores.
+Both use the same pairs, scaling, sizes, epochs and activation. scikit-learn's nearest solver is gradient descent on the
+full batch with momentum 0.9 and an adaptive rate. It is timed with its defaults (double precision, its own threads, one
+training after another); ours as the study runs, with one thread on each core, and on one core.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.paper import sizing
-from regolithd.calibration.paper.network import OUTPUT_UNIT, scale
+from regolithd.calibration.paper.perceptron import OUTPUT_UNIT, scale
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from regolithd.calibration.paper.training_set import TrainingSet
 
-SLICE_SIZES = (59, 64, 72, 84)
+TIMED_SIZES = (59, 64, 72, 84)
 
 
 @dataclass(frozen=True, slots=True)
-class Race:
-    """Seconds for one epoch of one network, averaged over the slice's sizes."""
+class SpeedComparison:
+    """Seconds for one epoch of one network, averaged over `TIMED_SIZES`; `_cpu_s` is CPU time, the others wall time."""
 
     ours_s: float
     ours_one_core_s: float
@@ -37,35 +37,35 @@ class Race:
 
     @property
     def ratio(self) -> float:
-        """How many times faster the study runs, as each is run."""
+        """Wall time of scikit-learn over ours on all cores."""
         return self.scikit_learn_s / self.ours_s
 
     @property
     def ratio_one_core(self) -> float:
-        """The same with one core for ours."""
+        """Wall time of scikit-learn over ours on one core."""
         return self.scikit_learn_s / self.ours_one_core_s
 
     @property
     def ratio_cpu(self) -> float:
-        """The same in CPU time, which does not see what else the machine is doing: one core against one."""
+        """CPU time of scikit-learn over ours: independent of other load on the machine."""
         return self.scikit_learn_cpu_s / self.ours_cpu_s
 
 
-def race(pairs: TrainingSet, folder: Path, epochs: int = 1000, trainings: int = 8) -> Race:
-    """Time both on the slice: `trainings` of ours for each size, one of scikit-learn's."""
+def compare_speed(pairs: TrainingSet, folder: Path, epochs: int = 1000, trainings: int = 8) -> SpeedComparison:
+    """Time `TIMED_SIZES`: `trainings` of ours for each size, one of scikit-learn's; `folder` takes the log."""
     folder.mkdir(parents=True, exist_ok=True)
-    _ours(pairs, folder, 2, 2, 1)  # compiles
+    _ours(pairs, folder, 2, 2, 1)  # so that compilation is not timed
     threads = sizing.cores()
     ours, _ = _ours(pairs, folder, epochs, trainings, threads)
     one_core, cpu = _ours(pairs, folder, epochs, trainings, 1)
     theirs, theirs_cpu = _scikit_learn(pairs, epochs)
-    return Race(ours, one_core, theirs, cpu, theirs_cpu)
+    return SpeedComparison(ours, one_core, theirs, cpu, theirs_cpu)
 
 
 def _ours(pairs: TrainingSet, folder: Path, epochs: int, trainings: int, threads: int) -> tuple[float, float]:
-    """Return seconds and CPU seconds for each epoch of a training."""
-    study = sizing.Study(SLICE_SIZES, trainings, epochs)
-    log = folder / "race.jsonl"
+    """Return wall and CPU seconds for one epoch of a training."""
+    study = sizing.Study(TIMED_SIZES, trainings, epochs)
+    log = folder / "speed.jsonl"
     log.unlink(missing_ok=True)
     start, cpu = time.perf_counter(), time.process_time()
     outcomes = list(sizing.run(study, pairs, sizing.resume(log, study), log, threads))
@@ -74,14 +74,14 @@ def _ours(pairs: TrainingSet, folder: Path, epochs: int, trainings: int, threads
 
 
 def _scikit_learn(pairs: TrainingSet, epochs: int) -> tuple[float, float]:
-    """Return seconds and CPU seconds for each epoch of a training."""
+    """Return wall and CPU seconds for one epoch of a training."""
     from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415  # only this comparison needs it
     from sklearn.neural_network import MLPRegressor  # noqa: PLC0415
 
     inputs = scale(pairs.inputs, pairs.inputs.min(axis=0), pairs.inputs.max(axis=0))
     targets = pairs.outputs / OUTPUT_UNIT
     taken = []
-    for neurons in SLICE_SIZES:
+    for neurons in TIMED_SIZES:
         model = MLPRegressor(
             hidden_layer_sizes=(neurons,),
             activation="logistic",
@@ -107,8 +107,8 @@ def _scikit_learn(pairs: TrainingSet, epochs: int) -> tuple[float, float]:
     return wall, cpu
 
 
-def figures(study: sizing.Study, outcomes: list[sizing.Outcome], speed: Race) -> dict[str, float]:
-    """Return the study's figures beside the paper's, one flat object."""
+def figures(study: sizing.Study, outcomes: list[sizing.Outcome], speed: SpeedComparison) -> dict[str, float]:
+    """Return the figures of the study and the speed comparison as one flat dictionary."""
     summaries = sizing.summarise(outcomes)
     best = sizing.best_size(outcomes)
     return {

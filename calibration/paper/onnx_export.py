@@ -1,4 +1,4 @@
-"""A trained network, frozen to ONNX with its model card: what the daemon loads."""
+"""Export of a trained perceptron to ONNX, with the model card that the daemon reads."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from regolithd.calibration.models.card import ModelCard, Variable
-from regolithd.calibration.paper.network import INPUTS, OUTPUT_UNIT, OUTPUTS, Network
+from regolithd.calibration.paper.perceptron import INPUTS, OUTPUT_UNIT, OUTPUTS, Perceptron
 
 if TYPE_CHECKING:
     from regolithd.calibration.paper.training_set import TrainingSet
 
 OPSET = 17
-IR_VERSION = 9  # what onnxruntime 1.19, the oldest that the rover may have, reads
+IR_VERSION = 9  # the newest that onnxruntime 1.19, the oldest supported on the rover, can read
 
 
-def freeze(network: Network, pairs: TrainingSet) -> onnx.ModelProto:
-    """Return the network as one ONNX graph: (N, 3) load, slip, current → (N, 2) cohesion, tan φ, float32."""
-    slope = 2 / (network.high - network.low)
-    hidden = network.hidden[:, :INPUTS] * slope
-    bias = network.hidden[:, INPUTS] - network.hidden[:, :INPUTS] @ (slope * network.low + 1)
+def export_onnx(perceptron: Perceptron, pairs: TrainingSet) -> onnx.ModelProto:
+    """Return the perceptron as one ONNX graph: (N, 3) load, slip, current → (N, 2) cohesion, tan φ, float32."""
+    slope = 2 / (perceptron.high - perceptron.low)
+    hidden = perceptron.hidden[:, :INPUTS] * slope
+    bias = perceptron.hidden[:, INPUTS] - perceptron.hidden[:, :INPUTS] @ (slope * perceptron.low + 1)
     constants = {
         "hidden_weights": hidden.T,
         "hidden_bias": bias,
-        "output_weights": network.output[:, :-1].T,
-        "output_bias": network.output[:, -1],
+        "output_weights": perceptron.output[:, :-1].T,
+        "output_bias": perceptron.output[:, -1],
         "output_unit": OUTPUT_UNIT,
     }
     nodes = [
@@ -47,18 +47,18 @@ def freeze(network: Network, pairs: TrainingSet) -> onnx.ModelProto:
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="regolithd")
     model.ir_version = IR_VERSION
-    helper.set_model_props(model, card(network, pairs).metadata())
+    helper.set_model_props(model, model_card(perceptron, pairs).metadata())
     onnx.checker.check_model(model)
     return model
 
 
-def card(network: Network, pairs: TrainingSet) -> ModelCard:
-    """Return the model card: names, units and ranges from the pairs, the version from the weights."""
-    digest = hashlib.sha256(network.hidden.tobytes() + network.output.tobytes()).hexdigest()[:12]
+def model_card(perceptron: Perceptron, pairs: TrainingSet) -> ModelCard:
+    """Return the model card: names, units and ranges of the pairs, and a version that is a hash of the weights."""
+    digest = hashlib.sha256(perceptron.hidden.tobytes() + perceptron.output.tobytes()).hexdigest()[:12]
     inputs = zip(("load_N", "slip", "motor_current_A"), ("N", "1", "A"), pairs.inputs.T, strict=True)
     outputs = zip(("cohesion_Pa", "tan_friction_angle"), ("Pa", "1"), pairs.outputs.T, strict=True)
     return ModelCard(
-        version=f"paper-{INPUTS}:{len(network.hidden)}:{OUTPUTS}-{digest}",
+        version=f"paper-{INPUTS}:{len(perceptron.hidden)}:{OUTPUTS}-{digest}",
         inputs=tuple(_variable(*each) for each in inputs),
         outputs=tuple(_variable(*each) for each in outputs),
         gain_Nm_per_A=pairs.gain_Nm_per_A,
