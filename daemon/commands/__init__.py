@@ -1,5 +1,5 @@
-"""The command line's commands, one file each: arguments in, exit status out, the work done elsewhere.
+"""The sub-commands of `regolithd`, one module each: options, error messages and exit status.
 
-A command imports what it needs inside its function, so that `regolithd --help` stays quick and the rover never loads
-what only the laptop has.
+Each module has `register(app)`. A command imports what it needs inside its function, so that `regolithd --help` is
+quick and the rover's computer does not load libraries that only the laptop has.
 """

@@ -1,4 +1,4 @@
-"""`regolithd calibrate …`: the bench procedures that give the constants, each from a recording."""
+"""`regolithd calibrate …`: fit load cells, drivetrain and wheel radius from bench recordings into `rover.toml`."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ if TYPE_CHECKING:
     from regolithd.calibration.drivetrain.bench.session import Written
 
 Recorded = Annotated[
-    Path | None, typer.Argument(help="CSV or Parquet of `regolithd export`; without it, what to do at the bench")
+    Path | None,
+    typer.Argument(help="CSV or Parquet of `regolithd export`. Without it, the bench procedure is printed."),
 ]
-Config = Annotated[Path, typer.Option(help="the rover.toml that the values go into")]
-Plot = Annotated[Path | None, typer.Option(help="draw the fit to this PNG or SVG")]
-Write = Annotated[bool, typer.Option("--write/--dry-run", help="write, or only say what would be written")]
+Config = Annotated[Path, typer.Option(help="The rover.toml to write the values into.")]
+Plot = Annotated[Path | None, typer.Option(help="Draw the fit to this PNG or SVG.")]
+Write = Annotated[bool, typer.Option("--write/--dry-run", help="Write, or only print what would be written.")]
 
 ROVER_TOML = Path("rover.toml")
 
@@ -25,18 +26,19 @@ ROVER_TOML = Path("rover.toml")
 def register(app: typer.Typer) -> None:
     """Add the commands."""
     bench = typer.Typer(
-        no_args_is_help=True, help="Take load cells, drivetrain and wheel radius from the bench or a comparison."
+        no_args_is_help=True,
+        help="Calibrate load cells, drivetrain and wheel radius from recordings, and write them into rover.toml.",
     )
-    bench.command("load-cell", help="Zero and span of the load cells, from known weights.")(load_cell)
-    bench.command("wheels-up", help="No-load current against speed, from a spin off the ground.")(wheels_up)
-    bench.command("brake", help="Efficiency of the drivetrain against torque, from a brake.")(brake)
-    bench.command("radius", help="Wheel radius, from a measured distance.")(radius)
-    bench.command("corrected", help="Drivetrain, from what `regolithd mismatch --corrected` wrote.")(corrected)
+    bench.command("load-cell")(load_cell)
+    bench.command("wheels-up")(wheels_up)
+    bench.command("brake")(brake)
+    bench.command("radius")(radius)
+    bench.command("corrected")(corrected)
     app.add_typer(bench, name="calibrate")
 
 
 def load_cell(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plot = None, write: Write = True) -> None:
-    """Fit each wheel that has weights in the recording."""
+    """Zero and span of the load cells, from known weights (kg) in the recording."""
     from regolithd.calibration.drivetrain.bench import procedures, session
 
     if recording is None:
@@ -46,7 +48,7 @@ def load_cell(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plo
 
 
 def wheels_up(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plot = None, write: Write = True) -> None:
-    """Fit each wheel that turned."""
+    """No-load current against motor speed, from a spin with the wheels off the ground."""
     from regolithd.calibration.drivetrain.bench import procedures, session
 
     if recording is None:
@@ -56,7 +58,7 @@ def wheels_up(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plo
 
 
 def brake(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plot = None, write: Write = True) -> None:
-    """Fit each wheel that has a brake's torque in the recording."""
+    """Drivetrain efficiency against torque, from a brake test."""
     from regolithd.calibration.drivetrain.bench import procedures, session
 
     if recording is None:
@@ -67,13 +69,13 @@ def brake(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plot = 
 
 def radius(
     recording: Recorded = None,
-    distance: Annotated[float, typer.Option(help="what the tape says, in metres")] = 0.0,
-    distance_std: Annotated[float, typer.Option(help="how sure the tape is, in metres")] = 0.005,
+    distance: Annotated[float, typer.Option(help="Measured distance in m.")] = 0.0,
+    distance_std: Annotated[float, typer.Option(help="Standard deviation of the distance in m.")] = 0.005,
     config: Config = ROVER_TOML,
     plot: Plot = None,
     write: Write = True,
 ) -> None:
-    """Divide the distance by what the wheels turned."""
+    """Wheel radius, from a measured distance and the wheels' rotation."""
     from regolithd.calibration.drivetrain.bench import procedures, session
 
     if recording is None:
@@ -83,18 +85,18 @@ def radius(
 
 
 def corrected(
-    simulation: Annotated[Path, typer.Argument(help="what `regolithd mismatch --corrected` wrote")],
+    simulation: Annotated[Path, typer.Argument(help="TOML written by `regolithd mismatch --corrected`.")],
     config: Config = ROVER_TOML,
     write: Write = True,
 ) -> None:
-    """Copy what the comparison found of the drivetrain."""
+    """Drivetrain constants, from a simulation that `regolithd mismatch --corrected` wrote."""
     from regolithd.calibration.drivetrain.bench.simulation import drivetrain
 
     _finish(lambda: drivetrain(simulation, config), config, write)
 
 
 def _finish(fit: Callable[[], Written], config: Path, write: bool) -> None:
-    """Fit, say what came out, and write it."""
+    """Fit, print the results, and write them unless `write` is false."""
     from regolithd.calibration.drivetrain.bench.line import BenchError
     from regolithd.calibration.mismatch.errors import RecordingError
 
@@ -106,6 +108,6 @@ def _finish(fit: Callable[[], Written], config: Path, write: bool) -> None:
     typer.echo("\n".join(written.says))
     if write:
         config.write_text(written.text, encoding="utf-8")
-        typer.echo(f"Wrote {config}; comments and order are as they were.")
+        typer.echo(f"Wrote {config}; comments and order are kept.")
     else:
-        typer.echo(f"{config} is as it was.")
+        typer.echo(f"{config} is unchanged.")

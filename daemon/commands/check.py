@@ -1,4 +1,4 @@
-"""`regolithd check`: everything that is wrong with configuration, bus, nodes, broker, model, disks and clock."""
+"""`regolithd check`: test configuration, bus, nodes, broker, models, disks and clock, and print each problem."""
 
 from __future__ import annotations
 
@@ -20,46 +20,49 @@ _MARKS = {"good": "✓", "warning": "!", "wrong": "✗", "not checked": "–"}
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command()(check)
+    app.command("check")(check)
 
 
 def check(
     *,
-    config: Annotated[Path, typer.Option(help="The configuration.")] = Path("/etc/regolithd/rover.toml"),
-    syntax: Annotated[bool, typer.Option("--syntax", help="The file alone: touch nothing else.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="As JSON.")] = False,
+    config: Annotated[Path, typer.Option(help="The rover's configuration (rover.toml).")] = Path(
+        "/etc/regolithd/rover.toml"
+    ),
+    syntax: Annotated[bool, typer.Option("--syntax", help="Check only the file, neither bus nor broker.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Say what is wrong and how to mend it. Nothing is changed or moved; a running daemon is not disturbed.
+    """Check configuration, bus, nodes, broker, models, disks and clock; print each problem and its remedy.
 
-    The exit status is 78 where the configuration cannot be used, 1 where anything else is wrong, and 0 otherwise.
+    Changes and moves nothing, and does not disturb a running daemon. Exit status: 0 if nothing is wrong, 78 if the
+    configuration is invalid, 1 for any other problem.
     """
     from regolithd.daemon.config.reader import EXIT_STATUS, ConfigurationError, read_configuration
 
     try:
         configuration = read_configuration(config)
     except ConfigurationError as error:
-        _tell_problems(error, as_json=json)
+        _print_problems(error, as_json=json)
         raise typer.Exit(EXIT_STATUS) from error
     if syntax:
         typer.echo(f"{config}: good")
         return
-    findings = _look(configuration, quiet=json)
-    _tell(findings, config, as_json=json)
+    findings = _findings(configuration, quiet=json)
+    _print_findings(findings, config, as_json=json)
     raise typer.Exit(int(any(finding.verdict == "wrong" for finding in findings)))
 
 
-def _look(configuration: Configuration, *, quiet: bool) -> list[Finding]:
+def _findings(configuration: Configuration, *, quiet: bool) -> list[Finding]:
     import asyncio
 
     from rich.console import Console
 
     from regolithd.daemon.check.all_checks import check_everything
 
-    with Console(stderr=True, quiet=quiet).status("Looking at bus, nodes, model, broker, disks and clock …"):
+    with Console(stderr=True, quiet=quiet).status("Checking bus, nodes, models, broker, disks and clock …"):
         return asyncio.run(check_everything(configuration))
 
 
-def _tell_problems(error: ConfigurationError, *, as_json: bool) -> None:
+def _print_problems(error: ConfigurationError, *, as_json: bool) -> None:
     from json import dumps
 
     if as_json:
@@ -68,10 +71,10 @@ def _tell_problems(error: ConfigurationError, *, as_json: bool) -> None:
     for problem in error.problems:
         typer.echo(str(problem), err=True)
     count = len(error.problems)
-    typer.echo(f"{count} problem{'s' if count != 1 else ''}: nothing else was looked at.", err=True)
+    typer.echo(f"{count} problem{'s' if count != 1 else ''} in the configuration; nothing else was checked.", err=True)
 
 
-def _tell(findings: list[Finding], config: Path, *, as_json: bool) -> None:
+def _print_findings(findings: list[Finding], config: Path, *, as_json: bool) -> None:
     from dataclasses import asdict
     from json import dumps
 
@@ -85,9 +88,9 @@ def _tell(findings: list[Finding], config: Path, *, as_json: bool) -> None:
     wrong = sum(finding.verdict == "wrong" for finding in findings)
     warnings = sum(finding.verdict == "warning" for finding in findings)
     if wrong:
-        console.print(f"[bold red]{wrong} wrong[/], {warnings} to think about.", highlight=False)
+        console.print(f"[bold red]{wrong} wrong[/], {warnings} warnings.", highlight=False)
     elif warnings:
-        console.print(f"[yellow]Nothing wrong, {warnings} to think about.[/]")
+        console.print(f"[yellow]Nothing wrong, {warnings} warnings.[/]")
     else:
         console.print("[green]Nothing wrong.[/]")
 
@@ -97,7 +100,7 @@ def _table(findings: list[Finding], config: Path) -> Table:
     from rich.table import Table
     from rich.text import Text
 
-    table = Table("", "what", "found, and how to mend it", box=box.SIMPLE_HEAD, expand=True)
+    table = Table("", "subject", "finding and remedy", box=box.SIMPLE_HEAD, expand=True)
     table.add_row(Text(_MARKS["good"], style="green"), "configuration", str(config))
     for finding in findings:
         style = _STYLES[finding.verdict]

@@ -1,4 +1,4 @@
-"""`regolithd evaluate`: how good the estimators and the alarm are, as figures."""
+"""`regolithd evaluate`: errors and coverage of the soil estimators, delays of the soil-change alarm."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Part(StrEnum):
-    """Which half of the evaluation."""
+    """A part of the evaluation."""
 
     ALL = "all"
     ESTIMATORS = "estimators"
@@ -25,19 +25,26 @@ class Part(StrEnum):
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command(help="Test posterior, paper's network, least squares and alarm on rovers that none has seen.")(evaluate)
+    app.command("evaluate")(evaluate)
 
 
 def evaluate(
-    out: Annotated[Path, typer.Option(help="the figures, one flat JSON object")] = Path("build/figures/evaluate.json"),
-    details: Annotated[Path, typer.Option(help="ranks and delays, for the pictures")] = Path("build/evaluate.npz"),
-    rovers: Annotated[int, typer.Option(min=100, help="rovers on held-out soils")] = 10_000,
-    drives: Annotated[int, typer.Option(min=10, help="drives that the alarm is tested on")] = 400,
-    hours: Annotated[float, typer.Option(min=0.1, help="of each drive over one soil")] = 1.0,
-    part: Annotated[Part, typer.Option(help="one half alone; the other's figures stay as they are")] = Part.ALL,
-    seed: Annotated[int, typer.Option(help="never one that training used")] = 31_907_442,
+    out: Annotated[Path, typer.Option(help="Write the figures here, as one JSON object.")] = Path(
+        "build/figures/evaluate.json"
+    ),
+    details: Annotated[Path, typer.Option(help="Write ranks and delays here, for `regolithd pictures`.")] = Path(
+        "build/evaluate.npz"
+    ),
+    rovers: Annotated[int, typer.Option(min=100, help="Number of simulated rovers on held-out soils.")] = 10_000,
+    drives: Annotated[int, typer.Option(min=10, help="Number of drives for the alarm.")] = 400,
+    hours: Annotated[float, typer.Option(min=0.1, help="Duration of each drive over one soil in h.")] = 1.0,
+    part: Annotated[Part, typer.Option(help="Evaluate only this part; the other's figures are kept.")] = Part.ALL,
+    seed: Annotated[int, typer.Option(help="Seed; must differ from the training's.")] = 31_907_442,
 ) -> None:
-    """Ask everything of everybody, and write it down."""
+    """Evaluate posterior, paper's network, least squares and soil-change alarm on simulated rovers.
+
+    The rovers and soils were not used in training. Writes figures (JSON) and ranks and delays (NPZ).
+    """
     import json
     import math
 

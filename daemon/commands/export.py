@@ -1,4 +1,4 @@
-"""`regolithd export`: a recording as CSV or Parquet."""
+"""`regolithd export`: write a recording as CSV or Parquet."""
 
 from __future__ import annotations
 
@@ -10,14 +10,19 @@ import typer
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command(help="Write a recording as one table: CSV or Parquet, one row per instant and wheel.")(export)
+    app.command("export")(export)
 
 
 def export(
-    recordings: Annotated[list[Path], typer.Argument(help="MCAP files, in their order", exists=True, dir_okay=False)],
-    to: Annotated[Path, typer.Option(help="out.csv or out.parquet")],
+    recordings: Annotated[
+        list[Path], typer.Argument(help="MCAP files, in chronological order.", exists=True, dir_okay=False)
+    ],
+    to: Annotated[Path, typer.Option(help="Output file: .csv or .parquet.")],
 ) -> None:
-    """Write the columns that `regolithd mismatch` reads."""
+    """Write a recording as one table, CSV or Parquet, with one row for each instant and wheel.
+
+    The columns are those that `regolithd mismatch` and `regolithd calibrate` read.
+    """
     from regolithd.daemon.recording.export import ExportError
     from regolithd.daemon.recording.export import export as write
     from regolithd.daemon.recording.progress import open_binary

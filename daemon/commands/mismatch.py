@@ -1,4 +1,4 @@
-"""`regolithd mismatch`: the physics that a simulation leaves out of a recording."""
+"""`regolithd mismatch`: name the physics that a simulation leaves out, from a recording."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.data.recording import Recording
 
 EXIT_DATA = 65
-"""EX_DATAERR: what was given cannot be compared."""
+"""EX_DATAERR: recording or simulation cannot be used."""
 
 
 def register(app: typer.Typer) -> None:
@@ -21,17 +21,16 @@ def register(app: typer.Typer) -> None:
 
     @app.command()
     def mismatch(
-        recording: Annotated[
-            Path, typer.Argument(help="CSV(.gz), Parquet, or a recording of the daemon's own (MCAP).")
-        ],
-        simulation: Annotated[Path, typer.Option(help="SIM.toml: the simulation's name and parameters.")],
-        json: Annotated[Path | None, typer.Option(help="Write the answer here.")] = None,
+        recording: Annotated[Path, typer.Argument(help="CSV(.gz), Parquet, or MCAP of the daemon.")],
+        simulation: Annotated[Path, typer.Option(help="SIM.toml: the simulation and its parameters.")],
+        json: Annotated[Path | None, typer.Option(help="Write the answer here, as JSON.")] = None,
         report: Annotated[Path | None, typer.Option(help="Write a self-contained HTML report here.")] = None,
-        corrected: Annotated[
-            Path | None, typer.Option(help="Write the simulation with the effects in it here.")
-        ] = None,
+        corrected: Annotated[Path | None, typer.Option(help="Write the corrected SIM.toml here.")] = None,
     ) -> None:
-        """Locate where simulation and recording differ, name the physics left out, and show the fit improve."""
+        """Name the physics that a simulation leaves out, from a recording.
+
+        Prints each effect with size and interval, indistinguishable effects, and the held-out error before and after.
+        """
         from regolithd.calibration.mismatch.errors import MismatchError
 
         try:
@@ -64,7 +63,7 @@ def _run(recording: Path, simulation: Path, json: Path | None, report: Path | No
         corrected.write_text(text, encoding="utf-8")
     if report:
         _write_report(report, found, recording, simulation)
-    _tell(Console(), found.answer)
+    _print_answer(Console(), found.answer)
 
 
 def _tables(path: Path) -> dict[str, Any]:
@@ -109,7 +108,7 @@ def _write_report(path: Path, found: Comparison, recording: Path, simulation: Pa
     )
 
 
-def _tell(console: Any, answer: Answer) -> None:  # noqa: ANN401  # rich's console
+def _print_answer(console: Any, answer: Answer) -> None:  # noqa: ANN401  # rich's console
     console.print(f"[bold]{answer.verdict}[/bold]")
     for effect in answer.effects:
         console.print(f"  {effect.name}: {effect.statement}")
@@ -119,7 +118,7 @@ def _tell(console: Any, answer: Answer) -> None:  # noqa: ANN401  # rich's conso
             f"{', '.join(map(str, rest.wheels))}, {rest.from_s:.0f} to {rest.to_s:.0f} s"
         )
     for pair in answer.indistinguishable:
-        console.print(f"  {' or '.join(pair.effects)}: this recording cannot tell. {pair.experiment}")
+        console.print(f"  {' or '.join(pair.effects)}: this recording does not distinguish them. {pair.experiment}")
     fit = answer.fit
     console.print(
         f"  held-out error of {fit.channel}: {fit.held_out_rmse_before:.5g} before, "

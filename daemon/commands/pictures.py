@@ -1,4 +1,4 @@
-"""`regolithd pictures`: what `regolithd evaluate` found, drawn for `docs/`."""
+"""`regolithd pictures`: draw the figures of `regolithd evaluate` for `docs/`."""
 
 from __future__ import annotations
 
@@ -10,17 +10,19 @@ import typer
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command(help="Draw what `regolithd evaluate` found, for docs/.")(pictures)
+    app.command("pictures")(pictures)
 
 
 def pictures(
-    figures: Annotated[Path, typer.Option(help="what `regolithd evaluate` found")] = Path(
+    figures: Annotated[Path, typer.Option(help="Figures of `regolithd evaluate`.")] = Path(
         "build/figures/evaluate.json"
     ),
-    details: Annotated[Path, typer.Option(help="its ranks and delays")] = Path("build/evaluate.npz"),
-    docs: Annotated[Path, typer.Option(help="where the pictures go")] = Path("docs"),
+    details: Annotated[Path, typer.Option(help="Ranks and delays of `regolithd evaluate`.")] = Path(
+        "build/evaluate.npz"
+    ),
+    docs: Annotated[Path, typer.Option(help="Folder for the pictures.")] = Path("docs"),
 ) -> None:
-    """Draw errors, calibration, one sample, the alarm and the drivetrain."""
+    """Draw the figures of `regolithd evaluate`: errors, coverage, one sample, alarm delays, drivetrain."""
     import json
 
     import numpy as np
@@ -29,7 +31,7 @@ def pictures(
     from regolithd.calibration.validation.estimators import pictures as draw
 
     if not (figures.is_file() and details.is_file()):
-        typer.echo(f"{figures} is not there: run `regolithd evaluate` first", err=True)
+        typer.echo(f"{figures} does not exist: run `regolithd evaluate` first", err=True)
         raise typer.Exit(1)
     found = json.loads(figures.read_text(encoding="utf-8"))
     with np.load(details) as kept:

@@ -1,4 +1,4 @@
-"""`regolithd prove`: conceal effects in recordings, let the solver answer, open the envelopes, print the score."""
+"""`regolithd prove`: blind trials of `regolithd mismatch` on simulated recordings with hidden effects."""
 
 from __future__ import annotations
 
@@ -22,18 +22,27 @@ def register(app: typer.Typer) -> None:
 
 
 def prove(  # each is an option of the command line
-    recordings: Annotated[int, typer.Option(help="How many recordings to make.")] = 200,
-    seed: Annotated[int | None, typer.Option(help="Seed of the batch; left out, one that nobody knows yet.")] = None,
-    out: Annotated[Path, typer.Option(help="The batch's folder; an interrupted batch goes on.")] = Path("build/prove"),
-    jobs: Annotated[int, typer.Option(help="Solvers at a time; 0: as many as there are cores.")] = 0,
-    solver: Annotated[str, typer.Option(help="Another solver, with {recording}, {simulation} and {answer}.")] = "",
-    group: Annotated[list[str] | None, typer.Option(help="nothing, single, pair, outside or constant alone.")] = None,
-    no_peers: Annotated[bool, typer.Option("--no-peers", help="Leave the other tools out.")] = False,
+    recordings: Annotated[int, typer.Option(help="Number of recordings.")] = 200,
+    seed: Annotated[int | None, typer.Option(help="Seed of the batch; a random one if left out.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the batch; an interrupted batch is continued.")] = Path(
+        "build/prove"
+    ),
+    jobs: Annotated[int, typer.Option(help="Number of parallel processes; 0: one per core.")] = 0,
+    solver: Annotated[
+        str, typer.Option(help="Command of another solver, with {recording}, {simulation}, {answer}.")
+    ] = "",
+    group: Annotated[
+        list[str] | None, typer.Option(help="Only this group: nothing, single, pair, outside, constant.")
+    ] = None,
+    no_baselines: Annotated[bool, typer.Option("--no-baselines", help="Do not run the baselines.")] = False,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the recordings.")] = False,
-    duration: Annotated[float, typer.Option(help="Length of each recording in seconds.")] = 1800.0,
-    figures: Annotated[Path | None, typer.Option(help="Write the score here too, as one flat JSON object.")] = None,
+    duration: Annotated[float, typer.Option(help="Duration of each recording in s.")] = 1800.0,
+    figures: Annotated[Path | None, typer.Option(help="Also write the score here, as one JSON object.")] = None,
 ) -> None:
-    """Prove what `regolithd mismatch` finds: effects concealed, truths sealed, answers scored, peers beside it."""
+    """Run blind trials of `regolithd mismatch`: recordings with hidden effects, scored beside three baselines.
+
+    A digest of each ground truth is written before its recording is analysed, so that the score can be verified.
+    """
     from rich.console import Console
 
     from regolithd.calibration.validation.blind_trials.batch import PEERS, SOLVER, Batch
@@ -48,13 +57,16 @@ def prove(  # each is an option of the command line
         recordings=recordings,
         jobs=jobs or os.cpu_count() or 1,
         solver=solver or SOLVER,
-        peers=None if no_peers else PEERS,
+        peers=None if no_baselines else PEERS,
         keep=keep,
         duration_s=duration,
         groups=tuple(group or ()),
     )
     console.print(f"seed {drawn}; {describe()}.", highlight=False)
-    console.print(f"Each truth is committed to in {out / 'commitments.csv'} before its solver starts.", highlight=False)
+    console.print(
+        f"A digest of each ground truth is written to {out / 'commitments.csv'} before its solver starts.",
+        highlight=False,
+    )
     try:
         outcomes = _run(batch, console)
     except ProofError as error:

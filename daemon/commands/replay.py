@@ -1,4 +1,4 @@
-"""`regolithd replay`: feed a log through the same pipeline, and get the same numbers."""
+"""`regolithd replay`: recompute all estimates from a candump log and compare them with the recording."""
 
 from __future__ import annotations
 
@@ -10,17 +10,22 @@ import typer
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command(help="Compute everything anew from a log, and compare it with what was recorded then.")(replay)
+    app.command("replay")(replay)
 
 
 def replay(
-    logs: Annotated[list[Path], typer.Argument(help="candump logs, in their order", exists=True, dir_okay=False)],
+    logs: Annotated[
+        list[Path], typer.Argument(help="candump logs, in chronological order.", exists=True, dir_okay=False)
+    ],
     config: Annotated[
-        Path | None, typer.Option(help="the rover's configuration; else the one in the recording beside the first log")
+        Path | None, typer.Option(help="The rover.toml; default: the one in the MCAP file beside the first log.")
     ] = None,
-    model: Annotated[Path | None, typer.Option(help="estimate with this network instead")] = None,
+    model: Annotated[Path | None, typer.Option(help="ONNX terrain network to use instead.")] = None,
 ) -> None:
-    """Print what came of it; status 1 where a number is not the same as then."""
+    """Recompute all estimates from candump logs, and compare them with the recording (MCAP) beside the first log.
+
+    Prints counters and a digest of all numbers. Exit status 1 if a recorded message differs.
+    """
     from regolithd.daemon.recording.progress import open_text
     from regolithd.daemon.recording.replay import replay_logs
     from regolithd.daemon.setup import configuration_or_exit, models_or_exit, recorded_configuration
@@ -46,7 +51,7 @@ def replay(
         typer.echo(f"DIFFERENT from the recording in {len(result.different)} messages:", err=True)
         for line in result.different[:5]:
             typer.echo(f"  {line}", err=True)
-        typer.echo("Another configuration or network, or the log before this one is missing?", err=True)
+        typer.echo("Possible causes: another configuration or network, or the preceding log is missing.", err=True)
         raise typer.Exit(1)
     if result.compared:
         typer.echo(f"identical  to the last bit with the {result.compared} messages recorded then")

@@ -1,4 +1,4 @@
-"""`regolithd reproduce`: recompute the paper's results and write them beside the published ones."""
+"""`regolithd reproduce`: recompute the paper's figures and write the page that compares them."""
 
 from __future__ import annotations
 
@@ -10,18 +10,20 @@ import typer
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command(help="Recompute the paper's results and write the page that compares them.")(reproduce)
+    app.command("reproduce")(reproduce)
 
 
 def reproduce(
-    docs: Annotated[Path, typer.Option(help="where page and pictures go")] = Path("docs"),
-    figures: Annotated[Path, typer.Option(help="the figures, one flat JSON object")] = Path(
+    docs: Annotated[Path, typer.Option(help="Folder for page and pictures.")] = Path("docs"),
+    figures: Annotated[Path, typer.Option(help="Write the figures here, as one JSON object.")] = Path(
         "build/figures/reproduce.json"
     ),
-    sizing: Annotated[Path, typer.Option(help="what `regolithd sizing` found")] = Path("build/figures/sizing.json"),
-    trainings: Annotated[int, typer.Option(min=2, help="networks of the paper's size")] = 20,
+    sizing: Annotated[Path, typer.Option(help="Figures of `regolithd sizing`, if it has run.")] = Path(
+        "build/figures/sizing.json"
+    ),
+    trainings: Annotated[int, typer.Option(min=2, help="Number of networks of the paper's size.")] = 20,
 ) -> None:
-    """Train, drive the synthetic traverse, compare."""
+    """Recompute the paper's figures, and write docs/reproduction.md, which compares them with the published ones."""
     import json
 
     import numpy as np

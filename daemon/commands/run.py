@@ -1,4 +1,4 @@
-"""`regolithd run`: the daemon."""
+"""`regolithd run`: run the daemon."""
 
 from __future__ import annotations
 
@@ -14,14 +14,19 @@ if TYPE_CHECKING:
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command(help="Acquire, estimate, record and publish, until stopped.")(run)
+    app.command("run")(run)
 
 
 def run(
-    config: Annotated[Path, typer.Option(help="the rover's configuration")] = Path("/etc/regolithd/rover.toml"),
-    verbose: Annotated[bool, typer.Option("--verbose", help="say more in the journal")] = False,
+    config: Annotated[Path, typer.Option(help="The rover's configuration (rover.toml).")] = Path(
+        "/etc/regolithd/rover.toml"
+    ),
+    verbose: Annotated[bool, typer.Option("--verbose", help="Log at level DEBUG.")] = False,
 ) -> None:
-    """Run until SIGTERM or Ctrl-C; then the drives stop, the recording is closed and `offline` is published."""
+    """Run the daemon: acquire, estimate, record and publish until SIGTERM or Ctrl-C.
+
+    At its end it stops the drives, closes the recording and publishes `offline`.
+    """
     import asyncio
     import logging
 
@@ -51,4 +56,4 @@ async def _run(configuration: Configuration, models: OnnxModels) -> None:
         asyncio.get_running_loop().add_signal_handler(number, task.cancel)
     await asyncio.wait([task])
     if not task.cancelled():
-        task.result()  # a bug: its traceback goes to the journal, and systemd starts us again
+        task.result()  # raises after a bug: the traceback goes to the journal, and systemd restarts the daemon

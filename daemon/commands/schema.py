@@ -1,4 +1,4 @@
-"""`regolithd schema`: write down what is published, from the models that publish it."""
+"""`regolithd schema`: write AsyncAPI document and JSON Schemas of the MQTT messages."""
 
 from __future__ import annotations
 

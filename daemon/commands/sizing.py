@@ -1,4 +1,4 @@
-"""`regolithd sizing`: the paper's study of the network's size, all of it."""
+"""`regolithd sizing`: repeat the paper's study of the number of hidden neurons."""
 
 from __future__ import annotations
 
@@ -10,17 +10,24 @@ import typer
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command(help="Run the paper's sizing study; interrupt it and it goes on from there.")(sizing)
+    app.command("sizing")(sizing)
 
 
 def sizing(
-    out: Annotated[Path, typer.Option(help="the figures, one flat JSON object")] = Path("build/figures/sizing.json"),
-    log: Annotated[Path, typer.Option(help="what is done so far")] = Path("build/sizing/outcomes.jsonl"),
-    trainings: Annotated[int, typer.Option(min=2, help="of each size")] = 100,
-    epochs: Annotated[int, typer.Option(min=1, help="the most epochs of one training")] = 10_000,
-    timing_epochs: Annotated[int, typer.Option(min=1, help="epochs timed, ours and scikit-learn's")] = 1000,
+    out: Annotated[Path, typer.Option(help="Write the figures here, as one JSON object.")] = Path(
+        "build/figures/sizing.json"
+    ),
+    log: Annotated[Path, typer.Option(help="Log of finished trainings (JSON lines).")] = Path(
+        "build/sizing/outcomes.jsonl"
+    ),
+    trainings: Annotated[int, typer.Option(min=2, help="Trainings of each size.")] = 100,
+    epochs: Annotated[int, typer.Option(min=1, help="Maximum number of epochs of one training.")] = 10_000,
+    timing_epochs: Annotated[int, typer.Option(min=1, help="Epochs of the comparison with scikit-learn.")] = 1000,
 ) -> None:
-    """Train, log, summarise, and time a slice of it against scikit-learn."""
+    """Repeat the paper's sizing study: mean MSE against the number of hidden neurons.
+
+    An interrupted study is continued from its log. At its end the training speed is compared with scikit-learn's.
+    """
     import json
     import time
 
@@ -55,10 +62,10 @@ def sizing(
                 outcomes.append(outcome)
                 progress.update(task, advance=1, description=f"3:{outcome.neurons}:2")
     except KeyboardInterrupt:
-        typer.echo(f"stopped; {log} holds what is done. Run it again to go on.", err=True)
+        typer.echo(f"Interrupted; finished trainings are in {log}. Run the command again to continue.", err=True)
         raise typer.Exit(130) from None
     seconds = time.perf_counter() - start
-    typer.echo("timing a slice against scikit-learn …")
+    typer.echo("comparing training speed with scikit-learn …")
     speed = compare_speed(pairs, log.parent, timing_epochs)
     best = study_of.best_size(outcomes)
     found = figures(study, outcomes, speed)

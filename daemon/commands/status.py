@@ -1,4 +1,4 @@
-"""`regolithd status`: how the running daemon and its nodes are."""
+"""`regolithd status`: show the state of the running daemon and its nodes."""
 
 from __future__ import annotations
 
@@ -15,15 +15,18 @@ if TYPE_CHECKING:
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command()(status)
+    app.command("status")(status)
 
 
 def status(
     *,
     config: Annotated[Path | None, typer.Option(help="The rover.toml of the running daemon.")] = None,
-    json: Annotated[bool, typer.Option("--json", help="As the daemon says it.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print the daemon's answer as JSON.")] = False,
 ) -> None:
-    """Show the running daemon's nodes, broker and traverse. The exit status is 0 while every node is operational."""
+    """Show the running daemon's nodes, broker connection and traverse.
+
+    Exit status: 0 if every node is operational, else 1.
+    """
     from regolithd.daemon.control.client import converse
 
     raise typer.Exit(converse(config, lambda path: _status(path, as_json=json)))
@@ -39,7 +42,7 @@ async def _status(path: Path, *, as_json: bool) -> int:
         daemon.ask(StatusRequest())
         reply = await daemon.reply()
     if not isinstance(reply, Status):
-        typer.echo(f"The daemon answered something else: {reply}", err=True)
+        typer.echo(f"Unexpected answer of the daemon: {reply}", err=True)
         return 1
     if as_json:
         typer.echo(reply.model_dump_json(indent=2))
@@ -63,7 +66,7 @@ def _table(status: Status) -> Table:
     from rich import box
     from rich.table import Table
 
-    table = Table("node", "kind", "wheel", "phase", "drive", "what is wrong", box=box.SIMPLE_HEAD, expand=True)
+    table = Table("node", "kind", "wheel", "phase", "drive", "problem", box=box.SIMPLE_HEAD, expand=True)
     colours = {"operational": "green", "booting": "yellow"}
     for node in status.nodes:
         colour = colours.get(node.phase, "red")

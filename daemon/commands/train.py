@@ -1,4 +1,4 @@
-"""`regolithd train`: the paper's network, trained and frozen to ONNX."""
+"""`regolithd train`: train the paper's network and write it as ONNX."""
 
 from __future__ import annotations
 
@@ -10,18 +10,22 @@ import typer
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command(help="Train the paper's network on its 504 pairs and freeze it to ONNX.")(train)
+    app.command("train")(train)
 
 
 def train(
-    out: Annotated[Path, typer.Option(help="where the network goes")] = Path("calibration/models/terrain.onnx"),
-    config: Annotated[Path | None, typer.Option(help="take the tables drivetrain and wheel from this TOML")] = None,
-    neurons: Annotated[int, typer.Option(min=1, help="hidden neurons")] = 64,
-    trainings: Annotated[int, typer.Option(min=1, help="how many to train; the one with the lowest MSE is kept")] = 100,
-    epochs: Annotated[int, typer.Option(min=1, help="the most epochs of one training")] = 10_000,
-    seed: Annotated[int, typer.Option(help="of the order of the pairs and of the initial weights")] = 1,
+    out: Annotated[Path, typer.Option(help="Write the network here (ONNX).")] = Path("calibration/models/terrain.onnx"),
+    config: Annotated[
+        Path | None, typer.Option(help="TOML with the tables drivetrain and wheel; default: Kapvik.")
+    ] = None,
+    neurons: Annotated[int, typer.Option(min=1, help="Number of hidden neurons.")] = 64,
+    trainings: Annotated[
+        int, typer.Option(min=1, help="Number of trainings; the network with the lowest MSE is kept.")
+    ] = 100,
+    epochs: Annotated[int, typer.Option(min=1, help="Maximum number of epochs of one training.")] = 10_000,
+    seed: Annotated[int, typer.Option(help="Seed of pair order and initial weights.")] = 1,
 ) -> None:
-    """Train `trainings` networks and keep the best."""
+    """Train the paper's network on its 504 input–output pairs, and write it as ONNX."""
     import tomllib
 
     import numpy as np

@@ -1,4 +1,4 @@
-"""`regolithd train-posterior`: the network that says how sure it is, trained on simulated rovers and frozen to ONNX."""
+"""`regolithd train-posterior`: train the posterior network on simulated rovers and write it as ONNX."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import typer
 
 def register(app: typer.Typer) -> None:
     """Add the command."""
-    app.command(name="train-posterior", help="Train the posterior on simulated rovers and freeze it to ONNX.")(
-        train_posterior
-    )
+    app.command("train-posterior")(train_posterior)
 
 
 def train_posterior(
-    out: Annotated[Path, typer.Option(help="where the network goes")] = Path("calibration/models/posterior.onnx"),
-    rovers: Annotated[int, typer.Option(min=1000, help="how many windows to simulate")] = 1_500_000,
-    steps: Annotated[int, typer.Option(min=50, help="how many steps of Adam")] = 40_000,
-    seed: Annotated[int, typer.Option(help="of rovers and initial weights")] = 1,
+    out: Annotated[Path, typer.Option(help="Write the network here (ONNX).")] = Path(
+        "calibration/models/posterior.onnx"
+    ),
+    rovers: Annotated[int, typer.Option(min=1000, help="Number of simulated windows.")] = 1_500_000,
+    steps: Annotated[int, typer.Option(min=50, help="Number of optimiser steps (Adam).")] = 40_000,
+    seed: Annotated[int, typer.Option(help="Seed of rovers and initial weights.")] = 1,
 ) -> None:
-    """Simulate, fit, freeze: some minutes on two cores."""
+    """Train the posterior network on simulated rovers, and write it as ONNX. Takes some minutes on two cores."""
     import numpy as np
     import onnx
     from rich.progress import Progress

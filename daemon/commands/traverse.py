@@ -1,4 +1,4 @@
-"""`regolithd traverse`: drive so far, at constant wheel speed; and `regolithd stop`."""
+"""`regolithd traverse`: drive a distance at constant wheel speed; `regolithd stop`: stop the wheels."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ INTERRUPTED = 130
 
 def register(app: typer.Typer) -> None:
     """Add the commands."""
-    app.command()(traverse)
-    app.command()(stop)
+    app.command("traverse")(traverse)
+    app.command("stop")(stop)
 
 
 def traverse(
     *,
-    distance: Annotated[float, typer.Option(help="How far the wheels' rims move, in metres.")],
-    speed: Annotated[float, typer.Option(help="How fast, in m/s; negative: backwards.")] = 0.022,
+    distance: Annotated[float, typer.Option(help="Distance of the wheels' rims in m.")],
+    speed: Annotated[float, typer.Option(help="Speed of the wheels' rims in m/s; negative: backwards.")] = 0.022,
     config: Config = None,
 ) -> None:
-    """Drive DISTANCE at constant wheel SPEED through the running daemon, then stop clean.
+    """Drive a distance at constant wheel speed through the running daemon, then stop with the drives' ramp.
 
-    Ctrl-C, a lost node, or the end of this command in any other way quick-stops the wheels.
+    Ctrl-C, a lost node, or any other end of this command quick-stops the wheels.
     """
     from regolithd.daemon.control.client import converse
 
@@ -49,7 +49,7 @@ async def _traverse(path: Path, distance_m: float, speed_m_s: float) -> int:
 
     def interrupt() -> None:
         nonlocal interrupted
-        if interrupted:  # once more: be gone at once; the daemon quick-stops then too
+        if interrupted:  # a second Ctrl-C ends at once; the daemon quick-stops then too
             raise SystemExit(INTERRUPTED)
         interrupted = True
         daemon.ask(StopRequest(quick=True))
@@ -69,7 +69,7 @@ async def _traverse(path: Path, distance_m: float, speed_m_s: float) -> int:
 
 
 async def _follow(daemon: Conversation) -> Ended | Refused:
-    """Show how it goes until it ends."""
+    """Show the progress until the traverse has ended or was refused."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
     from regolithd.daemon.control.protocol import Ended, Refused
@@ -105,10 +105,10 @@ def _show(bar: Bar, reply: object) -> None:
 
 def stop(
     *,
-    quick: Annotated[bool, typer.Option("--quick", help="At once, instead of with the drives' ramp.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Quick stop instead of the drives' ramp.")] = False,
     config: Config = None,
 ) -> None:
-    """Stop the wheels, whoever commanded them."""
+    """Stop the wheels, also those of a traverse that another user commanded."""
     from regolithd.daemon.control.client import converse
 
     raise typer.Exit(converse(config, lambda path: _stop(path, quick=quick)))

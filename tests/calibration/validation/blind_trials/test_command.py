@@ -18,7 +18,7 @@ def prove(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
     """Run the command on four short recordings, with a solver that never finds anything."""
     solver = folder / "silent.py"
     solver.write_text(SILENT)
-    command = [sys.executable, "-m", "regolithd", "prove", "--recordings", "4", "--duration", "100", "--no-peers"]
+    command = [sys.executable, "-m", "regolithd", "prove", "--recordings", "4", "--duration", "100", "--no-baselines"]
     command += ["--solver", f"{sys.executable} {solver} {{answer}}", "--out", str(folder / "batch"), *options]
     environment = {**os.environ, "COLUMNS": "100", "NO_COLOR": "1"}
     return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
