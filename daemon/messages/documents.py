@@ -37,7 +37,8 @@ def _title(channel: Channel) -> str:
 
 
 def _summary(channel: Channel) -> str:
-    return (channel.message.__doc__ or "").strip().splitlines()[0]
+    """Return the first paragraph of the message's docstring, as one line."""
+    return " ".join((channel.message.__doc__ or "").strip().split("\n\n")[0].split())
 
 
 def json_schemas() -> dict[str, dict[str, Any]]:
