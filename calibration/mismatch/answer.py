@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from regolithd.calibration.mismatch.candidates.candidate import Shape
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -130,15 +130,16 @@ class Curve:
 
     Attributes
     ----------
-    covariate, flavour: what it is plotted against; "drag" means along the direction of rotation, "gain" in proportion
-        to the prediction, "offset" as it is
+    covariate: what it is plotted against
+    coupling: "drag" for residual × sign of the speed, "gain" for residual × sign of the prediction, "offset" for the
+        residual as it is
     at, before, after: bin centres and mean residuals, shape (bin,)
     standard_error: of a bin's mean, with the noise's memory counted in, shape (bin,)
     wheels: the wheels that went into it
     """
 
     covariate: str
-    flavour: str
+    coupling: str
     at: Array
     before: Array
     after: Array
@@ -160,6 +161,10 @@ class Evidence:
     curves: the residual against every covariate, the most telling first
     values: the simulation's parameters where the recording put them
     contributions: the terms of `--corrected`
+    problem: what the candidates' columns are computed from; None draws no curve of an effect's own wheels
+    candidates: those that were looked for, for their labels
+    covariate_labels: axis labels with units, as the simulation gives them
+    wheel_column: what the recording calls a wheel, an axis or a side
     """
 
     channel: str
@@ -176,3 +181,6 @@ class Evidence:
     values: Mapping[str, float]
     contributions: tuple[Contribution, ...]
     problem: Problem | None = field(default=None, repr=False)
+    candidates: tuple[Candidate, ...] = field(default=(), repr=False)
+    covariate_labels: Mapping[str, str] = field(default_factory=dict, repr=False)
+    wheel_column: str = "wheel"

@@ -107,7 +107,13 @@ def compare(
             *_not_looked_for(problem, candidates, [c.name for c in fitting]),
         ),
     )
-    return Comparison(answer, _evidence(decision))
+    evidence = replace(
+        _evidence(decision),
+        candidates=tuple(candidates),
+        covariate_labels=simulation.covariate_labels,
+        wheel_column=simulation.wheel_column,
+    )
+    return Comparison(answer, evidence)
 
 
 def _only_proposed(problem: Problem, group: Group) -> bool:

@@ -66,7 +66,7 @@ class Candidate:
     equation: ClassVar[str]
     """The law, as text, for the answer and the report."""
     words: ClassVar[str]
-    """A noun phrase in lower case that begins the answer's sentence: "drag that grows with the wheel's speed"."""
+    """A noun phrase in lower case that begins the answer's sentence: "drag that grows with speed"."""
     signature: ClassVar[str]
     """What the effect looks like in a residual, for the documentation."""
     experiment: ClassVar[str]

@@ -18,12 +18,13 @@ class CoulombFriction(Candidate):
     name = "coulomb-friction"
     covariate = "direction"
     equation = "ΔI = I_c sign(ω)"
-    words = "constant drag against rotation (no-load current)"
+    words = "constant drag against the motion (Coulomb friction, no-load current)"
     signature = "a residual of constant size that changes sign with the direction of rotation"
     experiment = "drive the same stretch forwards and backwards at one speed"
     source = "Maxon RE 25: no-load current about 37 mA; harmonic drives add their starting torque"
     requires = ("direction",)
     label = "Coulomb friction"
+    parameter_labels: ClassVar = {"coulomb_current": "Coulomb friction"}
     coefficients: ClassVar = (Coefficient("coulomb_current", "{unit}"),)
 
     def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002

@@ -34,6 +34,7 @@ class StribeckFriction(Candidate):
     source = "Armstrong-Hélouvry, Dupont and Canudas de Wit (1994): δ from 1 to 2; Hess and Soom (1990): the quotient"
     requires = ("wheel_speed",)
     label = "Stribeck friction"
+    parameter_labels: ClassVar = {"stribeck_current": "Stribeck friction", "stribeck_speed_rad_s": "Stribeck speed"}
     coefficients: ClassVar = (Coefficient("stribeck_current", "{unit}"),)
     free: ClassVar = {"stribeck_speed_rad_s": (0.0, np.inf)}
 

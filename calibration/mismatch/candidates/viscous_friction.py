@@ -20,7 +20,7 @@ class ViscousFriction(Candidate):
     name = "viscous-friction"
     covariate = "wheel_speed"
     equation = "ΔI = b sign(ω) |ω|^p"
-    words = "drag that grows with the wheel's speed"
+    words = "drag that grows with speed"
     signature = "a residual along sign(ω) that rises with |ω| and vanishes towards standstill"
     experiment = "drive a staircase of at least four constant speeds, from creeping to full speed, both ways"
     source = "grease viscosity; power 0.7 (shear-thinning) to 1.4 (churning)"

@@ -1,4 +1,4 @@
-"""The little drawing that the report needs: scales, ticks and marks as inline SVG that follows the page's colours."""
+"""Scales, ticks and marks as inline SVG; colours come from the page's classes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Panel:
 
 
 def ticks(low: float, high: float, about: int = 5) -> list[float]:
-    """Return round numbers between two values, about as many as asked for."""
+    """Return about `about` round numbers between two values: multiples of 1, 2, 2.5 or 5 times a power of ten."""
     span = high - low
     if about == 0:
         return []
@@ -50,7 +50,7 @@ def ticks(low: float, high: float, about: int = 5) -> list[float]:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """Return a number as people write it: a true minus, no exponent where it can be helped."""
+    """Return a number with a minus sign (U+2212), and without an exponent from 1e-5 to 1e7."""
     if not np.isfinite(value):
         return "–"
     text = f"{value:.{digits}g}"
@@ -79,7 +79,7 @@ def line(points: Sequence[tuple[float, float]], kind: str) -> str:
 
 
 def box(panel: Panel, kind: str = "ground") -> str:
-    """Return the panel's ground."""
+    """Return the panel's background."""
     return (
         f'<rect class="{kind}" x="{panel.left:.1f}" y="{panel.top:.1f}" '
         f'width="{panel.width:.1f}" height="{panel.height:.1f}"/>'
@@ -105,7 +105,7 @@ def axes(panel: Panel, x_label: str, y_label: str, *, x_about: int = 6, y_about:
 
 
 def svg(width: float, height: float, parts: Sequence[str], label: str) -> str:
-    """Return the drawing, with words for those who cannot see it."""
+    """Return the drawing, with `label` for screen readers."""
     return (
         f'<svg viewBox="0 0 {width:.0f} {height:.0f}" role="img" aria-label="{escape(label)}" '
         f'xmlns="http://www.w3.org/2000/svg">{"".join(parts)}</svg>'

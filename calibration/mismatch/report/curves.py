@@ -1,4 +1,4 @@
-"""The residual of the wheels that an effect is on, against the covariate that orders it: what its section shows."""
+"""The residual of an effect's wheels against the covariate that it depends on."""
 
 from __future__ import annotations
 
@@ -14,20 +14,23 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Array, Evidence
 
 BINS = 22
+"""Bins of a curve (a choice: some 35 px each)."""
+LEAST_IN_A_BIN = 10
+"""Values in a bin on average, below which no curve is drawn (a choice)."""
 BLOCK_S = 30.0
-SIGNED = frozenset({"pitch", "none", "wheel_acceleration"})
-"""Covariates along which an effect has a sign of its own, whatever the direction of rotation."""
-INSTEAD = {"direction": "wheel_speed", "none": "time"}
-"""What shows an effect better than its own covariate, which has too few values."""
+"""Length of the blocks that the noise is summed over [s]: several of its autocorrelation times (a choice)."""
+SUBSTITUTES = {"direction": "wheel_speed", "none": "time"}
+"""Covariates with too few values for a curve, and the one that shows the effect in their place."""
 
 
-def curve_of(evidence: Evidence, covariate: str, wheels: Sequence[int]) -> Curve | None:
-    """Return the residual before and after on these wheels alone; None where it cannot be drawn.
+def curve_of(evidence: Evidence, covariate: str, wheels: Sequence[int], *, along_motion: bool = True) -> Curve | None:
+    """Return the mean residual of these wheels in bins of a covariate, before and after the effects.
 
-    Bins share the data evenly; a covariate with few values (a row of wheels) has one bin for each.
+    Bins hold equal numbers of values; a covariate with few distinct values (a row of wheels) has one bin for each.
+    With `along_motion` the residual is multiplied by the sign of the speed. None where there is nothing to draw.
     """
     problem = evidence.problem
-    shown = INSTEAD.get(covariate, covariate)
+    shown = SUBSTITUTES.get(covariate, covariate)
     if problem is None or covariate == "wheel_angle":
         return None
     values = _covariate(evidence, shown)
@@ -35,9 +38,9 @@ def curve_of(evidence: Evidence, covariate: str, wheels: Sequence[int]) -> Curve
         return None
     on = np.isin(np.asarray(evidence.wheels), list(wheels))
     known = np.isfinite(evidence.before) & np.isfinite(values) & on
-    signed = covariate in SIGNED or "direction" not in problem.covariates
-    along = np.where(signed or covariate == "direction", 1.0, problem.covariates.get("direction", np.ones(known.shape)))
-    if known.sum() < 10 * BINS:
+    drag = along_motion and covariate != "direction" and "direction" in problem.covariates
+    along = problem.covariates["direction"] if drag else np.ones(known.shape)
+    if known.sum() < LEAST_IN_A_BIN * BINS:
         return None
     edges = _edges(values[known])
     if len(edges) < 3:
@@ -50,9 +53,7 @@ def curve_of(evidence: Evidence, covariate: str, wheels: Sequence[int]) -> Curve
     )
     at = np.bincount(which, values[known], len(edges) - 1) / count
     error = _noise(evidence, known) / np.sqrt(count)
-    return Curve(
-        shown, "offset" if signed or covariate == "direction" else "drag", at, before, after, error, tuple(wheels)
-    )
+    return Curve(shown, "drag" if drag else "offset", at, before, after, error, tuple(wheels))
 
 
 def _covariate(evidence: Evidence, name: str) -> Array | None:
@@ -65,7 +66,7 @@ def _covariate(evidence: Evidence, name: str) -> Array | None:
 
 
 def _edges(values: Array) -> Array:
-    """Return bin edges that share the data evenly, or part a few distinct values."""
+    """Return bin edges that hold equal numbers of values, or separate a few distinct ones."""
     distinct = np.unique(values[:: max(len(values) // 5000, 1)])
     if len(distinct) <= BINS // 2:
         middles = (distinct[1:] + distinct[:-1]) / 2
@@ -74,7 +75,7 @@ def _edges(values: Array) -> Array:
 
 
 def _noise(evidence: Evidence, known: np.ndarray) -> float:
-    """Return the standard deviation that a mean of n values has, times √n: the noise's memory is in it."""
+    """Return the standard deviation of a mean of n values times √n, the noise's autocorrelation included."""
     block = (evidence.time_s // BLOCK_S).astype(np.int64)
     left = np.where(known, evidence.measured - evidence.after, 0.0)
     count = int(block.max()) + 1

@@ -1,4 +1,4 @@
-"""The report's pictures: wheels × time, the residual against what orders it, and the error before and after."""
+"""The report's drawings: residual over wheels and time, residual against a covariate, held-out error, intervals."""
 
 from __future__ import annotations
 
@@ -7,71 +7,63 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.report.axes import Panel, axes, box, line, number, svg, text
+from regolithd.calibration.mismatch.report.labels import scaled
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from regolithd.calibration.mismatch.answer import Answer, Curve, Evidence
     from regolithd.calibration.mismatch.report.axes import Array
+    from regolithd.calibration.mismatch.report.labels import Labels
 
 WIDTH = 800.0
+"""Of a drawing over the page's whole width [px]."""
 FULL_COLOUR = 6.0
-"""Standard errors at which the map's colour is full."""
+"""Standard errors at which a cell has its full colour (a choice: twice what noise seldom passes)."""
+OPACITY_POWER = 1.2
+"""Opacity goes with this power of the standard errors, so that noise stays pale (a choice)."""
+FAINTEST = 0.02
+"""Opacity below which a cell is not drawn: it could not be seen."""
 
-COVARIATES = {
-    "time": "time (min)",
-    "wheel_speed": "wheel speed (rad/s)",
-    "direction": "direction of rotation",
-    "temperature": "motor temperature (°C)",
-    "torque": "torque carried (as the simulation predicts it)",
-    "wheel_acceleration": "wheel acceleration (rad/s²)",
-    "wheel_angle": "wheel angle (rad)",
-    "pitch": "pitch (rad, nose up)",
-    "roll": "roll (rad, right side down)",
-    "yaw_rate": "yaw rate (rad/s, to the left)",
-    "slip": "slip",
-    "load": "load (N)",
-    "voltage": "bus voltage (V)",
-    "wheel_row": "wheel row (front to rear)",
-    "none": "all of it",
-}
-FLAVOURS = {"drag": "along the rotation", "gain": "along the prediction", "offset": "signed"}
+COUPLINGS = {"drag": "residual × sign of speed", "gain": "residual × sign of prediction", "offset": "residual"}
+"""What the vertical axis of a curve shows, by the curve's coupling."""
 
 
-def scaled(unit: str) -> tuple[float, str]:
-    """Return the factor and unit in which people read a value: a motor's current in milliamperes."""
-    return (1000.0, "m" + unit) if unit.split(" ", maxsplit=1)[0] == "A" else (1.0, unit)
-
-
-def covariate_label(name: str) -> str:
-    """Return a covariate as an axis names it."""
-    return COVARIATES.get(name, name.replace("_", " "))
-
-
-def map_figure(answer: Answer, evidence: Evidence) -> str:
-    """Draw each wheel's residual along time, before and after the effects, in standard errors."""
-    time_min = evidence.map_time_s / 60
-    edges = _edges(time_min)
+def map_figure(answer: Answer, evidence: Evidence, labels: Labels) -> str:
+    """Draw each wheel's residual over time in standard errors, before and after the effects."""
+    edges = _edges(evidence.map_time_s * labels.time_factor)
     rows = len(evidence.wheels)
     high, left, gap = 18.0, 84.0, 40.0
     wide = WIDTH - left - 12
-    words = ("calibrated simulation", "with the effects in it")[: 2 if answer.effects else 1]
-    tops = [26.0 + k * (high * rows + gap) for k in range(len(words))]
+    headings = ("calibrated simulation", "with the effects added")[: 2 if answer.effects else 1]
+    tops = [26.0 + k * (high * rows + gap) for k in range(len(headings))]
     panels = [Panel(left, top, wide, high * rows, (edges[0], edges[-1]), (0, rows)) for top in tops]
     parts: list[str] = []
-    for panel, values, heading in zip(panels, (evidence.map_before, evidence.map_after), words, strict=False):
+    for panel, values, heading in zip(panels, (evidence.map_before, evidence.map_after), headings, strict=False):
         parts += [text(left, panel.top - 9, heading, kind="strong"), box(panel)]
         parts += _cells(panel, edges, values)
         for row, wheel in enumerate(evidence.wheels):
-            label = f"wheel {wheel}" if rows > 1 else "residual"
+            label = f"{labels.wheel} {wheel}" if rows > 1 else "residual"
             parts.append(text(left - 9, panel.top + high * (row + 0.5) + 4, label, anchor="end"))
+    parts += _onsets(answer, panels, labels)
+    last = panels[-1]
+    below = Panel(last.left, last.top, last.width, last.height, last.x, (0, 0))
+    parts += [axes(below, labels.axis("time"), "", y_about=0), *_colour_key(left + wide - 310, 8)]
+    return svg(
+        WIDTH, last.top + last.height + 44, parts, f"Residual of each {labels.wheel} over time, before and after"
+    )
+
+
+def _onsets(answer: Answer, panels: Sequence[Panel], labels: Labels) -> list[str]:
+    """Return a line through all panels and its label for each effect that begins at some time."""
+    parts = []
     for effect in answer.effects:
         if effect.onset_s is not None:
-            at = panels[0].at_x(effect.onset_s / 60)
+            onset = effect.onset_s * labels.time_factor
+            at, below = panels[0].at_x(onset), panels[0].top + panels[0].height + 15
             parts += [line([(at, p.top - 4), (at, p.top + p.height + 4)], "onset") for p in panels]
-            parts.append(text(at + 5, panels[0].top + panels[0].height + 15, f"onset {effect.onset_s / 60:.1f} min"))
-    last = panels[-1]
-    parts += [axes(Panel(last.left, last.top, last.width, last.height, last.x, (0, 0)), "time (min)", "", y_about=0)]
-    parts += _colour_key(left + wide - 250, 8)
-    return svg(WIDTH, last.top + last.height + 44, parts, "Residual of each wheel along time, before and after")
+            parts.append(text(at + 5, below, f"onset {onset:.1f} {labels.time_unit}"))
+    return parts
 
 
 def _edges(centres: Array) -> Array:
@@ -83,15 +75,15 @@ def _edges(centres: Array) -> Array:
 
 
 def _cells(panel: Panel, edges: Array, values: Array) -> list[str]:
-    """Return one rectangle for each block and wheel, stronger the further from noise."""
+    """Return one rectangle for each block and wheel, its opacity growing with the standard errors."""
     parts = []
     rows = values.shape[1]
     high = panel.height / rows
     for block, wheel in np.argwhere(np.isfinite(values)):
         x0, x1 = panel.at_x(edges[block]), panel.at_x(edges[block + 1])
         z = float(values[block, wheel])
-        opacity = min(abs(z) / FULL_COLOUR, 1.0) ** 1.2
-        if opacity < 0.02:
+        opacity = min(abs(z) / FULL_COLOUR, 1.0) ** OPACITY_POWER
+        if opacity < FAINTEST:
             continue
         parts.append(
             f'<rect class="{"more" if z > 0 else "less"}" fill-opacity="{opacity:.2f}" x="{x0:.1f}" '
@@ -101,26 +93,27 @@ def _cells(panel: Panel, edges: Array, values: Array) -> list[str]:
 
 
 def _colour_key(left: float, top: float) -> list[str]:
-    """Return the key: from drawn less than predicted to drawn more, in standard errors."""
-    parts = [text(left - 6, top + 10, "less than simulated", anchor="end")]
+    """Return the key of the colours, in standard errors."""
+    parts = [text(left - 6, top + 10, "measured below simulated", anchor="end")]
     for step in range(-6, 7):
-        kind, opacity = ("more" if step > 0 else "less"), (abs(step) / FULL_COLOUR) ** 1.2
+        kind, opacity = ("more" if step > 0 else "less"), (abs(step) / FULL_COLOUR) ** OPACITY_POWER
         x = left + 10 * (step + 6)
         parts.append(f'<rect class="ground" x="{x:.1f}" y="{top}" width="10" height="11"/>')
         parts.append(
             f'<rect class="{kind}" fill-opacity="{opacity:.2f}" x="{x:.1f}" y="{top}" width="10" height="11"/>'
         )
-    parts.append(text(left + 138, top + 10, "more (±6 s.e.)"))
+    parts.append(text(left + 138, top + 10, "above (±6 standard errors)"))
     return parts
 
 
 def curve_figure(
-    curve: Curve, unit: str, *, corrected: bool = True, width: float = WIDTH, height: float = 270.0
+    curve: Curve, unit: str, labels: Labels, *, corrected: bool = True, width: float = WIDTH, height: float = 270.0
 ) -> str:
     """Draw the residual against a covariate: before with its error bars, and after, if it was corrected."""
     factor, shown = scaled(unit)
     small = width < 500
-    centre = curve.at / 60 if curve.covariate == "time" else curve.at
+    centre = curve.at * labels.time_factor if curve.covariate == "time" else curve.at
+    across = labels.axis(curve.covariate)
     before, after, spread = factor * curve.before, factor * curve.after, 2 * factor * curve.standard_error
     known = np.isfinite(before)
     if not known.any():
@@ -134,7 +127,7 @@ def curve_figure(
     panel = Panel(
         left, 12, width - left - 12, height - 62, (ends[0] - air, ends[1] + air), (low - margin, high + margin)
     )
-    label = "" if small else f"residual ({shown}, {FLAVOURS.get(curve.flavour, curve.flavour)})"
+    label = "" if small else f"{COUPLINGS.get(curve.coupling, curve.coupling)} ({shown})"
     parts = [box(panel), line([(panel.left, panel.at_y(0)), (panel.left + panel.width, panel.at_y(0))], "zero")]
     for x, y, e in zip(centre[known], before[known], spread[known], strict=True):
         at = panel.at_x(x)
@@ -146,10 +139,8 @@ def curve_figure(
         parts += [
             f'<circle class="{kind}" cx="{x:.1f}" cy="{y:.1f}" r="{radius}"/>' for x, y in xy if np.isfinite(x + y)
         ]
-    parts.append(
-        axes(panel, covariate_label(curve.covariate), label, x_about=4 if small else 7, y_about=3 if small else 5)
-    )
-    return svg(width, height, parts, f"Residual against {covariate_label(curve.covariate)}, before and after")
+    parts.append(axes(panel, across, label, x_about=4 if small else 7, y_about=3 if small else 5))
+    return svg(width, height, parts, f"Residual against {across}, before and after")
 
 
 def fit_figure(answer: Answer, unit: str) -> str:
@@ -188,4 +179,4 @@ def interval_figure(value: float, low: float, high: float) -> str:
     parts.append(line([(panel.at_x(low), 8), (panel.at_x(high), 8)], "before line"))
     parts.append(f'<circle class="before" cx="{panel.at_x(value):.1f}" cy="8" r="3.2"/>')
     drawing = svg(140, 16, parts, "value and interval")
-    return drawing.replace("<svg ", '<svg style="width:140px;display:inline-block;vertical-align:middle" ', 1)
+    return drawing.replace("<svg ", '<svg class="interval" ', 1)

@@ -1,4 +1,4 @@
-"""The answer in plain sentences: what, where, how big, how sure, and what it costs to leave out."""
+"""The answer's sentence about one effect: what, on which wheels, since when, how large, and the error without it."""
 
 from __future__ import annotations
 
@@ -11,13 +11,25 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
 
 
+def listed(items: Sequence[str]) -> str:
+    """Return 'a', 'a and b', or 'a, b and c'."""
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def plural(noun: str) -> str:
+    """Return the plural: wheels, axes, bodies."""
+    if noun.endswith("is"):
+        return noun[:-2] + "es"
+    if noun.endswith("y"):
+        return noun[:-1] + "ies"
+    return noun + "s"
+
+
 def wheels_in_words(wheels: Sequence[int], of: int, kind: str = "wheel") -> str:
-    """Return 'all 6 wheels', 'wheel 4', 'wheels 1, 3 and 5'."""
+    """Return 'all 6 wheels', 'wheel 4', 'wheels 1, 3 and 5'; `kind` is the singular."""
     if len(wheels) == of:
-        return f"all {of} {kind}s" if of > 1 else f"the {kind}"
-    if len(wheels) == 1:
-        return f"{kind} {wheels[0]}"
-    return f"{kind}s {', '.join(map(str, wheels[:-1]))} and {wheels[-1]}"
+        return f"all {of} {plural(kind)}"
+    return f"{plural(kind) if len(wheels) > 1 else kind} {listed([str(wheel) for wheel in wheels])}"
 
 
 def statement(
@@ -28,15 +40,22 @@ def statement(
     errors: tuple[float, float],
     kind: str,
 ) -> str:
-    """Return one sentence about an effect."""
+    """Return one sentence about an effect.
+
+    Parameters
+    ----------
+    wheels: names of those that have it, of `of`; a column of the recording is a `kind` (wheel, axis, side)
+    parameters: with `relative_size`, and `onset_s` where it has an onset
+    errors: held-out root mean squares on these wheels without and with the effect
+    """
     size = parameters["relative_size"]
-    where = wheels_in_words(wheels, of, kind)
+    where = f", on {wheels_in_words(wheels, of, kind)}" if of > 1 else ""
     onset = parameters.get("onset_s")
     begins = f" from {onset.value:.0f} s on (90 % sure: {onset.low:.0f} to {onset.high:.0f} s)" if onset else ""
     costs = 100 * (errors[0] / errors[1] - 1) if errors[1] > 0 else 0.0
     words = candidate.words[:1].upper() + candidate.words[1:]
     return (
-        f"{words}, on {where}{begins}: {100 * size.value:.0f} % of the mean reading "
+        f"{words}{where}{begins}: {100 * size.value:.0f} % of the mean reading "
         f"(90 % sure: {100 * size.low:.0f} to {100 * size.high:.0f} %); "
         f"left out, it makes the held-out error there {costs:.1f} % larger."
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from side_forces import CANDIDATES, sideways
@@ -26,6 +26,12 @@ class SingleWheel(Simulation):
     channel, unit = "force_N", "N"
     wheel_column = "axis"
     inputs = ("load_N", "slip")
+    covariate_labels: ClassVar = {
+        "slip_angle": "slip angle (rad)",
+        "sinkage": "sinkage (mm)",
+        "load": "load (N)",
+        "sideways": "lateral part of the sliding direction",
+    }
     parameters: Mapping[str, Prior] = {"scale": Prior(1.0, 0.1)}
 
     def prepare(self, recording: Recording) -> Recording:

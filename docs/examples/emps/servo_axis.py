@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from asymmetric_friction import AsymmetricFriction
@@ -27,6 +27,7 @@ class ServoAxis(Simulation):
 
     channel, unit = "force_N", "N"
     inputs = ("acceleration_m_s2",)
+    covariate_labels: ClassVar = {"wheel_speed": "carriage speed (m/s)", "position": "carriage position (m)"}
     parameters: Mapping[str, Prior] = {"mass_kg": Prior(95.0, 5.0, "kg")}
 
     def prepare(self, recording: Recording) -> Recording:

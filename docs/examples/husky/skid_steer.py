@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -23,6 +23,12 @@ class SkidSteer(Simulation):
     channel, unit = "motor_current_A", "A"
     wheel_column = "wheel"
     inputs = ("rim_speed_m_s",)
+    covariate_labels: ClassVar = {
+        "wheel_speed": "rim speed (m/s)",
+        "yaw_rate": "yaw rate (rad/s)",
+        "pitch": "forward acceleration (g)",
+        "torque": "predicted motor current (A)",
+    }
     parameters: Mapping[str, Prior] = {
         "standing_A": Prior(2.0, 5.0, "A"),
         "per_speed_A_s_m": Prior(0.0, 20.0, "A s/m"),

@@ -23,7 +23,8 @@ from regolithd.calibration.mismatch.answer import (
 )
 from regolithd.calibration.mismatch.report.axes import number, ticks
 from regolithd.calibration.mismatch.report.curves import curve_of
-from regolithd.calibration.mismatch.report.page import Provenance, render_report, verdict_sentence, words
+from regolithd.calibration.mismatch.report.labels import Labels, verdict_sentence
+from regolithd.calibration.mismatch.report.page import Provenance, render_report
 
 FROM = Provenance("drive.csv", "SIM.toml", "ab" * 32, "cd" * 32, "regolithd mismatch drive.csv --simulation SIM.toml")
 WORN = Effect(
@@ -177,8 +178,8 @@ def test_an_effect_s_curve_shows_its_own_wheels(evidence: Evidence) -> None:
 
 def test_names_are_spoken_as_people_speak() -> None:
     """The last hyphen parts what it is from what it does; names of people are capital."""
-    assert words("multi-pass-compaction") == "multi-pass compaction"
-    assert words("coulomb-friction") == "Coulomb friction"
+    assert Labels().effect("multi-pass-compaction") == "multi-pass compaction"
+    assert Labels().effect("coulomb-friction") == "Coulomb friction"
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-0.02, 0.033), (5.0, 5.0), (-1800.0, 3600.0)])

@@ -1,0 +1,121 @@
+"""Text of the report: names of effects, covariates, wheels, units and times as people write them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.report.statements import listed, plural
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from regolithd.calibration.mismatch.answer import Answer, Evidence
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate
+
+COVARIATES = {
+    "wheel_speed": "speed",
+    "direction": "direction of motion",
+    "torque": "predicted value",
+    "wheel_acceleration": "acceleration",
+    "wheel_angle": "angle",
+    "voltage": "bus voltage",
+    "wheel_row": "row",
+    "none": "nothing (a constant)",
+}
+"""Names of covariates for a simulation that gives no labels of its own; the others read well as they are."""
+PARAMETERS = {"onset_s": "onset", "relative_size": "share of the mean reading"}
+"""Parameters that the engine adds to those of a candidate."""
+UNITS = {"degC": "°C", "1": ""}
+"""Units whose spelling in the answer is not the usual one."""
+LONGEST_IN_SECONDS = 180.0
+"""Recordings up to this long have their times in seconds, longer ones in minutes [s] (a choice)."""
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Names for one report.
+
+    Attributes
+    ----------
+    wheel: what a column of the recording is called: wheel, axis, side
+    covariates: axis labels with units, as the simulation gives them
+    candidates: by name
+    in_minutes: whether times are in minutes, or in seconds
+    """
+
+    wheel: str = "wheel"
+    covariates: Mapping[str, str] = field(default_factory=dict)
+    candidates: Mapping[str, Candidate] = field(default_factory=lambda: {c.name: c for c in library()})
+    in_minutes: bool = True
+
+    @classmethod
+    def of(cls, evidence: Evidence) -> Labels:
+        """Return the labels of the simulation that the evidence is about."""
+        in_minutes = float(evidence.time_s[-1] - evidence.time_s[0]) > LONGEST_IN_SECONDS
+        candidates = {candidate.name: candidate for candidate in evidence.candidates or library()}
+        return cls(evidence.wheel_column, evidence.covariate_labels, candidates, in_minutes)
+
+    @property
+    def time_unit(self) -> str:
+        """Unit of times: min or s."""
+        return "min" if self.in_minutes else "s"
+
+    @property
+    def time_factor(self) -> float:
+        """Factor from seconds to `time_unit`."""
+        return 1 / 60 if self.in_minutes else 1.0
+
+    def effect(self, name: str) -> str:
+        """Return an effect's label; of a parameter's effect the name with spaces."""
+        candidate = self.candidates.get(name)
+        return candidate.label if candidate else name.replace("-", " ").replace("_", " ")
+
+    def axis(self, covariate: str) -> str:
+        """Return a covariate's axis label, with its unit where that is known."""
+        if covariate == "time":
+            return f"time ({self.time_unit})"
+        named = COVARIATES.get(covariate, covariate.replace("_", " "))
+        return self.covariates.get(covariate, named)
+
+    def covariate(self, name: str) -> str:
+        """Return a covariate's name in a sentence, without its unit."""
+        return self.axis(name).split(" (")[0] if name != "none" else COVARIATES[name]
+
+    def parameter(self, effect: str, name: str) -> str:
+        """Return the label of an effect's parameter."""
+        candidate = self.candidates.get(effect)
+        own = candidate.parameter_labels.get(name) if candidate else None
+        return own or PARAMETERS.get(name) or self.effect(name)
+
+    def wheels(self, wheels: Sequence[int], everything: Sequence[int]) -> str:
+        """Return 'all 6 wheels', 'wheel 4' or 'wheels 1, 3'; nothing where the machine has one alone."""
+        if len(wheels) == len(everything):
+            return f"all {len(wheels)} {plural(self.wheel)}" if len(wheels) > 1 else ""
+        return f"{plural(self.wheel) if len(wheels) > 1 else self.wheel} {', '.join(map(str, wheels))}"
+
+
+def capital(sentence: str) -> str:
+    """Return the sentence with its first letter as a capital."""
+    return sentence[:1].upper() + sentence[1:]
+
+
+def scaled(unit: str) -> tuple[float, str]:
+    """Return factor and unit in which a value is shown: currents in milliampere, the others as they are."""
+    return (1000.0, "m" + unit) if unit.split(" ", maxsplit=1)[0] == "A" else (1.0, UNITS.get(unit, unit))
+
+
+def verdict_sentence(answer: Answer, labels: Labels | None = None) -> str:
+    """Return the verdict in one sentence."""
+    labels = labels or Labels()
+    names = list(dict.fromkeys(labels.effect(effect.name) for effect in answer.effects))
+    if answer.verdict == "consistent":
+        return "Simulation and recording agree to within the noise."
+    if answer.verdict == "missing-physics":
+        return f"The simulation leaves out {listed(names)}."
+    covariates = list(dict.fromkeys(labels.covariate(place.covariate) for place in answer.unexplained))
+    place = f" that depends on {listed(covariates)}" if covariates else ""
+    if names:
+        return f"The simulation leaves out {listed(names)} – and something{place} that no known effect explains."
+    return f"The simulation leaves out something{place}, and no known effect explains it."

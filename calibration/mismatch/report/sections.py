@@ -1,0 +1,243 @@
+"""What each section of the report shows: numbers and drawings, ready for the template."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from markupsafe import Markup
+
+from regolithd.calibration.mismatch.report.axes import number
+from regolithd.calibration.mismatch.report.curves import curve_of
+from regolithd.calibration.mismatch.report.figures import curve_figure, fit_figure, interval_figure, map_figure
+from regolithd.calibration.mismatch.report.labels import capital, scaled
+from regolithd.calibration.mismatch.report.statements import listed
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.answer import Answer, Curve, Effect, Evidence, Unexplained
+    from regolithd.calibration.mismatch.report.labels import Labels
+
+MOST_CURVES, MOST_OTHER_CURVES = 3, 8
+"""Drawings of the residual against what was found, and against the other covariates (a choice: two pages)."""
+SMALL_WIDTH, SMALL_HEIGHT = 390.0, 190.0
+"""Size of the small drawings, two in a row [px]."""
+NO_BREAK = "\u00a0"
+"""A space at which a line is not broken."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A drawing and what its caption says: the covariate, and the wheels (empty: the only one)."""
+
+    svg: Markup
+    covariate: str = ""
+    wheels: str = ""
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """A row of an effect's table: texts, and a drawing of the interval."""
+
+    label: str
+    value: str
+    low: str
+    high: str
+    unit: str
+    interval: Markup
+
+
+@dataclass(frozen=True)
+class EffectSection:
+    """One named effect."""
+
+    label: str
+    statement: str
+    equation: str
+    facts: tuple[str, ...]
+    rows: tuple[ParameterRow, ...]
+
+
+@dataclass(frozen=True)
+class UnexplainedSection:
+    """One structure in the residual that no candidate explains."""
+
+    covariate: str
+    facts: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class FitSection:
+    """Held-out errors as texts, and the share of the error variance above the noise floor that was removed [%]."""
+
+    before: str
+    after: str
+    floor: str
+    unit: str
+    removed: str
+    svg: Markup
+
+
+@dataclass(frozen=True)
+class ConfusionRow:
+    """Effects that predict the same here, and the experiment that tells them apart."""
+
+    effects: str
+    experiment: str
+
+
+@dataclass(frozen=True)
+class SensitivityRow:
+    """A candidate's smallest detectable effect; empty texts: it cannot be detected here."""
+
+    label: str
+    size: str
+    share: str
+
+
+def summary(evidence: Evidence, labels: Labels) -> tuple[tuple[str, str], ...]:
+    """Return what was compared, as pairs of a number and its noun."""
+    length = float(evidence.time_s[-1] - evidence.time_s[0]) * labels.time_factor
+    values = int(np.isfinite(evidence.before).sum())
+    everything = labels.wheels(evidence.wheels, evidence.wheels).removeprefix("all ")
+    count = [tuple(everything.split(" ", 1))] if everything else []
+    found = [*count, (number(length), labels.time_unit), (f"{values:,}", f"values of {evidence.channel} compared")]
+    return tuple((first, second) for first, second in found)
+
+
+def residual_map(answer: Answer, evidence: Evidence, labels: Labels) -> Markup:
+    """Return the drawing of each wheel's residual over time; empty where there are no blocks."""
+    return _safe(map_figure(answer, evidence, labels)) if len(evidence.map_time_s) else Markup("")
+
+
+def curves(answer: Answer, evidence: Evidence, labels: Labels) -> tuple[Figure, ...]:
+    """Return the residual against the covariate of everything that was found; else the curve that stands out most."""
+    places = [_effect_place(found, labels) for found in answer.effects]
+    places += [_unexplained_place(place, evidence) for place in answer.unexplained]
+    found = (curve_of(evidence, name, wheels, along_motion=along) for name, wheels, along in dict.fromkeys(places))
+    drawn = [curve for curve in found if curve is not None] or list(evidence.curves[:1])
+    return tuple(_curve(curve, answer, evidence, labels) for curve in drawn[:MOST_CURVES])
+
+
+def _effect_place(found: Effect, labels: Labels) -> tuple[str, tuple[int, ...], bool]:
+    """Return the covariate, the wheels, and whether the residual is to be multiplied by the sign of the speed."""
+    candidate = labels.candidates.get(found.name)
+    along = (candidate is None or candidate.along_motion) and found.covariate != "direction"
+    return found.covariate, found.wheels, along
+
+
+def _unexplained_place(place: Unexplained, evidence: Evidence) -> tuple[str, tuple[int, ...], bool]:
+    """Return the same of a structure that no candidate explains: as its clearest curve has it."""
+    couplings = (curve.coupling for curve in evidence.curves if curve.covariate == place.covariate)
+    return place.covariate, place.wheels, next(couplings, "drag") == "drag"
+
+
+def _curve(curve: Curve, answer: Answer, evidence: Evidence, labels: Labels) -> Figure:
+    svg = _safe(curve_figure(curve, evidence.unit, labels, corrected=bool(answer.effects)))
+    return Figure(svg, labels.covariate(curve.covariate), labels.wheels(curve.wheels, evidence.wheels))
+
+
+def effect(found: Effect, evidence: Evidence, labels: Labels) -> EffectSection:
+    """Return one named effect: sentence, equation, facts and table."""
+    factor, unit = scaled(_unit_of(found))
+    before, after = factor * found.rmse_before, factor * found.rmse_after
+    fewer = 100 * (1 - after / before) if before else 0.0
+    facts = (
+        labels.wheels(found.wheels, evidence.wheels),
+        "constant" if found.covariate == "none" else f"depends on {labels.covariate(found.covariate)}",
+        "" if found.onset_s is None else f"from {number(found.onset_s * labels.time_factor)} {labels.time_unit} on",
+        f"held-out error {number(before)} → {number(after)} {unit} (−{fewer:.1f} %)",
+    )
+    return EffectSection(
+        capital(labels.effect(found.name)),
+        capital(found.statement).replace(" %", NO_BREAK + "%"),
+        found.equation,
+        tuple(fact for fact in facts if fact),
+        _parameter_rows(found, labels),
+    )
+
+
+def _parameter_rows(found: Effect, labels: Labels) -> tuple[ParameterRow, ...]:
+    rows = []
+    for name, parameter in found.parameters.items():
+        # Shares are read in percent.
+        factor, unit = (100.0, "%") if name == "relative_size" else scaled(parameter.unit)
+        value, low, high = (factor * each for each in (parameter.value, parameter.low, parameter.high))
+        if np.isfinite(value):
+            drawing = _safe(interval_figure(value, low, high))
+            label = labels.parameter(found.name, name)
+            rows.append(ParameterRow(label, number(value), number(low), number(high), unit, drawing))
+    return tuple(rows)
+
+
+def _unit_of(found: Effect) -> str:
+    """Return the unit that the channel's name ends in."""
+    return found.channel.rsplit("_", 1)[-1] if "_" in found.channel else ""
+
+
+def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> UnexplainedSection:
+    """Return one structure that no candidate explains: channel, wheels, time, and share of the residual's power."""
+    first, last = (number(each * labels.time_factor) for each in (place.from_s, place.to_s))
+    facts = (
+        place.channel,
+        labels.wheels(place.wheels, evidence.wheels),
+        f"{first} to {last} {labels.time_unit}",
+        f"{100 * place.share_of_residual:.1f} % of the residual’s power",
+    )
+    return UnexplainedSection(labels.covariate(place.covariate), tuple(fact for fact in facts if fact))
+
+
+def fit(answer: Answer, evidence: Evidence) -> FitSection:
+    """Return the held-out errors before and after, and the noise floor."""
+    found = answer.fit
+    factor, unit = scaled(evidence.unit)
+    before, after, floor = (
+        factor * value for value in (found.held_out_rmse_before, found.held_out_rmse_after, found.noise_floor_rmse)
+    )
+    reducible = before**2 - floor**2
+    removed = f"{min(100 * (before**2 - after**2) / reducible, 100):.0f}" if reducible > 0 else ""
+    svg = _safe(fit_figure(answer, evidence.unit))
+    return FitSection(number(before), number(after), number(floor), unit, removed, svg)
+
+
+def confusions(answer: Answer, labels: Labels) -> tuple[ConfusionRow, ...]:
+    """Return what this recording cannot tell apart."""
+    return tuple(
+        ConfusionRow(listed([labels.effect(name) for name in one.effects]), one.experiment)
+        for one in answer.indistinguishable
+    )
+
+
+def sensitivity(answer: Answer, evidence: Evidence, labels: Labels) -> tuple[SensitivityRow, ...]:
+    """Return the smallest detectable effect of each candidate that was not found."""
+    mean = float(np.nanmean(np.abs(evidence.measured)))
+    found = {each.name for each in answer.effects}
+    rows = []
+    for one in answer.sensitivity:
+        if one.name not in found:
+            size = number(scaled(one.unit)[0] * one.smallest_detectable, 2)
+            share = f"{100 * one.smallest_detectable / mean:.1f} %" if mean > 0 else "–"
+            known = np.isfinite(one.smallest_detectable)
+            label = capital(labels.effect(one.name))
+            rows.append(SensitivityRow(label, size if known else "", share if known else ""))
+    return tuple(rows)
+
+
+def other_curves(answer: Answer, evidence: Evidence, labels: Labels) -> tuple[Figure, ...]:
+    """Return the residual against the covariates that are not shown above, small."""
+    found = {each.covariate for each in answer.effects} | {each.covariate for each in answer.unexplained}
+    shown = found or {curve.covariate for curve in evidence.curves[:1]}
+    first = {curve.covariate: curve for curve in reversed(evidence.curves) if len(curve.at) > 2}
+    others = [c for c in evidence.curves if first.get(c.covariate) is c and c.covariate not in shown]
+    drawings = [
+        curve_figure(
+            curve, evidence.unit, labels, corrected=bool(answer.effects), width=SMALL_WIDTH, height=SMALL_HEIGHT
+        )
+        for curve in others[:MOST_OTHER_CURVES]
+    ]
+    return tuple(Figure(_safe(drawing)) for drawing in drawings)
+
+
+def _safe(svg: str) -> Markup:
+    """Mark a drawing as markup: its texts are escaped where they are drawn."""
+    return Markup(svg)  # noqa: S704
