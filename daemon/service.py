@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from regolithd.daemon.pipeline.terrain_network import TerrainNetwork
     from regolithd.drivers.can.bus import Bus
     from regolithd.drivers.can.frame import Frame
+    from regolithd.drivers.devices.decoding.signals import Signal
     from regolithd.drivers.master.events import NetworkEvent
 
 _log = logging.getLogger(__name__)
@@ -126,7 +127,11 @@ class Service:
         async with AsyncExitStack() as opened:
             bus = await self._open_bus(opened)
             self._network = Network(
-                bus, network_settings(self.configuration), on_frames=self._take_frames, on_event=self._take_event
+                bus,
+                network_settings(self.configuration),
+                on_frames=self._take_frames,
+                on_signals=self._take_signals,
+                on_event=self._take_event,
             )
             self._opened.set()
             await self._network.run()
@@ -152,7 +157,9 @@ class Service:
         self.liveness.beat(NETWORK)
         if self.recorder:
             self.recorder.frames(batch)
-        for estimate in self.chain.feed(batch):
+
+    def _take_signals(self, signals: Sequence[Signal]) -> None:
+        for estimate in self.chain.take(signals):
             if self.recorder:
                 self.recorder.estimate(estimate)
             for sink in self.sinks:

@@ -1,17 +1,14 @@
-"""CAN, CANopen and the nodes on the rover's bus – and their virtual twins.
+"""CAN, CANopen and the nodes on the rover's bus, real and virtual.
 
-Nothing here knows what soil is, or where the values go afterwards. From the wire upwards:
+The drivers know no soil and no MQTT. Each folder imports only those above it in this table:
 
-| file | reads beside | is |
+| folder | standard | content |
 |---|---|---|
-| `frame`, `bus`, `socketcan`, `kernel_batch`, `adapter`, `error_frame`… | linux/can.rst | frames, in and out |
-| `nmt`, `heartbeat`, `sync`, `timer`, `emcy`, `sdo`, `sdo_client`, `pdo` | CiA 301 | one service each |
-| `dictionary`, `eds/` | CiA 306 | what a node has |
-| `cia402`, `drive`, `motion` | CiA 402-2 | the motor controllers: the state machine, one drive, all of them |
-| `decode`, `signals` | CiA 301, 404, 410 | frames to SI values; pure, so that a log replays to the same bits |
-| `boot`, `boot_reason`, `configuration`, `link`, `supervisor` | CiA 302-2 | one node: booted, watched, booted again |
-| `network`, `events`, `status`, `probe`, `load` | | all nodes, and what is told of them |
-| `errors` | | everything that can go wrong, in one tree |
-| `virtual/` | CiA 301, 402, 404, 410 | the same nodes without hardware |
-| `benchmark` | | what a frame costs |
+| `can/` | linux/can.rst | frames, and buses to receive and send them: SocketCAN, python-can |
+| `canopen/` | CiA 301, 306 | one module for each service: NMT, SYNC, heartbeat, EMCY, SDO, PDO; object dictionaries |
+| `devices/` | CiA 402, 404, 410 | one file for each kind of device, one registry; decoding to SI values |
+| `master/` | CiA 302-2, 402-2 | the network: boots, supervises and commands the nodes |
+| `virtual/` | CiA 301 | virtual nodes with the same EDS files, for tests, demo and bench |
+
+`errors` is the tree of exceptions; `reference` writes `docs/bus.md`; `benchmark` measures the time per frame.
 """

@@ -1,16 +1,16 @@
-"""How dear is a frame? Our reader and decoder beside python-can's asyncio Notifier with canopen's `.raw`, in one run.
+"""Benchmark: time per received frame, ours against python-can's asyncio Notifier with canopen's `.raw`, in one run.
 
     make frames                                  on vcan, in User Mode Linux where this kernel has none
-    python -m regolithd.drivers.benchmark [vcan0]          where there is no such link: the decoders alone
+    python -m regolithd.drivers.benchmark [vcan0]          without such a link: the decoders alone
 
 Both get the same motor TPDOs and end at the same three SI values, which is checked.
 
     decode    from the frame to the values; no bus
-    burst     200 frames wait in the socket, as after a SYNC on a busy bus: take and decode them all
+    burst     200 frames wait in the socket, as after a SYNC on a busy bus: read and decode them all
     single    one frame at a time, wake-up included
 
-Both run in the same process, in turns; the best of the rounds counts, as other work on the machine only adds. In User
-Mode Linux a system call (a lock among them) is some 200 times as dear as natively, and the ratios grow with it.
+Both run in the same process, in turns; the best of the rounds counts, as other load on the machine only adds time. In
+User Mode Linux a system call (locks among them) takes some 200 times as long as natively, which raises the ratios.
 """
 
 from __future__ import annotations
@@ -32,11 +32,12 @@ import canopen
 from regolithd.drivers.can.frame import Frame
 from regolithd.drivers.can.open_bus import open_bus
 from regolithd.drivers.can.recvmmsg import CAN_FRAME
-from regolithd.drivers.canopen.decoder import Decoder
-from regolithd.drivers.canopen.pdo import tpdos
-from regolithd.drivers.devices.eds import eds_path
+from regolithd.drivers.devices.decoding.decoder import Decoder
+from regolithd.drivers.devices.decoding.pdo import tpdos
+from regolithd.drivers.devices.decoding.signals import Reading
+from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
+from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.errors import BusOpenError
-from regolithd.drivers.signals import NodeDescription, NodeKind, Reading
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
@@ -50,8 +51,8 @@ Values = tuple[float, float, float]
 LAST: Values = (0x0637, (FRAMES - 1) * 1e-3, -(FRAMES - 1) * 2.0 * math.pi / 60.0)
 
 
-class Tally:
-    """How many frames have become values, and the last values."""
+class DecodedValues:
+    """Counts the decoded frames and keeps the last values."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -74,8 +75,8 @@ class Tally:
 
 
 def our_decoder() -> Callable[[Frame], Values]:
-    """Return our way from a frame to values."""
-    decode = Decoder([NodeDescription(NODE_ID, NodeKind.MOTOR, 0)]).decode
+    """Return our decoder as a function from a frame to its values."""
+    decode = Decoder([NodeDescription(NODE_ID, MOTOR_CONTROLLER, 0)]).decode
 
     def values(frame: Frame) -> Values:
         signal = decode(frame)
@@ -90,10 +91,10 @@ def our_decoder() -> Callable[[Frame], Values]:
 def their_network(take: Callable[[Values], None]) -> canopen.Network:
     """Return a canopen network that hands the values of each TPDO 1 to `take`."""
     network = canopen.Network()
-    pdo = network.add_node(NODE_ID, str(eds_path(NodeKind.MOTOR))).tpdo[1]
+    pdo = network.add_node(NODE_ID, str(MOTOR_CONTROLLER.eds)).tpdo[1]
     pdo.clear()
     status, current, speed = (pdo.add_variable(index) for index in (0x6041, 0x6078, 0x606C))
-    pdo.cob_id, pdo.enabled = tpdos(NodeKind.MOTOR)[0].cob_id(NODE_ID), True
+    pdo.cob_id, pdo.enabled = tpdos(MOTOR_CONTROLLER)[0].cob_id(NODE_ID), True
     pdo.subscribe()
     rpm = 2.0 * math.pi / 60.0
     pdo.add_callback(lambda _pdo: take((float(status.raw), current.raw * 1e-3, speed.raw * rpm)))
@@ -101,56 +102,58 @@ def their_network(take: Callable[[Values], None]) -> canopen.Network:
 
 
 @asynccontextmanager
-async def ours(channel: str) -> AsyncIterator[Tally]:
-    """Read with `drivers.can.socketcan`, decode with `drivers.canopen.decoder`."""
-    tally, values = Tally(), our_decoder()
+async def ours(channel: str) -> AsyncIterator[DecodedValues]:
+    """Read with `drivers.can.socketcan`, decode with `drivers.devices.decoding.decoder`."""
+    decoded, values = DecodedValues(), our_decoder()
 
     async def read() -> None:
         async for batch in bus:
             for frame in batch:
-                tally.take(values(frame))
+                decoded.take(values(frame))
 
     async with open_bus("socketcan", channel) as bus, asyncio.TaskGroup() as tasks:
         reading = tasks.create_task(read())
-        yield tally
+        yield decoded
         reading.cancel()
 
 
 @asynccontextmanager
-async def theirs(channel: str) -> AsyncIterator[Tally]:
+async def theirs(channel: str) -> AsyncIterator[DecodedValues]:
     """Read with python-can's asyncio Notifier, decode with canopen's variables."""
-    tally = Tally()
-    network = their_network(tally.take)
+    decoded = DecodedValues()
+    network = their_network(decoded.take)
     with can.Bus(channel, interface="socketcan", receive_own_messages=True) as bus:
         notifier = can.Notifier(bus, network.listeners, loop=asyncio.get_running_loop())
-        yield tally
+        yield decoded
         notifier.stop(timeout=0.1)
 
 
-async def reading_cost(way: Callable[[str], AbstractAsyncContextManager[Tally]], channel: str) -> tuple[float, float]:
-    """Return what a frame costs in a burst and singly [µs]."""
+async def reading_time(
+    way: Callable[[str], AbstractAsyncContextManager[DecodedValues]], channel: str
+) -> tuple[float, float]:
+    """Return the time per frame in a burst and singly [µs]."""
     frames = [CAN_FRAME.pack(COB_ID, 8, data) for data in DATA]
     with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as sender:
         sender.bind((channel,))
-        async with way(channel) as tally:
+        async with way(channel) as decoded:
             for frame in frames:
                 sender.send(frame)
             start = time.perf_counter()
-            await tally.more(FRAMES)
+            await decoded.more(FRAMES)
             burst_s = time.perf_counter() - start
             singly_s = 0.0
             for frame in frames:
                 sender.send(frame)
                 start = time.perf_counter()
-                await tally.more(1)
+                await decoded.more(1)
                 singly_s += time.perf_counter() - start
-            check(tally.last)
+            check(decoded.last)
     return burst_s / FRAMES * 1e6, singly_s / FRAMES * 1e6
 
 
-def decoding_cost() -> tuple[float, float]:
-    """Return what decoding a frame costs us and them [µs]."""
-    mine, peers = our_decoder(), Tally()
+def decoding_time() -> tuple[float, float]:
+    """Return the time that our decoder and canopen's take per frame [µs]."""
+    mine, peers = our_decoder(), DecodedValues()
     network = their_network(peers.take)
     start = time.perf_counter()
     for data in DATA:
@@ -165,7 +168,7 @@ def decoding_cost() -> tuple[float, float]:
 
 
 def check(last: Values) -> None:
-    """Refuse a comparison in which one of the two gets it wrong."""
+    """Raise where one of the two decoded wrong values."""
     if not all(math.isclose(one, two) for one, two in zip(last, LAST, strict=True)):
         raise AssertionError(f"decoded {last}, sent was {LAST}")
 
@@ -174,16 +177,16 @@ async def compare(channel: str | None) -> dict[str, list[tuple[float, float]]]:
     """Return (ours, theirs) of each round [µs], taken in turns."""
     rounds: dict[str, list[tuple[float, float]]] = {"decode": [], "burst": [], "single": []}
     for _ in range(ROUNDS):
-        rounds["decode"].append(decoding_cost())
+        rounds["decode"].append(decoding_time())
         if channel is not None:
-            mine, peers = await reading_cost(ours, channel), await reading_cost(theirs, channel)
+            mine, peers = await reading_time(ours, channel), await reading_time(theirs, channel)
             rounds["burst"].append((mine[0], peers[0]))
             rounds["single"].append((mine[1], peers[1]))
     return {name: pairs for name, pairs in rounds.items() if pairs}
 
 
 async def reachable(channel: str) -> str | None:
-    """Return the channel, or None where it cannot be opened, and say why."""
+    """Return the channel; None, with a message, where it cannot be opened."""
     try:
         async with open_bus("socketcan", channel):
             return channel

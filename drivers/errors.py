@@ -1,4 +1,4 @@
-"""What can go wrong on the bus, in one tree; whoever catches `DriverError` has caught it all.
+"""The exceptions of the drivers, all derived from `DriverError`.
 
     DriverError
     ├── BusError (OSError)
@@ -11,32 +11,30 @@
     │   ├── SdoInterruptedError (ConnectionResetError)   the node restarted in the middle of the transfer
     │   ├── SdoAbortError                    the node (or we) aborted the transfer; carries the abort code
     │   └── SdoProtocolError (ValueError)    the node answered something that CiA 301 does not allow
-    ├── BootError                            a node could not be booted; carries a `BootReason`
     └── DriveError (RuntimeError)            a drive did not reach the state, or must not be commanded now
 
 For example, reading 0x1018:01 of a node that is switched off raises
 
     SdoTimeoutError: node 3, object 0x1018:01: no answer within 0.5 s. Is the node powered, and is its node-ID 3?
 
-Every message says the node, the object where there is one, what happened, and the cure where one is known.
+Every message names the node, the object where there is one, what happened, and the remedy where one is known. A node
+that cannot be booted raises `BootError` (`drivers.master.boot_error`), which is a `DriverError` too.
 """
 
 from __future__ import annotations
 
-from regolithd.drivers.master.boot_reason import CURES, BootReason
-
 
 class DriverError(Exception):
-    """Anything that the drivers raise.
+    """Base class of every exception that the drivers raise.
 
     Parameters
     ----------
     what
-        What happened, in plain words, without a full stop.
+        What happened, without a full stop.
     node_id, index, subindex
-        Where it happened; told at the start of the message.
+        Where it happened; at the start of the message.
     cure
-        What a person can do about it; told at its end.
+        What to do about it; at the end of the message.
     """
 
     def __init__(
@@ -56,7 +54,7 @@ class DriverError(Exception):
         super().__init__(self._message())
 
     def locate(self, node_id: int) -> None:
-        """Add the node where only its driver knows it."""
+        """Add the node-ID where it was not known when the error was raised."""
         self.node_id = node_id
         self.args = (self._message(),)
 
@@ -88,7 +86,7 @@ class BusFullError(BusError, TimeoutError):
 
 
 class DictionaryError(DriverError, ValueError):
-    """An object dictionary (EDS) lacks an object, or maps a PDO that cannot be."""
+    """An EDS file lacks an object, or does not allow a PDO mapping."""
 
 
 class SdoError(DriverError):
@@ -100,7 +98,7 @@ class SdoTimeoutError(SdoError, TimeoutError):
 
 
 class SdoInterruptedError(SdoError, ConnectionResetError):
-    """The node restarted in the middle of a transfer, and has forgotten it."""
+    """The node restarted in the middle of a transfer."""
 
 
 class SdoAbortError(SdoError):
@@ -113,16 +111,6 @@ class SdoAbortError(SdoError):
 
 class SdoProtocolError(SdoError, ValueError):
     """A node's SDO answer is not what CiA 301 allows at this point of the transfer."""
-
-
-class BootError(DriverError):
-    """A node could not be booted; `reason` says why, and brings its cure along."""
-
-    def __init__(
-        self, reason: BootReason, what: str, *, node_id: int, index: int | None = None, subindex: int = 0
-    ) -> None:
-        self.reason = reason
-        super().__init__(what, node_id=node_id, index=index, subindex=subindex, cure=CURES[reason])
 
 
 class DriveError(DriverError, RuntimeError):

@@ -119,12 +119,12 @@ def judge_nodes(found: list[Probe]) -> list[Finding]:
     """Return a line for each node that is not as it should be, and one for all that are."""
     lines = [
         (wrong if each.node.required else warning)(
-            f"node {each.node.node_id}", f"{each.node.kind.value}: {each.problem}", each.cure
+            f"node {each.node.node_id}", f"{each.node.kind}: {each.problem}", each.cure
         )
         for each in found
         if each.problem
     ]
-    well = Counter(each.node.kind.value for each in found if not each.problem)
+    well = Counter(each.node.kind for each in found if not each.problem)
     if well:
         kinds = ", ".join(f"{count} {kind}" for kind, count in well.items())
         lines.insert(0, good("nodes", f"{well.total()} of {len(found)} answer and are who they should be: {kinds}"))

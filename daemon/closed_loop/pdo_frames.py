@@ -7,8 +7,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.drivers.can.frame import Frame
-from regolithd.drivers.canopen.pdo import Meaning, Validity, tpdos
-from regolithd.drivers.signals import Quantity
+from regolithd.drivers.canopen import cob_id
+from regolithd.drivers.devices.decoding.pdo import tpdos
+from regolithd.drivers.devices.device import Measured
+from regolithd.drivers.devices.ground_speed import GROUND_SPEED
+from regolithd.drivers.devices.inclinometer import PITCH, ROLL, YAW_RATE
+from regolithd.drivers.devices.load_cell import LOAD
+from regolithd.drivers.devices.motor_controller import (
+    BUS_VOLTAGE,
+    MOTOR_CURRENT,
+    MOTOR_SPEED,
+    MOTOR_TEMPERATURE,
+    STATUSWORD,
+)
 from regolithd.drivers.virtual.plant import WHEELS
 
 if TYPE_CHECKING:
@@ -16,12 +27,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from regolithd.drivers.signals import NodeDescription
+    from regolithd.drivers.devices.device import PdoObject, Quantity
+    from regolithd.drivers.devices.node import NodeDescription
     from regolithd.drivers.virtual.plant import Measurement
 
     Array = NDArray[np.float64]
 
-SYNC_ID = 0x080
 OPERATION_ENABLED = 0x1237
 FRAME_NS = 130_000
 """Duration of a full frame on a bus of 1 Mbit/s, stuff bits included."""
@@ -33,11 +44,11 @@ def frames(
     """Yield the SYNC and every node's TPDOs, in the order of arbitration (lowest COB-ID first)."""
     known = _quantities(motor_speed_rad_s, read)
     answers = [
-        (pdo.cob_id(node.node_id), pdo.pack(*[_raw(meaning, known, node.wheel or 0) for meaning in pdo.meanings]))
+        (pdo.cob_id(node.node_id), pdo.pack(*[_raw(each, known, node.wheel or 0) for each in pdo.objects]))
         for node in nodes
-        for pdo in tpdos(node.kind, diagnostics=node.diagnostics)
+        for pdo in tpdos(node.device, diagnostics=node.diagnostics)
     ]
-    yield Frame(sync_ns, SYNC_ID, b"", sent=True)
+    yield Frame(sync_ns, cob_id.SYNC, b"", sent=True)
     for place, (can_id, data) in enumerate(sorted(answers), start=1):
         yield Frame(sync_ns + place * FRAME_NS, can_id, data)
 
@@ -47,19 +58,21 @@ def _quantities(motor_speed_rad_s: Array, read: Measurement) -> dict[Quantity, A
         return np.full(WHEELS, value)
 
     return {
-        Quantity.MOTOR_CURRENT: read.motor_current_A,
-        Quantity.MOTOR_SPEED: motor_speed_rad_s,
-        Quantity.LOAD: read.load_N,
-        Quantity.GROUND_SPEED: all_wheels(read.ground_speed_m_s),
-        Quantity.PITCH: all_wheels(read.pitch_rad),
-        Quantity.ROLL: all_wheels(read.roll_rad),
-        Quantity.YAW_RATE: all_wheels(read.yaw_rate_rad_s),
-        Quantity.MOTOR_TEMPERATURE: read.motor_temperature_degC,
-        Quantity.BUS_VOLTAGE: all_wheels(read.bus_voltage_V),
-        Quantity.STATUSWORD: all_wheels(OPERATION_ENABLED),
+        MOTOR_CURRENT: read.motor_current_A,
+        MOTOR_SPEED: motor_speed_rad_s,
+        LOAD: read.load_N,
+        GROUND_SPEED: all_wheels(read.ground_speed_m_s),
+        PITCH: all_wheels(read.pitch_rad),
+        ROLL: all_wheels(read.roll_rad),
+        YAW_RATE: all_wheels(read.yaw_rate_rad_s),
+        MOTOR_TEMPERATURE: read.motor_temperature_degC,
+        BUS_VOLTAGE: all_wheels(read.bus_voltage_V),
+        STATUSWORD: all_wheels(OPERATION_ENABLED),
     }
 
 
-def _raw(meaning: Meaning | Validity | None, known: Mapping[Quantity, Array], wheel: int) -> int:
-    """Return an object's raw value; a validity object is 0 (valid)."""
-    return round(known[meaning.quantity][wheel] / meaning.factor) if isinstance(meaning, Meaning) else 0
+def _raw(mapped: PdoObject, known: Mapping[Quantity, Array], wheel: int) -> int:
+    """Return an object's raw value; a validity object is 0 (valid), and so is a quantity that is not simulated."""
+    if not isinstance(mapped, Measured) or mapped.quantity not in known:
+        return 0
+    return round(known[mapped.quantity][wheel] / mapped.scale)

@@ -7,12 +7,19 @@ file. Every relative path is relative to the file's folder.
 from __future__ import annotations
 
 from pathlib import Path  # pydantic reads it at run time
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, create_model
 
 from regolithd.calibration.parameters import Drivetrain, LoadCells, Positive, Rover, Table, Wheel
-from regolithd.drivers.signals import NodeDescription, NodeKind
+from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
+from regolithd.drivers.devices.node import NodeDescription
+from regolithd.drivers.devices.registry import DEVICES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from regolithd.drivers.devices.device import Device
 
 NodeId = Annotated[int, Field(ge=1, le=126, strict=True)]
 WheelNumber = Annotated[int, Field(ge=1, le=6, strict=True)]
@@ -49,37 +56,50 @@ class SyncTiming(Table):
     rate_Hz: Annotated[float, Field(ge=1, le=200)] = 2.0
 
 
-class Nodes(Table):
+def _node_ids(device: Device) -> tuple[object, object]:
+    """Return the type and the default of a device's key: six node-IDs, one a wheel, or one that may be left out."""
+    first = device.default_node_id
+    return (SixNodes, tuple(range(first, first + 6))) if device.per_wheel else (NodeId | None, None)
+
+
+# One key for each registered device: motors, load_cells, inclinometer, ground_speed, …
+_NodeIds = create_model(  # type: ignore[call-overload]
+    "_NodeIds", __base__=Table, **{device.configuration_key: _node_ids(device) for device in DEVICES}
+)
+
+
+class Nodes(_NodeIds):
     """`[nodes]`: node-IDs on the bus, and heartbeat times; the k-th number of a list of six belongs to wheel k."""
 
-    motors: SixNodes = (1, 2, 3, 4, 5, 6)
-    load_cells: SixNodes = (11, 12, 13, 14, 15, 16)
-    inclinometer: NodeId | None = None
-    ground_speed: NodeId | None = None
     mirrored_wheels: tuple[WheelNumber, ...] = ()
     motor_diagnostics: bool = False
     heartbeat_ms: Annotated[int, Field(ge=20, le=10_000)] = 200
     heartbeat_timeout_ms: Annotated[int, Field(ge=50, le=30_000)] = 600
 
     def described(self) -> tuple[NodeDescription, ...]:
-        """Return the description of every node, as the drivers take it."""
-        wheels = [
-            NodeDescription(
-                node,
-                kind,
-                wheel,
-                diagnostics=self.motor_diagnostics and kind is NodeKind.MOTOR,
-                mirrored=wheel + 1 in self.mirrored_wheels and kind is NodeKind.MOTOR,
-            )
-            for kind, nodes in ((NodeKind.MOTOR, self.motors), (NodeKind.LOAD_CELL, self.load_cells))
-            for wheel, node in enumerate(nodes)
-        ]
-        body = [
-            NodeDescription(node, kind, None, required=False)
-            for kind, node in ((NodeKind.INCLINOMETER, self.inclinometer), (NodeKind.GROUND_SPEED, self.ground_speed))
-            if node is not None
-        ]
-        return tuple(wheels + body)
+        """Return the description of every node, in the order of the device registry."""
+        return tuple(node for _, node in self.by_key())
+
+    def by_key(self) -> Iterator[tuple[str, NodeDescription]]:
+        """Yield every node with the key that names its node-ID, such as `motors[0]`."""
+        for device in DEVICES:
+            key = device.configuration_key
+            ids = getattr(self, key)
+            if device.per_wheel:
+                for wheel, node_id in enumerate(ids):
+                    yield f"{key}[{wheel}]", self._on_wheel(device, wheel, node_id)
+            elif ids is not None:
+                yield key, NodeDescription(ids, device, None, required=False)
+
+    def _on_wheel(self, device: Device, wheel: int, node_id: int) -> NodeDescription:
+        motor = device is MOTOR_CONTROLLER
+        return NodeDescription(
+            node_id,
+            device,
+            wheel,
+            diagnostics=self.motor_diagnostics and motor,
+            mirrored=wheel + 1 in self.mirrored_wheels and motor,
+        )
 
 
 class Slip(Table):

@@ -169,11 +169,8 @@ def _checks_together(configuration: Configuration) -> Iterator[tuple[str, str, s
 
 def _shared_node_ids(nodes: Nodes) -> Iterator[tuple[str, str, str, str]]:
     taken: dict[int, str] = {}
-    lists = [(f"motors[{k}]", n) for k, n in enumerate(nodes.motors)]
-    lists += [(f"load_cells[{k}]", n) for k, n in enumerate(nodes.load_cells)]
-    lists += [("inclinometer", nodes.inclinometer)] if nodes.inclinometer is not None else []
-    lists += [("ground_speed", nodes.ground_speed)] if nodes.ground_speed is not None else []
-    for name, node in lists:
+    for name, described in nodes.by_key():
+        node = described.node_id
         if node in taken:
             yield (
                 f"nodes.{name}",

@@ -276,7 +276,7 @@ def _not_ready(rover: Rover | None) -> Refused | None:
             code=Code.NOT_READY, text="The CAN bus is not open.", cure="`regolithd check` says what is wrong with it."
         )
     missing = [
-        f"{status.node.kind.value} {node_id} is {status.phase.value}"
+        f"{status.node.kind} {node_id} is {status.phase.value}"
         for node_id, status in rover.status.items()
         if status.node.required and status.phase.value != "operational"
     ]
@@ -293,7 +293,7 @@ def _node_line(status: NodeStatus) -> NodeLine:
     node = status.node
     return NodeLine(
         node_id=node.node_id,
-        kind=node.kind.value,
+        kind=node.kind,
         wheel=None if node.wheel is None else node.wheel + 1,
         phase=status.phase.value,
         drive_state=None if status.drive_state is None else status.drive_state.value,

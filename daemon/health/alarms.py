@@ -12,8 +12,8 @@ from regolithd.drivers.master.status import NodePhase
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from regolithd.drivers.devices.device import Quantity
     from regolithd.drivers.master.status import NodeStatus
-    from regolithd.drivers.signals import Quantity
 
 _BUS_SEVERITY = {
     BusState.WARNING: Severity.WARNING,
@@ -104,7 +104,7 @@ def _own_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
     if inputs.control_trouble:
         yield Alarm("control", Severity.WARNING, inputs.control_trouble, "Until then the rover cannot be commanded.")
     if inputs.stuck:
-        which = ", ".join(f"{quantity.value} of wheel {wheel}" for quantity, wheel in inputs.stuck)
+        which = ", ".join(f"{quantity.name} of wheel {wheel}" for quantity, wheel in inputs.stuck)
         text = f"{which}: the same to the last digit for seconds, while other wheels' readings change"
         cure = "Do not trust it: switch the node off and on, look at its plug, exchange it."
         yield Alarm("sensor", Severity.ERROR, text, cure)

@@ -7,12 +7,17 @@ same: then nobody trembles, on a bench without noise for instance.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from regolithd.daemon.pipeline.snapshot import ROW, WHEELS, Snapshot
-from regolithd.drivers.signals import Quantity
+from regolithd.drivers.devices.registry import QUANTITIES
 
-WATCHED = (Quantity.LOAD, Quantity.MOTOR_CURRENT)
+if TYPE_CHECKING:
+    from regolithd.drivers.devices.device import Quantity
+
+WATCHED = tuple(quantity for quantity in QUANTITIES if quantity.noisy)
 STUCK_NS = 5_000_000_000
 STUCK_SNAPSHOTS = 20
 """Both must have passed: a slow converter repeats itself at a fast SYNC, and a few equal readings are no wonder."""

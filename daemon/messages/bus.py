@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from regolithd.daemon.messages.header import Header, NodeNumber, Time, WheelNumber
+from regolithd.drivers.devices.registry import DEVICES
 from regolithd.drivers.master.status import NodePhase  # noqa: TC001  # pydantic reads it at run time
-from regolithd.drivers.signals import NodeKind  # noqa: TC001  # likewise
+
+if TYPE_CHECKING:
+    NodeKind = str
+else:
+    NodeKind = StrEnum("NodeKind", {each.kind.upper().replace("-", "_"): each.kind for each in DEVICES})
+    NodeKind.__doc__ = "A node's device profile."
 
 
 class IdentityReport(BaseModel):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from regolithd.daemon.pipeline.snapshot import BODY_QUANTITIES, WHEEL_QUANTITIES
+
 if TYPE_CHECKING:
     from regolithd.daemon.messages.channels import Channel
 
@@ -13,7 +15,7 @@ _HEADER = {
     "sequence": 500,
     "time": "2013-06-11T14:07:22.018291000Z",
 }
-_WHEEL: dict[str, Any] = {
+_WHEEL: dict[str, Any] = {each.name: None for each in WHEEL_QUANTITIES} | {
     "measured": True,
     "valid": True,
     "motor_current_A": 0.08,
@@ -32,7 +34,7 @@ _WHEEL: dict[str, Any] = {
     "friction_angle_rad": 0.4992,
     "outside_training_range": [],
 }
-_SNAPSHOT = {
+_SNAPSHOT = {each.name: None for each in BODY_QUANTITIES} | {
     "model_version": "paper-3:64:2",
     "pitch_rad": 0.012,
     "roll_rad": -0.004,

@@ -1,83 +1,80 @@
-"""The messages of one SYNC: `snapshot` (all wheels, as lists of six) and `wheel/…` (one wheel, as plain values)."""
+"""The messages of one SYNC: `snapshot` (all wheels, as lists of six) and `wheel/…` (one wheel, as plain values).
+
+Their measured fields follow from the device registry.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import Field
+from pydantic import Field, create_model
 
 from regolithd.daemon.messages.header import Header, WheelNumber
-from regolithd.daemon.pipeline.snapshot import SlipSource
+from regolithd.daemon.pipeline.snapshot import BODY_QUANTITIES, WHEEL_QUANTITIES, SlipSource
 
-SixNumbers = Annotated[tuple[float | None, ...], Field(min_length=6, max_length=6)]
-SixIntegers = Annotated[tuple[int | None, ...], Field(min_length=6, max_length=6)]
-SixFlags = Annotated[tuple[bool, ...], Field(min_length=6, max_length=6)]
-SixSources = Annotated[tuple[SlipSource, ...], Field(min_length=6, max_length=6)]
-SixNameLists = Annotated[tuple[tuple[str, ...], ...], Field(min_length=6, max_length=6)]
+if TYPE_CHECKING:
+    from regolithd.drivers.devices.device import Quantity
 
 
-class SnapshotMessage(Header):
-    """All measurements of one SYNC, of the six wheels and the body, and the estimates made from them."""
+@dataclass(frozen=True, slots=True)
+class _WheelField:
+    """A field of `wheel`, which is a list of six in `snapshot`."""
 
-    model_version: str
-    """Version of the terrain network."""
-    pitch_rad: float | None
-    """Positive nose up."""
-    roll_rad: float | None
-    """Positive right side down."""
-    yaw_rate_rad_s: float | None
-    """Positive to the left."""
-    measured: SixFlags
-    """Where current, speed and load all arrived."""
-    valid: SixFlags
-    """Where an estimate could be made."""
-    motor_current_A: SixNumbers
-    """At the motor, signed."""
-    motor_speed_rad_s: SixNumbers
-    """At the motor, before the gears, signed."""
-    load_N: SixNumbers
-    """The load cell's reading."""
-    ground_speed_m_s: SixNumbers
-    """Speed of the wheel's hub over ground."""
-    motor_temperature_degC: SixNumbers
-    bus_voltage_V: SixNumbers
-    """Supply voltage at the motor controller."""
-    statusword: SixIntegers
-    """Object 0x6041 of the motor controller."""
-    wheel_torque_Nm: SixNumbers
-    """At the wheel, by Eq. 11, before smoothing."""
-    smoothed_torque_Nm: SixNumbers
-    """After the filter that removes momentary current drops."""
-    smoothed_load_N: SixNumbers
-    slip: SixNumbers
-    """i = 1 − V/(r ω)."""
-    slip_source: SixSources
-    """Measured, the configured constant, or none because the wheel stands still."""
-    cohesion_Pa: SixNumbers
-    friction_angle_rad: SixNumbers
-    outside_training_range: SixNameLists
-    """The terrain network's inputs that lie outside its training range; the estimate of such a wheel is unreliable."""
+    name: str
+    type: Any
+    description: str = ""
 
 
-class WheelMessage(Header):
-    """The measurements and estimates of one wheel at one SYNC: the values that `snapshot` has as lists of six."""
+def _number(quantity: Quantity) -> Any:  # noqa: ANN401  # a type
+    return int | None if quantity.flags else float | None
 
-    model_version: str
-    wheel: WheelNumber
-    measured: bool
-    valid: bool
-    motor_current_A: float | None
-    motor_speed_rad_s: float | None
-    load_N: float | None
-    ground_speed_m_s: float | None
-    motor_temperature_degC: float | None
-    bus_voltage_V: float | None
-    statusword: int | None
-    wheel_torque_Nm: float | None
-    smoothed_torque_Nm: float | None
-    smoothed_load_N: float | None
-    slip: float | None
-    slip_source: SlipSource
-    cohesion_Pa: float | None
-    friction_angle_rad: float | None
-    outside_training_range: tuple[str, ...]
+
+_WHEEL_FIELDS = (
+    _WheelField("measured", bool, "Where current, speed and load all arrived."),
+    _WheelField("valid", bool, "Where an estimate could be made."),
+    *(_WheelField(each.name, _number(each), each.description) for each in WHEEL_QUANTITIES),
+    _WheelField("wheel_torque_Nm", float | None, "At the wheel, by Eq. 11, before smoothing."),
+    _WheelField("smoothed_torque_Nm", float | None, "After the filter that removes momentary current drops."),
+    _WheelField("smoothed_load_N", float | None),
+    _WheelField("slip", float | None, "i = 1 − V/(r ω)."),
+    _WheelField(
+        "slip_source", SlipSource, "Measured, the configured constant, or none because the wheel stands still."
+    ),
+    _WheelField("cohesion_Pa", float | None),
+    _WheelField("friction_angle_rad", float | None),
+    _WheelField(
+        "outside_training_range",
+        tuple[str, ...],
+        "The terrain network's inputs that lie outside its training range; the estimate of such a wheel is unreliable.",
+    ),
+)
+
+
+def _described(kind: Any, description: str) -> tuple[Any, Any]:  # noqa: ANN401  # a type, and pydantic's field
+    return kind, Field(description=description or None)
+
+
+def _six(kind: Any) -> Any:  # noqa: ANN401  # a type
+    return Annotated[tuple[kind, ...], Field(min_length=6, max_length=6)]
+
+
+SnapshotMessage: type[Header] = create_model(  # type: ignore[call-overload]
+    "SnapshotMessage",
+    __base__=Header,
+    __module__=__name__,
+    __doc__="All measurements of one SYNC, of the six wheels and the body, and the estimates made from them.",
+    model_version=_described(str, "Version of the terrain network."),
+    **{each.name: _described(_number(each), each.description) for each in BODY_QUANTITIES},
+    **{each.name: _described(_six(each.type), each.description) for each in _WHEEL_FIELDS},
+)
+
+WheelMessage: type[Header] = create_model(  # type: ignore[call-overload]
+    "WheelMessage",
+    __base__=Header,
+    __module__=__name__,
+    __doc__="The measurements and estimates of one wheel at one SYNC: the values that `snapshot` has as lists of six.",
+    model_version=(str, ...),
+    wheel=(WheelNumber, ...),
+    **{each.name: (each.type, ...) for each in _WHEEL_FIELDS},
+)

@@ -25,13 +25,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.daemon.pipeline.snapshot import QUANTITIES, ROW, WHEELS, AcquisitionCounters, Array, Snapshot
-from regolithd.drivers.signals import Reading, Sync
+from regolithd.daemon.pipeline.snapshot import ROW, WHEELS, AcquisitionCounters, Array, Snapshot
+from regolithd.drivers.devices.decoding.signals import Reading, Sync
+from regolithd.drivers.devices.registry import QUANTITIES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from regolithd.drivers.signals import NodeDescription
+    from regolithd.drivers.devices.node import NodeDescription
 
 MEMORY = 3
 """Windows for which a PDO that stopped coming is still waited for."""

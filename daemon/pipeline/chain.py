@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 from regolithd.daemon.pipeline.acquire import Acquisition
 from regolithd.daemon.pipeline.pipeline import Pipeline
-from regolithd.drivers.canopen.decoder import Decoder
-from regolithd.drivers.signals import Reading, Sync
+from regolithd.drivers.devices.decoding.decoder import Decoder
+from regolithd.drivers.devices.decoding.signals import Reading, Sync
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from regolithd.daemon.pipeline.onnx_models import OnnxModels
     from regolithd.daemon.pipeline.snapshot import Estimate
     from regolithd.drivers.can.frame import Frame
+    from regolithd.drivers.devices.decoding.signals import Signal
 
 
 class Chain:
@@ -36,9 +37,13 @@ class Chain:
 
     def feed(self, frames: Iterable[Frame]) -> list[Estimate]:
         """Take the next frames of the bus; return an estimate for each snapshot that they complete."""
+        decode = self.decoder.decode
+        return self.take([signal for frame in frames if (signal := decode(frame)) is not None])
+
+    def take(self, signals: Iterable[Signal]) -> list[Estimate]:
+        """Take the next decoded signals; return an estimate for each snapshot that they complete."""
         estimates = []
-        for frame in frames:
-            signal = self.decoder.decode(frame)
+        for signal in signals:
             if isinstance(signal, Reading | Sync):
                 snapshot = self.acquisition.accept(signal)
                 if snapshot is not None:

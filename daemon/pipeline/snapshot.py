@@ -13,19 +13,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.drivers.signals import Quantity
+from regolithd.drivers.devices.load_cell import LOAD
+from regolithd.drivers.devices.motor_controller import MOTOR_CURRENT, MOTOR_SPEED
+from regolithd.drivers.devices.registry import QUANTITIES
 
 if TYPE_CHECKING:
     from regolithd.calibration.posterior.change_detection import Alarm
     from regolithd.calibration.posterior.estimator import FallProbability, Posterior
+    from regolithd.drivers.devices.device import Quantity
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 WHEELS = 6
-QUANTITIES = tuple(Quantity)
 ROW = {quantity: row for row, quantity in enumerate(QUANTITIES)}
-NEEDED = (Quantity.MOTOR_CURRENT, Quantity.MOTOR_SPEED, Quantity.LOAD)
+WHEEL_QUANTITIES = tuple(quantity for quantity in QUANTITIES if quantity.per_wheel)
+BODY_QUANTITIES = tuple(quantity for quantity in QUANTITIES if not quantity.per_wheel)
+NEEDED = (MOTOR_CURRENT, MOTOR_SPEED, LOAD)
 """Without these three, nothing can be said about a wheel."""
 
 
@@ -40,7 +44,7 @@ class Snapshot:
     time_ns
         The SYNC's kernel time, CLOCK_REALTIME.
     values
-        Shape (10, 6): one row for each `Quantity` in its order of declaration. What one node measures for the whole
+        Shape (quantities, 6): one row for each of `devices.registry.QUANTITIES`. What one node measures for the whole
         body stands in all six columns.
     """
 

@@ -13,8 +13,7 @@ import numpy as np
 from pydantic_core import to_json
 
 from regolithd.daemon.messages.header import SCHEMA_VERSION, iso_time
-from regolithd.daemon.pipeline.snapshot import ROW, WHEELS
-from regolithd.drivers.signals import Quantity
+from regolithd.daemon.pipeline.snapshot import BODY_QUANTITIES, ROW, WHEEL_QUANTITIES, WHEELS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,16 +21,6 @@ if TYPE_CHECKING:
     from regolithd.daemon.pipeline.snapshot import Array, Estimate
 
 _START = re.compile(rb'(\{"schema_version":\d+,"late":)(false|true),')
-
-_MEASURED_PER_WHEEL = (
-    Quantity.MOTOR_CURRENT,
-    Quantity.MOTOR_SPEED,
-    Quantity.LOAD,
-    Quantity.GROUND_SPEED,
-    Quantity.MOTOR_TEMPERATURE,
-    Quantity.BUS_VOLTAGE,
-)
-_BODY = (Quantity.PITCH, Quantity.ROLL, Quantity.YAW_RATE)
 
 
 def write(fields: dict[str, Any]) -> bytes:
@@ -60,8 +49,10 @@ def _per_wheel(estimate: Estimate) -> dict[str, Sequence[Any]]:
     return {
         "measured": snapshot.valid.tolist(),
         "valid": estimate.valid.tolist(),
-        **{quantity.value: snapshot.values[ROW[quantity]].tolist() for quantity in _MEASURED_PER_WHEEL},
-        "statusword": _integers(snapshot.statusword),
+        **{
+            quantity.name: _integers(snapshot[quantity]) if quantity.flags else snapshot[quantity].tolist()
+            for quantity in WHEEL_QUANTITIES
+        },
         "wheel_torque_Nm": estimate.wheel_torque_Nm.tolist(),
         "smoothed_torque_Nm": estimate.smoothed_torque_Nm.tolist(),
         "smoothed_load_N": estimate.smoothed_load_N.tolist(),
@@ -88,7 +79,7 @@ def encode(estimate: Estimate, session: str) -> tuple[bytes, list[bytes]]:
     """Return the `snapshot` message of an estimate, and its six `wheel/…` messages, wheel 1 first."""
     header = _header(estimate, session)
     six = _per_wheel(estimate)
-    body = {quantity.value: float(estimate.snapshot.values[ROW[quantity], 0]) for quantity in _BODY}
+    body = {quantity.name: float(estimate.snapshot.values[ROW[quantity], 0]) for quantity in BODY_QUANTITIES}
     wheels = [
         write(header | {"wheel": wheel + 1} | {name: values[wheel] for name, values in six.items()})
         for wheel in range(WHEELS)

@@ -208,7 +208,7 @@ def node_fields(status: NodeStatus) -> dict[str, Any]:
         "wheel": None if node.wheel is None else node.wheel + 1,
         "required": node.required,
         "phase": status.phase,
-        "nmt_state": None if status.nmt_state is None else status.nmt_state.words,
+        "nmt_state": None if status.nmt_state is None else status.nmt_state.text,
         "drive_state": None if status.drive_state is None else status.drive_state.value,
         "heard": None if status.heard_ns is None else iso_time(status.heard_ns),
         "identity": None if identity is None else IdentityReport(**asdict(identity)),

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic_core import to_json
 
-from regolithd.daemon.pipeline.snapshot import QUANTITIES, WHEELS, Snapshot
+from regolithd.daemon.pipeline.snapshot import WHEELS, Snapshot
+from regolithd.drivers.devices.registry import QUANTITIES
 
 if TYPE_CHECKING:
     from regolithd.daemon.pipeline.snapshot import Estimate
@@ -32,14 +33,14 @@ def snapshot_json(snapshot: Snapshot) -> bytes:
     content: dict[str, Any] = {"sequence": snapshot.sequence, "time_ns": snapshot.time_ns}
     for row, quantity in enumerate(QUANTITIES):
         if measured[row]:
-            content[quantity] = rows[row].tolist()
+            content[quantity.name] = rows[row].tolist()
     return _write(content)
 
 
 def snapshot_from_json(content: dict[str, Any]) -> Snapshot:
     """Return the snapshot that `snapshot_json` wrote."""
     nothing = [None] * WHEELS
-    values = np.array([content.get(quantity, nothing) for quantity in QUANTITIES], dtype=np.float64)
+    values = np.array([content.get(quantity.name, nothing) for quantity in QUANTITIES], dtype=np.float64)
     values.flags.writeable = False
     return Snapshot(content["sequence"], content["time_ns"], values)
 

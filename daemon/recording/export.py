@@ -8,7 +8,7 @@ from typing import IO, TYPE_CHECKING
 from regolithd.daemon.pipeline.snapshot import WHEELS
 from regolithd.daemon.recording.content import SNAPSHOT, snapshot_from_json
 from regolithd.daemon.recording.mcap_file import open_mcap, read_messages
-from regolithd.drivers.signals import Quantity
+from regolithd.drivers.devices.registry import QUANTITIES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -17,18 +17,8 @@ if TYPE_CHECKING:
 
     from regolithd.daemon.pipeline.snapshot import Snapshot
 
-COLUMNS = (
-    Quantity.MOTOR_CURRENT,
-    Quantity.MOTOR_SPEED,
-    Quantity.LOAD,
-    Quantity.GROUND_SPEED,
-    Quantity.PITCH,
-    Quantity.ROLL,
-    Quantity.YAW_RATE,
-    Quantity.MOTOR_TEMPERATURE,
-    Quantity.BUS_VOLTAGE,
-)
-HEADER = ("t_s", "wheel", *(str(column) for column in COLUMNS))
+COLUMNS = tuple(quantity for quantity in QUANTITIES if not quantity.flags)
+HEADER = ("t_s", "wheel", *(column.name for column in COLUMNS))
 
 Row = tuple[float | int | None, ...]
 

@@ -4,18 +4,23 @@
            error code  error register  manufacturer's own
            (LE)        (0x1001)
 
-The high byte of the code is CiA 301's error class; codes that CiA 301 or the maker of the motor controller define more
-closely have words of their own. Code 0x0000 says that an error is gone.
+The high byte of the code is CiA 301's error class; some codes are defined by CiA 301 in full, others by the device's
+manufacturer (`Device.error_texts`). Code 0x0000 says that an error has been reset.
 """
 
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from regolithd.drivers.can.frame import Frame
-from regolithd.drivers.signals import Emergency, NodeKind
+from regolithd.drivers.canopen import cob_id
 
-EMCY_COB_ID = 0x080  # + node-ID
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 _EMCY = struct.Struct("<HB5s")
 
 # CiA 301, table 26; a class is looked up by its first two digits, then by the first alone.
@@ -57,32 +62,6 @@ _CODES = {
     0x8240: "SYNC of unexpected length",
     0x8250: "RPDO overdue",
 }
-# EPOS firmware specification, chapter "Error codes".
-_EPOS_CODES = {
-    0x2310: "overcurrent: short circuit, or the current controller is badly tuned",
-    0x3210: "overvoltage: supply too high, or energy fed back while braking",
-    0x3220: "undervoltage: supply too weak for the acceleration",
-    0x4210: "overtemperature of the power stage",
-    0x5113: "internal 5 V supply too low",
-    0x6100: "internal software error",
-    0x6320: "software parameter out of range",
-    0x7320: "position sensor error: encoder cable or supply",
-    0x8111: "CAN overrun",
-    0x81FD: "CAN bus-off",
-    0x81FE: "CAN receive queue overrun",
-    0x81FF: "CAN transmit queue overrun",
-    0x8611: "following error: the motor cannot follow its demand",
-    0xFF01: "Hall sensor error",
-    0xFF02: "encoder index not found",
-    0xFF03: "encoder resolution wrong",
-    0xFF04: "Hall sensor not found",
-    0xFF06: "negative limit switch",
-    0xFF07: "positive limit switch",
-    0xFF08: "Hall angle detection error",
-    0xFF09: "software position limit",
-    0xFF0A: "position sensor breach",
-    0xFF0B: "system overloaded",
-}
 _REGISTER_BITS = (
     "generic",
     "current",
@@ -95,10 +74,33 @@ _REGISTER_BITS = (
 )
 
 
-def error_text(code: int, kind: NodeKind | None = None) -> str:
-    """Return an error code in words: the maker's for this kind of node, CiA 301's, or its class."""
-    own = _EPOS_CODES.get(code) if kind is NodeKind.MOTOR else None
-    text = own or _CODES.get(code)
+_NO_TEXTS: Mapping[int, str] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Emergency:
+    """A received EMCY message.
+
+    `code` 0x0000 means that the error has been reset; `register` is object 0x1001; `vendor` are the five bytes that
+    the manufacturer defines.
+    """
+
+    time_ns: int
+    node_id: int
+    code: int
+    register: int
+    vendor: bytes
+    text: str
+
+    @property
+    def cleared(self) -> bool:
+        """Whether it says that an error has been reset, rather than that there is one."""
+        return self.code == 0
+
+
+def error_text(code: int, manufacturer: Mapping[int, str] = _NO_TEXTS) -> str:
+    """Return the meaning of an error code: the manufacturer's, CiA 301's, or that of its class."""
+    text = manufacturer.get(code) or _CODES.get(code)
     if text is None:
         high = code >> 8
         text = _CLASSES.get(high) or _CLASSES.get(high & 0xF0, "reserved error class")
@@ -106,18 +108,18 @@ def error_text(code: int, kind: NodeKind | None = None) -> str:
 
 
 def register_bits(register: int) -> tuple[str, ...]:
-    """Return which kinds of error the error register (0x1001) says are present."""
+    """Return the kinds of error whose bits are set in the error register (0x1001)."""
     return tuple(name for bit, name in enumerate(_REGISTER_BITS) if register >> bit & 1)
 
 
-def parse(frame: Frame, node_id: int, kind: NodeKind | None = None) -> Emergency | None:
-    """Return the emergency in a frame, or None where it has not the eight bytes of one."""
+def parse(frame: Frame, node_id: int, manufacturer: Mapping[int, str] = _NO_TEXTS) -> Emergency | None:
+    """Return the emergency in a frame, or None where it does not have the eight bytes of one."""
     if len(frame.data) != _EMCY.size:
         return None
     code, register, vendor = _EMCY.unpack(frame.data)
-    return Emergency(frame.time_ns, node_id, code, register, vendor, error_text(code, kind))
+    return Emergency(frame.time_ns, node_id, code, register, vendor, error_text(code, manufacturer))
 
 
 def emergency_frame(node_id: int, code: int, register: int, vendor: bytes = bytes(5)) -> Frame:
     """Return the frame by which `node_id` reports an error."""
-    return Frame(0, EMCY_COB_ID + node_id, _EMCY.pack(code, register, vendor))
+    return Frame(0, cob_id.EMCY + node_id, _EMCY.pack(code, register, vendor))

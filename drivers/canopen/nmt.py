@@ -1,6 +1,6 @@
 """Network management (CiA 301, 7.2.8 and 7.3.2): commands to nodes, and the states that they report.
 
-A command is a frame of two bytes on COB-ID 0: what to do, and who (0 for everybody).
+A command is a frame of two bytes on COB-ID 0: command specifier and node-ID (0 for all nodes).
 A node reports its state in a one-byte frame on 0x700 + node-ID: as its heartbeat, and once, with 0, as it boots up.
 """
 
@@ -9,14 +9,13 @@ from __future__ import annotations
 from enum import IntEnum
 
 from regolithd.drivers.can.frame import Frame
+from regolithd.drivers.canopen import cob_id
 
-NMT_COB_ID = 0x000
-ERROR_CONTROL_COB_ID = 0x700  # + node-ID: boot-up and heartbeat
 ALL_NODES = 0
 
 
 class NmtCommand(IntEnum):
-    """What the master tells a node (CiA 301, 7.2.8.2.1)."""
+    """NMT command specifiers (CiA 301, 7.2.8.2.1)."""
 
     START = 0x01  # to operational: PDOs flow
     STOP = 0x02  # neither PDO nor SDO, only NMT and heartbeat
@@ -26,7 +25,7 @@ class NmtCommand(IntEnum):
 
 
 class NmtState(IntEnum):
-    """What a node says it is in (CiA 301, 7.2.8.3.2.2); boot-up is said once, on entering pre-operational."""
+    """NMT states as reported by a node (CiA 301, 7.2.8.3.2.2); boot-up once, on entering pre-operational."""
 
     BOOT_UP = 0x00
     STOPPED = 0x04
@@ -34,23 +33,23 @@ class NmtState(IntEnum):
     PRE_OPERATIONAL = 0x7F
 
     @property
-    def words(self) -> str:
-        """The state as a person reads it."""
+    def text(self) -> str:
+        """The state as text, such as `pre-operational`."""
         return self.name.lower().replace("_", "-")
 
 
 def command_frame(command: NmtCommand, node_id: int = ALL_NODES) -> Frame:
     """Return the frame that tells `node_id` (0: every node) to change its state."""
-    return Frame(0, NMT_COB_ID, bytes((command, node_id)))
+    return Frame(0, cob_id.NMT, bytes((command, node_id)))
 
 
 def state_frame(state: NmtState, node_id: int) -> Frame:
     """Return the heartbeat (or boot-up) frame of `node_id`."""
-    return Frame(0, ERROR_CONTROL_COB_ID + node_id, bytes((state,)))
+    return Frame(0, cob_id.ERROR_CONTROL + node_id, bytes((state,)))
 
 
 def parse_state(data: bytes) -> NmtState | None:
-    """Return the state in an error-control frame, or None where it is not one of CiA 301's.
+    """Return the state in an error-control frame, or None where CiA 301 has no such state.
 
     The top bit is node guarding's toggle, which a heartbeat keeps at 0; it is masked.
     """

@@ -1,4 +1,4 @@
-"""Object dictionaries: what an EDS file (CiA 306) says that a node has."""
+"""Object dictionaries: the objects that an EDS file (CiA 306) lists, with their types and access rights."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING
 import canopen
 from canopen.objectdictionary import ODVariable, datatypes
 
-from regolithd.drivers.devices.eds import eds_path
 from regolithd.drivers.errors import DictionaryError
 
 if TYPE_CHECKING:
-    from regolithd.drivers.signals import NodeKind
+    from pathlib import Path
 
-# CiA 301, table 44: how the numeric types of the drivers' objects lie in a PDO or an SDO, as `struct` codes.
+# CiA 301, table 44: the numeric data types in a PDO or an SDO, as `struct` codes.
 STRUCT_CODES = {
     datatypes.BOOLEAN: "?",
     datatypes.INTEGER8: "b",
@@ -31,26 +30,26 @@ STRUCT_CODES = {
 
 
 @cache
-def object_dictionary(kind: NodeKind) -> canopen.ObjectDictionary:
-    """Return the dictionary that this kind of node is driven by; node-ID-dependent defaults are for node 0."""
-    return canopen.import_od(str(eds_path(kind)), node_id=0)
+def object_dictionary(eds: Path) -> canopen.ObjectDictionary:
+    """Return the object dictionary of an EDS file; defaults that depend on the node-ID are for node 0."""
+    return canopen.import_od(str(eds), node_id=0)
 
 
-def variable(kind: NodeKind, index: int, subindex: int = 0) -> ODVariable:
-    """Return one entry of the dictionary.
+def variable(eds: Path, index: int, subindex: int = 0) -> ODVariable:
+    """Return one entry of an EDS file's object dictionary.
 
     Raises
     ------
     DictionaryError
         The EDS has no such object.
     """
-    entry = object_dictionary(kind).get_variable(index, subindex)
+    entry = object_dictionary(eds).get_variable(index, subindex)
     if entry is None:
         raise DictionaryError(
-            f"the EDS of {kind.value} nodes has no such object",
+            f"the EDS file {eds.name} has no such object",
             index=index,
             subindex=subindex,
-            cure=f"Take the device's own EDS file as drivers/devices/eds/{kind.value}.eds, or map another object",
+            cure="Put the device's own EDS file in its place, or map another object",
         )
     return entry
 

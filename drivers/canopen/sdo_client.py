@@ -6,7 +6,7 @@ import asyncio
 from typing import TYPE_CHECKING
 
 from regolithd.drivers.can.frame import Frame
-from regolithd.drivers.canopen.decoder import SDO_REQUEST_COB_ID
+from regolithd.drivers.canopen import cob_id
 from regolithd.drivers.canopen.sdo import ABORT_COMMAND, ABORT_TIMEOUT, Transfer, abort_request, download, upload
 from regolithd.drivers.errors import BusError, SdoError, SdoInterruptedError, SdoProtocolError, SdoTimeoutError
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class SdoClient:
-    """Reads and writes the objects of one node. Whoever reads the bus passes the node's answers to `handle`."""
+    """Reads and writes the objects of one node. The reader of the bus passes the node's answers to `handle`."""
 
     def __init__(self, bus: Bus, node_id: int, *, timeout_s: float) -> None:
         self.node_id = node_id
@@ -27,12 +27,12 @@ class SdoClient:
         self._one_at_a_time = asyncio.Lock()
 
     def handle(self, frame: Frame) -> None:
-        """Take a frame of the node's SDO server; without a transfer under way it is thrown away."""
+        """Take a frame of the node's SDO server; without a transfer under way it is discarded."""
         if self._one_at_a_time.locked():
             self._answers.put_nowait(frame.data)
 
     def interrupt(self) -> None:
-        """Give up the transfer under way: the node has restarted and knows nothing of it."""
+        """Abandon the transfer under way: the node has restarted and has lost it."""
         if self._one_at_a_time.locked():
             self._answers.put_nowait(None)
 
@@ -42,7 +42,7 @@ class SdoClient:
         Raises
         ------
         SdoTimeoutError, SdoInterruptedError, SdoAbortError, SdoProtocolError
-            As the error tree says.
+            See `drivers.errors`.
         BusError
             The request could not be sent.
         """
@@ -65,7 +65,7 @@ class SdoClient:
                 return await self._converse(transfer)
             except SdoInterruptedError as error:
                 error.locate(self.node_id)
-                raise  # no failure of the transfer: whoever boots the node knows
+                raise  # not counted as a failure: the boot is repeated
             except BusError:
                 self.failures += 1
                 raise
@@ -105,4 +105,4 @@ class SdoClient:
         return answer
 
     async def _send(self, request: bytes) -> None:
-        await self._bus.send(Frame(0, SDO_REQUEST_COB_ID + self.node_id, request))
+        await self._bus.send(Frame(0, cob_id.SDO_REQUEST + self.node_id, request))

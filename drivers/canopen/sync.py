@@ -1,7 +1,7 @@
 """The SYNC producer (CiA 301, 7.2.5): one frame on 0x080 per period, on a schedule that does not drift.
 
-The n-th SYNC is due at start + n·period, whatever became of those before (`drivers.timer`); how late each is sent is
-measured. A snapshot's time is not the schedule's: it is the kernel's time of the SYNC's echo.
+The n-th SYNC is due at start + n·period, whatever became of those before (`canopen.timer`); how late each is sent is
+measured. A snapshot's time is the kernel's receive time of the SYNC's echo, not the scheduled one.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from regolithd.drivers.can.frame import Frame
-from regolithd.drivers.canopen.decoder import SYNC_COB_ID
+from regolithd.drivers.canopen import cob_id
+from regolithd.drivers.canopen.timer import periodic
 from regolithd.drivers.errors import BusError
-from regolithd.drivers.timer import periodic
 
 if TYPE_CHECKING:
     from regolithd.drivers.can.bus import Bus
 
-SYNC_FRAME = Frame(0, SYNC_COB_ID, b"")
+SYNC_FRAME = Frame(0, cob_id.SYNC, b"")
 RATE_LIMITS_Hz = (1.0, 200.0)
 
 

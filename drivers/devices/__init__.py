@@ -1,1 +1,1 @@
-"""Device profiles: what each kind of node measures and how it is configured."""
+"""The kinds of device on the bus: one file each, listed in `registry`, and what follows from them."""

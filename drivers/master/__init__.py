@@ -1,1 +1,6 @@
-"""The CANopen master: boots, supervises and commands the nodes of one bus."""
+"""The CANopen master: a network of booted, supervised and commanded nodes."""
+
+from regolithd.drivers.master.network import Network
+from regolithd.drivers.master.status import NetworkCounters, NetworkSettings, NodePhase, NodeStatus
+
+__all__ = ["Network", "NetworkCounters", "NetworkSettings", "NodePhase", "NodeStatus"]

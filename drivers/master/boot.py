@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING
 from regolithd.drivers.canopen.nmt import NmtCommand, NmtState
 from regolithd.drivers.canopen.object_dictionary import object_dictionary
 from regolithd.drivers.errors import (
-    BootError,
     BusError,
     DictionaryError,
     DriverError,
@@ -28,13 +27,13 @@ from regolithd.drivers.errors import (
     SdoProtocolError,
     SdoTimeoutError,
 )
-from regolithd.drivers.master.boot_reason import BootReason
-from regolithd.drivers.master.configuration import Write, configuration
+from regolithd.drivers.master.boot_configuration import Write, boot_writes
+from regolithd.drivers.master.boot_error import BootError, BootReason
 from regolithd.drivers.master.events import Identity
 
 if TYPE_CHECKING:
-    from regolithd.drivers.master.remote_node import Link
-    from regolithd.drivers.signals import NodeDescription
+    from regolithd.drivers.devices.node import NodeDescription
+    from regolithd.drivers.master.remote_node import RemoteNode
 
 DEVICE_TYPE = 0x1000
 IDENTITY = 0x1018
@@ -52,7 +51,7 @@ class BootSettings:
     boot_up_timeout_s: float
 
 
-async def boot(link: Link, settings: BootSettings) -> Identity:
+async def boot(remote: RemoteNode, settings: BootSettings) -> Identity:
     """Boot one node into operational and return who it is.
 
     Raises
@@ -61,27 +60,27 @@ async def boot(link: Link, settings: BootSettings) -> Identity:
         With its reason; the node is left as it is, not operational.
     """
     try:
-        return await _Boot(link, settings).run()
+        return await _Boot(remote, settings).run()
     except DictionaryError as error:
         raise BootError(
             BootReason.UNUSABLE_EDS,
             error.what,
-            node_id=link.node.node_id,
+            node_id=remote.node.node_id,
             index=error.index,
             subindex=error.subindex,
         ) from error
     except BusError as error:
-        raise BootError(BootReason.BUS_DOWN, error.what, node_id=link.node.node_id) from error
+        raise BootError(BootReason.BUS_DOWN, error.what, node_id=remote.node.node_id) from error
 
 
-async def read_identity(link: Link) -> Identity:
+async def read_identity(remote: RemoteNode) -> Identity:
     """Return a node's device type (0x1000) and identity (0x1018); an optional entry that it has not is 0."""
-    device_type = await link.sdo.read_number(DEVICE_TYPE)
-    vendor = await link.sdo.read_number(IDENTITY, 1)
+    device_type = await remote.sdo.read_number(DEVICE_TYPE)
+    vendor = await remote.sdo.read_number(IDENTITY, 1)
     rest = []
     for subindex in (2, 3, 4):
         try:
-            rest.append(await link.sdo.read_number(IDENTITY, subindex))
+            rest.append(await remote.sdo.read_number(IDENTITY, subindex))
         except SdoAbortError:
             rest.append(0)
     return Identity(device_type, vendor, *rest)
@@ -99,23 +98,23 @@ def compare_identity(node: NodeDescription, found: Identity) -> tuple[BootReason
     )
     for reason, name, value, wanted, mask in checks:
         if wanted is not None and (value ^ wanted) & mask:
-            return reason, f"its {name} is 0x{value & mask:08X}, expected 0x{wanted & mask:08X} ({node.kind.value})"
+            return reason, f"its {name} is 0x{value & mask:08X}, expected 0x{wanted & mask:08X} ({node.kind})"
     return None
 
 
 def _expected(node: NodeDescription, index: int, subindex: int = 0) -> int | None:
     """Return what the EDS says, or None where it says nothing."""
-    entry = object_dictionary(node.kind).get_variable(index, subindex)
+    entry = object_dictionary(node.device.eds).get_variable(index, subindex)
     return None if entry is None else entry.default
 
 
 class _Boot:
     """One run through the process."""
 
-    def __init__(self, link: Link, settings: BootSettings) -> None:
-        self._link = link
+    def __init__(self, remote: RemoteNode, settings: BootSettings) -> None:
+        self._remote = remote
         self._settings = settings
-        self._boot_ups = link.boot_ups
+        self._boot_ups = remote.boot_ups
 
     async def run(self) -> Identity:
         await self._reset()
@@ -132,12 +131,12 @@ class _Boot:
         return identity
 
     async def _reset(self) -> None:
-        link, timeout_s = self._link, self._settings.boot_up_timeout_s
-        before = link.boot_ups
-        await link.tell(NmtCommand.RESET_NODE)
-        if not await link.news.until(lambda: link.boot_ups > before, timeout_s):
+        remote, timeout_s = self._remote, self._settings.boot_up_timeout_s
+        before = remote.boot_ups
+        await remote.send_command(NmtCommand.RESET_NODE)
+        if not await remote.changed.until(lambda: remote.boot_ups > before, timeout_s):
             raise self._error(BootReason.NO_BOOT_UP, f"no boot-up message within {timeout_s:g} s of the NMT reset")
-        self._boot_ups = link.boot_ups
+        self._boot_ups = remote.boot_ups
 
     async def _identify_restarted(self) -> Identity:
         """Identify the node; a boot-up meanwhile does no harm, as nothing has been written yet.
@@ -149,24 +148,24 @@ class _Boot:
         except SdoInterruptedError:
             return await self._identify()
         finally:
-            self._boot_ups = self._link.boot_ups
+            self._boot_ups = self._remote.boot_ups
 
     async def _identify(self) -> Identity:
         try:
-            identity = await read_identity(self._link)
+            identity = await read_identity(self._remote)
         except SdoTimeoutError as error:
             raise self._error(BootReason.NO_SDO_ANSWER, error.what, error) from error
         except SdoAbortError as error:
             raise self._error(BootReason.WRONG_DEVICE_TYPE, error.what, error) from error
-        difference = compare_identity(self._link.node, identity)
+        difference = compare_identity(self._remote.node, identity)
         if difference is not None:
             raise self._error(*difference)
         return identity
 
     async def _configure(self) -> None:
         settings = self._settings
-        writes = configuration(
-            self._link.node,
+        writes = boot_writes(
+            self._remote.node,
             heartbeat_s=settings.heartbeat_s,
             master_id=settings.master_id,
             master_lost_after_s=settings.master_lost_after_s,
@@ -179,7 +178,7 @@ class _Boot:
             self._check_restart()
 
     async def _write(self, write: Write) -> None:
-        sdo = self._link.sdo
+        sdo = self._remote.sdo
         index, subindex = write.index, write.subindex
         look_first = write.keep or write.read_only
         present = await sdo.read_number(index, subindex) if look_first else 0
@@ -192,28 +191,28 @@ class _Boot:
             raise BootError(
                 BootReason.CONFIGURATION_NOT_KEPT,
                 what,
-                node_id=self._link.node.node_id,
+                node_id=self._remote.node.node_id,
                 index=index,
                 subindex=subindex,
             )
 
     async def _start(self) -> None:
-        link = self._link
-        patience_s = _HEARTBEATS * self._settings.heartbeat_s
-        before = link.heard
-        if not await link.news.until(lambda: link.heard > before, patience_s):
-            raise self._error(BootReason.NO_HEARTBEAT, f"no heartbeat within {patience_s:g} s")
+        remote = self._remote
+        timeout_s = _HEARTBEATS * self._settings.heartbeat_s
+        before = remote.heard
+        if not await remote.changed.until(lambda: remote.heard > before, timeout_s):
+            raise self._error(BootReason.NO_HEARTBEAT, f"no heartbeat within {timeout_s:g} s")
         self._check_restart()
-        await link.tell(NmtCommand.START)
-        if not await link.news.until(lambda: link.state is NmtState.OPERATIONAL, patience_s):
+        await remote.send_command(NmtCommand.START)
+        if not await remote.changed.until(lambda: remote.state is NmtState.OPERATIONAL, timeout_s):
             self._check_restart()
-            said = link.state.words if link.state else "nothing"
-            raise self._error(BootReason.NOT_OPERATIONAL, f"still says {said} {patience_s:g} s after the NMT start")
+            said = remote.state.text if remote.state else "nothing"
+            raise self._error(BootReason.NOT_OPERATIONAL, f"still says {said} {timeout_s:g} s after the NMT start")
 
     def _check_restart(self) -> None:
-        if self._link.boot_ups != self._boot_ups:
+        if self._remote.boot_ups != self._boot_ups:
             raise self._error(BootReason.RESTARTED, "booted up again while it was being configured")
 
     def _error(self, reason: BootReason, what: str, cause: DriverError | None = None) -> BootError:
         place = cause or DriverError("")
-        return BootError(reason, what, node_id=self._link.node.node_id, index=place.index, subindex=place.subindex)
+        return BootError(reason, what, node_id=self._remote.node.node_id, index=place.index, subindex=place.subindex)

@@ -1,59 +1,53 @@
-"""One motor controller under command (CiA 402, profile velocity mode).
+"""The master of one motor controller (CiA 402, profile velocity mode).
 
 States are changed by SDO, which is confirmed and does not wait for a SYNC; speeds and stops go by RPDO 1, one frame
-with the controlword and the target velocity, so that no drive ever sees one without the other.
+with the controlword and the target velocity, so that no drive receives one without the other.
 """
 
 from __future__ import annotations
 
 import asyncio
-import math
 from typing import TYPE_CHECKING
 
 from regolithd.drivers.can.frame import Frame
-from regolithd.drivers.canopen.pdo import rpdos
-from regolithd.drivers.devices.cia402 import (
+from regolithd.drivers.devices.decoding.pdo import rpdos
+from regolithd.drivers.devices.motor_controller import (
+    CONTROLWORD,
+    ERROR_CODE,
+    MODE_DISPLAY,
     PROFILE_VELOCITY,
-    Controlword,
-    DriveState,
-    enabling_step,
-    standing,
-    state_of,
+    RAD_S_PER_RPM,
+    STATUSWORD_OBJECT,
+    TARGET_VELOCITY,
 )
 from regolithd.drivers.errors import DriveError
-from regolithd.drivers.signals import NodeKind
+from regolithd.drivers.master.cia402 import Controlword, DriveState, enabling_step, standing, state_of
 
 if TYPE_CHECKING:
     from regolithd.drivers.can.bus import Bus
-    from regolithd.drivers.master.remote_node import Link
+    from regolithd.drivers.master.remote_node import RemoteNode
 
-CONTROLWORD = 0x6040
-STATUSWORD = 0x6041
-MODE_DISPLAY = 0x6061
-TARGET_VELOCITY = 0x60FF
-ERROR_CODE = 0x603F
-_RPM_PER_RAD_S = 60.0 / (2.0 * math.pi)
 _ENABLE_TIMEOUT_S = 3.0
 _STOP_TIMEOUT_S = 3.0
-_HEED_S = 0.2  # a drive that is still enabled this long after the quick stop has not got it
+_RESEND_S = 0.2  # a drive still enabled this long after the quick stop has not received it
 _POLL_S = 0.02
 _STOPPED = (DriveState.SWITCH_ON_DISABLED, DriveState.READY, DriveState.SWITCHED_ON, DriveState.FAULT)
 
 
 class Drive:
-    """The master's end of one motor controller. `statusword` is the last that came, by TPDO or SDO."""
+    """Commands one motor controller. `statusword` is the last one received, by TPDO or SDO."""
 
-    def __init__(self, bus: Bus, link: Link) -> None:
-        self.link = link
-        self.node_id = link.node.node_id
+    def __init__(self, bus: Bus, remote: RemoteNode) -> None:
+        self.remote = remote
+        self.node_id = remote.node.node_id
         self.statusword: int | None = None
-        self.reported = DriveState.UNKNOWN  # as last told to whoever listens to changes
+        self.reported = DriveState.UNKNOWN  # in the last `DriveStateChanged` event
         self._bus = bus
-        self._rpdo = rpdos(NodeKind.MOTOR)[0]
+        self._rpdo = rpdos(remote.node.device)[0]
 
     @property
     def state(self) -> DriveState:
-        """Where the drive last said it is."""
+        """State by the last statusword."""
         return DriveState.UNKNOWN if self.statusword is None else state_of(self.statusword)
 
     async def enable(self) -> None:
@@ -64,9 +58,9 @@ class Drive:
         DriveError
             It does not get there in time.
         SdoError, BusError
-            It could not be asked.
+            Its statusword could not be read.
         """
-        sdo = self.link.sdo
+        sdo = self.remote.sdo
         mode = await sdo.read_number(MODE_DISPLAY, signed=True)
         if mode != PROFILE_VELOCITY:
             raise self._error(f"is in mode {mode} instead of profile velocity mode (3)", "Boot the node again")
@@ -74,7 +68,7 @@ class Drive:
         deadline = asyncio.get_running_loop().time() + _ENABLE_TIMEOUT_S
         last = Controlword.DISABLE_VOLTAGE
         await self._write_controlword(last)  # bit 7 at 0: a fault reset after it is a rising edge
-        while await self.ask() is not DriveState.ENABLED:
+        while await self.read_state() is not DriveState.ENABLED:
             word = enabling_step(self.state, last)
             if word is not None:
                 await self._write_controlword(word)
@@ -83,9 +77,9 @@ class Drive:
                 raise await self._not_enabled()
             await asyncio.sleep(_POLL_S)
 
-    async def ask(self) -> DriveState:
+    async def read_state(self) -> DriveState:
         """Read the statusword by SDO and return the state."""
-        self.statusword = await self.link.sdo.read_number(STATUSWORD)
+        self.statusword = await self.remote.sdo.read_number(STATUSWORD_OBJECT)
         return self.state
 
     def take_statusword(self, statusword: int) -> DriveState:
@@ -95,21 +89,21 @@ class Drive:
         return self.reported
 
     def forget(self) -> None:
-        """Forget the statusword of a drive that is no longer heard."""
+        """Forget the statusword of a lost drive."""
         self.statusword = None
         self.reported = DriveState.UNKNOWN
 
     async def turn(self, motor_speed_rad_s: float) -> None:
         """Send the target velocity [rad/s at the motor, forward positive]; the drive must be in operation enabled."""
-        direction = -1 if self.link.node.mirrored else 1
-        await self._command(Controlword.ENABLE_OPERATION, direction * round(motor_speed_rad_s * _RPM_PER_RAD_S))
+        direction = -1 if self.remote.node.mirrored else 1
+        await self._command(Controlword.ENABLE_OPERATION, direction * round(motor_speed_rad_s / RAD_S_PER_RPM))
 
     async def send_quick_stop(self) -> None:
         """Send the quick stop and do not wait."""
         await self._command(Controlword.QUICK_STOP, 0)
 
     async def until_stopped(self) -> None:
-        """Wait until the drive has stopped after a quick stop; one that does not heed the PDO is told by SDO as well.
+        """Wait until the drive has stopped after a quick stop; where the PDO has no effect, it is repeated by SDO.
 
         Raises
         ------
@@ -117,16 +111,18 @@ class Drive:
             It has not, in time.
         """
         begun = asyncio.get_running_loop().time()
-        while await self.ask() not in _STOPPED and not (self.state is DriveState.QUICK_STOP and self._standing()):
+        while await self.read_state() not in _STOPPED and not (
+            self.state is DriveState.QUICK_STOP and self._standing()
+        ):
             waited_s = asyncio.get_running_loop().time() - begun
-            if self.state is DriveState.ENABLED and waited_s > _HEED_S:
+            if self.state is DriveState.ENABLED and waited_s > _RESEND_S:
                 await self._write_controlword(Controlword.QUICK_STOP)
             if waited_s > _STOP_TIMEOUT_S:
                 raise self._error(f"does not stop: it is in {self.state}", "Cut the motors' supply")
             await asyncio.sleep(_POLL_S)
 
     async def disable(self) -> None:
-        """Take the power off the motor; it must stand."""
+        """Disable the motor's voltage; it must be at standstill."""
         await self._write_controlword(Controlword.DISABLE_VOLTAGE)
 
     def _standing(self) -> bool:
@@ -137,12 +133,12 @@ class Drive:
         await self._bus.send(Frame(0, self._rpdo.cob_id(self.node_id), data))
 
     async def _write_controlword(self, word: Controlword) -> None:
-        await self.link.sdo.write(CONTROLWORD, 0, word.to_bytes(2, "little"))
+        await self.remote.sdo.write(CONTROLWORD, 0, word.to_bytes(2, "little"))
 
     async def _not_enabled(self) -> DriveError:
         cure = "See its emergency messages; cut its supply and switch it on again"
         if self.state is DriveState.FAULT:
-            code = await self.link.sdo.read_number(ERROR_CODE)
+            code = await self.remote.sdo.read_number(ERROR_CODE)
             return self._error(f"stays in fault, error code 0x{code:04X}", cure)
         return self._error(f"is still in {self.state} after {_ENABLE_TIMEOUT_S:g} s", cure)
 

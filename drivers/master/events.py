@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from regolithd.drivers.can.bus import BusState
-    from regolithd.drivers.devices.cia402 import DriveState
-    from regolithd.drivers.master.boot_reason import BootReason
-    from regolithd.drivers.signals import Emergency
+    from regolithd.drivers.canopen.emcy import Emergency
+    from regolithd.drivers.master.boot_error import BootReason
+    from regolithd.drivers.master.cia402 import DriveState
 
 
 @dataclass(frozen=True, slots=True)

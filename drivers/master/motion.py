@@ -9,8 +9,8 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING
 
-from regolithd.drivers.devices.cia402 import DriveState
 from regolithd.drivers.errors import BusError, DriveError, DriverError
+from regolithd.drivers.master.cia402 import DriveState
 from regolithd.drivers.master.status import NodePhase
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class Motion:
         self.moving = any(wheel_speed_rad_s)
         try:
             for drive in self._drives.values():
-                wheel = drive.link.node.wheel
+                wheel = drive.remote.node.wheel
                 if wheel is not None:
                     await drive.turn(wheel_speed_rad_s[wheel] * self._gear_ratio)
         except BusError:

@@ -1,15 +1,15 @@
-"""The nodes of one bus: booted, supervised and commanded.
+"""The CANopen master: boots, supervises and commands the nodes of one bus.
 
     async with open_bus("socketcan", "can0") as bus, asyncio.TaskGroup() as tasks:
-        network = Network(bus, settings, on_frames=pipeline.feed, on_event=publish)
+        network = Network(bus, settings, on_frames=record, on_signals=acquire, on_event=publish)
         tasks.create_task(network.run())
         await network.settled()
         await network.enable()
         await network.set_speed((0.29,) * 6)
 
-`run` is the bus's only reader. Each batch of frames goes to `on_frames` first – recording and snapshots – and then to
-the nodes' own conversations. Cancelling `run` is the way to stop: the drives are stopped and disabled, then every node
-is put back into pre-operational.
+`run` is the bus's only reader, and the only one that decodes: each batch of frames goes to `on_frames` as received, and
+to `on_signals` as decoded. Cancelling `run` stops the network: the drives are stopped and disabled, then every node is
+set to pre-operational.
 """
 
 from __future__ import annotations
@@ -21,14 +21,16 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from regolithd.drivers.can.bus import Bus, BusState
-from regolithd.drivers.canopen.emcy import EMCY_COB_ID, parse
+from regolithd.drivers.canopen.emcy import Emergency
 from regolithd.drivers.canopen.heartbeat import produce_heartbeat
 from regolithd.drivers.canopen.nmt import NmtCommand
-from regolithd.drivers.canopen.pdo import tpdos
 from regolithd.drivers.canopen.sync import produce_sync
-from regolithd.drivers.devices.cia402 import DriveState
+from regolithd.drivers.devices.decoding.decoder import Decoder
+from regolithd.drivers.devices.decoding.signals import NodeState, Reading
+from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER, STATUSWORD
 from regolithd.drivers.errors import DriverError
-from regolithd.drivers.master.configuration import CONSUMER_HEARTBEAT
+from regolithd.drivers.master.boot_configuration import CONSUMER_HEARTBEAT
+from regolithd.drivers.master.cia402 import DriveState
 from regolithd.drivers.master.drive import Drive
 from regolithd.drivers.master.events import (
     BusStateChanged,
@@ -39,21 +41,21 @@ from regolithd.drivers.master.events import (
     NodeLost,
 )
 from regolithd.drivers.master.motion import Motion, each
-from regolithd.drivers.master.remote_node import Link
+from regolithd.drivers.master.remote_node import RemoteNode
 from regolithd.drivers.master.status import NetworkCounters, NetworkSettings, NodePhase, NodeStatus
 from regolithd.drivers.master.supervisor import Supervisor
-from regolithd.drivers.signals import NodeKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from regolithd.drivers.can.frame import Frame
-    from regolithd.drivers.canopen.pdo import Pdo
-    from regolithd.drivers.signals import NodeDescription
+    from regolithd.drivers.canopen.sdo_client import SdoClient
+    from regolithd.drivers.devices.decoding.signals import Signal
+    from regolithd.drivers.devices.node import NodeDescription
 
 __all__ = ["Network", "NetworkCounters", "NetworkSettings", "NodePhase", "NodeStatus"]
 
-_LEAVE_TIMEOUT_S = 5.0  # a stop that cannot be confirmed must not keep the program from ending
+_LEAVE_TIMEOUT_S = 5.0  # a stop that is not confirmed must not keep the program from ending
 _BUS_STATES = {
     BusState.ACTIVE: "the bus works",
     BusState.WARNING: "many errors on the bus: check terminators (60 Ω between the wires), length and plugs",
@@ -71,9 +73,16 @@ class Network:
     bus
         An open bus, which `run` alone reads.
     on_frames
-        Called with each batch of frames, in order, before anything else is done with them. Must not block.
+        Called with each batch of frames, in order, before they are decoded. Must not block.
+    on_signals
+        Called with what a batch of frames decodes to, in order. Must not block.
     on_event
         Called with each event as it happens. Must not block.
+
+    Attributes
+    ----------
+    decoder
+        Decodes the frames; counts what it cannot decode.
     """
 
     def __init__(
@@ -82,19 +91,22 @@ class Network:
         settings: NetworkSettings,
         *,
         on_frames: Callable[[Sequence[Frame]], None] = lambda _batch: None,
+        on_signals: Callable[[Sequence[Signal]], None] = lambda _signals: None,
         on_event: Callable[[NetworkEvent], None] = lambda _event: None,
     ) -> None:
         self.bus = bus
         self.settings = settings
+        self.decoder = Decoder(settings.nodes, master_id=settings.master_id)
         self._counters = NetworkCounters()
         self._on_frames = on_frames
+        self._on_signals = on_signals
         self._on_event = on_event
-        self._handlers: dict[int, Callable[[Frame], None]] = {}
+        self._sdo_clients: dict[int, SdoClient] = {}  # by the COB-ID of the answers
         self._supervisors: dict[int, Supervisor] = {}
         self._drives: dict[int, Drive] = {}
         self._bus_state = bus.state
-        self._must_stop: NetworkEvent | None = None
-        self._stop_wanted = asyncio.Event()
+        self._stop_cause: NetworkEvent | None = None
+        self._stop_requested = asyncio.Event()
         for node in settings.nodes:
             self._add(node)
         self._motion = Motion(self._drives, self._status, gear_ratio=settings.gear_ratio)
@@ -107,7 +119,7 @@ class Network:
     @property
     def counters(self) -> NetworkCounters:
         """What the network counts of itself."""
-        clients = [supervisor.link.sdo for supervisor in self._supervisors.values()]
+        clients = [supervisor.remote.sdo for supervisor in self._supervisors.values()]
         self._counters.sdo_transfers = sum(client.transfers for client in clients)
         self._counters.sdo_failures = sum(client.failures for client in clients)
         return self._counters
@@ -123,7 +135,7 @@ class Network:
             try:
                 async with asyncio.TaskGroup() as tasks:
                     tasks.create_task(produce_sync(self.bus, settings.sync_rate_Hz, self._counters.sync))
-                    tasks.create_task(self._stop_when_wanted())
+                    tasks.create_task(self._stop_when_requested())
                     for supervisor in self._supervisors.values():
                         tasks.create_task(supervisor.run())
             finally:
@@ -134,7 +146,7 @@ class Network:
     async def settled(self) -> None:
         """Wait until each node is operational or has failed its first boot."""
         for supervisor in self._supervisors.values():
-            await supervisor.link.news.until(lambda supervisor=supervisor: supervisor.attempts > 0)  # type: ignore[misc]
+            await supervisor.remote.changed.until(lambda supervisor=supervisor: supervisor.attempts > 0)  # type: ignore[misc]
 
     async def enable(self) -> None:
         """Bring all drives to operation enabled, standing still; a fault is reset first.
@@ -174,15 +186,11 @@ class Network:
 
     def _add(self, node: NodeDescription) -> None:
         node_id = node.node_id
-        link = Link(self.bus, node, sdo_timeout_s=self.settings.sdo_timeout_s)
-        supervisor = Supervisor(link, self.settings, self._emit)
-        self._supervisors[node_id] = supervisor
-        self._handlers |= link.handlers
-        self._handlers[EMCY_COB_ID + node_id] = lambda frame: self._take_emergency(supervisor, frame)
-        if node.kind is NodeKind.MOTOR:
-            drive = self._drives[node_id] = Drive(self.bus, link)
-            tpdo = tpdos(node.kind)[0]
-            self._handlers[tpdo.cob_id(node_id)] = lambda frame: self._take_statusword(drive, tpdo, frame)
+        remote = RemoteNode(self.bus, node, sdo_timeout_s=self.settings.sdo_timeout_s)
+        self._supervisors[node_id] = Supervisor(remote, self.settings, self._emit)
+        self._sdo_clients[remote.answer_cob_id] = remote.sdo
+        if node.device is MOTOR_CONTROLLER:
+            self._drives[node_id] = Drive(self.bus, remote)
 
     def _status(self, node_id: int) -> NodeStatus:
         status = self._supervisors[node_id].status
@@ -190,39 +198,58 @@ class Network:
         return status if drive is None else replace(status, drive_state=drive.state)
 
     async def _read(self) -> None:
-        handlers = self._handlers
         async for batch in self.bus:
             if batch:
                 self._on_frames(batch)
-            for frame in batch:
-                handler = handlers.get(frame.can_id)
-                if handler is not None and frame.ordinary and not frame.sent:
-                    handler(frame)
+                self._on_signals(self._decode(batch))
             if self.bus.state is not self._bus_state:
                 self._bus_state = self.bus.state
                 text = _BUS_STATES[self._bus_state].format(channel=self.bus.channel)
                 self._emit(BusStateChanged(time.time_ns(), self._bus_state, f"{self.bus.channel}: {text}"))
 
-    def _take_emergency(self, supervisor: Supervisor, frame: Frame) -> None:
-        node = supervisor.link.node
-        emergency = parse(frame, node.node_id, node.kind)
-        if emergency is None:
-            return
+    def _decode(self, batch: Sequence[Frame]) -> list[Signal]:
+        """Return the signals of a batch, after the nodes that they come from have taken them."""
+        signals: list[Signal] = []
+        decode, sdo_clients = self.decoder.decode, self._sdo_clients
+        for frame in batch:
+            signal = decode(frame)
+            if signal is not None:
+                signals.append(signal)
+                if not frame.sent:
+                    self._take(signal)
+            elif frame.can_id in sdo_clients and frame.ordinary and not frame.sent:
+                sdo_clients[frame.can_id].handle(frame)
+        return signals
+
+    def _take(self, signal: Signal) -> None:
+        match signal:
+            case Reading(node_id=node_id) if node_id in self._drives:
+                self._take_statusword(self._drives[node_id], signal)
+            case NodeState(node_id=node_id):
+                self._supervisors[node_id].remote.take_state(signal)
+            case Emergency(node_id=node_id):
+                self._take_emergency(self._supervisors[node_id], signal)
+            case _:
+                pass
+
+    def _take_emergency(self, supervisor: Supervisor, emergency: Emergency) -> None:
+        node = supervisor.remote.node
         supervisor.count_emergency()
         said = "error gone" if emergency.cleared else f"error 0x{emergency.code:04X}: {emergency.text}"
-        text = f"node {node.node_id} ({node.kind.value}): {said}"
-        self._emit(NodeEmergency(frame.time_ns, node.node_id, emergency, text))
+        text = f"node {node.node_id} ({node.kind}): {said}"
+        self._emit(NodeEmergency(emergency.time_ns, node.node_id, emergency, text))
 
-    def _take_statusword(self, drive: Drive, tpdo: Pdo, frame: Frame) -> None:
-        if len(frame.data) != tpdo.layout.size:
-            return  # the decoder counts it
+    def _take_statusword(self, drive: Drive, reading: Reading) -> None:
+        statusword = next((value for quantity, value in reading.values if quantity is STATUSWORD), None)
+        if statusword is None:
+            return  # its diagnostic TPDO
         before = drive.reported
-        state = drive.take_statusword(tpdo.layout.unpack(frame.data)[0])
+        state = drive.take_statusword(int(statusword))
         if state is not before:
             text = f"drive {drive.node_id}: {before} → {state}"
-            self._emit(DriveStateChanged(frame.time_ns, drive.node_id, state, text))
+            self._emit(DriveStateChanged(reading.time_ns, drive.node_id, state, text))
 
-    def _count_heartbeat(self, sent: bool) -> None:  # a plain yes or no from its producer
+    def _count_heartbeat(self, sent: bool) -> None:
         self._counters.heartbeats_sent += sent
         self._counters.heartbeats_failed += not sent
 
@@ -230,25 +257,25 @@ class Network:
         if isinstance(event, NodeLost) and event.node_id in self._drives:
             self._drives[event.node_id].forget()
         if self._motion.moving and self._ends_motion(event):
-            self._must_stop = event
-            self._stop_wanted.set()
+            self._stop_cause = event
+            self._stop_requested.set()
         self._on_event(event)
 
     def _ends_motion(self, event: NetworkEvent) -> bool:
         match event:
             case NodeLost(node_id=node_id):
-                return self._supervisors[node_id].link.node.required
+                return self._supervisors[node_id].remote.node.required
             case DriveStateChanged(state=state):
                 return state is not DriveState.ENABLED
             case _:
                 return False
 
-    async def _stop_when_wanted(self) -> None:
-        """Stop all wheels when one is lost: a rover that drags a dead wheel digs itself in."""
+    async def _stop_when_requested(self) -> None:
+        """Stop all wheels when one is lost: a rover that drags an unpowered wheel digs itself in."""
         while True:
-            await self._stop_wanted.wait()
-            self._stop_wanted.clear()
-            event = self._must_stop
+            await self._stop_requested.wait()
+            self._stop_requested.clear()
+            event = self._stop_cause
             if event is None or not self._motion.moving:
                 continue
             outcome = "all others are stopped"
@@ -260,13 +287,13 @@ class Network:
             self._on_event(MotionStopped(time.time_ns(), node_id, f"motion stopped: {event.text}; {outcome}"))
 
     async def _leave(self) -> None:
-        """Stop and disable the drives, let them forget their master, and put every node into pre-operational."""
+        """Stop and disable the drives, end their heartbeat consumers, and set every node to pre-operational."""
         with suppress(DriverError, TimeoutError):
             async with asyncio.timeout(_LEAVE_TIMEOUT_S):
                 try:
                     await self.disable()
                 finally:
-                    await each(drive.link.sdo.write(CONSUMER_HEARTBEAT, 1, bytes(4)) for drive in self._motion.live())
+                    await each(drive.remote.sdo.write(CONSUMER_HEARTBEAT, 1, bytes(4)) for drive in self._motion.live())
         for supervisor in self._supervisors.values():
             with suppress(DriverError):
-                await supervisor.link.tell(NmtCommand.ENTER_PRE_OPERATIONAL)
+                await supervisor.remote.send_command(NmtCommand.ENTER_PRE_OPERATIONAL)

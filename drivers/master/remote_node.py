@@ -1,58 +1,63 @@
-"""One node as its master sees it: what it last said of itself, and how to talk to it."""
+"""One node as its master sees it: its NMT state, and its SDO client."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from regolithd.drivers.canopen.decoder import SDO_ANSWER_COB_ID
-from regolithd.drivers.canopen.nmt import ERROR_CONTROL_COB_ID, NmtCommand, NmtState, command_frame, parse_state
+from regolithd.drivers.canopen import cob_id
+from regolithd.drivers.canopen.nmt import NmtCommand, NmtState, command_frame
 from regolithd.drivers.canopen.sdo_client import SdoClient
-from regolithd.drivers.condition import Watch
+from regolithd.drivers.master.condition import Condition
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from regolithd.drivers.can.bus import Bus
-    from regolithd.drivers.can.frame import Frame
-    from regolithd.drivers.signals import NodeDescription
+    from regolithd.drivers.devices.decoding.signals import NodeState
+    from regolithd.drivers.devices.node import NodeDescription
 
 
-class Link:
-    """The conversation with one node. Whoever reads the bus passes its frames on; anyone may wait on `news`."""
+class RemoteNode:
+    """What a node has reported, and the means to talk to it.
+
+    The reader of the bus passes its heartbeats to `take_state` and its SDO answers (`answer_cob_id`) to `sdo.handle`.
+
+    Attributes
+    ----------
+    state
+        NMT state that it last reported; None before the first heartbeat.
+    heard_ns, heard
+        Time and number of its heartbeats and boot-up messages.
+    boot_ups
+        Number of its boot-up messages.
+    changed
+        Notified at each heartbeat and boot-up message, and at the end of each boot.
+    """
 
     def __init__(self, bus: Bus, node: NodeDescription, *, sdo_timeout_s: float) -> None:
         self.node = node
         self.sdo = SdoClient(bus, node.node_id, timeout_s=sdo_timeout_s)
-        self.news = Watch()
+        self.changed = Condition()
         self.state: NmtState | None = None
         self.heard_ns: int | None = None
-        self.heard = 0  # heartbeats and boot-ups so far
+        self.heard = 0
         self.boot_ups = 0
         self._bus = bus
 
     @property
-    def handlers(self) -> dict[int, Callable[[Frame], None]]:
-        """What takes the frames of its SDO server and of its error control, by COB-ID."""
-        node_id = self.node.node_id
-        return {
-            SDO_ANSWER_COB_ID + node_id: self.sdo.handle,
-            ERROR_CONTROL_COB_ID + node_id: self._take_state,
-        }
+    def answer_cob_id(self) -> int:
+        """COB-ID of the answers of its SDO server."""
+        return cob_id.SDO_ANSWER + self.node.node_id
 
-    async def tell(self, command: NmtCommand) -> None:
+    async def send_command(self, command: NmtCommand) -> None:
         """Send an NMT command to the node."""
         await self._bus.send(command_frame(command, self.node.node_id))
 
-    def _take_state(self, frame: Frame) -> None:
-        """Take a heartbeat or boot-up message; one that says no state of CiA 301 is none."""
-        state = parse_state(frame.data)
-        if state is None:
-            return
+    def take_state(self, report: NodeState) -> None:
+        """Take a heartbeat or boot-up message."""
         self.heard += 1
-        self.heard_ns = frame.time_ns
-        booted = state is NmtState.BOOT_UP
+        self.heard_ns = report.time_ns
+        booted = report.state is NmtState.BOOT_UP
         if booted:
             self.boot_ups += 1
             self.sdo.interrupt()
-        self.state = NmtState.PRE_OPERATIONAL if booted else state
-        self.news.notify()
+        self.state = NmtState.PRE_OPERATIONAL if booted else report.state
+        self.changed.notify()

@@ -1,4 +1,4 @@
-"""A look at the bus that changes nothing: who answers, and who they are.
+"""A scan of the bus that changes nothing: which nodes answer, and their identity.
 
 Each node is asked for 0x1000 and 0x1018 by SDO, and its heartbeat is listened for. Nothing is reset, written or moved.
 A node that sends no heartbeat (none was configured) has no known NMT state, which is no problem by itself.
@@ -11,23 +11,24 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from regolithd.drivers.canopen.nmt import NmtState
+from regolithd.drivers.devices.decoding.decoder import Decoder
+from regolithd.drivers.devices.decoding.signals import NodeState
 from regolithd.drivers.errors import BusError, SdoError
 from regolithd.drivers.master.boot import compare_identity, read_identity
-from regolithd.drivers.master.boot_reason import CURES, BootReason
-from regolithd.drivers.master.remote_node import Link
+from regolithd.drivers.master.boot_error import CURES, BootReason
+from regolithd.drivers.master.remote_node import RemoteNode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Sequence
 
     from regolithd.drivers.can.bus import Bus
-    from regolithd.drivers.can.frame import Frame
+    from regolithd.drivers.devices.node import NodeDescription
     from regolithd.drivers.master.events import Identity
-    from regolithd.drivers.signals import NodeDescription
 
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """What was found where a node should be. `problem` is empty where all is well, `cure` says what to do."""
+    """What was found at the node-ID of a configured node. `problem` is empty where there is none."""
 
     node: NodeDescription
     answers: bool
@@ -40,45 +41,47 @@ class Probe:
 async def probe(
     bus: Bus, nodes: Sequence[NodeDescription], *, listen_s: float = 1.0, sdo_timeout_s: float = 0.5
 ) -> list[Probe]:
-    """Ask every node who it is, all at once, and listen for heartbeats for `listen_s`.
+    """Read every node's identity, all at once, and listen for heartbeats for `listen_s`.
 
     The bus must have no other reader in this program. Beside a daemon that is booting nodes an answer may be taken for
     another's; beside one that runs it is safe.
     """
-    links = [Link(bus, node, sdo_timeout_s=sdo_timeout_s) for node in nodes]
-    handlers: dict[int, Callable[[Frame], None]] = {}
-    for link in links:
-        handlers |= link.handlers
+    remotes = [RemoteNode(bus, node, sdo_timeout_s=sdo_timeout_s) for node in nodes]
     async with asyncio.TaskGroup() as tasks:
-        reader = tasks.create_task(_read(bus, handlers))
-        asking = [tasks.create_task(_ask(link)) for link in links]
+        reader = tasks.create_task(_read(bus, remotes))
+        asking = [tasks.create_task(_ask(remote)) for remote in remotes]
         await asyncio.sleep(listen_s)
         await asyncio.wait(asking)
         reader.cancel()
-    return [_probe(link, asked.result()) for link, asked in zip(links, asking, strict=True)]
+    return [_probe(remote, asked.result()) for remote, asked in zip(remotes, asking, strict=True)]
 
 
-async def _read(bus: Bus, handlers: Mapping[int, Callable[[Frame], None]]) -> None:
+async def _read(bus: Bus, remotes: Sequence[RemoteNode]) -> None:
+    decoder = Decoder(remote.node for remote in remotes)
+    by_node_id = {remote.node.node_id: remote for remote in remotes}
+    sdo_clients = {remote.answer_cob_id: remote.sdo for remote in remotes}
     async for batch in bus:
         for frame in batch:
-            handler = handlers.get(frame.can_id)
-            if handler is not None and frame.ordinary and not frame.sent:
-                handler(frame)
+            signal = decoder.decode(frame)
+            if isinstance(signal, NodeState):
+                by_node_id[signal.node_id].take_state(signal)
+            elif frame.can_id in sdo_clients and frame.ordinary and not frame.sent:
+                sdo_clients[frame.can_id].handle(frame)
 
 
-async def _ask(link: Link) -> Identity | SdoError | BusError:
+async def _ask(remote: RemoteNode) -> Identity | SdoError | BusError:
     try:
-        return await read_identity(link)
+        return await read_identity(remote)
     except (SdoError, BusError) as error:
         return error
 
 
-def _probe(link: Link, found: Identity | SdoError | BusError) -> Probe:
-    node, state = link.node, link.state
+def _probe(remote: RemoteNode, found: Identity | SdoError | BusError) -> Probe:
+    node, state = remote.node, remote.state
     if isinstance(found, BusError):
         return Probe(node, answers=False, identity=None, nmt_state=state, problem=str(found), cure=found.cure)
     if isinstance(found, SdoError):
-        problem, cure = _silence(link, found)
+        problem, cure = _silence(remote, found)
         return Probe(node, answers=False, identity=None, nmt_state=state, problem=problem, cure=cure)
     difference = compare_identity(node, found)
     if difference is None:
@@ -87,9 +90,9 @@ def _probe(link: Link, found: Identity | SdoError | BusError) -> Probe:
     return Probe(node, answers=True, identity=found, nmt_state=state, problem=problem, cure=CURES[reason])
 
 
-def _silence(link: Link, error: SdoError) -> tuple[str, str]:
-    if link.state is NmtState.STOPPED:
+def _silence(remote: RemoteNode, error: SdoError) -> tuple[str, str]:
+    if remote.state is NmtState.STOPPED:
         return "it is in NMT state stopped, in which it answers nothing", "The daemon resets it when it starts"
-    if link.state is not None:
-        return f"its heartbeat says {link.state.words}, but: {error.what}", CURES[BootReason.NO_SDO_ANSWER]
+    if remote.state is not None:
+        return f"its heartbeat says {remote.state.text}, but: {error.what}", CURES[BootReason.NO_SDO_ANSWER]
     return error.what, CURES[BootReason.NO_BOOT_UP]

@@ -10,10 +10,10 @@ from regolithd.drivers.canopen.sync import SyncCounters
 
 if TYPE_CHECKING:
     from regolithd.drivers.canopen.nmt import NmtState
-    from regolithd.drivers.devices.cia402 import DriveState
-    from regolithd.drivers.master.boot_reason import BootReason
+    from regolithd.drivers.devices.node import NodeDescription
+    from regolithd.drivers.master.boot_error import BootReason
+    from regolithd.drivers.master.cia402 import DriveState
     from regolithd.drivers.master.events import Identity
-    from regolithd.drivers.signals import NodeDescription
 
 
 class NodePhase(StrEnum):

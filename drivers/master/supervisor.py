@@ -15,17 +15,16 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from regolithd.drivers.canopen.heartbeat import until_lost
-from regolithd.drivers.errors import BootError
 from regolithd.drivers.master.boot import BootSettings, boot
-from regolithd.drivers.master.boot_reason import BootReason
+from regolithd.drivers.master.boot_error import BootError, BootReason
 from regolithd.drivers.master.events import NetworkEvent, NodeBooted, NodeBootFailed, NodeLost, NodeReturned
+from regolithd.drivers.master.heartbeat_consumer import until_lost
 from regolithd.drivers.master.status import NetworkSettings, NodePhase, NodeStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from regolithd.drivers.master.remote_node import Link
+    from regolithd.drivers.master.remote_node import RemoteNode
 
 _SILENT = (BootReason.NO_BOOT_UP, BootReason.NO_SDO_ANSWER, BootReason.FELL_SILENT, BootReason.BUS_DOWN)
 _PAUSE_S = 0.1  # before a node that is heard again is booted: it may be restarting in a row
@@ -34,8 +33,8 @@ _PAUSE_S = 0.1  # before a node that is heard again is booted: it may be restart
 class Supervisor:
     """Runs one node's life; `status` is what is known of it."""
 
-    def __init__(self, link: Link, settings: NetworkSettings, emit: Callable[[NetworkEvent], None]) -> None:
-        self.link = link
+    def __init__(self, remote: RemoteNode, settings: NetworkSettings, emit: Callable[[NetworkEvent], None]) -> None:
+        self.remote = remote
         self.attempts = 0
         self._settings = settings
         self._boot_settings = BootSettings(
@@ -45,14 +44,14 @@ class Supervisor:
             boot_up_timeout_s=settings.boot_up_timeout_s,
         )
         self._emit = emit
-        self._status = NodeStatus(link.node)
+        self._status = NodeStatus(remote.node)
         self._patience_s = settings.retry_after_s
         self._away = False  # told as lost or failed, and not heard since
 
     @property
     def status(self) -> NodeStatus:
         """What is known of the node at this moment."""
-        return replace(self._status, nmt_state=self.link.state, heard_ns=self.link.heard_ns)
+        return replace(self._status, nmt_state=self.remote.state, heard_ns=self.remote.heard_ns)
 
     @property
     def phase(self) -> NodePhase:
@@ -76,9 +75,9 @@ class Supervisor:
             self._status = replace(self._status, phase=NodePhase.BOOTING)
 
     async def _boot(self) -> bool:
-        node_id = self.link.node.node_id
+        node_id = self.remote.node.node_id
         try:
-            identity = await boot(self.link, self._boot_settings)
+            identity = await boot(self.remote, self._boot_settings)
         except BootError as error:
             text = str(error)
             said_before = text == self._status.text
@@ -89,21 +88,21 @@ class Supervisor:
         else:
             self._note_return()
             boots = self._status.boots + 1
-            text = f"node {node_id} ({self.link.node.kind.value}) is operational"
+            text = f"node {node_id} ({self.remote.node.kind}) is operational"
             self._status = replace(
                 self._status, phase=NodePhase.OPERATIONAL, identity=identity, reason=None, text=text, boots=boots
             )
             self._emit(NodeBooted(time.time_ns(), node_id, identity, text))
         self.attempts += 1
-        self.link.news.notify()
+        self.remote.changed.notify()
         return self.phase is NodePhase.OPERATIONAL
 
     async def _watch(self) -> bool:
         """Return, once the node is lost, whether it is silent."""
         self._patience_s = self._settings.retry_after_s
-        loss = await until_lost(self.link, self._settings.node_lost_after_s)
-        node_id = self.link.node.node_id
-        text = f"node {node_id} ({self.link.node.kind.value}) lost: {loss.text}"
+        loss = await until_lost(self.remote, self._settings.node_lost_after_s)
+        node_id = self.remote.node.node_id
+        text = f"node {node_id} ({self.remote.node.kind}) lost: {loss.text}"
         self._status = replace(self._status, phase=NodePhase.LOST, text=text)
         self._emit(NodeLost(time.time_ns(), node_id, text))
         self._away = True
@@ -112,17 +111,17 @@ class Supervisor:
     def _note_return(self) -> None:
         if self._away:
             self._away = False
-            node = self.link.node
-            text = f"node {node.node_id} ({node.kind.value}) is heard again"
+            node = self.remote.node
+            text = f"node {node.node_id} ({node.kind}) is heard again"
             self._emit(NodeReturned(time.time_ns(), node.node_id, text))
 
     async def _heard_again(self) -> bool:
         """Wait until the node is heard (where silence was the trouble) or boots up; False: some time has passed."""
-        link = self.link
-        heard, boot_ups = link.heard, link.boot_ups
+        remote = self.remote
+        heard, boot_ups = remote.heard, remote.boot_ups
         any_sign = self.phase is NodePhase.LOST or self._status.reason in _SILENT
-        returned = await link.news.until(
-            lambda: link.boot_ups > boot_ups or (any_sign and link.heard > heard), self._patience_s
+        returned = await remote.changed.until(
+            lambda: remote.boot_ups > boot_ups or (any_sign and remote.heard > heard), self._patience_s
         )
         if returned:
             self._patience_s = self._settings.retry_after_s

@@ -15,8 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from regolithd.drivers.devices.motor_controller import VirtualMotorController
 from regolithd.drivers.virtual.faults import Faults
-from regolithd.drivers.virtual.motor_controller import MotorController
 from regolithd.drivers.virtual.node import State
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def _identity(node: VirtualNode, words: list[str], now: int) -> None:
 
 def _drive_fault(node: VirtualNode, words: list[str], now: int) -> None:
     del now
-    if not isinstance(node.device, MotorController):
+    if not isinstance(node.device, VirtualMotorController):
         raise TellError(f"node {node.id} is no drive")
     node.device.fault(_number(words))
 

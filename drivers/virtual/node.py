@@ -10,14 +10,11 @@ from collections import Counter
 from enum import IntEnum
 from typing import TYPE_CHECKING
 
-from regolithd.drivers.devices.eds import eds_path
-from regolithd.drivers.signals import NodeKind
+from regolithd.drivers.canopen import cob_id
+from regolithd.drivers.canopen.sdo_abort import Abort, AbortError
 from regolithd.drivers.virtual import emcy, pdo
-from regolithd.drivers.virtual.abort import Abort, AbortError
-from regolithd.drivers.virtual.device import Device, GroundSpeed, Inclinometer, LoadCell
 from regolithd.drivers.virtual.emcy import EmergencyProducer
 from regolithd.drivers.virtual.faults import Faults
-from regolithd.drivers.virtual.motor_controller import MotorController
 from regolithd.drivers.virtual.object_dictionary import Dictionary, Key
 from regolithd.drivers.virtual.sdo_server import SdoServer
 
@@ -25,20 +22,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from regolithd.drivers.can.frame import Frame
-    from regolithd.drivers.signals import NodeDescription
-    from regolithd.drivers.virtual.plant import Measurement
+    from regolithd.drivers.devices.node import NodeDescription
+    from regolithd.drivers.devices.virtual.measurement import Measurement
 
 BOOT_NS = 20_000_000
 """From reset to boot-up."""
 
-DEVICES: dict[NodeKind, type[Device]] = {
-    NodeKind.MOTOR: MotorController,
-    NodeKind.LOAD_CELL: LoadCell,
-    NodeKind.INCLINOMETER: Inclinometer,
-    NodeKind.GROUND_SPEED: GroundSpeed,
-}
-
-_NMT, _SDO_REQUEST, _SDO_ANSWER, _ERROR_CONTROL = 0x000, 0x600, 0x580, 0x700
 _SYNC_OBJECT, _CONSUMER, _PRODUCER, _IDENTITY, _ERROR_BEHAVIOUR = 0x1005, 0x1016, 0x1017, 0x1018, 0x1029
 _STAYS, _STOPS = 1, 2  # values of 0x1029:01; 0 (the default) enters pre-operational
 
@@ -67,9 +56,9 @@ class VirtualNode:
         self.state = State.OFF
         self._emit = emit
         self._now = 0
-        self.dictionary = Dictionary(eds_path(description.kind), self.id)
+        self.dictionary = Dictionary(description.device.eds, self.id)
         self._emergency = EmergencyProducer(self.dictionary, self._send_emergency)
-        self.device = DEVICES[description.kind](self.dictionary, self._emergency, description.wheel)
+        self.device = description.device.virtual(self.dictionary, self._emergency, description.wheel)
         self._sdo = SdoServer(self.dictionary)
         self.dictionary.on_write = self._check
         self.dictionary.after_write = self._written
@@ -126,7 +115,7 @@ class VirtualNode:
             return
         self.state = State.PRE_OPERATIONAL
         self.counts["boot_up"] += 1
-        self._emit(0, _ERROR_CONTROL + self.id, b"\0")
+        self._emit(0, cob_id.ERROR_CONTROL + self.id, b"\0")
 
     def _command(self, data: bytes) -> None:
         """Obey a network management command (CiA 301, 7.2.8.2)."""
@@ -165,13 +154,13 @@ class VirtualNode:
         can_id = frame.can_id
         if can_id == self.sync_cob_id:
             self._sync()
-        elif can_id == _NMT:
+        elif can_id == cob_id.NMT:
             self._command(frame.data)
-        elif can_id == _SDO_REQUEST + self.id:
+        elif can_id == cob_id.SDO_REQUEST + self.id:
             self._request(frame.data)
         elif can_id in self._receive:
             self._take(self._receive[can_id], frame.data)
-        elif can_id == _ERROR_CONTROL + self._master:
+        elif can_id == cob_id.ERROR_CONTROL + self._master:
             self._master_heard()
 
     def _request(self, data: bytes) -> None:
@@ -180,7 +169,7 @@ class VirtualNode:
         self.counts["sdo"] += 1
         answer = self._sdo.answer(data)
         if answer is not None:
-            self._emit(0, _SDO_ANSWER + self.id, answer)
+            self._emit(0, cob_id.SDO_ANSWER + self.id, answer)
 
     def _sync(self) -> None:
         self.counts["sync"] += 1
@@ -258,8 +247,10 @@ class VirtualNode:
             return
         if not self.faults.frozen:
             self.device.measure(measurement)
-        if self.faults.status:
-            self.dictionary.put(0x6150, 1, self.dictionary.get(0x6150, 1) | self.faults.status)
+        status = self.description.device.validity
+        if self.faults.status and status is not None:
+            raised = self.dictionary.get(status.index, status.subindex) | self.faults.status
+            self.dictionary.put(status.index, status.subindex, raised)
         if self.state is State.OPERATIONAL:
             for each in self._transmit:
                 if not each.synchronous and now >= each.sent_ns + each.inhibit_ns:
@@ -272,7 +263,7 @@ class VirtualNode:
         self._heartbeat_due = due + period if self._now < due + period else self._now + period
         if not self.faults.no_heartbeat and self.state is not State.INITIALISING:
             self.counts["heartbeat"] += 1
-            self._emit(0, _ERROR_CONTROL + self.id, bytes((self.state,)))
+            self._emit(0, cob_id.ERROR_CONTROL + self.id, bytes((self.state,)))
 
     @property
     def _master(self) -> int:
@@ -285,7 +276,7 @@ class VirtualNode:
         self._master_due = self._now + period * 1_000_000
         if self._master_lost:
             self._master_lost = False
-            if not isinstance(self.device, MotorController):  # a drive's error lasts until fault reset
+            if not self.device.latches_errors:
                 self._emergency.clear(emcy.HEARTBEAT_LOST)
 
     def _master_silent(self) -> None:

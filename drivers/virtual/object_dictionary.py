@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import canopen
 from canopen.objectdictionary import ODVariable, datatypes
 
-from regolithd.drivers.virtual.abort import Abort, AbortError
+from regolithd.drivers.canopen.sdo_abort import Abort, AbortError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

@@ -10,7 +10,7 @@ import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from regolithd.drivers.virtual.abort import Abort, AbortError
+from regolithd.drivers.canopen.sdo_abort import Abort, AbortError
 
 if TYPE_CHECKING:
     from regolithd.drivers.virtual.object_dictionary import Dictionary, Key

@@ -1,48 +1,24 @@
-"""The seam between the nodes and the world they measure: physics is handed in, the nodes only report it.
+"""The interface between the virtual nodes and the simulated rover that they measure.
 
     plant = MyPlant()
     measurement = plant.measure(time_s, motor_speeds_rad_s)
 
-The nodes know neither wheel nor ground. Wheel k of the paper is index k − 1.
+The physics is passed in; the nodes only report it. Wheel k of the paper is index k − 1.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from regolithd.drivers.devices.virtual.measurement import WHEELS, Array, Measurement
 
-WHEELS = 6
-
-
-def _wheels(value: float) -> Array:
-    return np.full(WHEELS, value)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Measurement:
-    """What every sensor on the rover would read at one instant; arrays of shape (6,), SI.
-
-    Signs: pitch positive nose up, roll positive right side down, yaw rate positive to the left.
-    """
-
-    motor_current_A: Array
-    load_N: Array
-    motor_temperature_degC: Array = field(default_factory=lambda: _wheels(20.0))
-    bus_voltage_V: float = 24.0
-    pitch_rad: float = 0.0
-    roll_rad: float = 0.0
-    yaw_rate_rad_s: float = 0.0
-    ground_speed_m_s: float = 0.0
-    hub_speed_m_s: Array = field(default_factory=lambda: _wheels(0.0))
+__all__ = ["WHEELS", "Array", "Bench", "Measurement", "Plant"]
 
 
 class Plant(Protocol):
-    """The world: called once for each SYNC, and about fifty times a second where there is none."""
+    """The simulated rover: called once for each SYNC, and about fifty times a second where there is none."""
 
     def measure(self, time_s: float, motor_speed_rad_s: Array) -> Measurement:
         """Return what is measured at `time_s`, the motors turning at these speeds [rad/s], shape (6,).
@@ -52,9 +28,9 @@ class Plant(Protocol):
 
 
 class Bench:
-    """Six drives on a bench, wheels up: a plant for those who need none.
+    """Six drives on a bench, wheels off the ground: a plant without physics.
 
-    Each wheel has another load and current, so that a wheel that is taken for its neighbour shows.
+    Each wheel has another load and current, so that values assigned to the wrong wheel are noticed.
     """
 
     def measure(self, time_s: float, motor_speed_rad_s: Array) -> Measurement:

@@ -21,10 +21,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.drivers.can.frame import Frame
+from regolithd.drivers.canopen import cob_id
+from regolithd.drivers.devices.motor_controller import VirtualMotorController
+from regolithd.drivers.devices.node import NodeDescription
+from regolithd.drivers.devices.registry import DEVICES
 from regolithd.drivers.errors import BusError
-from regolithd.drivers.signals import NodeDescription, NodeKind
 from regolithd.drivers.virtual.fault_injection import tell
-from regolithd.drivers.virtual.motor_controller import MotorController
 from regolithd.drivers.virtual.node import VirtualNode
 from regolithd.drivers.virtual.plant import WHEELS
 
@@ -34,21 +36,18 @@ if TYPE_CHECKING:
     from regolithd.drivers.can.bus import Bus
     from regolithd.drivers.virtual.plant import Array, Plant
 
-KAPVIK = (
-    *(NodeDescription(1 + wheel, NodeKind.MOTOR, wheel) for wheel in range(WHEELS)),
-    *(NodeDescription(11 + wheel, NodeKind.LOAD_CELL, wheel) for wheel in range(WHEELS)),
-    NodeDescription(21, NodeKind.INCLINOMETER, None, required=False),
-    NodeDescription(22, NodeKind.GROUND_SPEED, None, required=False),
+KAPVIK = tuple(
+    NodeDescription(device.default_node_id + (wheel or 0), device, wheel, required=device.per_wheel)
+    for device in DEVICES
+    for wheel in (range(WHEELS) if device.per_wheel else (None,))
 )
-"""The nodes that the rover has."""
+"""One device of each kind for the body, or six, with their default node-IDs."""
 
 MOVING_STEP_NS = 20_000_000
 """How often the drives' ramps are followed where no SYNC does it."""
 IDLE_STEP_NS = 200_000_000
 LONGEST_STEP_S = 5.0
 """A clock that jumps further than this, either way, moves the world no further."""
-
-_ERROR_CONTROL = 0x700
 
 
 class VirtualRover:
@@ -79,7 +78,7 @@ class VirtualRover:
         self._later: list[tuple[int, int, Frame]] = []
         self._order = itertools.count()
         self.nodes = {each.node_id: VirtualNode(each, self._emit) for each in nodes}
-        self._drives = [node.device for node in self.nodes.values() if isinstance(node.device, MotorController)]
+        self._drives = [node.device for node in self.nodes.values() if isinstance(node.device, VirtualMotorController)]
         self._time_s = 0.0
         self._advanced_ns: int | None = None  # by the wall clock, as is `_sync_ns`
         self._step_due = 0
@@ -103,7 +102,7 @@ class VirtualRover:
             interval_ns = frame.time_ns - self._sync_ns if self._sync_ns is not None else 0
             self._sync_ns = frame.time_ns
             self._step_due = now + max(IDLE_STEP_NS, 3 * interval_ns)
-        elif frame.can_id < _ERROR_CONTROL:
+        elif frame.can_id < cob_id.ERROR_CONTROL:
             self._advance(frame.time_ns)  # what a command changes begins now, not when somebody last looked
         for node in self.nodes.values():
             node.receive(frame, now)

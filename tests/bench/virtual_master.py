@@ -14,7 +14,7 @@ from regolithd.drivers.virtual import KAPVIK, Bench, VirtualRover
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from regolithd.drivers.signals import NodeDescription
+    from regolithd.drivers.devices.node import NodeDescription
     from regolithd.drivers.virtual import Plant
     from regolithd.drivers.virtual.node import VirtualNode
 

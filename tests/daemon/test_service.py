@@ -21,8 +21,8 @@ from regolithd.daemon.recording.export import HEADER, ExportError, export
 from regolithd.daemon.recording.mcap_file import read_messages
 from regolithd.daemon.service import Service, event_json
 from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.canopen.emcy import Emergency
 from regolithd.drivers.master.events import NetworkEvent, NodeEmergency
-from regolithd.drivers.signals import Emergency
 from regolithd.drivers.virtual import Bench, VirtualRover
 
 

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from regolithd.drivers.can.open_bus import open_bus
-from regolithd.drivers.canopen.decoder import Decoder
+from regolithd.drivers.devices.decoding.decoder import Decoder
+from regolithd.drivers.devices.decoding.signals import Reading
 from regolithd.drivers.master.network import Network, NetworkSettings
-from regolithd.drivers.signals import Reading
 from regolithd.drivers.virtual.plant import Bench
 from regolithd.drivers.virtual.rover import KAPVIK, VirtualRover
 
@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 
     from regolithd.drivers.can.bus import Bus
     from regolithd.drivers.can.frame import Frame
+    from regolithd.drivers.devices.decoding.signals import Signal
+    from regolithd.drivers.devices.node import NodeDescription
     from regolithd.drivers.master.events import NetworkEvent
-    from regolithd.drivers.signals import NodeDescription, Signal
     from regolithd.drivers.virtual.plant import Plant
 
 _CHANNELS = itertools.count()
@@ -92,7 +93,7 @@ class Rig:
 
     async def until_transfers(self, node_id: int, count: int) -> None:
         """Wait until so many SDO transfers have begun with a node."""
-        sdo = self.network._supervisors[node_id].link.sdo
+        sdo = self.network._supervisors[node_id].remote.sdo
         await until(lambda: sdo.transfers >= count, f"{count} SDO transfers with node {node_id}")
 
     async def until_attempts(self, node_id: int, count: int) -> None:

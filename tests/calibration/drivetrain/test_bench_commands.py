@@ -17,7 +17,8 @@ from regolithd.daemon.config.configuration import Configuration, Smoothing
 from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.pipeline.pipeline import Pipeline
 from regolithd.daemon.pipeline.snapshot import QUANTITIES, ROW, Snapshot
-from regolithd.drivers.signals import Quantity
+from regolithd.drivers.devices.load_cell import LOAD
+from regolithd.drivers.devices.motor_controller import MOTOR_CURRENT, MOTOR_SPEED
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -133,8 +134,8 @@ def test_the_daemon_corrects_loads_by_what_the_bench_found() -> None:
     cells = LoadCells(zero_N=2.0, span=1.1)  # type: ignore[arg-type]  # one value for six wheels
     configuration = Configuration(load_cells=cells, smoothing=Smoothing(window_s=0.0, time_constant_s=0.0))
     values = np.full((len(QUANTITIES), 6), np.nan)
-    values[ROW[Quantity.LOAD]] = 52.0
-    values[ROW[Quantity.MOTOR_CURRENT]] = 0.08
-    values[ROW[Quantity.MOTOR_SPEED]] = 400.0
+    values[ROW[LOAD]] = 52.0
+    values[ROW[MOTOR_CURRENT]] = 0.08
+    values[ROW[MOTOR_SPEED]] = 400.0
     estimate = Pipeline(configuration, load_models(configuration)).step(Snapshot(0, 10**18, values))
     np.testing.assert_allclose(estimate.smoothed_load_N, 55.0)

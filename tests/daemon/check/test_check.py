@@ -22,8 +22,11 @@ from regolithd.daemon.check.models import check_models, judge_card
 from regolithd.daemon.config.configuration import Bus, Configuration, Control, Estimator, Mqtt
 from regolithd.daemon.control.client import ControlError
 from regolithd.daemon.control.protocol import NodeLine, Status
+from regolithd.drivers.devices.ground_speed import GROUND_SPEED_SENSOR
+from regolithd.drivers.devices.load_cell import LOAD_CELL
+from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
+from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.master.scan import Probe
-from regolithd.drivers.signals import NodeDescription, NodeKind
 
 ROOT = Path(__file__).resolve().parents[3]
 NOW_S = 1_790_000_000.0
@@ -180,9 +183,9 @@ async def test_an_in_process_bus_has_nobody_to_ask() -> None:
 
 def test_each_node_that_is_not_right_has_its_line() -> None:
     """One that may be absent is a warning."""
-    motor = NodeDescription(1, NodeKind.MOTOR, 0)
-    cell = NodeDescription(11, NodeKind.LOAD_CELL, 0)
-    speed = NodeDescription(22, NodeKind.GROUND_SPEED, None, required=False)
+    motor = NodeDescription(1, MOTOR_CONTROLLER, 0)
+    cell = NodeDescription(11, LOAD_CELL, 0)
+    speed = NodeDescription(22, GROUND_SPEED_SENSOR, None, required=False)
     found = judge_nodes(
         [
             Probe(motor, answers=True, identity=None, nmt_state=None),

@@ -27,10 +27,11 @@ from regolithd.daemon.control.protocol import LINE_LIMIT, REPLY, Accepted, Ended
 from regolithd.daemon.control.server import ControlSink
 from regolithd.daemon.control.socket import ControlSocketError, open_control_socket
 from regolithd.daemon.pipeline.snapshot import Snapshot
+from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
+from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.errors import DriveError
 from regolithd.drivers.master.events import MotionStopped
 from regolithd.drivers.master.status import NodePhase, NodeStatus
-from regolithd.drivers.signals import NodeDescription, NodeKind
 
 GROUP = grp.getgrgid(os.getgid()).gr_name
 
@@ -48,7 +49,9 @@ class Rover:
         """Its nodes; the third is in `phase`."""
         return {
             n: NodeStatus(
-                NodeDescription(n, NodeKind.MOTOR, n - 1), self.phase if n == 3 else NodePhase.OPERATIONAL, text="said"
+                NodeDescription(n, MOTOR_CONTROLLER, n - 1),
+                self.phase if n == 3 else NodePhase.OPERATIONAL,
+                text="said",
             )
             for n in range(1, 7)
         }

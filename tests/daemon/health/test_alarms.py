@@ -7,11 +7,13 @@ import pytest
 from regolithd.daemon.health.alarms import AlarmInputs, current_alarms, known_names
 from regolithd.daemon.messages.alarm import Severity
 from regolithd.drivers.can.bus import BusState
+from regolithd.drivers.devices.ground_speed import GROUND_SPEED_SENSOR
+from regolithd.drivers.devices.load_cell import LOAD_CELL
+from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.master.status import NodePhase, NodeStatus
-from regolithd.drivers.signals import NodeDescription, NodeKind
 
-CELL = NodeDescription(13, NodeKind.LOAD_CELL, 2)
-SPEED = NodeDescription(22, NodeKind.GROUND_SPEED, None, required=False)
+CELL = NodeDescription(13, LOAD_CELL, 2)
+SPEED = NodeDescription(22, GROUND_SPEED_SENSOR, None, required=False)
 
 TROUBLES = [
     ("bus_trouble", "no such link", "bus", Severity.CRITICAL),

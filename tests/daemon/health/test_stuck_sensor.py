@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 
 from regolithd.daemon.health.stuck_sensor import StuckSensorDetector
 from regolithd.daemon.pipeline.snapshot import QUANTITIES, ROW, Snapshot
-from regolithd.drivers.signals import Quantity
+from regolithd.drivers.devices.load_cell import LOAD
+from regolithd.drivers.devices.motor_controller import MOTOR_CURRENT, MOTOR_SPEED
+
+if TYPE_CHECKING:
+    from regolithd.drivers.devices.device import Quantity
 
 RANDOM = np.random.default_rng(5)
 
@@ -19,10 +25,10 @@ def snapshots(
     made = []
     for k in range(int(rate_Hz * seconds)):
         values = np.full((len(QUANTITIES), 6), np.nan)
-        values[ROW[Quantity.MOTOR_SPEED]] = speed
-        values[ROW[Quantity.MOTOR_CURRENT]] = np.round(0.07 * (1 + noise * RANDOM.standard_normal(6)), 3)
-        values[ROW[Quantity.LOAD]] = np.round(49 * (1 + noise / 3 * RANDOM.standard_normal(6)), 2)
-        values[ROW[Quantity.LOAD], [wheel - 1 for wheel in frozen]] = 48.23
+        values[ROW[MOTOR_SPEED]] = speed
+        values[ROW[MOTOR_CURRENT]] = np.round(0.07 * (1 + noise * RANDOM.standard_normal(6)), 3)
+        values[ROW[LOAD]] = np.round(49 * (1 + noise / 3 * RANDOM.standard_normal(6)), 2)
+        values[ROW[LOAD], [wheel - 1 for wheel in frozen]] = 48.23
         made.append(Snapshot(k, round(k * 1e9 / rate_Hz), values))
     return made
 
@@ -39,8 +45,8 @@ def watch(*drives: list[Snapshot]) -> tuple[tuple[Quantity, int], ...]:
 @pytest.mark.parametrize("rate_Hz", [2.0, 10.0, 100.0])
 def test_a_load_that_stays_the_same_is_stuck(rate_Hz: float) -> None:
     """After twenty snapshots and five seconds, whichever is longer; one or two of them."""
-    assert watch(snapshots(rate_Hz, 12, frozen=(3,))) == ((Quantity.LOAD, 3),)
-    assert watch(snapshots(rate_Hz, 12, frozen=(2, 6))) == ((Quantity.LOAD, 2), (Quantity.LOAD, 6))
+    assert watch(snapshots(rate_Hz, 12, frozen=(3,))) == ((LOAD, 3),)
+    assert watch(snapshots(rate_Hz, 12, frozen=(2, 6))) == ((LOAD, 2), (LOAD, 6))
     assert watch(snapshots(rate_Hz, 4.9, frozen=(3,))) == ()
 
 
@@ -66,5 +72,5 @@ def test_what_is_not_measured_is_not_stuck() -> None:
     """NaN is never the same as NaN, and a gap begins the count anew."""
     drive = snapshots(10, 12, frozen=(3,))
     for snapshot in drive[::40]:
-        snapshot.values[ROW[Quantity.LOAD], 2] = np.nan
+        snapshot.values[ROW[LOAD], 2] = np.nan
     assert watch(drive) == ()

@@ -7,10 +7,14 @@ from hypothesis import strategies as st
 
 from regolithd.daemon.pipeline.acquire import Acquisition
 from regolithd.daemon.pipeline.snapshot import Snapshot
-from regolithd.drivers.signals import NodeDescription, NodeKind, Quantity, Reading, Sync
+from regolithd.drivers.devices.decoding.signals import Reading, Sync
+from regolithd.drivers.devices.ground_speed import GROUND_SPEED, GROUND_SPEED_SENSOR
+from regolithd.drivers.devices.load_cell import LOAD
+from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER, MOTOR_CURRENT, MOTOR_SPEED
+from regolithd.drivers.devices.node import NodeDescription
 
 PERIOD_NS = 500_000_000
-MOTORS = tuple(NodeDescription(k + 1, NodeKind.MOTOR, k) for k in range(6))
+MOTORS = tuple(NodeDescription(k + 1, MOTOR_CONTROLLER, k) for k in range(6))
 PDOS = tuple(0x181 + k for k in range(6))
 MS = 1_000_000
 
@@ -22,7 +26,7 @@ def acquisition() -> Acquisition:
 
 def reading(node: int, time_ns: int, current: float = 0.08) -> Reading:
     """Return one motor's TPDO."""
-    return Reading(time_ns, node, 0x180 + node, ((Quantity.MOTOR_CURRENT, current), (Quantity.MOTOR_SPEED, 400.0)))
+    return Reading(time_ns, node, 0x180 + node, ((MOTOR_CURRENT, current), (MOTOR_SPEED, 400.0)))
 
 
 def window(taken: Acquisition, k: int, nodes: range | tuple[int, ...] = range(1, 7)) -> list[Snapshot]:
@@ -130,7 +134,7 @@ def test_foreign_duplicate_and_early_readings_are_counted_and_not_taken() -> Non
     taken.accept(Sync(PERIOD_NS))
     taken.accept(reading(1, PERIOD_NS + MS, current=0.1))
     taken.accept(reading(1, PERIOD_NS + 2 * MS, current=0.2))
-    taken.accept(Reading(PERIOD_NS + 3 * MS, 99, 0x1E3, ((Quantity.LOAD, 1.0),)))
+    taken.accept(Reading(PERIOD_NS + 3 * MS, 99, 0x1E3, ((LOAD, 1.0),)))
     snapshot = taken.accept(Sync(2 * PERIOD_NS))
     assert snapshot is not None
     assert snapshot.motor_current_A[0] == pytest.approx(0.1)
@@ -140,9 +144,9 @@ def test_foreign_duplicate_and_early_readings_are_counted_and_not_taken() -> Non
 
 def test_what_one_node_measures_for_the_body_stands_at_all_wheels_and_nothing_can_be_changed_later() -> None:
     """A snapshot is frozen."""
-    taken = Acquisition((NodeDescription(22, NodeKind.GROUND_SPEED, None),), (0x196,), PERIOD_NS)
+    taken = Acquisition((NodeDescription(22, GROUND_SPEED_SENSOR, None),), (0x196,), PERIOD_NS)
     taken.accept(Sync(1_234_567_891))
-    taken.accept(Reading(1_235_000_000, 22, 0x196, ((Quantity.GROUND_SPEED, 0.0215),)))
+    taken.accept(Reading(1_235_000_000, 22, 0x196, ((GROUND_SPEED, 0.0215),)))
     snapshot = taken.accept(Sync(1_734_567_891))
     assert snapshot is not None
     assert snapshot.time_ns == 1_234_567_000  # whole microseconds, as the log has it

@@ -17,9 +17,9 @@ from rig import Rig, settings, until
 from regolithd.drivers.can.bus import Bus, BusState
 from regolithd.drivers.can.frame import Frame
 from regolithd.drivers.can.open_bus import open_bus
+from regolithd.drivers.devices.decoding.signals import Sync
 from regolithd.drivers.errors import BusDownError, BusFullError, BusOpenError
 from regolithd.drivers.master.events import BusStateChanged, NodeBooted, NodeLost
-from regolithd.drivers.signals import Sync
 from regolithd.drivers.virtual.plant import Bench
 from regolithd.drivers.virtual.rover import KAPVIK, VirtualRover
 

@@ -7,14 +7,16 @@ from dataclasses import replace
 import pytest
 from rig import rig
 
+from regolithd.drivers.devices.load_cell import LOAD_CELL
+from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
+from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.errors import DictionaryError
-from regolithd.drivers.master.boot_reason import CURES, BootReason
+from regolithd.drivers.master.boot_error import CURES, BootReason
 from regolithd.drivers.master.events import NodeBooted, NodeBootFailed
 from regolithd.drivers.master.network import NodePhase
-from regolithd.drivers.signals import NodeDescription, NodeKind
 
-MOTOR = NodeDescription(4, NodeKind.MOTOR, 3)
-LOAD_CELL = NodeDescription(11, NodeKind.LOAD_CELL, 0)
+MOTOR = NodeDescription(4, MOTOR_CONTROLLER, 3)
+CELL = NodeDescription(11, LOAD_CELL, 0)
 
 FAULTS = {
     BootReason.NO_BOOT_UP: "no-boot-up 4",
@@ -31,7 +33,7 @@ FAULTS = {
 @pytest.mark.parametrize("reason", FAULTS)
 async def test_a_fault_has_its_reason_and_the_mended_node_boots(reason: BootReason) -> None:
     """The reason is told with a cure, a healthy neighbour is not disturbed, and the node boots once it is mended."""
-    async with rig([MOTOR, LOAD_CELL], tell=[FAULTS[reason]]) as r:
+    async with rig([MOTOR, CELL], tell=[FAULTS[reason]]) as r:
         failed = await r.until_told(NodeBootFailed)
         assert (failed.node_id, failed.reason, failed.cure) == (4, reason, CURES[reason])
         assert "node 4" in failed.text
@@ -46,7 +48,7 @@ async def test_a_fault_has_its_reason_and_the_mended_node_boots(reason: BootReas
 
 async def test_a_node_of_another_profile_is_refused() -> None:
     """A load cell where a motor controller should be."""
-    async with rig([NodeDescription(4, NodeKind.LOAD_CELL, 3)], known=[MOTOR]) as r:
+    async with rig([NodeDescription(4, LOAD_CELL, 3)], known=[MOTOR]) as r:
         failed = await r.until_told(NodeBootFailed)
         assert failed.reason is BootReason.WRONG_DEVICE_TYPE
         assert "0x00020194" in failed.text
@@ -55,7 +57,7 @@ async def test_a_node_of_another_profile_is_refused() -> None:
 
 async def test_an_exchanged_device_is_noticed_by_its_serial_number() -> None:
     """Where the serial number is configured, another one is refused."""
-    known = NodeDescription(4, NodeKind.MOTOR, 3, serial=77)
+    known = NodeDescription(4, MOTOR_CONTROLLER, 3, serial=77)
     async with rig([MOTOR], known=[known]) as r:
         assert (await r.until_told(NodeBootFailed)).reason is BootReason.WRONG_SERIAL
         r.rover.tell("identity 4 serial 77")
@@ -74,7 +76,7 @@ async def test_a_node_that_restarts_while_it_is_configured_is_booted_again() -> 
 
 async def test_a_missing_node_is_told_once_and_the_others_boot() -> None:
     """However often it is tried, the same failure is one event."""
-    async with rig([LOAD_CELL], known=[MOTOR, LOAD_CELL], boot_up_timeout_s=0.2, retry_after_s=0.1) as r:
+    async with rig([CELL], known=[MOTOR, CELL], boot_up_timeout_s=0.2, retry_after_s=0.1) as r:
         await r.until_told(NodeBooted, node_id=11)
         await r.until_attempts(4, 3)
         assert [event.reason for event in r.told(NodeBootFailed)] == [BootReason.NO_BOOT_UP]
@@ -82,7 +84,7 @@ async def test_a_missing_node_is_told_once_and_the_others_boot() -> None:
 
 async def test_a_sensor_in_another_unit_is_refused_not_misread() -> None:
     """A load cell whose process value has three decimal digits would be read ten times too large."""
-    async with rig([LOAD_CELL], tell=["off 11"]) as r:
+    async with rig([CELL], tell=["off 11"]) as r:
         objects = r.rover.nodes[11].dictionary
         objects.entries = {**objects.entries, (0x6132, 1): replace(objects.entries[0x6132, 1], default=3)}
         r.rover.tell("on 11")
@@ -96,7 +98,7 @@ async def test_an_eds_that_lacks_an_object_is_a_reason_and_no_crash(monkeypatch:
     def lacking(*_: object, **__: object) -> None:
         raise DictionaryError("the EDS of motor nodes has no such object", index=0x1017)
 
-    monkeypatch.setattr("regolithd.drivers.master.boot.configuration", lacking)
+    monkeypatch.setattr("regolithd.drivers.master.boot.boot_writes", lacking)
     async with rig([MOTOR]) as r:
         failed = await r.until_told(NodeBootFailed)
         assert failed.reason is BootReason.UNUSABLE_EDS

@@ -8,14 +8,17 @@ import random
 import pytest
 from rig import Rig, rig, until
 
+from regolithd.drivers.devices.inclinometer import INCLINOMETER
+from regolithd.drivers.devices.load_cell import LOAD_CELL
+from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
+from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.errors import DriverError
-from regolithd.drivers.signals import NodeDescription, NodeKind
 
 NODES = (
-    NodeDescription(1, NodeKind.MOTOR, 0),
-    NodeDescription(2, NodeKind.MOTOR, 1),
-    NodeDescription(11, NodeKind.LOAD_CELL, 0),
-    NodeDescription(21, NodeKind.INCLINOMETER, None),
+    NodeDescription(1, MOTOR_CONTROLLER, 0),
+    NodeDescription(2, MOTOR_CONTROLLER, 1),
+    NodeDescription(11, LOAD_CELL, 0),
+    NodeDescription(21, INCLINOMETER, None),
 )
 FAULTS = (
     "off {}",

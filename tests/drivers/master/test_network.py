@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import pytest
 from rig import rig, until
 
 from regolithd.drivers.can.open_bus import open_bus
 from regolithd.drivers.canopen.nmt import NmtState
-from regolithd.drivers.devices.cia402 import DriveState
+from regolithd.drivers.devices.decoding.signals import Sync
+from regolithd.drivers.devices.load_cell import LOAD, LOAD_CELL
+from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER, MOTOR_SPEED
+from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.errors import DriveError
+from regolithd.drivers.master.cia402 import DriveState
 from regolithd.drivers.master.events import (
     DriveStateChanged,
     MotionStopped,
@@ -22,10 +27,12 @@ from regolithd.drivers.master.events import (
     NodeReturned,
 )
 from regolithd.drivers.master.scan import probe
-from regolithd.drivers.signals import NodeDescription, NodeKind, Quantity, Sync
 
-MOTORS = tuple(NodeDescription(1 + wheel, NodeKind.MOTOR, wheel) for wheel in range(6))
-LOAD_CELLS = tuple(NodeDescription(11 + wheel, NodeKind.LOAD_CELL, wheel) for wheel in range(6))
+if TYPE_CHECKING:
+    from regolithd.drivers.devices.device import Quantity
+
+MOTORS = tuple(NodeDescription(1 + wheel, MOTOR_CONTROLLER, wheel) for wheel in range(6))
+LOAD_CELLS = tuple(NodeDescription(11 + wheel, LOAD_CELL, wheel) for wheel in range(6))
 CREEP_rad_s = (0.29,) * 6
 
 
@@ -41,7 +48,7 @@ async def test_every_node_boots_and_measures() -> None:
         assert {status.phase for status in r.network.status.values()} == {"operational"}
         assert {status.nmt_state for status in r.network.status.values()} == {NmtState.OPERATIONAL}
         await until(lambda: all(len(r.readings(node.node_id)) > 3 for node in r.decoder.nodes), "three readings of all")
-        assert values(r.readings(13), Quantity.LOAD)[-1] == pytest.approx(52.0)
+        assert values(r.readings(13), LOAD)[-1] == pytest.approx(52.0)
         assert any(isinstance(signal, Sync) for signal in r.signals)
         assert not r.decoder.undecodable
         assert r.network.counters.sdo_failures == 0
@@ -56,13 +63,13 @@ async def test_wheels_turn_at_the_speed_that_is_asked_and_stop() -> None:
         for node_id, speed in enumerate((140.0, 280.0, 420.0, -140.0, -280.0, 0.0), start=1):
             await until(
                 lambda node_id=node_id, speed=speed: (
-                    values(r.readings(node_id), Quantity.MOTOR_SPEED)[-1] == pytest.approx(speed, abs=0.06)
+                    values(r.readings(node_id), MOTOR_SPEED)[-1] == pytest.approx(speed, abs=0.06)
                 ),
                 f"motor {node_id} turning at {speed} rad/s",
             )
         await r.network.quick_stop()
         await until(
-            lambda: all(values(r.readings(node), Quantity.MOTOR_SPEED)[-1] == 0.0 for node in range(1, 7)),
+            lambda: all(values(r.readings(node), MOTOR_SPEED)[-1] == 0.0 for node in range(1, 7)),
             "all wheels standing",
         )
         with pytest.raises(DriveError, match="a quick stop was commanded"):
@@ -80,9 +87,7 @@ async def test_mirrored_motors_turn_the_other_way_and_read_as_forward() -> None:
         await r.network.set_speed((0.1,) * 6)
         for node_id in range(1, 7):
             await until(
-                lambda node_id=node_id: (
-                    values(r.readings(node_id), Quantity.MOTOR_SPEED)[-1] == pytest.approx(140.0, abs=0.06)
-                ),
+                lambda node_id=node_id: values(r.readings(node_id), MOTOR_SPEED)[-1] == pytest.approx(140.0, abs=0.06),
                 f"motor {node_id} reads as forward",
             )
         assert r.rover.nodes[1].device.speed_rad_s > 0.0
@@ -104,7 +109,7 @@ async def test_a_stop_while_the_drives_are_being_enabled_wins() -> None:
     async with rig(MOTORS) as r:
         await r.network.settled()
         enabling = asyncio.ensure_future(r.network.enable())
-        await r.until_transfers(1, r.network._supervisors[1].link.sdo.transfers + 2)
+        await r.until_transfers(1, r.network._supervisors[1].remote.sdo.transfers + 2)
         await r.network.quick_stop()
         with pytest.raises(DriveError, match="stopped meanwhile: a quick stop was commanded"):
             await enabling
@@ -163,7 +168,7 @@ async def test_a_lost_drive_stops_the_others_and_returns_without_a_restart() -> 
 
 async def test_a_lost_load_cell_that_is_not_required_does_not_stop_the_wheels() -> None:
     """What the rover can drive without, it drives without."""
-    optional = NodeDescription(11, NodeKind.LOAD_CELL, 0, required=False)
+    optional = NodeDescription(11, LOAD_CELL, 0, required=False)
     async with rig((*MOTORS, optional)) as r:
         await r.network.settled()
         await r.network.enable()

@@ -9,8 +9,7 @@ import pytest
 from virtual_master import MOTOR_TPDO, AbortedError, Master
 
 from regolithd.drivers.can.open_bus import open_bus
-from regolithd.drivers.devices.eds import eds_path
-from regolithd.drivers.signals import NodeKind
+from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
 from regolithd.drivers.virtual import KAPVIK, Bench, VirtualRover
 
 
@@ -24,7 +23,7 @@ def master() -> Master:
 def test_every_object_of_the_sheet_is_there(master: Master, description: canopen.ObjectDictionary) -> None:
     """Each number in the EDS reads back its default, but for what the device measures and its serial number."""
     node = description.node_id
-    od = canopen.import_od(str(eds_path(description.kind)), node)
+    od = canopen.import_od(str(description.device.eds), node)
     live = {0x1018, 0x2F00, 0x6041, 0x6079, 0x9130}
     for entry in od.values():
         for variable in [entry] if isinstance(entry, canopen.objectdictionary.ODVariable) else entry.values():
@@ -150,7 +149,7 @@ async def test_another_implementations_client_is_served() -> None:
             network = canopen.Network()
             network.connect(interface="virtual", channel="sdo-canopen")
             try:
-                node = network.add_node(3, str(eds_path(NodeKind.MOTOR)))
+                node = network.add_node(3, str(MOTOR_CONTROLLER.eds))
                 node.sdo.RESPONSE_TIMEOUT = 5
                 assert node.sdo[0x1008].raw == "EPOS 24/1"
                 node.sdo[0x6083].raw = 777

@@ -9,17 +9,29 @@ import pytest
 from rig import rig, until
 
 from regolithd.drivers.canopen.nmt import NmtState
-from regolithd.drivers.canopen.pdo import tpdos
-from regolithd.drivers.master.configuration import configuration
+from regolithd.drivers.devices.decoding.pdo import tpdos
+from regolithd.drivers.devices.ground_speed import GROUND_SPEED, GROUND_SPEED_SENSOR
+from regolithd.drivers.devices.inclinometer import INCLINOMETER, PITCH, ROLL, YAW_RATE
+from regolithd.drivers.devices.load_cell import LOAD, LOAD_CELL
+from regolithd.drivers.devices.motor_controller import (
+    BUS_VOLTAGE,
+    MOTOR_CONTROLLER,
+    MOTOR_CURRENT,
+    MOTOR_SPEED,
+    MOTOR_TEMPERATURE,
+    STATUSWORD,
+)
+from regolithd.drivers.devices.node import NodeDescription
+from regolithd.drivers.devices.registry import DEVICES
+from regolithd.drivers.master.boot_configuration import boot_writes
 from regolithd.drivers.master.events import NodeBooted, NodeEmergency, NodeLost
-from regolithd.drivers.signals import NodeDescription, NodeKind, Quantity
 from regolithd.drivers.virtual.plant import Measurement
 
 NODES = {
-    NodeKind.MOTOR: NodeDescription(3, NodeKind.MOTOR, 2, diagnostics=True),
-    NodeKind.LOAD_CELL: NodeDescription(14, NodeKind.LOAD_CELL, 3),
-    NodeKind.INCLINOMETER: NodeDescription(21, NodeKind.INCLINOMETER, None),
-    NodeKind.GROUND_SPEED: NodeDescription(22, NodeKind.GROUND_SPEED, None),
+    MOTOR_CONTROLLER: NodeDescription(3, MOTOR_CONTROLLER, 2, diagnostics=True),
+    LOAD_CELL: NodeDescription(14, LOAD_CELL, 3),
+    INCLINOMETER: NodeDescription(21, INCLINOMETER, None),
+    GROUND_SPEED_SENSOR: NodeDescription(22, GROUND_SPEED_SENSOR, None),
 }
 
 
@@ -42,23 +54,23 @@ class World:
 
 
 EXPECTED = {
-    NodeKind.MOTOR: {
-        Quantity.MOTOR_CURRENT: -0.081,
-        Quantity.MOTOR_SPEED: 0.0,
-        Quantity.BUS_VOLTAGE: 23.456,
-        Quantity.MOTOR_TEMPERATURE: -3.5,
+    MOTOR_CONTROLLER: {
+        MOTOR_CURRENT: -0.081,
+        MOTOR_SPEED: 0.0,
+        BUS_VOLTAGE: 23.456,
+        MOTOR_TEMPERATURE: -3.5,
     },
-    NodeKind.LOAD_CELL: {Quantity.LOAD: 44.56},
-    NodeKind.INCLINOMETER: {
-        Quantity.PITCH: math.radians(-12.34),
-        Quantity.ROLL: math.radians(5.67),
-        Quantity.YAW_RATE: math.radians(-0.89),
+    LOAD_CELL: {LOAD: 44.56},
+    INCLINOMETER: {
+        PITCH: math.radians(-12.34),
+        ROLL: math.radians(5.67),
+        YAW_RATE: math.radians(-0.89),
     },
-    NodeKind.GROUND_SPEED: {Quantity.GROUND_SPEED: -0.02199},
+    GROUND_SPEED_SENSOR: {GROUND_SPEED: -0.02199},
 }
 
 
-@pytest.fixture(params=list(NodeKind))
+@pytest.fixture(params=DEVICES, ids=lambda device: device.kind)
 def node(request: pytest.FixtureRequest) -> NodeDescription:
     """One node of each kind."""
     return NODES[request.param]
@@ -78,9 +90,9 @@ async def test_its_configuration_is_in_the_node(node: NodeDescription) -> None:
     """Every object that was written holds what was written."""
     async with rig([node]) as r:
         await r.until_told(NodeBooted)
-        sdo = r.network._supervisors[node.node_id].link.sdo
+        sdo = r.network._supervisors[node.node_id].remote.sdo
         wanted = {}
-        for write in configuration(node, heartbeat_s=0.2, master_id=127, master_lost_after_s=2.0):
+        for write in boot_writes(node, heartbeat_s=0.2, master_id=127, master_lost_after_s=2.0):
             wanted[write.index, write.subindex] = write  # the last one counts
         for write in wanted.values():
             value = await sdo.read_number(write.index, write.subindex, signed=write.signed)
@@ -91,13 +103,13 @@ async def test_what_it_measures_arrives_in_si(node: NodeDescription) -> None:
     """Every quantity of the layout arrives, with sign and scale, at every SYNC, and none that was not measured."""
     async with rig([node], plant=World()) as r:
         await r.until_told(NodeBooted)
-        pdos = tpdos(node.kind, diagnostics=node.diagnostics)
+        pdos = tpdos(node.device, diagnostics=node.diagnostics)
         await until(lambda: len(r.readings(node.node_id)) >= 3 * len(pdos), "three readings of each PDO")
         last = r.readings(node.node_id)[-len(pdos) :]
         assert {reading.cob_id for reading in last} == {pdo.cob_id(node.node_id) for pdo in pdos}
         measured = {quantity: value for reading in last for quantity, value in reading.values}
-        measured.pop(Quantity.STATUSWORD, None)
-        assert measured == pytest.approx(EXPECTED[node.kind], abs=1e-9)
+        measured.pop(STATUSWORD, None)
+        assert measured == pytest.approx(EXPECTED[node.device], abs=1e-9)
 
 
 async def test_its_emergency_is_told_in_words(node: NodeDescription) -> None:
@@ -131,7 +143,7 @@ async def test_short_frames_are_counted_and_not_decoded(node: NodeDescription) -
 
 async def test_an_invalid_measurement_has_no_value() -> None:
     """A load cell that says `not valid` in 0x6150 is heard, and measures nothing."""
-    async with rig([NODES[NodeKind.LOAD_CELL]]) as r:
+    async with rig([NODES[LOAD_CELL]]) as r:
         await r.until_told(NodeBooted)
         r.rover.tell("status 14 1")
         await until(lambda: r.readings(14) and r.readings(14)[-1].values == (), "a reading without value")

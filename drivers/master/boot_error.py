@@ -1,12 +1,14 @@
-"""Why a node could not be booted, and what a person can do about it."""
+"""Why a node could not be booted, and what to do about it."""
 
 from __future__ import annotations
 
 from enum import StrEnum
 
+from regolithd.drivers.errors import DriverError
+
 
 class BootReason(StrEnum):
-    """Why a node could not be booted. The letter is CiA 302-2's, where it has one for the same thing."""
+    """Why a node could not be booted. The letter is that of CiA 302-2's boot-slave process, where it has one."""
 
     NO_BOOT_UP = "no-boot-up"  # E/F: silent after the NMT reset
     NO_SDO_ANSWER = "no-sdo-answer"  # B: no answer for 0x1000
@@ -44,3 +46,13 @@ CURES = {
     BootReason.UNUSABLE_EDS: "Put the device's own EDS in place; it must list what the driver configures",
     BootReason.BUS_DOWN: "Bring the link up: `ip link set can0 up type can bitrate 1000000 restart-ms 100`",
 }
+
+
+class BootError(DriverError):
+    """A node could not be booted; `reason` says why, and determines the remedy in the message."""
+
+    def __init__(
+        self, reason: BootReason, what: str, *, node_id: int, index: int | None = None, subindex: int = 0
+    ) -> None:
+        self.reason = reason
+        super().__init__(what, node_id=node_id, index=index, subindex=subindex, cure=CURES[reason])

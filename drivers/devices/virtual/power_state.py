@@ -1,4 +1,4 @@
-"""The power drive system's state machine (CiA 402-2, figure 2), as the device itself runs it.
+"""The power drive system's state machine (CiA 402-2, figure 2) inside the virtual motor controller.
 
     0 start ▸ NOT READY TO SWITCH ON ▸ 1 ▸ SWITCH ON DISABLED ◂──────────────┐
                                            2 ▾ ▴ 7                           │
@@ -10,8 +10,8 @@
                                       11 ▾ ▴ 16    9 ▸ SWITCH ON DISABLED    ▴ 13 from anywhere
                                       QUICK STOP ACTIVE ▸ 12 ▸ SWITCH ON DISABLED
 
-The driver has its own reading of the standard; this one shares no code with it, or one mistake would pass on both
-sides. Everything here is pure.
+The master's side of the state machine (`master.cia402`) is written independently and shares no code with this one, so
+that a misreading of the standard does not pass on both sides. Everything here is pure.
 """
 
 from __future__ import annotations
@@ -80,8 +80,8 @@ def command(controlword: int) -> Command:
     return Command.ENABLE_OPERATION if enable_operation else Command.SWITCH_ON
 
 
-def obey(state: PowerState, controlword: int, before: int, *, quick_stop_option: int) -> PowerState:
-    """Return the state after a controlword; the one before it tells a rising edge. What is illegal changes nothing."""
+def next_state(state: PowerState, controlword: int, before: int, *, quick_stop_option: int) -> PowerState:
+    """Return the state after a controlword; `before` is the previous one. An illegal command changes nothing."""
     rising = controlword & ~before & FAULT_RESET
     if state is PowerState.FAULT:
         return PowerState.SWITCH_ON_DISABLED if rising else state  # 15

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from regolithd.drivers.devices.cia402 import Controlword, DriveState, enabling_step, state_of
+from regolithd.drivers.master.cia402 import Controlword, DriveState, enabling_step, state_of
 
 # CiA 402-2, table 30, written out as the standard prints it: bits 6 5 3 2 1 0, x for any.
 PRINTED = {

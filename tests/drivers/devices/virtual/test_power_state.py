@@ -7,7 +7,7 @@ import itertools
 import pytest
 from virtual_master import Drive
 
-from regolithd.drivers.virtual.power_state import PowerState, obey
+from regolithd.drivers.devices.virtual.power_state import PowerState, next_state
 
 NRTSO, SOD, RTSO, SO, OE, QSA, FRA, FAULT = (
     PowerState.NOT_READY_TO_SWITCH_ON,
@@ -62,7 +62,7 @@ def expected(state: PowerState, controlword: int, before: int, option: int) -> P
 def test_every_controlword_does_what_the_standard_says_and_nothing_else(state: PowerState) -> None:
     """All controlwords' low bytes, after each state of bit 7, with each kind of quick-stop option."""
     for controlword, before, option in itertools.product(range(256), (0x00, 0x80), (2, 6)):
-        reached = obey(state, controlword, before, quick_stop_option=option)
+        reached = next_state(state, controlword, before, quick_stop_option=option)
         assert reached is expected(state, controlword, before, option), (hex(controlword), hex(before), option)
 
 

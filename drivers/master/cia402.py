@@ -62,8 +62,6 @@ _REMOTE = 1 << 9  # the controlword is obeyed
 _TARGET_REACHED = 1 << 10
 _SPEED_ZERO = 1 << 12  # profile velocity mode
 
-PROFILE_VELOCITY = 3  # modes of operation, 0x6060
-
 
 def state_of(statusword: int) -> DriveState:
     """Return the state that a statusword says."""

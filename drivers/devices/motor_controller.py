@@ -1,32 +1,79 @@
-"""A motor controller (CiA 402) in profile velocity mode, EPOS-24/1-like.
+"""Motor controller (CiA 402) in profile velocity mode, with the objects of an EPOS 24/1.
 
-Speeds are in rpm at the motor, as the device keeps them.
+Speeds are in rpm at the motor, currents in mA, as the device keeps them.
 """
 
 from __future__ import annotations
 
 import math
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from regolithd.drivers.virtual.abort import Abort, AbortError
-from regolithd.drivers.virtual.device import Device
-from regolithd.drivers.virtual.power_state import HALT, STAYS_IN_QUICK_STOP, PowerState, obey
+from regolithd.drivers.canopen.sdo_abort import Abort, AbortError
+from regolithd.drivers.devices.device import (
+    EVENT_DRIVEN,
+    Command,
+    Device,
+    Measured,
+    PdoLayout,
+    Quantity,
+    Setting,
+)
+from regolithd.drivers.devices.eds import EDS_FOLDER
+from regolithd.drivers.devices.virtual.device import VirtualDevice
+from regolithd.drivers.devices.virtual.power_state import HALT, STAYS_IN_QUICK_STOP, PowerState, next_state
 
 if TYPE_CHECKING:
-    from regolithd.drivers.virtual.emcy import EmergencyProducer
-    from regolithd.drivers.virtual.object_dictionary import Dictionary, Key
-    from regolithd.drivers.virtual.plant import Measurement
+    from regolithd.drivers.devices.virtual.device import ErrorReports, Key, ObjectValues
+    from regolithd.drivers.devices.virtual.measurement import Measurement
 
-ABORT_CONNECTION_OPTION, ERROR_CODE, CONTROLWORD, STATUSWORD = 0x6007, 0x603F, 0x6040, 0x6041
+ABORT_CONNECTION_OPTION, ERROR_CODE, CONTROLWORD, STATUSWORD_OBJECT = 0x6007, 0x603F, 0x6040, 0x6041
 QUICK_STOP_OPTION, DISABLE_OPTION, FAULT_REACTION_OPTION = 0x605A, 0x605C, 0x605E
-MODE, MODE_DISPLAY, DEMAND, ACTUAL, TARGET = 0x6060, 0x6061, 0x606B, 0x606C, 0x60FF
+MODE, MODE_DISPLAY, VELOCITY_DEMAND, VELOCITY_ACTUAL, TARGET_VELOCITY = 0x6060, 0x6061, 0x606B, 0x606C, 0x60FF
 CURRENT, VOLTAGE, TEMPERATURE = 0x6078, 0x6079, 0x2F00
 CURRENT_AVERAGED, VELOCITY_AVERAGED = 0x2027, 0x2028
 MAX_VELOCITY, ACCELERATION, DECELERATION, QUICK_STOP_DECELERATION = 0x607F, 0x6083, 0x6084, 0x6085
 
-PROFILE_VELOCITY = 3
+PROFILE_VELOCITY = 3  # modes of operation, 0x6060
+RAD_S_PER_RPM = 2.0 * math.pi / 60.0
+
+MOTOR_CURRENT = Quantity("motor_current_A", "At the motor, signed.", mirrored=True, noisy=True)
+MOTOR_SPEED = Quantity("motor_speed_rad_s", "At the motor, before the gears, signed.", mirrored=True)
+MOTOR_TEMPERATURE = Quantity("motor_temperature_degC")
+BUS_VOLTAGE = Quantity("bus_voltage_V", "Supply voltage at the motor controller.")
+STATUSWORD = Quantity("statusword", "Object 0x6041 of the motor controller.", flags=True)
+
+# EPOS firmware specification, chapter "Error codes".
+_EPOS_ERRORS = MappingProxyType(
+    {
+        0x2310: "overcurrent: short circuit, or the current controller is badly tuned",
+        0x3210: "overvoltage: supply too high, or energy fed back while braking",
+        0x3220: "undervoltage: supply too weak for the acceleration",
+        0x4210: "overtemperature of the power stage",
+        0x5113: "internal 5 V supply too low",
+        0x6100: "internal software error",
+        0x6320: "software parameter out of range",
+        0x7320: "position sensor error: encoder cable or supply",
+        0x8111: "CAN overrun",
+        0x81FD: "CAN bus-off",
+        0x81FE: "CAN receive queue overrun",
+        0x81FF: "CAN transmit queue overrun",
+        0x8611: "following error: the motor cannot follow its demand",
+        0xFF01: "Hall sensor error",
+        0xFF02: "encoder index not found",
+        0xFF03: "encoder resolution wrong",
+        0xFF04: "Hall sensor not found",
+        0xFF06: "negative limit switch",
+        0xFF07: "positive limit switch",
+        0xFF08: "Hall angle detection error",
+        0xFF09: "software position limit",
+        0xFF0A: "position sensor breach",
+        0xFF0B: "system overloaded",
+    }
+)
+
 COASTING_RPM_PER_S = 50_000.0
-"""How fast the gears' friction stops a motor without current: two gears of 1400 : 1 do not roll on."""
+"""Deceleration of a motor without current: the friction of its gears (1400 : 1) stops it almost at once."""
 AVERAGING_S = 0.05  # time constant of 0x2027 and 0x2028
 
 _VOLTAGE_ENABLED, _REMOTE, _TARGET_REACHED, _SPEED_ZERO = 0x0010, 0x0200, 0x0400, 0x1000
@@ -38,16 +85,16 @@ _POWERED = frozenset(
         PowerState.FAULT_REACTION_ACTIVE,
     }
 )
-_RAD_S_PER_RPM = math.pi / 30
-
 HEARTBEAT_LOST = 0x8130
 
 
-class MotorController(Device):
-    """State machine, velocity ramp and measurements of one drive."""
+class VirtualMotorController(VirtualDevice):
+    """A virtual drive: state machine, velocity ramp and measurements."""
 
-    def __init__(self, dictionary: Dictionary, emergency: EmergencyProducer, wheel: int | None) -> None:
-        super().__init__(dictionary, emergency, wheel)
+    latches_errors = True  # until fault reset
+
+    def __init__(self, dictionary: ObjectValues, errors: ErrorReports, wheel: int | None) -> None:
+        super().__init__(dictionary, errors, wheel)
         self.state = PowerState.NOT_READY_TO_SWITCH_ON
         self.speed_rpm = 0.0
         self._controlword = 0
@@ -59,7 +106,7 @@ class MotorController(Device):
     @property
     def speed_rad_s(self) -> float:
         """The motor's speed [rad/s]."""
-        return self.speed_rpm * _RAD_S_PER_RPM
+        return self.speed_rpm * RAD_S_PER_RPM
 
     @property
     def busy(self) -> bool:
@@ -80,11 +127,11 @@ class MotorController(Device):
             raise AbortError(Abort.INVALID_VALUE)
 
     def written(self, key: Key, value: int) -> None:
-        """Obey the controlword; everything else is read when it is needed."""
+        """Follow the controlword; every other object is read when it is needed."""
         if key == (CONTROLWORD, 0):
             before, self._controlword = self._controlword, value
             was = self.state
-            self.state = obey(was, value, before, quick_stop_option=self.dictionary.get(QUICK_STOP_OPTION))
+            self.state = next_state(was, value, before, quick_stop_option=self.dictionary.get(QUICK_STOP_OPTION))
             if self.state is not was:
                 self._entered(was)
         elif key == (MODE, 0):
@@ -96,7 +143,7 @@ class MotorController(Device):
         if self.state in {PowerState.FAULT_REACTION_ACTIVE, PowerState.FAULT}:
             return
         self.dictionary.put(ERROR_CODE, 0, code)
-        self.emergency.set(code)
+        self.errors.set(code)
         powered = self.state in _POWERED
         self.state = PowerState.FAULT_REACTION_ACTIVE
         option = self.dictionary.get(FAULT_REACTION_OPTION) if powered else 0
@@ -111,9 +158,9 @@ class MotorController(Device):
         if option == 1:
             self.fault(HEARTBEAT_LOST)
         elif option == 2:
-            self.state = obey(was, 0x0000, 0, quick_stop_option=0)
+            self.state = next_state(was, 0x0000, 0, quick_stop_option=0)
         elif option == 3:
-            self.state = obey(was, 0x0002, 0, quick_stop_option=0)
+            self.state = next_state(was, 0x0002, 0, quick_stop_option=0)
         if option in {2, 3} and self.state is not was:
             self._entered(was)
             self._show()
@@ -160,7 +207,7 @@ class MotorController(Device):
         self._stop_rpm_per_s = self._ramp(option)
         if was is PowerState.FAULT:
             self.dictionary.put(ERROR_CODE, 0, 0)
-            self.emergency.clear()
+            self.errors.clear()
         self._settle()
 
     def _settle(self) -> None:
@@ -181,7 +228,7 @@ class MotorController(Device):
             return 0.0, self._stop_rpm_per_s
         get = self.dictionary.get
         limit = get(MAX_VELOCITY)
-        goal = 0 if self._controlword & HALT else min(max(get(TARGET), -limit), limit)
+        goal = 0 if self._controlword & HALT else min(max(get(TARGET_VELOCITY), -limit), limit)
         faster = abs(goal) > abs(self.speed_rpm) and goal * self.speed_rpm >= 0
         return float(goal), float(get(ACCELERATION if faster else DECELERATION))
 
@@ -196,6 +243,44 @@ class MotorController(Device):
         if not self.speed_rpm:
             word |= _SPEED_ZERO
         speed = round(self.speed_rpm)
-        self.dictionary.put(STATUSWORD, 0, word)
-        self.dictionary.put(ACTUAL, 0, speed)
-        self.dictionary.put(DEMAND, 0, speed)
+        self.dictionary.put(STATUSWORD_OBJECT, 0, word)
+        self.dictionary.put(VELOCITY_ACTUAL, 0, speed)
+        self.dictionary.put(VELOCITY_DEMAND, 0, speed)
+
+
+MOTOR_CONTROLLER = Device(
+    kind="motor",
+    configuration_key="motors",
+    eds=EDS_FOLDER / "motor.eds",
+    default_node_id=1,
+    per_wheel=True,
+    tpdos=(
+        # 0x2027 and 0x2028, averaged by the controller, may be mapped in place of 0x6078 and 0x606C.
+        PdoLayout(
+            1,
+            (
+                Measured(STATUSWORD_OBJECT, 0, STATUSWORD, 1.0),
+                Measured(CURRENT, 0, MOTOR_CURRENT, 1e-3),  # mA
+                Measured(VELOCITY_ACTUAL, 0, MOTOR_SPEED, RAD_S_PER_RPM),
+            ),
+        ),
+        PdoLayout(
+            2,
+            (
+                Measured(VOLTAGE, 0, BUS_VOLTAGE, 1e-3),  # mV
+                Measured(TEMPERATURE, 0, MOTOR_TEMPERATURE, 0.1),  # 0.1 °C
+            ),
+            diagnostic=True,
+        ),
+    ),
+    # Commands act at once: a quick stop must not wait for a SYNC, nor be lost with it.
+    rpdos=(PdoLayout(1, (Command(CONTROLWORD), Command(TARGET_VELOCITY)), EVENT_DRIVEN),),
+    settings=(
+        Setting(MODE, 0, PROFILE_VELOCITY),
+        Setting(ABORT_CONNECTION_OPTION, 0, 3),  # on the master's loss: quick stop
+        Setting(QUICK_STOP_OPTION, 0, 2),  # brake with the quick-stop ramp, then switch-on disabled
+    ),
+    monitors_master=True,
+    error_texts=_EPOS_ERRORS,
+    virtual=VirtualMotorController,
+)

@@ -10,13 +10,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from regolithd.drivers.can.frame import Frame
-from regolithd.drivers.canopen.decoder import Decoder, Undecodable
-from regolithd.drivers.canopen.emcy import emergency_frame, register_bits
+from regolithd.drivers.canopen.emcy import Emergency, emergency_frame, register_bits
 from regolithd.drivers.canopen.nmt import NmtState, state_frame
-from regolithd.drivers.signals import Emergency, NodeDescription, NodeKind, NodeState, Quantity, Reading, Sync
+from regolithd.drivers.devices.decoding.decoder import Decoder, Undecodable
+from regolithd.drivers.devices.decoding.signals import NodeState, Reading, Sync
+from regolithd.drivers.devices.ground_speed import GROUND_SPEED
+from regolithd.drivers.devices.inclinometer import PITCH, ROLL, YAW_RATE
+from regolithd.drivers.devices.load_cell import LOAD
+from regolithd.drivers.devices.motor_controller import (
+    BUS_VOLTAGE,
+    MOTOR_CONTROLLER,
+    MOTOR_CURRENT,
+    MOTOR_SPEED,
+    MOTOR_TEMPERATURE,
+    STATUSWORD,
+)
+from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.virtual.rover import KAPVIK
 
-NODES = (*KAPVIK[1:], NodeDescription(1, NodeKind.MOTOR, 0, diagnostics=True))
+NODES = (*KAPVIK[1:], NodeDescription(1, MOTOR_CONTROLLER, 0, diagnostics=True))
 BUSY_IDS = st.sampled_from(
     [base + node.node_id for base in (0x80, 0x180, 0x280, 0x580, 0x600, 0x700) for node in NODES] + [0, 0x80, 0x77F]
 )
@@ -41,37 +53,37 @@ def test_a_motor_speaks_in_si() -> None:
         1,
         0x181,
         (
-            (Quantity.STATUSWORD, 0x0637),
-            (Quantity.MOTOR_CURRENT, pytest.approx(-0.080)),
-            (Quantity.MOTOR_SPEED, pytest.approx(3922 * 2 * math.pi / 60)),
+            (STATUSWORD, 0x0637),
+            (MOTOR_CURRENT, pytest.approx(-0.080)),
+            (MOTOR_SPEED, pytest.approx(3922 * 2 * math.pi / 60)),
         ),
     )
 
 
 def test_a_mirrored_motor_has_the_signs_of_the_rover() -> None:
     """Current and speed change their sign; the statusword does not, and nothing is minus zero."""
-    mirrored = Decoder([NodeDescription(2, NodeKind.MOTOR, 1, mirrored=True)])
+    mirrored = Decoder([NodeDescription(2, MOTOR_CONTROLLER, 1, mirrored=True)])
     values = dict(mirrored.decode(Frame(5, 0x182, struct.pack("<Hhi", 0x0637, -80, 0))).values)
-    assert values[Quantity.STATUSWORD] == 0x0637
-    assert values[Quantity.MOTOR_CURRENT] == pytest.approx(0.080)
-    assert math.copysign(1.0, values[Quantity.MOTOR_SPEED]) == 1.0
+    assert values[STATUSWORD] == 0x0637
+    assert values[MOTOR_CURRENT] == pytest.approx(0.080)
+    assert math.copysign(1.0, values[MOTOR_SPEED]) == 1.0
 
 
 def test_diagnostics_and_sensors_speak_in_si() -> None:
     """Supply voltage and temperature, load, slopes and yaw rate, ground speed."""
     decoder = Decoder(NODES)
     sent = {
-        0x281: (struct.pack("<Ih", 23456, -35), {Quantity.BUS_VOLTAGE: 23.456, Quantity.MOTOR_TEMPERATURE: -3.5}),
-        0x18B: (struct.pack("<iB", 3160, 0), {Quantity.LOAD: 31.60}),
+        0x281: (struct.pack("<Ih", 23456, -35), {BUS_VOLTAGE: 23.456, MOTOR_TEMPERATURE: -3.5}),
+        0x18B: (struct.pack("<iB", 3160, 0), {LOAD: 31.60}),
         0x195: (
             struct.pack("<hhh", -1000, 250, 90),
             {
-                Quantity.PITCH: math.radians(-10),
-                Quantity.ROLL: math.radians(2.5),
-                Quantity.YAW_RATE: math.radians(0.9),
+                PITCH: math.radians(-10),
+                ROLL: math.radians(2.5),
+                YAW_RATE: math.radians(0.9),
             },
         ),
-        0x196: (struct.pack("<iB", 2200, 0), {Quantity.GROUND_SPEED: 0.022}),
+        0x196: (struct.pack("<iB", 2200, 0), {GROUND_SPEED: 0.022}),
     }
     for can_id, (data, expected) in sent.items():
         assert dict(decoder.decode(Frame(0, can_id, data)).values) == pytest.approx(expected)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from regolithd.drivers.timer import KernelTimer, LoopTimer, Schedule, Timer, periodic
+from regolithd.drivers.canopen.timer import KernelTimer, LoopTimer, Schedule, Timer, periodic
 
 START_NS = 100_000_000_000
 PERIOD_NS = 5_000_000

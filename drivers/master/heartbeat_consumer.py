@@ -1,0 +1,42 @@
+"""The master's heartbeat consumer (CiA 301, 7.2.8.3.2): when a node counts as lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from regolithd.drivers.canopen.nmt import NmtState
+
+if TYPE_CHECKING:
+    from regolithd.drivers.master.remote_node import RemoteNode
+
+# After the heartbeat time has passed, frames may still wait in the socket because this program itself was late: a node
+# is lost only when nothing arrives from it during this further time, in which the socket is read.
+_GRACE_S = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """How an operational node was lost; `silent`: its heartbeat has stopped, so it cannot be booted now."""
+
+    text: str
+    silent: bool
+
+
+async def until_lost(remote: RemoteNode, lost_after_s: float) -> Loss:
+    """Wait until an operational node is lost, and return how."""
+    boot_ups = remote.boot_ups
+    while True:
+        if not await _heard_within(remote, lost_after_s) and not await _heard_within(remote, _GRACE_S):
+            return Loss(f"no heartbeat for {lost_after_s:g} s", silent=True)
+        if remote.boot_ups > boot_ups:
+            return Loss("it restarted by itself", silent=False)
+        if remote.state is not NmtState.OPERATIONAL:
+            return Loss(
+                f"it left operational and says {remote.state.text if remote.state else 'nothing'}", silent=False
+            )
+
+
+async def _heard_within(remote: RemoteNode, time_s: float) -> bool:
+    before = remote.heard
+    return await remote.changed.until(lambda: remote.heard > before, time_s)

@@ -1,0 +1,49 @@
+"""The list of writes that configures a node."""
+
+from __future__ import annotations
+
+from regolithd.drivers.devices.inclinometer import INCLINOMETER
+from regolithd.drivers.devices.load_cell import LOAD_CELL
+from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
+from regolithd.drivers.devices.node import NodeDescription
+from regolithd.drivers.devices.registry import DEVICES
+from regolithd.drivers.master.boot_configuration import boot_writes
+
+
+def test_a_pdo_is_set_up_in_the_standard_s_order() -> None:
+    """Off, type, count 0, entries, count, on – and what is not used is off."""
+    writes = boot_writes(
+        NodeDescription(3, MOTOR_CONTROLLER, 2), heartbeat_s=0.2, master_id=127, master_lost_after_s=0.5
+    )
+    first = [(write.index, write.subindex, write.value) for write in writes if write.index in (0x1800, 0x1A00)]
+    assert first == [
+        (0x1800, 1, 0x80000000),
+        (0x1800, 2, 1),
+        (0x1A00, 0, 0),
+        (0x1A00, 1, 0x60410010),
+        (0x1A00, 2, 0x60780010),
+        (0x1A00, 3, 0x606C0020),
+        (0x1A00, 0, 3),
+        (0x1800, 1, 0x183),
+    ]
+    unused = [write.index for write in writes if write.subindex == 1 and write.keep]
+    assert {0x1801, 0x1802, 0x1803, 0x1401, 0x1402, 0x1403} <= set(unused)
+    assert (0x1016, 1, 127 << 16 | 500) in [(write.index, write.subindex, write.value) for write in writes]
+
+
+def test_units_are_set_or_compared() -> None:
+    """A sensor that measures in another unit is refused, not misread."""
+    of = {
+        device: boot_writes(NodeDescription(9, device, 0), heartbeat_s=0.2, master_id=127, master_lost_after_s=0.5)
+        for device in DEVICES
+    }
+    resolution = next(write for write in of[INCLINOMETER] if write.index == 0x6000)
+    assert (resolution.value, resolution.read_only) == (10, False)
+    digits = next(write for write in of[LOAD_CELL] if write.index == 0x6132)
+    assert (digits.value, digits.read_only) == (2, True)
+
+
+def test_a_valid_pdo_keeps_its_identifier_while_it_is_switched_off() -> None:
+    """CiA 301 forbids to change it and bit 31 at once."""
+    off = boot_writes(NodeDescription(3, LOAD_CELL, 2), heartbeat_s=0.2, master_id=127, master_lost_after_s=0.5)[2]
+    assert off.data(present=0x40000183) == (0xC0000183).to_bytes(4, "little")
