@@ -14,7 +14,7 @@ import sys
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from regolithd.calibration.drivetrain.bench.simulation import drivetrain
+from regolithd.calibration.drivetrain.bench.from_corrected_simulation import copy_drivetrain
 from regolithd.calibration.validation.blind_trials.isolation import run_alone
 from regolithd.daemon.closed_loop.case import first_scenario, rover_toml, second_scenario, sim_toml
 from regolithd.daemon.closed_loop.simulated_drive import record, simulate
@@ -133,6 +133,6 @@ def _compare(folder: Path, simulation: str, answer: str, corrected: str) -> dict
 def _apply(corrected: Path, rover: Path) -> tuple[str, ...]:
     """Write the corrected drivetrain into `rover.toml`, as `regolithd calibrate corrected` does; return the changes."""
     shutil.copy(rover, rover.with_name("rover-before.toml"))
-    written = drivetrain(corrected, rover)
-    rover.write_text(written.text, encoding="utf-8")
-    return tuple(written.says)
+    update = copy_drivetrain(corrected, rover)
+    rover.write_text(update.text, encoding="utf-8")
+    return tuple(update.messages)

@@ -10,7 +10,7 @@ import typer
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from regolithd.calibration.drivetrain.bench.session import Written
+    from regolithd.calibration.drivetrain.bench.configuration_update import ConfigurationUpdate
 
 Recorded = Annotated[
     Path | None,
@@ -39,32 +39,32 @@ def register(app: typer.Typer) -> None:
 
 def load_cell(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plot = None, write: Write = True) -> None:
     """Zero and span of the load cells, from known weights (kg) in the recording."""
-    from regolithd.calibration.drivetrain.bench import procedures, session
+    from regolithd.calibration.drivetrain.bench import from_recording, procedures
 
     if recording is None:
         typer.echo(procedures.LOAD_CELLS)
         return
-    _finish(lambda: session.load_cells(recording, config, plot), config, write)
+    _finish(lambda: from_recording.load_cells(recording, config, plot), config, write)
 
 
 def wheels_up(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plot = None, write: Write = True) -> None:
     """No-load current against motor speed, from a spin with the wheels off the ground."""
-    from regolithd.calibration.drivetrain.bench import procedures, session
+    from regolithd.calibration.drivetrain.bench import from_recording, procedures
 
     if recording is None:
         typer.echo(procedures.WHEELS_UP)
         return
-    _finish(lambda: session.wheels_up(recording, config, plot), config, write)
+    _finish(lambda: from_recording.wheels_up(recording, config, plot), config, write)
 
 
 def brake(recording: Recorded = None, config: Config = ROVER_TOML, plot: Plot = None, write: Write = True) -> None:
     """Drivetrain efficiency against torque, from a brake test."""
-    from regolithd.calibration.drivetrain.bench import procedures, session
+    from regolithd.calibration.drivetrain.bench import from_recording, procedures
 
     if recording is None:
         typer.echo(procedures.BRAKE)
         return
-    _finish(lambda: session.brake(recording, config, plot), config, write)
+    _finish(lambda: from_recording.brake(recording, config, plot), config, write)
 
 
 def radius(
@@ -76,12 +76,12 @@ def radius(
     write: Write = True,
 ) -> None:
     """Wheel radius, from a measured distance and the wheels' rotation."""
-    from regolithd.calibration.drivetrain.bench import procedures, session
+    from regolithd.calibration.drivetrain.bench import from_recording, procedures
 
     if recording is None:
         typer.echo(procedures.RADIUS)
         return
-    _finish(lambda: session.radius(recording, config, distance, distance_std, plot), config, write)
+    _finish(lambda: from_recording.radius(recording, config, distance, distance_std, plot), config, write)
 
 
 def corrected(
@@ -90,24 +90,24 @@ def corrected(
     write: Write = True,
 ) -> None:
     """Drivetrain constants, from a simulation that `regolithd mismatch --corrected` wrote."""
-    from regolithd.calibration.drivetrain.bench.simulation import drivetrain
+    from regolithd.calibration.drivetrain.bench.from_corrected_simulation import copy_drivetrain
 
-    _finish(lambda: drivetrain(simulation, config), config, write)
+    _finish(lambda: copy_drivetrain(simulation, config), config, write)
 
 
-def _finish(fit: Callable[[], Written], config: Path, write: bool) -> None:
+def _finish(fit: Callable[[], ConfigurationUpdate], config: Path, write: bool) -> None:
     """Fit, print the results, and write them unless `write` is false."""
-    from regolithd.calibration.drivetrain.bench.line import BenchError
+    from regolithd.calibration.drivetrain.bench.line_fit import BenchError
     from regolithd.calibration.mismatch.errors import RecordingError
 
     try:
-        written = fit()
+        update = fit()
     except (BenchError, RecordingError, OSError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error
-    typer.echo("\n".join(written.says))
+    typer.echo("\n".join(update.messages))
     if write:
-        config.write_text(written.text, encoding="utf-8")
+        config.write_text(update.text, encoding="utf-8")
         typer.echo(f"Wrote {config}; comments and order are kept.")
     else:
         typer.echo(f"{config} is unchanged.")

@@ -1,5 +1,11 @@
-"""Procedures at the test bench that give the constants: what to do, what to measure, and the fit.
+"""Bench calibration of load cells, drivetrain and wheel radius: instructions, fits, and the update of `rover.toml`.
 
-Each fit takes arrays from a recording (the columns of `regolithd export`), and returns values with their standard
-deviations. `toml_edit` writes them where the daemon reads them.
+| module | content |
+|---|---|
+| `procedures` | instructions for the bench, and the four fits |
+| `line_fit`, `efficiency_fit` | least squares of the steps of a procedure, with standard deviations |
+| `from_recording` | a recording (`regolithd export`) → constants of each wheel → updated `rover.toml` |
+| `from_corrected_simulation` | a simulation corrected by `regolithd mismatch` → updated `rover.toml` |
+| `configuration_update` | sets values in a TOML text; comments and order stay |
+| `plot` | figures of measurements and fits |
 """

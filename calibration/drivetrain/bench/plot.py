@@ -1,4 +1,4 @@
-"""What was measured and what was fitted, wheel by wheel: pictures for the person at the bench."""
+"""Figures of the bench calibration: measurements and fit of each wheel."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from regolithd.calibration.drivetrain.bench.efficiency import Efficiency
-    from regolithd.calibration.drivetrain.bench.procedures import Radius
+    from regolithd.calibration.drivetrain.bench.efficiency_fit import EfficiencyFit
+    from regolithd.calibration.drivetrain.bench.procedures import RadiusFit
 
 Array = NDArray[np.float64]
-Fit = tuple[Array, Array, Callable[[Array], Array]]
-"""Measured x and y, and the fitted line."""
+PlottedFit = tuple[Array, Array, Callable[[Array], Array]]
+"""Measured x and y, and the fitted function."""
 
 STYLE: Any = {"svg.hashsalt": "regolithd", "font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
 MEASURED, FITTED = "#7f8c8d", "#c0392b"
-NINE_TENTHS = 1.645
-"""Standard deviations on either side that hold nine tenths."""
+STD_90 = 1.645
+"""Half width of a 90 % interval in standard deviations (normal distribution)."""
 
 
 @dataclass(frozen=True, slots=True)
-class Braked:
-    """One wheel under a brake: what was measured, what was fitted, and the gain of gears without losses."""
+class BrakeTest:
+    """One wheel under a brake: measurements, fit, and the gain without losses κ ζ_PG ζ_HD."""
 
     torque_Nm: Array
     current_A: Array
-    fit: Efficiency
+    fit: EfficiencyFit
     ideal_gain_Nm_per_A: float
 
 
-def draw(path: Path, wheels: dict[int, Fit], x_label: str, y_label: str) -> None:
-    """Write one panel for each wheel: points, and the fitted line."""
+def plot_fits(path: Path, wheels: dict[int, PlottedFit], x_label: str, y_label: str) -> None:
+    """Write a figure with one panel for each wheel: measurements, and the fitted function."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9, 3 * -(-len(wheels) // 3)), layout="constrained")
         panels = figure.subplots(-(-len(wheels) // 3), min(3, len(wheels)), squeeze=False, sharex=True, sharey=True)
@@ -56,63 +56,65 @@ def draw(path: Path, wheels: dict[int, Fit], x_label: str, y_label: str) -> None
         _save(figure, path)
 
 
-def draw_brake(path: Path, wheels: dict[int, Braked]) -> None:
-    """Write for each wheel the current against the brake's torque, and the efficiency that follows from it."""
+def plot_brake(path: Path, wheels: dict[int, BrakeTest]) -> None:
+    """Write a figure with the current and the efficiency of each wheel against the brake's torque."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9, 3.2 * len(wheels)), layout="constrained")
         rows = figure.subplots(len(wheels), 2, squeeze=False, sharex=True)
-        for (left, right), (wheel, braked) in zip(rows, sorted(wheels.items()), strict=True):
-            _current(left, braked)
-            _efficiency(right, braked)
+        for (left, right), (wheel, test) in zip(rows, sorted(wheels.items()), strict=True):
+            _plot_current(left, test)
+            _plot_efficiency(right, test)
             left.set_title(f"wheel {wheel}", loc="left")
         rows[0, 1].legend(frameon=False, loc="lower right")
         figure.supxlabel("brake torque [N m]")
         _save(figure, path)
 
 
-def _current(panel: Axes, braked: Braked) -> None:
-    line = np.linspace(0, braked.torque_Nm.max(), 200)
-    fitted, std = braked.fit.line(line), NINE_TENTHS * braked.fit.line_std(line)
-    panel.plot(braked.torque_Nm, 1e3 * braked.current_A, ".", color=MEASURED, markersize=2, alpha=0.6)
+def _plot_current(panel: Axes, test: BrakeTest) -> None:
+    line = np.linspace(0, test.torque_Nm.max(), 200)
+    fitted, std = test.fit.line(line), STD_90 * test.fit.line_std(line)
+    panel.plot(test.torque_Nm, 1e3 * test.current_A, ".", color=MEASURED, markersize=2, alpha=0.6)
     panel.fill_between(line, 1e3 * (fitted - std), 1e3 * (fitted + std), color=FITTED, alpha=0.2, linewidth=0)
     panel.plot(line, 1e3 * fitted, color=FITTED)
     panel.set_ylabel("motor current [mA]")
     panel.set_ylim(bottom=0)
 
 
-def _efficiency(panel: Axes, braked: Braked) -> None:
-    line = np.linspace(0, braked.torque_Nm.max(), 200)[1:]
-    share, std = braked.fit.efficiency(line, braked.ideal_gain_Nm_per_A)
-    low, high = share - NINE_TENTHS * std, share + NINE_TENTHS * std
-    levels = np.unique(braked.torque_Nm)
-    means = np.array([braked.current_A[braked.torque_Nm == level].mean() for level in levels])
-    at_levels = levels / (braked.ideal_gain_Nm_per_A * means)
+def _plot_efficiency(panel: Axes, test: BrakeTest) -> None:
+    line = np.linspace(0, test.torque_Nm.max(), 200)[1:]
+    share, std = test.fit.efficiency(line, test.ideal_gain_Nm_per_A)
+    low, high = share - STD_90 * std, share + STD_90 * std
+    levels = np.unique(test.torque_Nm)
+    means = np.array([test.current_A[test.torque_Nm == level].mean() for level in levels])
+    at_levels = levels / (test.ideal_gain_Nm_per_A * means)
     panel.plot(levels, 100 * at_levels, "o", color=MEASURED, markersize=4, label="mean at each torque")
     panel.fill_between(line, 100 * low, 100 * high, color=FITTED, alpha=0.2, linewidth=0, label="90 %")
     panel.plot(line, 100 * share, color=FITTED, label="fitted")
-    panel.set_ylabel("efficiency, no-load current and all [%]")
+    panel.set_ylabel("efficiency, including no-load current [%]")
     panel.set_ylim(bottom=0)
 
 
-def draw_radius(path: Path, rolled: dict[int, tuple[Array, Array]], found: dict[int, Radius], mean: Radius) -> None:
-    """Write how the wheels turned (time [s] and speed at the wheel [rad/s]), and the radius of each with all's mean."""
+def plot_radius(
+    path: Path, rolled: dict[int, tuple[Array, Array]], found: dict[int, RadiusFit], mean: RadiusFit
+) -> None:
+    """Write a figure of the wheels' speeds (time [s], speed at the wheel [rad/s]), their radii, and the mean radius."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9, 3.4), layout="constrained")
         left, right = figure.subplots(1, 2)
         for wheel, (time, speed) in sorted(rolled.items()):
             left.plot(time, speed, linewidth=0.8, label=f"wheel {wheel}")
         left.set_xlabel("time [s]")
-        left.set_ylabel("speed of the wheel [rad/s]")
-        left.set_title("start and stop must both be in the recording", loc="left")
+        left.set_ylabel("wheel speed [rad/s]")
+        left.set_title("the recording must include start and stop", loc="left")
         left.legend(frameon=False, fontsize=7, ncols=2)
-        low, high = (1e3 * (mean.radius_m + side * NINE_TENTHS * mean.radius_std_m) for side in (-1, 1))
+        low, high = (1e3 * (mean.radius_m + side * STD_90 * mean.radius_std_m) for side in (-1, 1))
         right.axhspan(low, high, color=FITTED, alpha=0.2, linewidth=0)
-        right.axhline(1e3 * mean.radius_m, color=FITTED, label="written; 90 %")
+        right.axhline(1e3 * mean.radius_m, color=FITTED, label="mean, as written; 90 %")
         wheels = sorted(found)
         values, deviations = (
             [1e3 * getattr(found[wheel], name) for wheel in wheels] for name in ("radius_m", "radius_std_m")
         )
-        bars = NINE_TENTHS * np.array(deviations)
+        bars = STD_90 * np.array(deviations)
         right.errorbar(wheels, values, bars, fmt="o", color=MEASURED, capsize=3, label="each wheel; 90 %")
         right.set_xticks(wheels)
         right.set_xlabel("wheel")

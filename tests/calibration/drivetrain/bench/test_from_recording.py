@@ -1,4 +1,4 @@
-"""The bench commands: they guide, fit a recording, draw it, and write what the daemon then reads."""
+"""`regolithd calibrate`: instructions, the fit of a recording, its figure, and the update of `rover.toml`."""
 
 import shutil
 import subprocess
@@ -20,7 +20,7 @@ from regolithd.daemon.pipeline.snapshot import QUANTITIES, ROW, Snapshot
 from regolithd.drivers.devices.load_cell import LOAD
 from regolithd.drivers.devices.motor_controller import MOTOR_CURRENT, MOTOR_SPEED
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[4]
 
 
 def calibrate(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -44,8 +44,8 @@ def spin(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_spin_becomes_the_daemons_drivetrain(tmp_path: Path, spin: Path) -> None:
-    """The values stand in rover.toml for each wheel, with their deviations, and the daemon takes the file."""
+def test_a_spin_updates_the_no_load_current(tmp_path: Path, spin: Path) -> None:
+    """`rover.toml` has the values of each wheel with their standard deviations, and is a valid configuration."""
     config, plot = tmp_path / "rover.toml", tmp_path / "spin.png"
     shutil.copy(ROOT / "rover.toml", config)
     done = calibrate("wheels-up", spin, "--config", config, "--plot", plot)
@@ -71,8 +71,8 @@ def braked(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_brake_becomes_the_daemons_efficiency_against_torque(tmp_path: Path, braked: Path) -> None:
-    """Of wheel 3 alone: from then on the daemon's torque is the brake's, at each of its torques."""
+def test_a_brake_test_updates_the_efficiency_against_torque(tmp_path: Path, braked: Path) -> None:
+    """Wheel 3 alone is changed, and the torque computed from its current is the brake's at each torque."""
     config, plot = tmp_path / "rover.toml", tmp_path / "brake.svg"
     shutil.copy(ROOT / "rover.toml", config)
     done = calibrate("brake", braked, "--config", config, "--plot", plot)
@@ -89,8 +89,8 @@ def test_a_brake_becomes_the_daemons_efficiency_against_torque(tmp_path: Path, b
         assert wheel_torque(np.full(6, current), np.full(6, 400.0), calibrated)[2] == pytest.approx(torque, rel=0.02)
 
 
-def test_a_distance_becomes_the_daemons_radius_with_a_picture(tmp_path: Path) -> None:
-    """Six wheels of 76 mm over 6 m, with start and stop in the recording."""
+def test_a_distance_updates_the_radius_and_draws_a_figure(tmp_path: Path) -> None:
+    """Six wheels of 76 mm that roll 6 m give a radius of 76 mm within three standard deviations."""
     config, plot = tmp_path / "rover.toml", tmp_path / "radius.svg"
     shutil.copy(ROOT / "rover.toml", config)
     time = np.arange(0, 130, 0.5)
@@ -106,7 +106,7 @@ def test_a_distance_becomes_the_daemons_radius_with_a_picture(tmp_path: Path) ->
 
 
 def test_a_dry_run_writes_nothing(tmp_path: Path, spin: Path) -> None:
-    """What would be written is said, and the file stays."""
+    """A dry run prints the values and leaves the file unchanged."""
     config = tmp_path / "rover.toml"
     shutil.copy(ROOT / "rover.toml", config)
     before = config.read_bytes()
@@ -116,21 +116,21 @@ def test_a_dry_run_writes_nothing(tmp_path: Path, spin: Path) -> None:
     assert done.returncode == 0
 
 
-def test_without_a_recording_the_command_guides() -> None:
-    """Each procedure says what to do at the bench."""
+def test_without_a_recording_the_command_prints_instructions() -> None:
+    """Without a recording each command prints the instructions for the bench."""
     for name in ("load-cell", "wheels-up", "brake", "radius"):
         assert "  1. " in CliRunner().invoke(app, ["calibrate", name]).stdout
 
 
-def test_a_recording_without_the_weights_says_what_is_missing(spin: Path) -> None:
-    """The message names the column, and nothing is written."""
+def test_a_recording_without_weights_is_an_error_that_names_the_column(spin: Path) -> None:
+    """The error names the missing column, and the exit code is 1."""
     done = calibrate("load-cell", spin, "--config", ROOT / "rover.toml")
     assert done.returncode == 1
     assert "weight_kg" in done.stderr
 
 
-def test_the_daemon_corrects_loads_by_what_the_bench_found() -> None:
-    """A cell that reads 2 N too much and a tenth too little is put right before anything is estimated from it."""
+def test_the_daemon_corrects_loads_by_zero_and_span() -> None:
+    """A load cell with a zero of 2 N and a span of 1.1 is corrected before the smoothing."""
     cells = LoadCells(zero_N=2.0, span=1.1)  # type: ignore[arg-type]  # one value for six wheels
     configuration = Configuration(load_cells=cells, smoothing=Smoothing(window_s=0.0, time_constant_s=0.0))
     values = np.full((len(QUANTITIES), 6), np.nan)

@@ -1,4 +1,4 @@
-"""A straight line through measurements, with honest errors: what three of the four procedures come down to."""
+"""Least-squares line through the step means of a bench procedure, with standard deviations."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Array = NDArray[np.float64]
 
 
 class BenchError(ValueError):
-    """A recording does not hold what the procedure needs; the message says what to do at the bench."""
+    """A recording does not contain what the procedure needs; the message says what to do at the bench."""
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class LineFit:
     """y = offset + slope x, each with its standard deviation; `residual_std` is that of y about the line."""
 
     offset: float
@@ -25,11 +25,23 @@ class Line:
     residual_std: float
 
 
-def fit_line(x: Array, y: Array, steps: Array) -> Line:
-    """Return the least-squares line through the means of each step of the procedure.
+def fit_line(x: Array, y: Array, steps: Array) -> LineFit:
+    """Return the least-squares line through the means of the steps.
 
-    Samples within a step share its errors (a weight put on askew, a grease film), so that the steps and not the samples
-    are what the uncertainty counts: a thousand samples of two weights are two measurements.
+    Samples of one step have a common error (a weight put on off-centre, a grease film), so the number of steps, not of
+    samples, determines the standard deviations: a thousand samples of two weights are two measurements.
+
+    Parameters
+    ----------
+    x, y
+        Measurements, shape (samples,).
+    steps
+        Number of the step that each sample belongs to, same shape.
+
+    Raises
+    ------
+    BenchError
+        There are fewer than three steps, or all are at the same x.
     """
     names = np.unique(steps)
     if len(names) < 3:
@@ -46,4 +58,4 @@ def fit_line(x: Array, y: Array, steps: Array) -> Line:
     deviation = float(np.sqrt(np.sum(residual**2) / (len(at) - 2)))
     slope_std = deviation / float(np.sqrt(spread))
     offset_std = deviation * float(np.sqrt(1 / len(at) + middle**2 / spread))
-    return Line(offset, offset_std, slope, slope_std, deviation)
+    return LineFit(offset, offset_std, slope, slope_std, deviation)
