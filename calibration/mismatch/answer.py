@@ -116,12 +116,21 @@ def _plain(value: object) -> Any:  # noqa: ANN401  # JSON has no narrower type
 
 @dataclass(frozen=True)
 class Contribution:
-    """One named effect's term in the corrected simulation: enough to add it again to any recording."""
+    """One effect's term in the corrected simulation: enough to add it to any recording.
+
+    Attributes
+    ----------
+    shape: the candidate's shape parameters
+    coefficients: one for each of its columns
+    wheels: the names of the wheels that have it
+    relative_std: relative standard deviation of its size
+    """
 
     name: str
     shape: Shape
     coefficients: tuple[float, ...]
     wheels: tuple[int, ...]
+    relative_std: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,12 @@
-"""The corrected simulation: SIM.toml with the effects in it, and a simulation that has such effects.
+"""The corrected simulation: SIM.toml with calibrated parameters and the effects that were found.
 
-Drivetrain terms that the daemon has too go into its tables; the others stand in `[[effects]]`, each with its shape,
-its coefficients and its wheels, and are added to the prediction when the file is read again.
+An effect that the simulation has parameters for goes into them (`Simulation.absorb_effects`). The others are written
+to `[[effects]]`, each with its shape, coefficients and wheels, and are added to the prediction when the file is read.
 """
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 FURTHEST_STD = 3.0
-NINE_TENTHS_WIDTH = 2 * 1.645
-"""How many standard deviations a 90 % interval is wide."""
+"""Standard deviations of its prior that a parameter may move (a choice: one in 370 lies further)."""
+INTERVAL_STDS = 2 * 1.645
+"""Width of a 90 % interval of a normal density, in standard deviations."""
 
 
 def corrected_tables(
@@ -39,25 +40,28 @@ def corrected_tables(
 ) -> dict[str, Any]:
     """Return SIM.toml's tables with the calibrated parameters and every effect.
 
-    `effects` say how sure the contributions are, in the same order; left out, nothing is written of that.
+    Parameters
+    ----------
+    tables: of the SIM.toml that was compared
+    values: the parameters' values in the fit with the effects
+    contributions: the effects' terms
+    effects: the same, with their intervals, in the same order; left out, the terms have no standard deviation
     """
-    corrected = {**tables, **simulation.corrected_tables(_within_reason(simulation, values))}
-    shares = [_relative_std(effect) for effect in effects] or [0.0] * len(contributions)
-    rest = [
-        {**{name: _toml(value) for name, value in asdict(effect).items()}, "relative_std": share}
-        for effect, share in zip(contributions, shares, strict=True)
-        if not _into_drivetrain(corrected, simulation, effect, share)
-    ]
+    if effects:
+        pairs = zip(contributions, effects, strict=True)
+        contributions = [replace(term, relative_std=_relative_std(effect)) for term, effect in pairs]
+    calibrated = {**tables, **simulation.corrected_tables(_within_three_std(simulation, values))}
+    corrected, rest = simulation.absorb_effects(calibrated, contributions)
     before = list(tables.get("effects", []))
     if before or rest:
-        corrected["effects"] = before + rest
+        corrected["effects"] = before + [_plain(asdict(effect)) for effect in rest]
     return corrected
 
 
-def _within_reason(simulation: Simulation, values: Mapping[str, float]) -> dict[str, float]:
-    """Return the parameters no further from what was stated than it can be off: three standard deviations.
+def _within_three_std(simulation: Simulation, values: Mapping[str, float]) -> dict[str, float]:
+    """Return the parameters, clipped to three standard deviations of their priors.
 
-    Where something is missing that has no name, the parameters lean over to stand in for it.
+    Where a structure is unexplained, the fit moves the parameters further than that to imitate it.
     """
     kept = {}
     for name, value in values.items():
@@ -75,49 +79,17 @@ def _within_reason(simulation: Simulation, values: Mapping[str, float]) -> dict[
 
 
 def _relative_std(effect: Effect) -> float:
-    """Return the relative standard deviation of an effect's size, whose 90 % interval is known."""
+    """Return the relative standard deviation of an effect's size, from its 90 % interval."""
     size = effect.parameters.get("relative_size")
-    return 0.0 if size is None or size.value == 0 else (size.high - size.low) / NINE_TENTHS_WIDTH / size.value
+    return 0.0 if size is None or size.value == 0 else (size.high - size.low) / INTERVAL_STDS / size.value
 
 
-def _into_drivetrain(tables: dict[str, Any], simulation: Simulation, effect: Contribution, share: float) -> bool:
-    """Put Coulomb and viscous friction where the daemon keeps them; say whether that could be done."""
-    drivetrain = tables.get("drivetrain")
-    if simulation.channel != "motor_current_A" or not isinstance(drivetrain, dict):
-        return False
-    six: Array = np.isin(np.arange(1, 7), effect.wheels).astype(np.float64)
-    (value, *_) = effect.coefficients
-    if effect.name == "coulomb-friction" and value >= 0:
-        _add(drivetrain, "no_load_current_A", value * six)
-        _add_squared(drivetrain, "no_load_current_std_A", share * value * six)
-        return True
-    if effect.name == "viscous-friction" and value >= 0 and abs(float(effect.shape["power"]) - 1) < 1e-9:
-        # The daemon's viscous term is per motor speed, the effect's per wheel speed.
-        ratio = drivetrain["planetary_ratio"] * drivetrain["harmonic_ratio"]
-        _add(drivetrain, "viscous_current_A_s_per_rad", value / ratio * six)
-        _add_squared(drivetrain, "viscous_current_std_A_s_per_rad", share * value / ratio * six)
-        return True
-    return False
-
-
-def _add(drivetrain: dict[str, Any], name: str, six: Array) -> None:
-    drivetrain[name] = (np.array(_six(drivetrain, name)) + six).tolist()
-
-
-def _add_squared(drivetrain: dict[str, Any], name: str, six: Array) -> None:
-    drivetrain[name] = np.hypot(_six(drivetrain, name), six).tolist()
-
-
-def _six(drivetrain: Mapping[str, Any], name: str) -> list[float]:
-    before = drivetrain.get(name, 0.0)
-    return [float(v) for v in before] if isinstance(before, list | tuple) else [float(before)] * 6
-
-
-def _toml(value: object) -> object:
+def _plain(value: Any) -> Any:  # noqa: ANN401  # what TOML can hold
+    """Return the value with lists for tuples and Python's floats for NumPy's."""
     if isinstance(value, dict):
-        return {k: _toml(v) for k, v in value.items()}
+        return {key: _plain(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):
-        return [_toml(v) for v in value]
+        return [_plain(inner) for inner in value]
     return float(value) if isinstance(value, float) else value
 
 
@@ -138,6 +110,7 @@ def stated_effects(tables: Mapping[str, Any]) -> tuple[Contribution, ...]:
                     dict(effect["shape"]),
                     tuple(float(c) for c in effect["coefficients"]),
                     tuple(int(w) for w in effect["wheels"]),
+                    float(effect.get("relative_std", 0.0)),
                 )
             )
         except (KeyError, TypeError, ValueError) as error:
@@ -156,36 +129,3 @@ def effect_of(problem: Problem, candidates: Sequence[Candidate], effects: Sequen
         on = np.isin(problem.recording.wheels, effect.wheels)
         total += np.einsum("c,ctw,w->tw", np.array(effect.coefficients), columns, on)
     return total
-
-
-def to_toml(tables: Mapping[str, Any]) -> str:
-    """Write tables as TOML: what SIM.toml needs, and no more of the language."""
-    lines: list[str] = []
-    for name, table in tables.items():
-        if isinstance(table, dict):
-            lines += [f"[{name}]", *_keys(table), ""]
-            for inner, below in table.items():
-                if isinstance(below, dict):
-                    lines += [f"[{name}.{inner}]", *_keys(below), ""]
-    for effect in tables.get("effects", []):
-        lines += ["[[effects]]", *_keys(effect), ""]
-    return "\n".join(lines)
-
-
-def _keys(table: Mapping[str, Any]) -> list[str]:
-    inline = {"shape"}
-    return [f"{k} = {_value(v)}" for k, v in table.items() if not isinstance(v, dict) or k in inline]
-
-
-def _value(value: object) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{k} = {_value(v)}" for k, v in value.items()) + " }"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_value(v) for v in value) + "]"
-    if isinstance(value, float | np.floating):
-        return repr(float(value))
-    return str(value)

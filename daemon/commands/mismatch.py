@@ -44,8 +44,9 @@ def _run(recording: Path, simulation: Path, json: Path | None, report: Path | No
     from rich.console import Console
 
     from regolithd.calibration.mismatch.comparison import compare
-    from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects, to_toml
+    from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects
     from regolithd.calibration.mismatch.simulation.load import load_simulation
+    from regolithd.calibration.toml_document import with_tables
 
     tables = _tables(simulation)
     simulated = load_simulation(tables, beside=simulation.resolve().parent)
@@ -57,10 +58,9 @@ def _run(recording: Path, simulation: Path, json: Path | None, report: Path | No
         _write_json(json, found.answer)
     if corrected:
         evidence = found.evidence
-        text = to_toml(
-            corrected_tables(tables, simulated, evidence.values, evidence.contributions, found.answer.effects)
-        )
-        corrected.write_text(text, encoding="utf-8")
+        new = corrected_tables(tables, simulated, evidence.values, evidence.contributions, found.answer.effects)
+        # The user's own comments and order stay.
+        corrected.write_text(with_tables(simulation.read_text(encoding="utf-8"), new), encoding="utf-8")
     if report:
         _write_report(report, found, recording, simulation)
     _print_answer(Console(), found.answer)

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import tomlkit
 from tomlkit.items import Table
 
+from regolithd.calibration.toml_document import set_item
+
 
 @dataclass(frozen=True, slots=True)
 class ConfigurationUpdate:
@@ -26,11 +28,7 @@ def set_value(text: str, table: str, key: str, value: float | list[float]) -> st
     section = document.setdefault(table, tomlkit.table())
     if not isinstance(section, Table):
         raise TypeError(f"{table} is not a table of the configuration")
-    old, new = section.get(key), tomlkit.value(_toml(value))
-    section[key] = new
-    if old is not None and old.trivia.comment:
-        shorter = len(old.as_string()) - len(new.as_string())
-        new.trivia.comment_ws = " " * max(len(old.trivia.comment_ws) + shorter, 1)
+    set_item(section, key, tomlkit.value(_toml(value)))
     return tomlkit.dumps(document)
 
 

@@ -20,6 +20,7 @@ from regolithd.calibration.terrain.wheel_soil import LARGEST_CONTACT_ANGLE_RAD, 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from regolithd.calibration.mismatch.answer import Contribution
     from regolithd.calibration.mismatch.data.recording import Recording
 
 Array = NDArray[np.float64]
@@ -28,6 +29,10 @@ GRAVITY_M_S2 = 9.81
 SLOWEST_RAD_S = 0.05
 """Below this speed at the wheel the model says nothing: slip is a quotient of two small numbers there."""
 
+WHEELS = 6
+"""Of the daemon's rover: `[drivetrain]` has a value for each."""
+POWER_TOLERANCE = 1e-9
+"""Difference from 1 of a viscous friction's power that is rounding."""
 LIFTED_N = 1.0
 """What a cell may read under a wheel that hangs in its suspension."""
 
@@ -187,6 +192,14 @@ class RoverWheel(Simulation):
         soil["friction_angle_deg"] = float(values["friction_angle_deg"])
         return tables
 
+    def absorb_effects(
+        self, tables: Mapping[str, Any], effects: Sequence[Contribution]
+    ) -> tuple[dict[str, Any], tuple[Contribution, ...]]:
+        """Add Coulomb friction and viscous friction of power 1 to `[drivetrain]`, where the daemon reads them."""
+        drivetrain = dict(tables["drivetrain"])
+        left = tuple(effect for effect in effects if not _absorb(drivetrain, self.tables.drivetrain.ratio, effect))
+        return {**tables, "drivetrain": drivetrain}, left
+
     def _place_m(self, inputs: Mapping[str, Array], speed: Array) -> Array:
         """Return how far along the way each wheel is [m]: what the middle has driven, and where the axle stands.
 
@@ -200,6 +213,30 @@ class RoverWheel(Simulation):
 
     def _wheel_speed(self, inputs: Mapping[str, Array]) -> Array:
         return inputs["motor_speed_rad_s"] / self.tables.drivetrain.ratio
+
+
+def _absorb(drivetrain: dict[str, Any], ratio: float, effect: Contribution) -> bool:
+    """Add a friction to `[drivetrain]`; return whether there is a key for it."""
+    value = effect.coefficients[0]
+    if value < 0:
+        return False
+    if effect.name == "coulomb-friction":
+        _add_friction(drivetrain, ("no_load_current_A", "no_load_current_std_A"), value, effect)
+        return True
+    if effect.name == "viscous-friction" and abs(float(effect.shape["power"]) - 1) < POWER_TOLERANCE:
+        # The daemon's viscous term is per motor speed, the effect's per wheel speed.
+        names = ("viscous_current_A_s_per_rad", "viscous_current_std_A_s_per_rad")
+        _add_friction(drivetrain, names, value / ratio, effect)
+        return True
+    return False
+
+
+def _add_friction(drivetrain: dict[str, Any], names: tuple[str, str], value: float, effect: Contribution) -> None:
+    """Add a value to the effect's wheels, and its standard deviation in quadrature."""
+    on: Array = np.isin(np.arange(1, WHEELS + 1), effect.wheels).astype(np.float64)
+    before, std = (np.broadcast_to(np.asarray(drivetrain[name], np.float64), (WHEELS,)) for name in names)
+    drivetrain[names[0]] = (before + value * on).tolist()
+    drivetrain[names[1]] = np.hypot(std, effect.relative_std * value * on).tolist()
 
 
 def slip_sunk(contact_angle_rad: Array, slip: Array, strength: float) -> Array:

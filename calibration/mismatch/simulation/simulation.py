@@ -29,6 +29,7 @@ from regolithd.calibration.mismatch.errors import SimulationError
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from regolithd.calibration.mismatch.answer import Contribution
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.prior import Prior, SensorError
@@ -113,3 +114,12 @@ class Simulation:
                 name: {"value": float(values[name]), "std": prior.std} for name, prior in self.parameters.items()
             }
         }
+
+    def absorb_effects(
+        self, tables: Mapping[str, Any], effects: Sequence[Contribution]
+    ) -> tuple[dict[str, Any], tuple[Contribution, ...]]:
+        """Return SIM.toml's tables with those effects in them that this simulation has keys for, and the effects left.
+
+        By default it has none: all are left, and are written to `[[effects]]`.
+        """
+        return dict(tables), tuple(effects)

@@ -6,6 +6,7 @@ import gzip
 from typing import TYPE_CHECKING
 
 import numpy as np
+import tomlkit
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,13 +31,7 @@ COLUMNS = (
 
 def toml_text(tables: Tables) -> str:
     """Return the tables as TOML."""
-    return "\n".join(
-        f"[{name}]\n" + "".join(f"{k} = {_value(v)}\n" for k, v in table.items()) for name, table in tables.items()
-    )
-
-
-def _value(value: float | str) -> str:
-    return f'"{value}"' if isinstance(value, str) else repr(value)
+    return tomlkit.dumps(tables)
 
 
 def recording_text(trial: Trial) -> str:

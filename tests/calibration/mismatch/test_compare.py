@@ -14,10 +14,11 @@ from drives import TABLES, columns, recording, simulation
 from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.comparison import Comparison, compare
-from regolithd.calibration.mismatch.corrected import corrected_tables, effect_of, stated_effects, to_toml
+from regolithd.calibration.mismatch.corrected import corrected_tables, effect_of, stated_effects
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.problem import build_problem
 from regolithd.calibration.mismatch.simulation.load import load_simulation
+from regolithd.calibration.toml_document import to_toml
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

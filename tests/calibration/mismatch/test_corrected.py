@@ -8,9 +8,10 @@ import pytest
 from drives import TABLES, columns, simulation
 
 from regolithd.calibration.mismatch.comparison import Comparison, compare
-from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects, to_toml
+from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel
+from regolithd.calibration.toml_document import to_toml
 
 CONCEALED_A = 0.037
 
