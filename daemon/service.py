@@ -49,7 +49,7 @@ _log = logging.getLogger(__name__)
 
 NETWORK, RECORDING = "network", "recording"
 TASK_TIMEOUT_S = 5.0
-WATCH_S = 0.5
+WATCHDOG_POLL_S = 0.5
 BUS_RETRY_S = 2.0
 
 
@@ -113,7 +113,7 @@ class Service:
                 tasks = [group.create_task(sink.run()) for sink in self.sinks]
                 if self.recorder:
                     tasks.append(group.create_task(self._record(self.recorder)))
-                tasks.append(group.create_task(self._watch()))
+                tasks.append(group.create_task(self._feed_watchdog()))
                 try:
                     await self._run_network()
                 finally:
@@ -178,10 +178,10 @@ class Service:
             self.liveness.beat(RECORDING)
             await asyncio.sleep(FLUSH_S)
 
-    async def _watch(self) -> None:
+    async def _feed_watchdog(self) -> None:
         """Feed the watchdog while every task answers; let it bite when one does not."""
         period_s = watchdog_period_s()
-        pause_s = min(WATCH_S, period_s or WATCH_S)
+        pause_s = min(WATCHDOG_POLL_S, period_s or WATCHDOG_POLL_S)
         try:
             while self._network is None:
                 # systemd shall wait for the bus, however long it takes, and show why.
@@ -191,8 +191,8 @@ class Service:
             notify(f"{READY}\nSTATUS=acquiring at {self.configuration.sync.rate_Hz:g} Hz")
             while True:
                 self._check_sync_progress(self._network)
-                if silent := self.liveness.silent():
-                    notify(f"STATUS=no answer from {', '.join(silent)}")
+                if overdue := self.liveness.overdue():
+                    notify(f"STATUS=no answer from {', '.join(overdue)}")
                 elif period_s is not None:
                     notify(WATCHDOG)
                 await asyncio.sleep(pause_s)

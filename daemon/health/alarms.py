@@ -1,4 +1,4 @@
-"""What is wrong at this moment, told from the inputs alone: the same inputs, the same alarms."""
+"""Decides which alarms are active: a pure function of `AlarmInputs`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _BUS_SEVERITY = {
 
 @dataclass(frozen=True, slots=True)
 class Alarm:
-    """Something that is wrong; `name` is what it is about, and its topic."""
+    """A condition that needs attention; `name` is also its topic, `alarm/<name>`."""
 
     name: str
     severity: Severity
@@ -35,7 +35,7 @@ class Alarm:
 
 @dataclass(frozen=True, slots=True)
 class AlarmInputs:
-    """What alarms are told from. Empty texts mean that all is well; counts are since the start."""
+    """The values that alarms are decided from. An empty text means no problem; counts are since the start."""
 
     nodes: Mapping[int, NodeStatus] = field(default_factory=dict)
     bus_trouble: str = ""
@@ -51,13 +51,13 @@ class AlarmInputs:
 
 
 def current_alarms(inputs: AlarmInputs) -> dict[str, Alarm]:
-    """Return what is wrong, by name."""
-    found = [*_node_alarms(inputs.nodes.values()), *_bus_alarms(inputs), *_own_alarms(inputs)]
+    """Return the active alarms by name."""
+    found = [*_node_alarms(inputs.nodes.values()), *_bus_alarms(inputs), *_daemon_alarms(inputs)]
     return {alarm.name: alarm for alarm in found}
 
 
-def known_names(node_ids: Iterable[int]) -> tuple[str, ...]:
-    """Return every name that an alarm can have."""
+def alarm_names(node_ids: Iterable[int]) -> tuple[str, ...]:
+    """Return the name of every alarm that there is."""
     return (
         "bus",
         "kernel",
@@ -77,42 +77,54 @@ def _node_alarms(nodes: Iterable[NodeStatus]) -> Iterable[Alarm]:
             continue
         severity = Severity.ERROR if status.node.required else Severity.WARNING
         what = status.text or f"node {status.node.node_id} is {status.phase.value}"
-        cure = "Is it powered and connected? It is booted again as soon as it is heard."
+        cure = "Check its power and its connection. It is booted again as soon as its heartbeat returns."
         yield Alarm(f"node-{status.node.node_id}", severity, what, cure)
 
 
 def _bus_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
     if inputs.bus_trouble:
-        yield Alarm("bus", Severity.CRITICAL, inputs.bus_trouble, "`regolithd check` says more.")
+        yield Alarm("bus", Severity.CRITICAL, inputs.bus_trouble, "`regolithd check` gives details.")
     elif severity := _BUS_SEVERITY.get(inputs.bus_state):
-        cure = "Look at cable, termination (120 Ω at both ends) and bit rate; `ip -details link` shows the counters."
+        cure = (
+            "Check cable, termination (120 Ω at both ends) and bit rate; `ip -details link` shows the error counters."
+        )
         yield Alarm("bus", severity, f"the bus is in state {inputs.bus_state.value}", cure)
     if inputs.kernel_drops:
-        cure = "The computer is too busy, or the bus too full: lower [sync] rate_Hz, or stop what else runs."
+        cure = "Lower [sync] rate_Hz, or stop other programs on this computer."
         yield Alarm("kernel", Severity.ERROR, f"the kernel dropped {inputs.kernel_drops} frames in this run", cure)
 
 
-def _own_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
+def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
     if inputs.store_dropped:
         text = f"{inputs.store_dropped} messages were lost: the store was full, or could not be read"
-        yield Alarm("store", Severity.ERROR, text, "Bring the broker back, or raise [mqtt] spool_limit_MB.")
+        yield Alarm(
+            "store", Severity.ERROR, text, "Restore the connection to the broker, or raise [mqtt] spool_limit_MB."
+        )
     elif inputs.store_unstored:
-        text = f"the disk refused {inputs.store_unstored} messages; they waited in memory alone"
-        yield Alarm("store", Severity.WARNING, text, "Make room on the disk of [mqtt] spool_directory.")
+        text = f"the disk refused {inputs.store_unstored} messages; they are kept in memory only"
+        yield Alarm("store", Severity.WARNING, text, "Free space on the disk of [mqtt] spool_directory.")
     if inputs.recording_trouble:
-        yield Alarm("recording", Severity.ERROR, inputs.recording_trouble, "Make room, or mend [recording] directory.")
+        yield Alarm(
+            "recording",
+            Severity.ERROR,
+            inputs.recording_trouble,
+            "Free space on the disk, or correct [recording] directory.",
+        )
     if inputs.control_trouble:
-        yield Alarm("control", Severity.WARNING, inputs.control_trouble, "Until then the rover cannot be commanded.")
+        yield Alarm(
+            "control",
+            Severity.WARNING,
+            inputs.control_trouble,
+            "The rover cannot be commanded until this is corrected.",
+        )
     if inputs.stuck:
         which = ", ".join(f"{quantity.name} of wheel {wheel}" for quantity, wheel in inputs.stuck)
-        text = f"{which}: the same to the last digit for seconds, while other wheels' readings change"
-        cure = "Do not trust it: switch the node off and on, look at its plug, exchange it."
+        text = f"{which}: the reading has been exactly constant for seconds, while other wheels' readings change"
+        cure = "Do not use it: switch the node off and on, check its connector, replace it."
         yield Alarm("sensor", Severity.ERROR, text, cure)
     if inputs.soil_change:
-        cure = "Stop and look before the wheels dig in: less slip, another way, or back."
+        cure = "Stop before the wheels dig in, and look: drive with less slip, another way, or back."
         yield Alarm("soil-change", Severity.WARNING, inputs.soil_change, cure)
     if inputs.clock_jump_s:
-        text = f"the clock jumped by {inputs.clock_jump_s:+.3f} s: times before and after do not fit together"
-        yield Alarm(
-            "clock", Severity.WARNING, text, "Let it be synchronised before the daemon starts (time-sync.target)."
-        )
+        text = f"the clock jumped by {inputs.clock_jump_s:+.3f} s: times before and after are not comparable"
+        yield Alarm("clock", Severity.WARNING, text, "Synchronise it before the daemon starts (time-sync.target).")

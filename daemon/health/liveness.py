@@ -1,4 +1,4 @@
-"""Who has answered lately: each task beats, and the watchdog is fed only while all of them do."""
+"""Task liveness: each task reports regularly that it runs; the watchdog is fed only while all tasks do."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ if TYPE_CHECKING:
 
 
 class TaskLiveness:
-    """The last beat of each task, by name.
+    """The time of the last report of each task, by name.
 
-    `expect` once what shall beat, and how long it may be silent; `beat` from the task itself, at each round of its
-    loop; then `silent` names those that are overdue.
+    Call `expect` once for each task, with the longest time between its reports; call `beat` from the task itself, in
+    each iteration of its loop. `overdue` returns the tasks whose last report is too old.
     """
 
     def __init__(self, monotonic_ns: Callable[[], int] = time.monotonic_ns) -> None:
         self._now = monotonic_ns
         self._last: dict[str, int] = {}
-        self._patience: dict[str, int] = {}
+        self._timeout_ns: dict[str, int] = {}
 
-    def expect(self, name: str, patience_s: float) -> None:
-        """Begin to expect a task; it counts as having answered now."""
-        self._patience[name] = int(patience_s * 1e9)
+    def expect(self, name: str, timeout_s: float) -> None:
+        """Begin to monitor a task; it counts as having reported now."""
+        self._timeout_ns[name] = int(timeout_s * 1e9)
         self._last[name] = self._now()
 
     def beat(self, name: str) -> None:
-        """Say that the task is alive."""
+        """Report that a task runs."""
         self._last[name] = self._now()
 
     def ages_s(self) -> dict[str, float]:
-        """Return how long ago each task answered [s]."""
+        """Return the time since the last report of each task [s]."""
         now = self._now()
         return {name: (now - last) / 1e9 for name, last in self._last.items()}
 
-    def silent(self) -> list[str]:
-        """Return the tasks that have not answered in time."""
+    def overdue(self) -> list[str]:
+        """Return the names of the tasks that have not reported in time."""
         now = self._now()
-        return [name for name, patience in self._patience.items() if now - self._last[name] > patience]
+        return [name for name, timeout_ns in self._timeout_ns.items() if now - self._last[name] > timeout_ns]

@@ -1,4 +1,4 @@
-"""systemd's notification protocol, sd_notify(3): one datagram to the socket that it names in the environment."""
+"""systemd's notification protocol, sd_notify(3): one datagram to the socket that NOTIFY_SOCKET names."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ READY = "READY=1"
 
 
 def notify(message: str) -> None:
-    """Tell systemd; without systemd, nothing happens. Lines such as `STATUS=…` may be joined by newlines."""
+    """Send a message to systemd; without systemd, do nothing. Lines such as `STATUS=…` may be joined by newlines."""
     address = os.environ.get("NOTIFY_SOCKET", "")
     if not address:
         return
@@ -22,11 +22,11 @@ def notify(message: str) -> None:
             channel.connect(address)
             channel.send(message.encode())
         except OSError:
-            return  # systemd is gone or its queue is full: the next message tells it the same
+            return  # systemd does not listen, or its queue is full: messages repeat, so the next one will do
 
 
 def watchdog_period_s() -> float | None:
-    """Return how often systemd wants to hear from us [s], or None where it does not (sd_watchdog_enabled(3))."""
+    """Return half of WATCHDOG_USEC [s], or None where no watchdog is set for this process (sd_watchdog_enabled(3))."""
     microseconds = os.environ.get("WATCHDOG_USEC", "")
     mine = os.environ.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
     return int(microseconds) / 2e6 if microseconds.isdigit() and mine else None

@@ -1,21 +1,25 @@
-"""From decoded frames to snapshots: a pure function of the frame stream, so that a replayed log gives the same numbers.
+"""Assembles snapshots from decoded frames: a pure function of the frame stream, so a replay gives the same numbers.
 
-No clock is read here. A SYNC opens a window, readings fill it, and it closes
+No clock is read here. A SYNC opens a window, and readings fill it. It closes
 
 - at the next SYNC, or
-- as soon as every PDO that was heard in one of the last three windows has come, none of them in doubt.
+- as soon as every PDO that came in one of the last three windows has come in this one, none of them ambiguous.
 
-A PDO does not say which SYNC it answers, and a node that was held up answers an old one after the next has been sent.
-So answers are counted: each SYNC is owed one by each PDO, and a PDO is of the newest SYNC only when with it nothing is
-owed any more. Until then it is in doubt and not taken. An answer that really was lost is forgotten, and the doubt with
-it, once `DOUBT_NS` has passed in which each window brought exactly one.
+A PDO does not say which SYNC it answers, and a node that was delayed may answer an old SYNC after the next has been
+sent. So the answers of each PDO are counted: each SYNC makes one more outstanding, each answer one fewer.
 
-A reading is *late*, and not taken, when it is in doubt, when its window has been closed, or when it comes in the last
-tenth of the SYNC period (CiA 301 calls the rest the synchronous window, 0x1007). It is a *duplicate* when nothing is
-owed: the first is kept.
+| a reading comes, and | it is | what is done |
+|---|---|---|
+| nothing was outstanding | duplicate | dropped: the first is kept |
+| more answers are outstanding after it | ambiguous: it may answer an old SYNC | dropped, counted as late |
+| its window is closed, or 0.9 of the SYNC period has passed (0x1007, synchronous window) | late | dropped |
+| otherwise | the answer to the newest SYNC | accepted |
 
-A snapshot's time is its SYNC's kernel time in whole microseconds. That is one bit on a 1 Mbit/s bus, and what a candump
-log holds.
+An answer that was lost would keep its PDO ambiguous. It is forgotten once each window of the last `AMBIGUITY_NS`
+brought exactly one answer.
+
+A snapshot's time is its SYNC's kernel time in whole microseconds. That is one bit on a 1 Mbit/s bus, and the resolution
+of a candump log.
 """
 
 from __future__ import annotations
@@ -34,31 +38,41 @@ if TYPE_CHECKING:
 
     from regolithd.drivers.devices.node import NodeDescription
 
-MEMORY = 3
-"""Windows for which a PDO that stopped coming is still waited for."""
+AWAITED_WINDOWS = 3
+"""Number of windows for which a PDO that stopped coming is still waited for."""
 
-DOUBT_NS = 500_000_000
-"""Longer than a node, or the computer that runs a virtual one, is held up; at least `MEMORY` windows."""
+AMBIGUITY_NS = 500_000_000
+"""Longer than a node, or the computer that runs a virtual one, is delayed; at least `AWAITED_WINDOWS` windows."""
 
 SYNCHRONOUS_WINDOW = 0.9
 """Share of the SYNC period in which an answer counts."""
 
 
 @dataclass(slots=True)
-class _Account:
-    """What one PDO owes: answers to how many SYNCs, and for how many windows in a row it has sent exactly one."""
+class _PdoCount:
+    """The answers of one PDO.
 
-    owed: int = 0
+    Attributes
+    ----------
+    outstanding
+        SYNCs that it has not answered yet.
+    steady
+        Windows in a row in which it came exactly once while an answer was outstanding.
+    received
+        How often it came in this window.
+    """
+
+    outstanding: int = 0
     steady: int = 0
-    came: int = 0
+    received: int = 0
 
-    def settle(self, doubtful_windows: int) -> None:
-        """Close the books of a window, and owe the next answer."""
-        self.steady = self.steady + 1 if self.owed and self.came == 1 else 0
-        if self.steady >= doubtful_windows:
-            self.owed = self.steady = 0  # what is still owed was lost
-        self.owed += 1
-        self.came = 0
+    def begin_window(self, ambiguous_windows: int) -> None:
+        """Count one more SYNC to be answered; forget lost answers after so many steady windows."""
+        self.steady = self.steady + 1 if self.outstanding and self.received == 1 else 0
+        if self.steady >= ambiguous_windows:
+            self.outstanding = self.steady = 0  # the answers that are still outstanding were lost
+        self.outstanding += 1
+        self.received = 0
 
 
 class Acquisition:
@@ -67,9 +81,9 @@ class Acquisition:
     Parameters
     ----------
     nodes
-        Who is expected on the bus.
+        The configured nodes; readings of any other are counted as unexpected.
     pdos
-        The identifiers of the PDOs that they are configured to send; what does not come counts as missing.
+        COB-IDs of the PDOs that they are configured to send; one that does not come counts as missing.
     period_ns
         The SYNC period.
     """
@@ -78,11 +92,11 @@ class Acquisition:
         self._wheels = {node.node_id: node.wheel for node in nodes}
         self._pdos = frozenset(pdos)
         self._window_ns = int(period_ns * SYNCHRONOUS_WINDOW)
-        self._doubtful_windows = max(MEMORY, -(-DOUBT_NS // period_ns))
+        self._ambiguous_windows = max(AWAITED_WINDOWS, -(-AMBIGUITY_NS // period_ns))
         self._sequence = -1
         self._open: Array | None = None
         self._sync_ns = 0
-        self._accounts: dict[int, _Account] = {}
+        self._counts: dict[int, _PdoCount] = {}
         self._heard: list[set[int]] = []
         self._awaited: set[int] = set()
         self._taken: set[int] = set()
@@ -90,34 +104,34 @@ class Acquisition:
 
     @property
     def counters(self) -> AcquisitionCounters:
-        """Return what became of everything so far."""
+        """Return the counts of snapshots and readings so far."""
         return AcquisitionCounters(
             self._snapshots, self._accepted, self._late, self._duplicate, self._unexpected, self._missing
         )
 
     def accept(self, item: Sync | Reading) -> Snapshot | None:
-        """Take the next thing that was on the bus; return the snapshot that it completes, if any."""
+        """Take the next SYNC or reading; return the snapshot that it completes, if any."""
         if isinstance(item, Sync):
-            closed = self._close() if self._open is not None else None
-            self._begin(item.time_ns)
+            closed = self._close_window() if self._open is not None else None
+            self._begin_window(item.time_ns)
             return closed
         return self._read(item)
 
-    def _begin(self, time_ns: int) -> None:
+    def _begin_window(self, time_ns: int) -> None:
         if self._sequence >= 0:
-            self._heard = [*self._heard[1 - MEMORY :], self._came]
+            self._heard = [*self._heard[1 - AWAITED_WINDOWS :], self._received_pdos]
             self._awaited = set().union(*self._heard)
-        for account in self._accounts.values():
-            account.settle(self._doubtful_windows)
+        for count in self._counts.values():
+            count.begin_window(self._ambiguous_windows)
         self._taken = set()
         self._sequence += 1
         self._sync_ns = time_ns
         self._open = np.full((len(QUANTITIES), WHEELS), np.nan)
 
     @property
-    def _came(self) -> set[int]:
-        """The PDOs that have come in this window."""
-        return {cob_id for cob_id, account in self._accounts.items() if account.came}
+    def _received_pdos(self) -> set[int]:
+        """COB-IDs of the PDOs that came in this window."""
+        return {cob_id for cob_id, count in self._counts.items() if count.received}
 
     def _read(self, reading: Reading) -> Snapshot | None:
         if reading.node_id not in self._wheels:
@@ -126,26 +140,26 @@ class Acquisition:
         if self._sequence < 0:
             self._late += 1
             return None
-        account = self._accounts.setdefault(reading.cob_id, _Account(owed=1))  # the first one ever is of this SYNC
-        account.came += 1
-        if not account.owed:
+        count = self._counts.setdefault(reading.cob_id, _PdoCount(outstanding=1))  # its first answers this SYNC
+        count.received += 1
+        if not count.outstanding:
             self._duplicate += 1
             return None
-        account.owed -= 1
+        count.outstanding -= 1
         in_window = reading.time_ns - self._sync_ns <= self._window_ns
-        if account.owed or not in_window or self._open is None:
+        if count.outstanding or not in_window or self._open is None:
             self._late += 1
             return None
         self._accepted += 1
         self._taken.add(reading.cob_id)
-        self._enter(self._open, reading)
-        return self._close() if self._awaited and self._complete() else None
+        self._write(self._open, reading)
+        return self._close_window() if self._awaited and self._complete() else None
 
     def _complete(self) -> bool:
-        accounts = [self._accounts[cob_id] for cob_id in self._awaited]
-        return all(account.came and not account.owed for account in accounts)
+        counts = [self._counts[cob_id] for cob_id in self._awaited]
+        return all(count.received and not count.outstanding for count in counts)
 
-    def _enter(self, values: Array, reading: Reading) -> None:
+    def _write(self, values: Array, reading: Reading) -> None:
         wheel = self._wheels[reading.node_id]
         for quantity, value in reading.values:
             if wheel is None:
@@ -153,7 +167,7 @@ class Acquisition:
             else:
                 values[ROW[quantity], wheel] = value
 
-    def _close(self) -> Snapshot:
+    def _close_window(self) -> Snapshot:
         values = self._open
         assert values is not None  # noqa: S101  # only an open window is closed
         values.flags.writeable = False

@@ -1,7 +1,14 @@
-"""torque ▸ smooth ▸ slip ▸ estimate ▸ posterior: from one snapshot to one estimate.
+"""Torque, smoothing, slip, terrain network and posterior: from one snapshot to one estimate.
 
-The stages are the modules of those names; this one only joins them. Everything depends on the snapshots that came
-before and on nothing else, so a replay gives the same numbers to the last bit.
+| stage | module | in ─▶ out, each of shape (6,) |
+|---|---|---|
+| torque | `calibration.drivetrain.torque` | motor current and speed ─▶ wheel torque (Eq. 11) |
+| smoothing | `smooth` | torque, load, measured slip ─▶ the same without momentary drops |
+| slip | `slip` | measured or configured slip |
+| terrain network | `terrain_network` | smoothed values ─▶ cohesion, friction angle |
+| posterior | `posterior` | unsmoothed values ─▶ credible intervals for all wheels together, soil-change alarm |
+
+An estimate depends on the snapshots so far and on nothing else, so a replay gives the same numbers to the last bit.
 """
 
 from __future__ import annotations
@@ -23,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class Pipeline:
-    """The stages after acquisition, for one rover."""
+    """The stages after acquisition, with their state, for one rover."""
 
     def __init__(self, configuration: Configuration, models: OnnxModels) -> None:
         self._drivetrain = configuration.drivetrain
@@ -39,10 +46,10 @@ class Pipeline:
         self._posterior = PosteriorStage(models.posterior, configuration) if models.posterior else None
 
     def step(self, snapshot: Snapshot) -> Estimate:
-        """Return what the stages make of the next snapshot."""
+        """Return the estimate of the next snapshot."""
         speed = snapshot.motor_speed_rad_s / self._drivetrain.ratio
         direction = np.where(np.abs(speed) < self._slip.standstill_rad_s, 0.0, np.sign(speed))  # NaN stays NaN
-        self._forget_reversed(direction)
+        self._reset_reversed(direction)
         torque = wheel_torque(snapshot.motor_current_A, snapshot.motor_speed_rad_s, self._drivetrain)
         turning = np.abs(direction) == 1
         measured = wheel_slip(speed, snapshot.ground_speed_m_s, self._radius_m, turning)
@@ -72,8 +79,8 @@ class Pipeline:
             soil_change=alarm,
         )
 
-    def _forget_reversed(self, direction: Array) -> None:
-        """Begin anew for a wheel that stopped or turned round: what it felt before says nothing about now."""
+    def _reset_reversed(self, direction: Array) -> None:
+        """Reset the smoothing of a wheel that stopped or reversed: its filter holds values of the other direction."""
         known = ~np.isnan(direction)
         if (changed := known & (direction != self._direction)).any():
             self._smoother.reset(changed)

@@ -1,8 +1,8 @@
-"""The last stage: how sure the rover can be of the ground under it, from the last seconds of all six wheels.
+"""The last stage: credible intervals of the soil under the rover, from the last seconds of all six wheels.
 
-The terrain network before it is the paper's: a point for each wheel and instant, mostly its training prior. This one
-(`calibration.posterior.estimator`) gives intervals, twice a second. It says nothing while the drivetrain has not been
-calibrated: an unknown no-load current would be taken for soil.
+The terrain network gives a point estimate for each wheel and instant. The posterior network
+(`calibration.posterior.estimator`) gives intervals for all wheels together, twice a second. There is no posterior while
+the drivetrain is not calibrated: an unknown no-load current would be attributed to the soil.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ if TYPE_CHECKING:
     from regolithd.daemon.pipeline.snapshot import Array
 
 SLIP_STD_MEASURED = 0.005
-SLIP_STD_GUESSED = 0.03
+SLIP_STD_CONFIGURED = 0.03
+"""Standard deviations of the slip: where the ground speed is measured, and where `[slip] constant` is used."""
 HISTORY = 400
-"""Half seconds that are kept to compare before and after a change."""
+"""Number of half-second means that are kept, to compare the soil before and after a change."""
 
 
 class PosteriorStage:
-    """Collects half-second means and asks the posterior; no clock but the snapshots'."""
+    """Collects half-second means and evaluates the posterior; time comes from the snapshots alone."""
 
     def __init__(self, estimator: PosteriorEstimator, configuration: Configuration) -> None:
         settings, drivetrain = configuration.posterior, configuration.drivetrain
@@ -45,7 +46,7 @@ class PosteriorStage:
     def step(
         self, time_ns: int, load_N: Array, slip: Array, driving_torque_Nm: Array, sources: tuple[SlipSource, ...]
     ) -> tuple[Posterior | None, SoilChange | None]:
-        """Return a posterior when a half second has closed, and an alarm when the soil has changed.
+        """Return a posterior when a half second has ended, and an alarm when the soil has changed.
 
         Arrays have shape (6,), unsmoothed, NaN where a wheel stands.
         """
@@ -55,10 +56,10 @@ class PosteriorStage:
         if not window.size:
             return None, None
         uncertainty = self._uncertainty(sources)
-        return self._estimator.estimate(window, uncertainty), self._watch(time_ns, window[:, -1], uncertainty)
+        return self._estimator.estimate(window, uncertainty), self._detect_change(time_ns, window[:, -1], uncertainty)
 
-    def _watch(self, time_ns: int, means: Array, uncertainty: CalibrationUncertainty) -> SoilChange | None:
-        """Return the alarm, if any, with how likely each quantity fell between before its onset and since."""
+    def _detect_change(self, time_ns: int, means: Array, uncertainty: CalibrationUncertainty) -> SoilChange | None:
+        """Return the alarm, if any, with the probability that each quantity is lower since its onset than before."""
         if self._change is None:
             return None
         self._history.append(means)
@@ -72,20 +73,20 @@ class PosteriorStage:
         return SoilChange(alarm, fall)
 
     def _uncertainty(self, sources: tuple[SlipSource, ...]) -> CalibrationUncertainty:
-        guessed = SlipSource.CONFIGURED in sources
+        configured = SlipSource.CONFIGURED in sources
         return CalibrationUncertainty(
             gain_relative_std=self._gain_std,
             no_load_current_std_A=self._no_load_std_A,
-            slip_std=SLIP_STD_GUESSED if guessed else SLIP_STD_MEASURED,
+            slip_std=SLIP_STD_CONFIGURED if configured else SLIP_STD_MEASURED,
             no_load_current_A=self._no_load_A,
             soil=self._soil,
         )
 
 
 def gain_relative_std(drivetrain: Drivetrain) -> float:
-    """Return how well the gain is known at a usual torque, relative: from the brake where a wheel had one, mean of all.
+    """Return the relative standard deviation of the gain at a usual torque, mean over the wheels.
 
-    A brake measures the whole gain, so that how well Eq. 11's constants are known no longer counts at its wheels.
+    A brake test measures the whole gain: for its wheels, its standard deviation replaces that of Eq. 11's constants.
     """
     factor, std = np.array(drivetrain.gain_factor), np.array(drivetrain.gain_factor_std)
     braked = np.hypot(std / factor, USUAL_TORQUE_Nm * np.array(drivetrain.load_loss_std_per_Nm))

@@ -1,14 +1,14 @@
 """Removes momentary current drops without hiding a step: a one-sided outlier test, then a one-pole low-pass.
 
 A sample of the driving torque that lies further below the median of the last `window_s` than `threshold` times the
-window's spread (1.4826 × the median absolute deviation, which is σ for Gaussian noise) is a drop: the median takes its
-place. Whatever falls and stays down becomes the median itself after half a window at most, so a step is never hidden,
-and one that is smaller than the threshold is not delayed at all. The low-pass then takes the noise that is left. Loads
-and slips have no drops; they go through the low-pass alone, and so stay beside their torque.
+window's spread (1.4826 × the median absolute deviation, which is σ for Gaussian noise) is a drop: the median
+replaces it. A value that falls and stays low becomes the median itself after half a window at most, so a step is never
+hidden, and one that is smaller than the threshold is not delayed at all. The low-pass then reduces the remaining noise.
+Loads and slips have no drops; they go through the low-pass alone, which delays them as much as the torque.
 
 Delay with the defaults, at any rate: with the noise of the paper's Table 4 a step is half through after 1.0 s and 90 %
-through after 3.0 s (25 %) to 3.5 s (60 %); the low-pass alone takes as long. A step far outside the noise waits for the
-median: 2.7 s and 5.1 s at worst. Why this and no other: docs/decisions/016-smoothing.md.
+through after 3.0 s (25 %) to 3.5 s (60 %); the low-pass alone takes as long. A step far outside the noise is delayed
+by the median: 2.7 s and 5.1 s at worst. docs/decisions/016-smoothing.md compares alternatives.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ import numpy as np
 
 from regolithd.daemon.pipeline.snapshot import WHEELS, Array, Mask
 
-GAUSSIAN = 1.4826
+MAD_TO_STD = 1.4826
 """Median absolute deviation → standard deviation, for Gaussian noise."""
 
-LEAST_SPREAD = 0.02
-"""Of the median: a signal without noise must not make every flicker a drop."""
+MIN_SPREAD = 0.02
+"""Relative to the median: in a signal without noise, a change by the last digit must not count as a drop."""
 
-MOST_SAMPLES = 45
-"""That the median looks at; at high rates it takes every so many-th, which keeps it as good and cheap."""
+MAX_SAMPLES = 45
+"""In the median's window; at high rates only every n-th sample is used, which limits the computing time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,13 +43,13 @@ class DropRejector:
 
     def __init__(self, rate_Hz: float, window_s: float, threshold: float) -> None:
         length = max(1, round(window_s * rate_Hz))
-        self._every = -(-length // MOST_SAMPLES)
+        self._every = -(-length // MAX_SAMPLES)
         self._recent = np.full((max(1, length // self._every // 2 * 2 + 1), WHEELS), np.nan)
         self._threshold = threshold
         self._count = 0
 
     def reset(self, wheels: Mask) -> None:
-        """Forget what was before, for the wheels of a mask."""
+        """Forget earlier samples of the wheels of a mask of shape (6,)."""
         self._recent[:, wheels] = np.nan
 
     def step(self, values: Array) -> Array:
@@ -60,13 +60,13 @@ class DropRejector:
             self._recent[self._count // self._every % len(self._recent)] = values
         self._count += 1
         middle = _median(self._recent)
-        spread = GAUSSIAN * _median(np.abs(self._recent - middle))
-        lowest = middle - self._threshold * np.maximum(spread, LEAST_SPREAD * np.abs(middle))
+        spread = MAD_TO_STD * _median(np.abs(self._recent - middle))
+        lowest = middle - self._threshold * np.maximum(spread, MIN_SPREAD * np.abs(middle))
         return np.where(values < lowest, middle, values)  # NaN is not less than anything
 
 
 class LowPass:
-    """A one-pole low-pass over `channels` × 6 values that knows gaps: its share follows the time that has passed."""
+    """A one-pole low-pass over `channels` × 6 values; its gain follows from the time since the last sample."""
 
     def __init__(self, channels: int, time_constant_s: float) -> None:
         self._time_constant_ns = time_constant_s * 1e9
@@ -74,14 +74,14 @@ class LowPass:
         self._time_ns = np.zeros((channels, WHEELS))
 
     def reset(self, wheels: Mask) -> None:
-        """Forget what was before, for the wheels of a mask."""
+        """Forget earlier samples of the wheels of a mask of shape (6,)."""
         self._state[:, wheels] = np.nan
 
     def step(self, time_ns: int, values: Array) -> Array:
         """Return the filtered values; where nothing arrived (NaN) the state waits, and NaN is returned."""
         if self._time_constant_ns == 0:
             return values
-        elapsed_ns = np.maximum(time_ns - self._time_ns, 0.0)  # a clock that was set back has not un-elapsed
+        elapsed_ns = np.maximum(time_ns - self._time_ns, 0.0)  # the clock may have been set back
         share = -np.expm1(-elapsed_ns / self._time_constant_ns)
         moved = np.where(np.isnan(self._state), values, self._state + share * (values - self._state))
         arrived = ~np.isnan(values)
@@ -91,7 +91,7 @@ class LowPass:
 
 
 class Smoother:
-    """Both in a row, for the torque, the load and the slip of six wheels.
+    """Drop rejection and low-pass, for the torque, the load and the slip of six wheels.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ class Smoother:
         self._low_pass = LowPass(3, time_constant_s)
 
     def reset(self, wheels: Mask) -> None:
-        """Forget what was before, for the wheels of a mask of shape (6,)."""
+        """Forget earlier samples of the wheels of a mask of shape (6,)."""
         self._rejector.reset(wheels)
         self._low_pass.reset(wheels)
 

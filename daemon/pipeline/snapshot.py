@@ -1,4 +1,4 @@
-"""One SYNC, one `Snapshot`; and what the stages make of it, one `Estimate`.
+"""The data of one SYNC: a `Snapshot` of the measurements, and the `Estimate` that the pipeline computes from it.
 
 All arrays are float64 (or bool for masks) of shape (6,), read-only, SI; wheel k of the paper is index k − 1. NaN means
 "not measured": a value that did not arrive is never repeated and never invented.
@@ -30,12 +30,12 @@ ROW = {quantity: row for row, quantity in enumerate(QUANTITIES)}
 WHEEL_QUANTITIES = tuple(quantity for quantity in QUANTITIES if quantity.per_wheel)
 BODY_QUANTITIES = tuple(quantity for quantity in QUANTITIES if not quantity.per_wheel)
 NEEDED = (MOTOR_CURRENT, MOTOR_SPEED, LOAD)
-"""Without these three, nothing can be said about a wheel."""
+"""The quantities that an estimate of a wheel needs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """What was measured at one SYNC.
+    """The measurements of one SYNC.
 
     Attributes
     ----------
@@ -44,8 +44,8 @@ class Snapshot:
     time_ns
         The SYNC's kernel time, CLOCK_REALTIME.
     values
-        Shape (quantities, 6): one row for each of `devices.registry.QUANTITIES`. What one node measures for the whole
-        body stands in all six columns.
+        Shape (quantities, 6): one row for each of `devices.registry.QUANTITIES`. A quantity of the whole body has the
+        same value in all six columns.
     """
 
     sequence: int
@@ -115,27 +115,27 @@ class Snapshot:
 
 @dataclass(frozen=True, slots=True)
 class AcquisitionCounters:
-    """What became of the readings, since the start. Taken together they account for every one."""
+    """Counts since the start: every reading is accepted, late, duplicate or unexpected."""
 
     snapshots: int = 0
     accepted: int = 0  # readings that went into a snapshot
-    late: int = 0  # readings that came before the first SYNC, after their snapshot had been closed, or in doubt
+    late: int = 0  # readings before the first SYNC, after their window, or ambiguous (`acquire`)
     duplicate: int = 0  # a second reading of the same PDO in one window; the first is kept
     unexpected: int = 0  # readings from nodes that the configuration does not know
     missing: int = 0  # PDOs that were expected in a window and did not come, or not in time
 
 
 class SlipSource(StrEnum):
-    """Where a slip comes from."""
+    """The source of a slip."""
 
     MEASURED = "ground-speed"
     CONFIGURED = "configured"
-    NONE = "none"  # the wheel stands still: there is no slip to speak of
+    NONE = "none"  # the wheel stands still: its slip is undefined
 
 
 @dataclass(frozen=True, slots=True)
 class SoilChange:
-    """An alarm, and how likely it is that each quantity fell; `fall` is None where too little was measured before."""
+    """A soil-change alarm, and the probability that each quantity fell; None where too little was measured before."""
 
     alarm: Alarm
     fall: FallProbability | None
@@ -143,32 +143,32 @@ class SoilChange:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
-    """What the stages made of one snapshot: the last thing before it is recorded and published.
+    """The values that the pipeline computed from one snapshot, to be recorded and published.
 
     Attributes
     ----------
     snapshot
-        What was measured.
+        The measurements.
     wheel_torque_Nm
         Torque at the wheel by Eq. 11, unsmoothed; positive where it drives forward.
     smoothed_torque_Nm, smoothed_load_N
-        The same, and the load, after the filter that removes momentary drops.
+        Torque and load after the filter that removes momentary drops.
     slip
-        i = 1 − V/(r ω); NaN while the wheel stands still. `slip_source` says where it comes from, for each wheel.
+        i = 1 − V/(r ω); NaN while the wheel stands still. `slip_source` is the source for each wheel.
     cohesion_Pa, friction_angle_rad
-        The network's estimate; NaN where `valid` is false.
+        The terrain network's estimate; NaN where `valid` is false.
     valid
         Where an estimate could be made.
     input_names
-        The network's inputs, as its model card names them.
+        Names of the terrain network's inputs, from its model card.
     outside
         Shape (inputs, 6): where an input lies outside the range that the network was trained on.
     model_version
-        The network's version.
+        The terrain network's version.
     posterior
-        What the last seconds of all wheels say about the ground, as intervals; where a half second has just ended.
+        Credible intervals of the soil, from the last seconds of all wheels; None unless a half second has just ended.
     soil_change
-        The alarm that the soil has changed, where it has just been noticed.
+        The alarm that the soil has changed; None unless it has just been raised.
     """
 
     snapshot: Snapshot

@@ -1,4 +1,4 @@
-"""Detects a change of soil: `calibration.posterior.change_detection`, fed with half-second means of six wheels."""
+"""Detects a change of soil from half-second means of six wheels, by `calibration.posterior.change_detection`."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from regolithd.daemon.pipeline.snapshot import Array, SoilChange
 
 REFERENCE = SOILS["sandy-loam"]
-"""How torque follows load and slip; how large it is, the detector learns on the way."""
+"""Soil that gives the shape of torque against load and slip; the detector estimates its magnitude while driving."""
 
 
 class SoilChangeDetector:
-    """The detector for one rover. After an alarm it begins anew: what it knew was of the old soil."""
+    """The detector for one rover. An alarm resets it: its state belongs to the old soil."""
 
     def __init__(self, configuration: Configuration) -> None:
         self._wheel = configuration.wheel
@@ -25,7 +25,7 @@ class SoilChangeDetector:
         self._state = change.start()
 
     def step(self, time_ns: int, load_N: Array, slip: Array, torque_Nm: Array) -> change.Alarm | None:
-        """Take one half second's means, shape (6,), NaN where a wheel stood or was not measured."""
+        """Take the means of one half second, shape (6,), NaN where a wheel stood still or was not measured."""
         angle = contact_angle(load_N, slip, self._wheel, REFERENCE)
         expected = wheel_torque(angle, slip, self._wheel, REFERENCE)
         self._state, _ = change.step(self._state, torque_Nm, expected)
@@ -35,20 +35,20 @@ class SoilChangeDetector:
         return alarm
 
 
-def change_text(changed: SoilChange) -> str:
-    """Return an alarm with its evidence, in one sentence."""
+def soil_change_text(changed: SoilChange) -> str:
+    """Return an alarm and its evidence as one sentence."""
     alarm = changed.alarm
-    what = "gives way: torque fell" if alarm.direction == "fall" else "resists more: torque rose"
+    what = "is weaker: wheel torque fell" if alarm.direction == "fall" else "is stronger: wheel torque rose"
     ago_s = (alarm.time_ns - alarm.onset_ns) / 1e9
     wheels = {"all": "all wheels", "front": "the front wheels", "front-and-middle": "the front and middle wheels"}
-    likely = ""
+    probability = ""
     if (fall := changed.fall) is not None:
-        likely = (
-            f"; that it fell is {100 * fall.cohesion:.0f} % likely of the cohesion, {100 * fall.friction_angle:.0f} % "
-            f"of the friction angle, {100 * fall.drawbar_margin:.0f} % of the drawbar margin"
+        probability = (
+            f"; probability of a decrease: cohesion {100 * fall.cohesion:.0f} %, "
+            f"friction angle {100 * fall.friction_angle:.0f} %, drawbar margin {100 * fall.drawbar_margin:.0f} %"
         )
     return (
-        f"the soil {what} to {100 * alarm.torque_ratio:.0f} % of what load and slip let expect, since {ago_s:g} s, "
-        f"under {wheels.get(alarm.group, alarm.group)} (score {alarm.statistic:.1f}, alarm at {alarm.threshold:g})"
-        f"{likely}"
+        f"the soil {what} to {100 * alarm.torque_ratio:.0f} % of what load and slip predict, since {ago_s:g} s, "
+        f"under {wheels.get(alarm.group, alarm.group)} (statistic {alarm.statistic:.1f}, threshold {alarm.threshold:g})"
+        f"{probability}"
     )

@@ -17,19 +17,16 @@ if TYPE_CHECKING:
 
     import onnxruntime
 
-"""The network that comes with regolithd."""
-
-
 CURE = "Train one (`regolithd train`), or mend [estimator] model."
 
 
 class TerrainModelError(ModelError):
-    """A file's network is not a terrain network as the daemon needs it."""
+    """A file holds an ONNX model that is not a terrain network, or does not fit the daemon."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Terrain:
-    """The network's answer for six wheels: NaN where an input was missing. `outside` has shape (inputs, 6)."""
+    """The network's estimate for six wheels: NaN where an input was missing. `outside` has shape (inputs, 6)."""
 
     cohesion_Pa: Array
     friction_angle_rad: Array
@@ -46,21 +43,21 @@ class TerrainNetwork:
         self._low = np.array([[variable.low] for variable in self.card.inputs])
         self._high = np.array([[variable.high] for variable in self.card.inputs])
         self._name = self._session.get_inputs()[0].name
-        self._try()
+        self._run_once()
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """Return what the network takes, in its order."""
+        """Return the names of the network's inputs, in its order."""
         return tuple(variable.name for variable in self.card.inputs)
 
-    def estimate(self, known: Mapping[str, Array]) -> Terrain:
-        """Return the terrain under six wheels; `known` has an array of shape (6,) for each of `input_names`."""
-        inputs = np.stack([known[name] for name in self.input_names])
-        answer = self._run(inputs)
-        missing = np.isnan(inputs).any(axis=0)
+    def estimate(self, inputs: Mapping[str, Array]) -> Terrain:
+        """Return the soil estimate under six wheels; `inputs` has an array of shape (6,) for each of `input_names`."""
+        batch = np.stack([inputs[name] for name in self.input_names])
+        answer = self._run(batch)
+        missing = np.isnan(batch).any(axis=0)
         cohesion, tangent = np.where(missing, np.nan, answer)
         with np.errstate(invalid="ignore"):
-            outside = (inputs < self._low) | (inputs > self._high)
+            outside = (batch < self._low) | (batch > self._high)
         return Terrain(cohesion, np.arctan(tangent), outside)
 
     def _run(self, inputs: Array) -> Array:
@@ -68,8 +65,8 @@ class TerrainNetwork:
         (answer,) = self._session.run(None, {self._name: batch})
         return np.asarray(answer, np.float64).T
 
-    def _try(self) -> None:
-        """Run it once: whatever does not fit shows now, and not on the way."""
+    def _run_once(self) -> None:
+        """Run it once, so that a model that does not fit is refused at the start."""
         middle = np.repeat((self._low + self._high) / 2, WHEELS, axis=1)
         try:
             answer = self._run(middle)

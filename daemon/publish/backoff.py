@@ -1,4 +1,4 @@
-"""How long to wait before the next attempt: twice as long each time, bounded, and never all rovers at once."""
+"""Exponential backoff with jitter: the delay before the next attempt to connect."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 @dataclass(slots=True)
 class Backoff:
-    """Delays between attempts [s]: `first`, doubling up to `longest`, each shortened by chance by up to a half."""
+    """Delays between attempts [s]: `first`, doubling up to `longest`, each shortened at random by up to a half."""
 
     first: float = 0.5
     longest: float = 30.0
@@ -16,11 +16,11 @@ class Backoff:
     attempts: int = 0
 
     def next(self) -> float:
-        """Return how long to wait now."""
+        """Return the delay before the next attempt [s]."""
         whole = min(self.longest, self.first * 2.0 ** min(self.attempts, 30))
         self.attempts += 1
         return whole * self.random.uniform(0.5, 1.0)
 
     def reset(self) -> None:
-        """Begin anew: an attempt succeeded."""
+        """Start again with the shortest delay: an attempt succeeded."""
         self.attempts = 0

@@ -1,10 +1,15 @@
-"""One connection to the broker: from birth to death, with everything that is sent in between.
+"""One connection to the MQTT broker, from its birth message to its death message.
 
-Four tasks live in it: one notices that the connection is lost, one sends what is stored, in order, with a window of
-unacknowledged messages, one sends what is live, and one ends a connection on which nothing is acknowledged any more.
+| task | does |
+|---|---|
+| `_send_stored` | sends stored messages in order, at most `WINDOW` unacknowledged |
+| `_send_live` | sends live messages |
+| `_wait_for_loss` | raises `MqttError` when the connection is lost |
+| `_beat` | reports that the publishing task runs |
 
-aiomqtt sends a clean DISCONNECT whenever its context is left, so the broker then forgets the will. Hence `offline` is
-published by ourselves on every way out but the loss of the connection.
+A publish that is not acknowledged within `ACKNOWLEDGE_TIMEOUT_S` ends the connection. aiomqtt sends a DISCONNECT
+whenever its context is left, and the broker then discards the will. Hence the death message is published explicitly,
+whatever ends the connection; only where the connection is lost does the broker publish the will.
 """
 
 from __future__ import annotations
@@ -24,22 +29,22 @@ if TYPE_CHECKING:
     from regolithd.daemon.publish.outbox import Outbox, OutgoingMessage
 
 WINDOW = 64
-"""How many stored messages may be on their way unacknowledged: a broker 50 ms away then takes 1280 a second."""
+"""Stored messages that may be unacknowledged at a time: 1280 a second at a round-trip time of 50 ms."""
 
-LATE_PER_S = 1000.0
-"""How fast a backlog is sent at most. A broker drops what its subscribers are too slow for (mosquitto: beyond 1000)."""
+MAX_LATE_PER_S = 1000.0
+"""Rate limit for late messages. A broker drops messages that a slow subscriber does not take (mosquitto: over 1000)."""
 
-ACKNOWLEDGE_WITHIN_S = 5.0
-"""Nothing acknowledged for this long: the broker hangs. Shorter than keepalive would notice."""
+ACKNOWLEDGE_TIMEOUT_S = 5.0
+"""A publish that is not acknowledged for this long: the broker hangs. Shorter than MQTT's keepalive."""
 
-FAREWELL_WITHIN_S = 2.0
+DEATH_TIMEOUT_S = 2.0
 
 _AT_LEAST_ONCE = 1
 _LATE_BATCH = 20
 
 
 class StateMessages(Protocol):
-    """What is said at the beginning and the end of a connection; payloads of the `state` topic."""
+    """Makes the birth and death messages of a connection: payloads of the `state` topic."""
 
     def birth(self) -> bytes:
         """Return `online`."""
@@ -49,7 +54,7 @@ class StateMessages(Protocol):
 
 
 class Connection:
-    """One connection. `run` returns when `stop` is set and everything is sent; raises `MqttError` when it is lost."""
+    """One connection. `run` returns once `stop` is set and everything is sent; it raises `MqttError` if it is lost."""
 
     def __init__(
         self, settings: Mqtt, root: str, outbox: Outbox, state_messages: StateMessages, stop: asyncio.Event
@@ -62,19 +67,22 @@ class Connection:
         self._window = asyncio.Semaphore(WINDOW)
         self.up = False
 
-    async def run(self, on_up: Callable[[], None], beat: Callable[[], None]) -> None:
-        """Connect, say birth, send until stopped or lost, say death. `on_up` is called once birth is acknowledged."""
+    async def run(self, on_connected: Callable[[], None], beat: Callable[[], None]) -> None:
+        """Connect, publish the birth, send until stopped or lost, publish the death.
+
+        `on_connected` is called once the birth is acknowledged.
+        """
         reason = "failed"
         async with self._client() as client:
             try:
-                await self._be_born(client)
+                await self._publish_birth(client)
                 self.up = True
-                on_up()
+                on_connected()
                 await self._send(client, beat)
                 reason = "stopped"
             finally:
                 self.up = False
-                await self._say_death(client, reason)
+                await self._publish_death(client, reason)
 
     def _client(self) -> Client:
         settings = self._settings
@@ -90,15 +98,15 @@ class Connection:
             ),
             clean_session=True,
             keepalive=settings.keepalive_s,
-            timeout=ACKNOWLEDGE_WITHIN_S,
+            timeout=ACKNOWLEDGE_TIMEOUT_S,
             max_inflight_messages=WINDOW,
             tls_context=tls_context(settings),
-            logger=_quiet,
+            logger=_aiomqtt_log,
         )
         client.pending_calls_threshold = 2 * WINDOW
         return client
 
-    async def _be_born(self, client: Client) -> None:
+    async def _publish_birth(self, client: Client) -> None:
         await self._publish(client, "state", self._state_messages.birth(), retain=True)
         for topic, payload in self._outbox.connected().items():
             await self._publish(client, topic, payload, retain=True)
@@ -109,7 +117,7 @@ class Connection:
         try:
             async with asyncio.TaskGroup() as tasks:
                 background = [
-                    tasks.create_task(self._watch(client)),
+                    tasks.create_task(self._wait_for_loss(client)),
                     tasks.create_task(self._send_live(client)),
                     tasks.create_task(self._beat(beat)),
                 ]
@@ -118,12 +126,12 @@ class Connection:
                     task.cancel()
         except* MqttError as group:
             lost = _first(group)
-        if lost is not None:  # raised here, it has no context but its own
+        if lost is not None:  # raised outside the group, so that its context is not the group
             raise lost
 
     @staticmethod
-    async def _watch(client: Client) -> None:
-        """Wait for the connection's loss. No message ever comes: the daemon subscribes to nothing."""
+    async def _wait_for_loss(client: Client) -> None:
+        """Wait until the connection is lost. No message comes: the daemon subscribes to nothing."""
         async for _ in client.messages:
             continue
 
@@ -143,7 +151,7 @@ class Connection:
                 late += message.late
                 if late >= _LATE_BATCH:
                     late = 0
-                    await asyncio.sleep(_LATE_BATCH / LATE_PER_S)
+                    await asyncio.sleep(_LATE_BATCH / MAX_LATE_PER_S)
             await self._outbox.arrived.wait()
 
     async def _deliver(self, client: Client, message: OutgoingMessage) -> None:
@@ -153,26 +161,26 @@ class Connection:
         finally:
             self._window.release()
         if self._stop.is_set():
-            self._outbox.arrived.set()  # the last one ends the loop
+            self._outbox.arrived.set()  # the last acknowledgement ends the loop
 
     async def _send_live(self, client: Client) -> None:
         while True:
             await self._outbox.live_arrived.wait()
             messages = self._outbox.take_live()
-            # At once, so that they leave in one write; the next are taken only when these have left.
+            # All at once, so that they go out in one write; the next are taken once these are sent.
             await asyncio.gather(*(client.publish(f"{self._root}/{topic}", messages[topic]) for topic in messages))
 
     async def _publish(self, client: Client, topic: str, payload: bytes, *, retain: bool) -> None:
         await client.publish(f"{self._root}/{topic}", payload, qos=_AT_LEAST_ONCE, retain=retain)
 
-    async def _say_death(self, client: Client, reason: str) -> None:
+    async def _publish_death(self, client: Client, reason: str) -> None:
         with suppress(MqttError, TimeoutError):
-            async with asyncio.timeout(FAREWELL_WITHIN_S):
+            async with asyncio.timeout(DEATH_TIMEOUT_S):
                 await self._publish(client, "state", self._state_messages.death(reason), retain=True)
 
 
 def tls_context(settings: Mqtt) -> ssl.SSLContext | None:
-    """Return what `[mqtt] tls` and `ca_file` ask for; without a file, the system's authorities count."""
+    """Return the TLS context of `[mqtt] tls` and `ca_file`; without a file it trusts the system's authorities."""
     return ssl.create_default_context(cafile=settings.ca_file) if settings.tls else None
 
 
@@ -184,5 +192,5 @@ def _first(group: BaseExceptionGroup[MqttError]) -> MqttError:
     return error
 
 
-_quiet = logging.getLogger("regolithd.daemon.publish.aiomqtt")
-_quiet.setLevel(logging.CRITICAL)  # what it has to say is said once, by the publisher
+_aiomqtt_log = logging.getLogger("regolithd.daemon.publish.aiomqtt")
+_aiomqtt_log.setLevel(logging.CRITICAL)  # the publisher logs each error once

@@ -1,4 +1,4 @@
-"""Why there is no connection to the broker, in words for the person who reads the journal at night."""
+"""Explains why there is no connection to the broker, and what to do, for the journal and `regolithd check`."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ _PASSWORD_CODES = (4, 5, 134, 135)  # CONNACK of MQTT 3.1.1, and what paho makes
 
 
 def reason_of(error: Exception, settings: Mqtt) -> str:
-    """Return what happened, and the cure where one is known."""
+    """Return what happened, and what to do where that is known."""
     place = f"MQTT broker {settings.host}:{settings.port}"
     cause = _root(error)
     match cause:
         case socket.gaierror():
-            return f"{place}: the name cannot be resolved. Mend [mqtt] host, or the network's name service."
+            return f"{place}: the name cannot be resolved. Correct [mqtt] host, or the name service."
         case ConnectionRefusedError():
-            return f"{place}: nobody listens there. Is the broker running, and is [mqtt] port right?"
+            return f"{place}: connection refused. Start the broker, or correct [mqtt] port."
         case ssl.SSLError():
-            return f"{place}: TLS failed: {cause.reason}. Mend [mqtt] tls and ca_file, or the broker's certificate."
+            return f"{place}: TLS failed: {cause.reason}. Correct [mqtt] tls and ca_file, or the broker's certificate."
         case TimeoutError():
-            return f"{place}: no answer. Is the machine on the network, and the broker not hung?"
+            return f"{place}: no answer. Check the network, and that the broker responds."
         case OSError():
             return f"{place}: {cause}."
         case _:
@@ -34,7 +34,7 @@ def reason_of(error: Exception, settings: Mqtt) -> str:
 
 
 def _root(error: Exception) -> BaseException:
-    """Return the system's own error behind aiomqtt's, which drops the type."""
+    """Return the OSError that caused aiomqtt's error, or the error itself."""
     found: BaseException | None = error
     while found is not None and not isinstance(found, OSError):
         found = found.__cause__ or found.__context__
@@ -43,8 +43,10 @@ def _root(error: Exception) -> BaseException:
 
 def _refusal(error: Exception) -> str:
     if "Disconnected" in str(error) or "connection was lost" in str(error):
-        return "the connection was lost. If this repeats at once, another client has the same [rover] name."
+        return "the connection was lost. If it repeats immediately, another client uses the same [rover] name."
     code = getattr(error.rc, "value", error.rc) if isinstance(error, MqttCodeError) else None
     if code in _PASSWORD_CODES:
-        return "user name or password refused. Mend [mqtt] username and password_file, or the broker's password file."
+        return (
+            "user name or password refused. Correct [mqtt] username and password_file, or the broker's password file."
+        )
     return f"{error}."

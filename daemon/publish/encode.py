@@ -1,7 +1,7 @@
-"""From what the pipeline knows to the bytes of a message.
+"""Encodes an estimate as JSON: the `snapshot` message and the six `wheel/…` messages of one SYNC.
 
-The seven messages of a SYNC are built by hand and written by pydantic's own JSON writer: validating what has just been
-computed would cost ten times as much. A test holds that what is written here is what the models say, to the byte.
+The fields are put together here and written by pydantic's JSON writer, without the models' validation, which would take
+ten times as long. A test compares the result with the models' own, byte by byte.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _START = re.compile(rb'(\{"schema_version":\d+,"late":)(false|true),')
 
 
 def write(fields: dict[str, Any]) -> bytes:
-    """Return the JSON of a message's fields; what is not a number becomes null."""
+    """Return a message's fields as JSON; NaN becomes null."""
     return to_json(fields, inf_nan_mode="null")
 
 
@@ -41,7 +41,7 @@ def _integers(numbers: Array) -> list[int | None]:
 
 
 def _per_wheel(estimate: Estimate) -> dict[str, Sequence[Any]]:
-    """Return every quantity that each wheel has, as six values, under its message's name."""
+    """Return the fields that have one value for each wheel, name → six values."""
     snapshot = estimate.snapshot
     outside: list[tuple[str, ...]] = [()] * WHEELS
     if np.logical_or.reduce(estimate.outside, axis=None):

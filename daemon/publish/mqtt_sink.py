@@ -1,4 +1,4 @@
-"""What the service tells its publisher: estimates and events as they come, and once a second how everything is."""
+"""The MQTT sink of the service: publishes estimates and events as they come, health and alarms once a second."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ import time
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from regolithd.daemon.health.alarms import Alarm, AlarmInputs, current_alarms, known_names
+from regolithd.daemon.health.alarms import Alarm, AlarmInputs, alarm_names, current_alarms
 from regolithd.daemon.health.stuck_sensor import StuckSensorDetector
 from regolithd.daemon.messages.alarm import AlarmMessage, Severity
 from regolithd.daemon.messages.bus import EmergencyMessage, EventMessage, IdentityReport, NodeMessage
 from regolithd.daemon.messages.header import iso_time
 from regolithd.daemon.messages.health import AcquisitionReport, HealthMessage, RecordingReport, SyncReport
 from regolithd.daemon.messages.posterior import PosteriorMessage
-from regolithd.daemon.pipeline.soil_change import change_text
+from regolithd.daemon.pipeline.soil_change import soil_change_text
 from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.canopen.emcy import register_bits
 from regolithd.drivers.master.events import NodeEmergency
@@ -31,27 +31,27 @@ if TYPE_CHECKING:
     from regolithd.drivers.master.events import NetworkEvent
     from regolithd.drivers.master.status import NodeStatus
 
-HEALTH_EVERY_S = 1.0
-JUMP_NS = 500_000_000
-"""A clock that is off by this much against the monotonic one has been set, not slewed."""
-JUMP_SHOWN_S = 60.0
-SOIL_CHANGE_SHOWN_S = 120.0
+HEALTH_PERIOD_S = 1.0
+CLOCK_JUMP_NS = 500_000_000
+"""A change of CLOCK_REALTIME against CLOCK_MONOTONIC by more than this within a second: the clock was set."""
+CLOCK_JUMP_ALARM_S = 60.0
+SOIL_CHANGE_ALARM_S = 120.0
 PUBLISHING = "publishing"
 PUBLISHING_TIMEOUT_S = 10.0
 _PAGE_MB = resource.getpagesize() / 1e6
 
 
 class MqttSink:
-    """A sink of the service, over MQTT.
+    """Publishes everything that the service produces, over MQTT.
 
     Parameters
     ----------
     service
-        Whose state is told.
+        The service whose estimates, events and state are published.
     publisher
-        Who tells it.
+        The publisher that delivers the messages.
     control_trouble
-        Returns why no commands can be taken, or nothing.
+        Returns why no commands can be taken, or an empty text.
     """
 
     def __init__(
@@ -61,84 +61,84 @@ class MqttSink:
         self._service = service
         self._control_trouble = control_trouble
         self._started_ns = time.monotonic_ns()
-        self._told_nodes: dict[int, tuple[object, ...]] = {}
-        self._told_alarms: dict[str, Alarm | None] = {}
+        self._published_nodes: dict[int, tuple[object, ...]] = {}
+        self._published_alarms: dict[str, Alarm | None] = {}
         self._offset_ns = time.time_ns() - time.monotonic_ns()
         self._jump_s = 0.0
         self._jump_until_ns = 0
         self._soil_change = ""
         self._soil_change_until_ns = 0
-        self._stuck = StuckSensorDetector()
+        self._stuck_sensors = StuckSensorDetector()
 
     def estimate(self, estimate: Estimate) -> None:
-        """Publish one SYNC."""
-        self._stuck.step(estimate.snapshot)
+        """Publish the estimate of one SYNC, with its posterior and soil-change event if it has any."""
+        self._stuck_sensors.step(estimate.snapshot)
         self.publisher.estimate(estimate)
         if estimate.soil_change is not None:
-            self._soil_change = change_text(estimate.soil_change)
-            self._soil_change_until_ns = time.monotonic_ns() + int(SOIL_CHANGE_SHOWN_S * 1e9)
-            say = self.publisher.say
+            self._soil_change = soil_change_text(estimate.soil_change)
+            self._soil_change_until_ns = time.monotonic_ns() + int(SOIL_CHANGE_ALARM_S * 1e9)
+            publish = self.publisher.publish
             time_ns = estimate.snapshot.time_ns
-            say("event", EventMessage, time_ns=time_ns, kind="soil-change", node_id=None, text=self._soil_change)
+            publish("event", EventMessage, time_ns=time_ns, kind="soil-change", node_id=None, text=self._soil_change)
         if estimate.posterior is not None:
-            self.publisher.say(
+            self.publisher.publish(
                 "posterior", PosteriorMessage, time_ns=estimate.snapshot.time_ns, **asdict(estimate.posterior)
             )
 
     def event(self, event: NetworkEvent) -> None:
-        """Publish what happened, and soon after, when its consequences have been drawn, how the nodes are."""
-        say = self.publisher.say
-        say("event", EventMessage, time_ns=event.time_ns, **event_fields(event))
+        """Publish an event, and then, once the network has updated its state, the nodes and alarms that changed."""
+        publish = self.publisher.publish
+        publish("event", EventMessage, time_ns=event.time_ns, **event_fields(event))
         if isinstance(event, NodeEmergency):
-            say("emcy", EmergencyMessage, time_ns=event.time_ns, **self._emergency_fields(event))
-        asyncio.get_running_loop().call_soon(self._tell_changes)
+            publish("emcy", EmergencyMessage, time_ns=event.time_ns, **self._emergency_fields(event))
+        asyncio.get_running_loop().call_soon(self._publish_changes)
 
     async def run(self) -> None:
-        """Deliver until cancelled, and tell health meanwhile."""
+        """Deliver until cancelled, and publish health and alarms once a second."""
         self._service.liveness.expect(PUBLISHING, PUBLISHING_TIMEOUT_S)
         async with asyncio.TaskGroup() as tasks:
-            telling = tasks.create_task(self._tell())
+            reporting = tasks.create_task(self._report_periodically())
             try:
                 await self.publisher.run()
             finally:
-                telling.cancel()
+                reporting.cancel()
 
-    async def _tell(self) -> None:
+    async def _report_periodically(self) -> None:
         while True:
-            self._watch_clock()
-            self._tell_changes()
-            self.publisher.say("health", HealthMessage, **self._health())
-            await asyncio.sleep(HEALTH_EVERY_S)
+            self._detect_clock_jump()
+            self._publish_changes()
+            self.publisher.publish("health", HealthMessage, **self._health())
+            await asyncio.sleep(HEALTH_PERIOD_S)
 
-    def _tell_changes(self) -> None:
-        """Publish each node and each alarm that is not as it was told last."""
+    def _publish_changes(self) -> None:
+        """Publish each node and each alarm that differs from what was last published."""
         network = self._service.network
         for node_id, status in (network.status if network is not None else {}).items():
             fields = node_fields(status)
-            told = tuple(value for name, value in fields.items() if name != "heard")
-            if self._told_nodes.get(node_id) != told:
-                self._told_nodes[node_id] = told
-                self.publisher.say(f"node/{node_id}", NodeMessage, **fields)
+            state = tuple(value for name, value in fields.items() if name != "heard")
+            if self._published_nodes.get(node_id) != state:
+                self._published_nodes[node_id] = state
+                self.publisher.publish(f"node/{node_id}", NodeMessage, **fields)
         active = current_alarms(self._alarm_inputs())
-        for name in known_names(node.node_id for node in self._service.configuration.nodes.described()):
+        for name in alarm_names(node.node_id for node in self._service.configuration.nodes.described()):
             alarm = active.get(name)
-            if name not in self._told_alarms or self._told_alarms[name] != alarm:
-                self._tell_alarm(name, alarm)
+            if name not in self._published_alarms or self._published_alarms[name] != alarm:
+                self._publish_alarm(name, alarm)
 
-    def _tell_alarm(self, name: str, alarm: Alarm | None) -> None:
-        """Tell an alarm; once at the start also that there is none, as the broker may hold that of an earlier run."""
-        self._told_alarms[name] = alarm
+    def _publish_alarm(self, name: str, alarm: Alarm | None) -> None:
+        """Publish an alarm, or that it is not active: the broker may have retained an active one of an earlier run."""
+        self._published_alarms[name] = alarm
         now = time.time_ns()
         fields = asdict(alarm or Alarm(name, Severity.WARNING, "", ""))
         fields |= {"active": alarm is not None, "since": iso_time(now)}
-        self.publisher.say(f"alarm/{name}", AlarmMessage, time_ns=now, **fields)
+        self.publisher.publish(f"alarm/{name}", AlarmMessage, time_ns=now, **fields)
 
-    def _watch_clock(self) -> None:
+    def _detect_clock_jump(self) -> None:
         now = time.monotonic_ns()
         offset = time.time_ns() - now
-        if abs(offset - self._offset_ns) > JUMP_NS:
+        if abs(offset - self._offset_ns) > CLOCK_JUMP_NS:
             self._jump_s = (offset - self._offset_ns) / 1e9
-            self._jump_until_ns = now + int(JUMP_SHOWN_S * 1e9)
+            self._jump_until_ns = now + int(CLOCK_JUMP_ALARM_S * 1e9)
         elif now > self._jump_until_ns:
             self._jump_s = 0.0
         self._offset_ns = offset
@@ -157,7 +157,7 @@ class MqttSink:
             control_trouble=self._control_trouble(),
             clock_jump_s=self._jump_s,
             soil_change=self._soil_change if time.monotonic_ns() < self._soil_change_until_ns else "",
-            stuck=self._stuck.stuck,
+            stuck=self._stuck_sensors.stuck,
         )
 
     def _health(self) -> dict[str, Any]:
@@ -246,7 +246,7 @@ def _recording_report(service: Service) -> RecordingReport | None:
 
 def _resident_MB() -> float:
     try:
-        with open("/proc/self/statm", encoding="ascii") as file:  # noqa: PTH123  # once a second, as cheap as can be
+        with open("/proc/self/statm", encoding="ascii") as file:  # noqa: PTH123  # once a second: pathlib costs more
             return int(file.read().split()[1]) * _PAGE_MB
     except OSError:
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3

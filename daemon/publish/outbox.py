@@ -1,6 +1,11 @@
-"""What is to be published, before there is a connection: the store, the newest live messages, the current states.
+"""The queue between the daemon and the connection: stored messages, newest live messages, current retained messages.
 
-Filling it never waits and never fails, whatever the broker does. One task fills it, one empties it, in one event loop.
+Adding to it never waits and never fails, whatever the broker does. One task adds, one sends, in the same event loop.
+
+| a stored message that is sent | is sent | with the retain flag |
+|---|---|---|
+| first within `LIVE_WITHIN_NS`, in the connection in which it was stored | unchanged | of its channel |
+| later, again, or in another connection | marked late | only if it is the newest of a retained topic |
 """
 
 from __future__ import annotations
@@ -21,19 +26,19 @@ if TYPE_CHECKING:
     from regolithd.daemon.publish.spool import Spool
 
 LIVE_WITHIN_NS = 1_000_000_000
-"""A stored message that is sent within a second of being stored is not late."""
+"""A stored message that is sent within this time is not late."""
 
 _RETAINED = frozenset(channel.address.split("/")[0] for channel in CHANNELS if channel.retain)
 
 
 def is_retained(topic: str) -> bool:
-    """Whether the broker is to keep the last message of this topic (below `<prefix>/<rover>/`)."""
+    """Return whether messages of this topic (below `<prefix>/<rover>/`) have the retain flag."""
     return topic.split("/", 1)[0] in _RETAINED
 
 
 @dataclass(frozen=True, slots=True)
 class OutgoingMessage:
-    """A message on its way; `index` is its place in the store."""
+    """A stored message as it is to be sent; `index` is its place in the store."""
 
     index: int
     topic: str
@@ -50,7 +55,7 @@ class _Flight:
 
 @dataclass(slots=True)
 class Outbox:
-    """Everything that waits. `arrived` is set whenever something new does."""
+    """All messages that wait. `arrived` is set when a stored message is added, `live_arrived` when a live one is."""
 
     spool: Spool
     arrived: asyncio.Event = field(default_factory=asyncio.Event)
@@ -59,33 +64,33 @@ class Outbox:
     _live: dict[str, bytes] = field(default_factory=dict)
     _current: dict[str, tuple[int, bytes]] = field(default_factory=dict)  # retained topics: newest index and payload
     _position: int = 0  # the next index to send
-    _sent_to: int = 0  # behind the last index that was ever sent by this process
-    _live_from: int = 0  # what was stored before this connection is late
+    _sent_to: int = 0  # one past the last index that this process has sent
+    _live_from: int = 0  # indices below were stored before this connection: late
     _flights: deque[_Flight] = field(default_factory=deque)
 
     def store(self, topic: str, payload: bytes) -> None:
-        """Take a message that must not be lost."""
+        """Add a message that is stored until it is acknowledged."""
         index = self.spool.append(topic, payload)
         if is_retained(topic):
             self._current[topic] = (index, payload)
         self.arrived.set()
 
-    def show(self, messages: dict[str, bytes]) -> None:
-        """Take live messages; one that is still waiting on the same topic is replaced."""
+    def add_live(self, messages: dict[str, bytes]) -> None:
+        """Add live messages, topic → payload; each replaces one that still waits on the same topic."""
         self._live |= messages
         self.live_arrived.set()
 
     def take_live(self) -> dict[str, bytes]:
-        """Return the live messages, and forget them."""
+        """Return the live messages and remove them."""
         taken, self._live = self._live, {}
         self.live_arrived.clear()
         return taken
 
     def connected(self) -> dict[str, bytes]:
-        """Begin a connection: what was sent and not acknowledged is sent again, late.
+        """Begin a connection: messages that were sent and not acknowledged will be sent again, marked late.
 
-        Returns the retained messages that the broker had acknowledged before, topic → payload. It may have lost them in
-        a restart; they are no news, so they are marked late as well.
+        Returns the retained messages that the broker had acknowledged before, topic → payload, marked late: the broker
+        may have lost them in a restart.
         """
         self._position = self.spool.first
         self._live_from = self.spool.next
@@ -94,9 +99,9 @@ class Outbox:
         return {topic: as_late(payload) for topic, (index, payload) in self._current.items() if index < self._position}
 
     def waiting(self) -> Iterator[OutgoingMessage]:
-        """Yield what is to be sent next, in order, as long as something is at hand. Each must be taken by `sent`.
+        """Yield the next messages to send, in order. Call `sent` for each.
 
-        Whether one is late is decided when it is asked for: the one before may have waited long for its turn.
+        Whether a message is late is decided when it is yielded, since it may have waited for the ones before it.
         """
         self.arrived.clear()
         for record in self.spool.read(self._position):
@@ -120,14 +125,14 @@ class Outbox:
         return time.monotonic_ns() - record.stored_ns > LIVE_WITHIN_NS
 
     def sent(self, message: OutgoingMessage) -> None:
-        """Note that this one is on its way."""
+        """Note that a message is sent and awaits its acknowledgement."""
         self.repeated += message.index < self._sent_to
         self._position = message.index + 1
         self._sent_to = max(self._sent_to, self._position)
         self._flights.append(_Flight(message.index))
 
     def acknowledged(self, message: OutgoingMessage) -> None:
-        """Note that the broker has it. The store forgets it once it has everything before it as well."""
+        """Note an acknowledgement. The store deletes a message once all before it are acknowledged as well."""
         for flight in self._flights:
             if flight.index == message.index:
                 flight.acknowledged = True
@@ -142,5 +147,5 @@ class Outbox:
 
     @property
     def in_flight(self) -> int:
-        """How many are on their way."""
+        """Number of messages that await their acknowledgement."""
         return len(self._flights)

@@ -1,11 +1,12 @@
-"""The daemon's voice: takes estimates and events, never waits, and delivers what must not be lost.
+"""The MQTT publisher: takes messages without waiting, and delivers the stored ones at least once, in order.
 
     publisher = Publisher(configuration, spool)
     publisher.estimate(estimate)        # from the pipeline; returns at once, whatever the broker does
-    await publisher.run()               # connects, and connects again, until cancelled; then says `offline`
+    await publisher.run()               # connects and reconnects until cancelled; then publishes `offline`
 
-Cancelling `run` is the way to stop: what waits is delivered first, for a bounded time; the rest stays in the store and
-comes, marked late, with the next start.
+Stored messages (`Channel.stored`) go through the store on disk; live messages are sent only while connected, and a
+newer one replaces an older one that still waits. Cancelling `run` is the way to stop: waiting messages are delivered
+first, for at most `STOP_TIMEOUT_S`; the rest stays in the store and is sent, marked late, after the next start.
 """
 
 from __future__ import annotations
@@ -38,20 +39,20 @@ if TYPE_CHECKING:
     from regolithd.daemon.pipeline.snapshot import Estimate
     from regolithd.daemon.publish.spool import Spool
 
-STOP_WITHIN_S = 4.0
-"""How long what waits may take to be delivered at the end, before it is left to the next start."""
+STOP_TIMEOUT_S = 4.0
+"""Time for the delivery of waiting messages when the daemon stops; the others stay in the store."""
 
-HELD_S = 5.0
-"""A connection that lasted for less counts as one more failure: brokers throw out a second client of the same name."""
+STABLE_CONNECTION_S = 5.0
+"""A shorter connection counts as a failed attempt: a broker disconnects a second client with the same identifier."""
 
-SYNC_EVERY_S = 1.0
-"""What has waited for this long is brought to the disk."""
+DISK_SYNC_PERIOD_S = 1.0
+"""Messages that have waited for this long are synced to the disk."""
 
 _log = logging.getLogger(__name__)
 
 
 def new_session(now_ns: int) -> str:
-    """Return a name for this run of the daemon that no other has, and that sorts by time."""
+    """Return a unique name for this run of the daemon; names sort by start time."""
     moment = iso_time(now_ns)[:19].replace("-", "").replace(":", "")
     return f"{moment}Z-{secrets.token_hex(2)}"
 
@@ -65,18 +66,18 @@ def software_version() -> str:
 
 
 class Publisher:
-    """Publishes for one rover. One task runs `run`; the rest is called from the same event loop and returns at once.
+    """Publishes for one rover. One task runs `run`; the other methods are called in its event loop and return at once.
 
     Parameters
     ----------
     configuration
         `[rover] name` and `[mqtt]`.
     spool
-        Where what must not be lost waits; this publisher is its only user.
+        The store on disk; this publisher is its only user.
     backoff
-        How long to wait between attempts to connect.
+        Delays between attempts to connect.
     beat
-        Called at least once a second while this task answers.
+        Called at least once a second while this task runs.
     """
 
     def __init__(
@@ -102,22 +103,22 @@ class Publisher:
         self._connections = 0
         self._sequences: Counter[str] = Counter()
         self._problem = ""
-        self._said: set[str] = set()
+        self._logged: set[str] = set()
         self._up_since: float | None = None
 
     @property
     def connected(self) -> bool:
-        """Whether the broker is there, and has acknowledged our birth."""
+        """Whether there is a connection, and the broker has acknowledged its birth message."""
         return self._connection is not None and self._connection.up
 
     @property
     def problem(self) -> str:
-        """Why there is no connection; empty where there is one."""
+        """Why there is no connection; empty while there is one."""
         return "" if self.connected else self._problem
 
     @property
     def report(self) -> PublishingReport:
-        """What became of the messages that must not be lost."""
+        """Counts of the stored messages, for the `health` message."""
         counters = self._spool.counters
         return PublishingReport(
             connections=self._connections,
@@ -131,19 +132,19 @@ class Publisher:
         )
 
     def estimate(self, estimate: Estimate) -> None:
-        """Publish one SYNC: the snapshot for the record, and the six wheels live."""
+        """Publish the estimate of one SYNC: `snapshot` stored, and the six `wheel/…` live."""
         snapshot, wheels = encode(estimate, self.session)
         self._outbox.store("snapshot", snapshot)
         if self.connected:
-            self._outbox.show({f"wheel/{k + 1}": payload for k, payload in enumerate(wheels)})
+            self._outbox.add_live({f"wheel/{k + 1}": payload for k, payload in enumerate(wheels)})
 
-    def say(self, topic: str, message: type[Header], *, time_ns: int | None = None, **fields: Any) -> None:  # noqa: ANN401  # the model checks them
-        """Publish any other message on a topic below `<prefix>/<rover>/`, as its channel says."""
+    def publish(self, topic: str, message: type[Header], *, time_ns: int | None = None, **fields: Any) -> None:  # noqa: ANN401  # the model checks them
+        """Publish another message on a topic below `<prefix>/<rover>/`, stored or live as its channel says."""
         payload = self._write(topic, message, time_ns, fields)
         if _STORED[topic.split("/", 1)[0]]:
             self._outbox.store(topic, payload)
         elif self.connected:
-            self._outbox.show({topic: payload})
+            self._outbox.add_live({topic: payload})
 
     def _write(self, topic: str, message: type[Header], time_ns: int | None, fields: dict[str, Any]) -> bytes:
         sequence = self._sequences[topic]
@@ -153,11 +154,11 @@ class Publisher:
         return written.model_dump_json().encode()
 
     def birth(self) -> bytes:
-        """Return the `online` of this connection."""
+        """Return the birth message of this connection: `online`."""
         return self._state(Presence.ONLINE, "connected")
 
     def death(self, reason: str) -> bytes:
-        """Return the `offline` that ends this connection."""
+        """Return the death message of this connection: `offline`."""
         return self._state(Presence.OFFLINE, reason)
 
     def _state(self, state: Presence, reason: str) -> bytes:
@@ -174,9 +175,9 @@ class Publisher:
         return message.model_dump_json().encode()
 
     async def run(self) -> None:
-        """Deliver until cancelled; then deliver what waits, for a bounded time, and say `offline`."""
+        """Deliver until cancelled; then deliver waiting messages for a bounded time, and publish `offline`."""
         async with asyncio.TaskGroup() as tasks:
-            keeper = tasks.create_task(self._keep_on_disk())
+            keeper = tasks.create_task(self._sync_to_disk())
             delivery = tasks.create_task(self._deliver())
             try:
                 await asyncio.shield(delivery)
@@ -186,21 +187,21 @@ class Publisher:
                 if not self.connected:
                     delivery.cancel()
                 with suppress(TimeoutError):
-                    async with asyncio.timeout(STOP_WITHIN_S):
+                    async with asyncio.timeout(STOP_TIMEOUT_S):
                         await delivery
                 raise
             finally:
                 keeper.cancel()
 
     async def _deliver(self) -> None:
-        """Connect again and again; return once stopped."""
+        """Connect, and reconnect after each loss; return once stopped."""
         while not self._stop.is_set():
             self._connections += 1
             self._connection = Connection(self._settings, self._root, self._outbox, self, self._stop)
             try:
-                await self._connection.run(self._say_up, self._beat)
+                await self._connection.run(self._on_connected, self._beat)
             except (MqttError, OSError) as error:  # OSError: the password file, the certificates
-                self._say_down(error)
+                self._on_disconnected(error)
                 await self._pause(self._backoff.next())
 
     async def _pause(self, delay_s: float) -> None:
@@ -211,42 +212,42 @@ class Publisher:
                 async with asyncio.timeout(min(left, 0.5)):
                     await self._stop.wait()
 
-    def _say_up(self) -> None:
+    def _on_connected(self) -> None:
         self._up_since = time.monotonic()
         _log.info(
-            "connected to the MQTT broker %s:%d; %d messages wait",
+            "connected to the MQTT broker %s:%d; %d messages are waiting",
             self._settings.host,
             self._settings.port,
             self._spool.queued,
         )
 
-    def _say_down(self, error: Exception) -> None:
-        """Say a reason once, not at each attempt."""
+    def _on_disconnected(self, error: Exception) -> None:
+        """Log why there is no connection: as a warning once, for repeated attempts at debug level."""
         reason = reason_of(error, self._settings)
-        if self._up_since is not None and time.monotonic() - self._up_since > HELD_S:
+        if self._up_since is not None and time.monotonic() - self._up_since > STABLE_CONNECTION_S:
             self._backoff.reset()
         self._up_since = None
         level = logging.DEBUG if reason == self._problem else logging.WARNING
-        _log.log(level, "%s The daemon goes on, keeps what must not be lost, and tries again.", reason)
+        _log.log(level, "%s The daemon goes on, stores messages, and tries again.", reason)
         self._problem = reason
 
-    def _say_once(self, trouble: str) -> None:
-        _log.log(logging.DEBUG if trouble in self._said else logging.WARNING, "%s", trouble)
-        self._said.add(trouble)
+    def _log_once(self, trouble: str) -> None:
+        _log.log(logging.DEBUG if trouble in self._logged else logging.WARNING, "%s", trouble)
+        self._logged.add(trouble)
 
-    async def _keep_on_disk(self) -> None:
-        """Bring to the disk what has waited for a second; a broker that keeps up spares the disk."""
+    async def _sync_to_disk(self) -> None:
+        """Sync to the disk what has waited for a second; while the broker acknowledges in time, nothing is synced."""
         first = -1
         while True:
             waits = self._spool.queued and self._spool.first == first
             first = self._spool.first
             if waits:
-                # fsync blocks for as long as the disk takes: in a thread, and the only one here.
+                # fsync blocks for as long as the disk takes: hence a thread, the only one here.
                 try:
                     await asyncio.to_thread(self._spool.begin_sync())
                 except OSError as error:
-                    self._say_once(f"the store could not be brought to the disk: {error}")
-            await asyncio.sleep(SYNC_EVERY_S)
+                    self._log_once(f"the store could not be synced to the disk: {error}")
+            await asyncio.sleep(DISK_SYNC_PERIOD_S)
 
 
 _STORED = {channel.address.split("/", 1)[0]: channel.stored for channel in CHANNELS}

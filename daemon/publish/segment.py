@@ -1,10 +1,10 @@
-r"""One file of the store: records one behind another, written once, read in order.
+r"""One file of the store: a sequence of records, appended once and read in order.
 
     file    magic "regspl1\n", record, record, …
     record  body length u32 · CRC-32 of the body u32 · topic length u16 · body (topic in UTF-8, then payload)
 
-All numbers little endian. The file's name is the index of its first record; the others count on from there. A kill in
-the middle of a write, or a power cut, leaves a last record that is short or fails its checksum: reading ends before it.
+All numbers little endian. The file's name is the index of its first record; the others follow. A process killed
+during a write, or a power cut, leaves a last record that is short or fails its checksum: reading ends before it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _HEAD = struct.Struct("<IIH")
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """One message that waits: its topic below `<prefix>/<rover>/`, and its payload.
+    """One stored message: its topic below `<prefix>/<rover>/`, and its payload.
 
     `stored_ns` is when it was stored (CLOCK_MONOTONIC), or None where it was read back from disk.
     """
@@ -47,7 +47,7 @@ def pack(topic: str, payload: bytes) -> bytes:
 
 
 def unpack(data: bytes, first: int) -> Iterator[tuple[Record, int]]:
-    """Yield the sound records in a segment's bytes, with the offset behind each; end at the first that is not."""
+    """Yield the valid records in a segment's bytes, each with the offset of its end; stop at the first invalid one."""
     offset = len(MAGIC)
     if not data.startswith(MAGIC):
         return
@@ -63,7 +63,7 @@ def unpack(data: bytes, first: int) -> Iterator[tuple[Record, int]]:
 
 
 class Segment:
-    """A file of the store, and what is known of it without reading it again."""
+    """A file of the store, with its first index, number of records and size."""
 
     def __init__(self, path: Path, first: int, count: int, size: int) -> None:
         self.path = path
@@ -75,15 +75,15 @@ class Segment:
 
     @property
     def end(self) -> int:
-        """The index behind the last record."""
+        """One past the index of the last record."""
         return self.first + self.count
 
     @classmethod
     def create(cls, directory: Path, first: int) -> Segment:
-        """Begin a new file whose first record will have this index."""
+        """Create a new file whose first record will have this index."""
         path = directory / f"{first:016d}{SUFFIX}"
         segment = cls(path, first, 0, len(MAGIC))
-        # One that is there already holds no sound record, or its index would have been counted.
+        # An existing file of this name holds no valid record, or its index would have been counted.
         segment._file = os.open(path, os.O_CREAT | os.O_TRUNC | os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC, 0o640)
         try:
             os.write(segment._file, MAGIC)
@@ -94,13 +94,13 @@ class Segment:
 
     @classmethod
     def complete(cls, path: Path, end: int) -> Segment:
-        """Take a file that an earlier process left for sound, up to where the next one begins."""
+        """Return the segment of a file that is known to be complete, up to the index where the next one begins."""
         first = int(path.stem)
         return cls(path, first, end - first, path.stat().st_size)
 
     @classmethod
     def found(cls, path: Path) -> Segment:
-        """Look at a file that an earlier process left; `torn` says that something in it cannot be read."""
+        """Read a file that an earlier process left; `torn` is set where its end cannot be read."""
         segment = cls(path, int(path.stem), 0, len(MAGIC))
         data = path.read_bytes()
         for _, offset in unpack(data, segment.first):
@@ -119,26 +119,26 @@ class Segment:
             raise
         if written != len(record):
             os.ftruncate(self._file, self.size)
-            raise OSError(errno.ENOSPC, "the disk took only a part of a record", str(self.path))
+            raise OSError(errno.ENOSPC, "the disk accepted only a part of a record", str(self.path))
         self.size += written
         self.count += 1
 
     def read(self) -> list[Record]:
-        """Return all its sound records."""
+        """Return all its valid records."""
         return [record for record, _ in unpack(self.path.read_bytes(), self.first)]
 
     def duplicate(self) -> int | None:
-        """Return a file descriptor of its own for a thread that syncs it to disk, or None where it is closed."""
+        """Return a duplicate file descriptor for a thread that syncs it to disk, or None where it is closed."""
         return None if self._file is None else os.dup(self._file)
 
     def close(self) -> None:
-        """Give the file back."""
+        """Close the file."""
         if self._file is not None:
             os.close(self._file)
             self._file = None
 
     def remove(self) -> None:
-        """Delete the file; where it cannot be, the next process finds it, and what is in it is acknowledged."""
+        """Delete the file; if that fails, the next process finds it and skips its records as acknowledged."""
         self.close()
         with suppress(OSError):
             self.path.unlink()

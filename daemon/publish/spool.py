@@ -1,19 +1,22 @@
-"""What the broker has not acknowledged yet, on disk: bounded, in order, safe against kill -9.
+"""The store on disk of messages that the broker has not acknowledged: bounded, in order, safe against kill -9.
 
-Every message that must not be lost is appended here first and sent then (a write-ahead log), so there is one path for
-live and for late, and its order is the order of the index. Files are small (`daemon.publish.segment`) and go when all
-their records are acknowledged. `acknowledged` holds the first index that is not, with a checksum.
+A stored message is appended here before it is sent (a write-ahead log), so live and late messages take the same path,
+in the order of the index. Files are small (`daemon.publish.segment`) and are deleted once all their records are
+acknowledged. The file `acknowledged` holds the first index that is not, with a checksum.
 
     spool = Spool(directory, limit_bytes=200_000_000)
-    index = spool.append("snapshot", payload)     # in the kernel's hands now: a kill of this process loses nothing
-    for record in spool.read(index): …            # from there on, as many as are at hand
+    index = spool.append("snapshot", payload)     # written to the kernel: a killed process loses nothing
+    for record in spool.read(index): …            # from this index on, a batch
     spool.acknowledge(index + 1, records=1)       # everything before this
 
-While the broker keeps up, nothing is synced: files are deleted before the kernel gets to writing them, so an SD card is
-spared. When messages wait, `sync` is called once a second; a power cut then costs a second at most.
+| state | what is done | what may be lost |
+|---|---|---|
+| the broker acknowledges in time | no sync: files are deleted before they reach the SD card | as in the next row |
+| messages wait | `begin_sync` once a second | messages of one second, by a power cut |
+| the store is full | the oldest file is deleted | its records, counted in `dropped` |
+| the disk is full, failing or read-only | messages are kept in memory, counted in `unstored` | these, by a restart |
 
-Full: the oldest file is deleted, and `dropped` counts what was in it. Disk full, failing or read-only: a message waits
-in memory alone, and `unstored` counts it. Nothing that a disk does raises an error here once the store is open.
+Once the store is open, no failure of the disk raises an error here.
 """
 
 from __future__ import annotations
@@ -36,35 +39,35 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 RECENT = 512
-"""Records that are kept in memory as well: a broker that keeps up costs no reading."""
+"""Records that are kept in memory as well: while the broker acknowledges in time, nothing is read from the disk."""
 
 _CURSOR = struct.Struct("<QI")
 
 
 class SpoolError(Exception):
-    """The store cannot be used; the message says why, and the cure."""
+    """The store cannot be used; the message says why, and what to do."""
 
 
 @dataclass(slots=True)
 class SpoolCounters:
-    """What became of the records since the start."""
+    """Counts of records since the start."""
 
     stored: int = 0
     acknowledged: int = 0
     dropped: int = 0  # never acknowledged, deleted because the store was full, or unreadable
-    unstored: int = 0  # the disk refused them: they waited in memory alone
+    unstored: int = 0  # refused by the disk, and kept in memory only
     torn: int = 0  # files with an end that could not be read
 
 
 class Spool:
-    """The store. One task uses it; only what `begin_sync` returns may run in a thread.
+    """The store. One task uses it; only the function that `begin_sync` returns may run in a thread.
 
     Parameters
     ----------
     directory
-        Its own; made when it is not there. A second process is refused.
+        Its folder, created if missing. A second process is refused.
     limit_bytes
-        What all files together may take.
+        Limit for the size of all files together.
     """
 
     def __init__(self, directory: Path, limit_bytes: int, *, segment_bytes: int | None = None) -> None:
@@ -73,26 +76,26 @@ class Spool:
         self.segment_bytes = segment_bytes or min(1_000_000, max(4096, limit_bytes // 16))
         self.counters = SpoolCounters()
         self._recent: deque[Record] = deque(maxlen=RECENT)
-        self._lock = self._take()
+        self._lock = self._lock_directory()
         self._cursor_file = os.open(directory / "acknowledged", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o640)
         self._first = self._read_cursor()
         self._segments = self._found()
         self._next = max(self._first, self._segments[-1].end if self._segments else 0)
         self._active: Segment | None = None
-        self._forget_acknowledged()
+        self._delete_acknowledged()
 
-    def _take(self) -> int:
+    def _lock_directory(self) -> int:
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             lock = os.open(self.directory / "lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o640)
         except OSError as error:
-            cure = "Give the daemon's user this folder, or choose another: [mqtt] spool_directory."
+            cure = "Make this folder writable for the daemon's user, or choose another: [mqtt] spool_directory."
             raise SpoolError(f"{self.directory}: cannot be written: {error.strerror}. {cure}") from error
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             os.close(lock)
-            raise SpoolError(f"{self.directory}: another regolithd uses it. Stop that one first.") from error
+            raise SpoolError(f"{self.directory}: another regolithd uses it. Stop that process first.") from error
         return lock
 
     def _read_cursor(self) -> int:
@@ -103,7 +106,7 @@ class Spool:
         return int(first) if zlib.crc32(data[:8]) == checksum else 0
 
     def _found(self) -> list[Segment]:
-        """Return the files that an earlier process left; only the last can be torn by a kill, and is looked through."""
+        """Return the files of an earlier process; only the last may end in an incomplete record, so it is read."""
         paths = sorted(path for path in self.directory.glob(f"*{SUFFIX}") if path.stem.isdigit())
         segments = [Segment.complete(path, int(after.stem)) for path, after in pairwise(paths)]
         if paths:
@@ -117,7 +120,7 @@ class Spool:
 
     @property
     def first(self) -> int:
-        """The oldest index that is not acknowledged and not dropped; `next` where nothing waits."""
+        """The oldest index that is neither acknowledged nor dropped; equal to `next` where nothing waits."""
         return self._first
 
     @property
@@ -127,36 +130,36 @@ class Spool:
 
     @property
     def queued(self) -> int:
-        """How many records wait."""
+        """Number of records that wait."""
         return self._next - self._first
 
     @property
     def size_bytes(self) -> int:
-        """What the files take."""
+        """Size of all files together."""
         return sum(segment.size for segment in self._segments)
 
     def append(self, topic: str, payload: bytes) -> int:
-        """Store a message and return its index. What the disk refuses stays in memory, and is counted."""
+        """Store a message and return its index. If the disk refuses it, it stays in memory and is counted."""
         data = pack(topic, payload)
         index = self._next
         self._next += 1
         try:
-            self._room_for(len(data), index).append(data)
+            self._segment_for(len(data), index).append(data)
             self.counters.stored += 1
         except OSError:
             self.counters.unstored += 1
-            self._active = None  # the next record begins a file of its own, as this index is missing
+            self._active = None  # this index is missing from the file, so the next record begins a new one
         self._recent.append(Record(index, topic, payload, time.monotonic_ns()))
         return index
 
-    def _room_for(self, size: int, index: int) -> Segment:
+    def _segment_for(self, size: int, index: int) -> Segment:
         active = self._active
         if active is None or active.size + size > self.segment_bytes:
             while self._segments and self.size_bytes + max(size, self.segment_bytes) > self.limit_bytes:
                 self._drop_oldest()
             active = self._active = Segment.create(self.directory, index)
             self._segments.append(active)
-            self._forget_acknowledged()
+            self._delete_acknowledged()
         return active
 
     def _drop_oldest(self) -> None:
@@ -166,7 +169,7 @@ class Spool:
         self._first = max(self._first, segment.end)
 
     def read(self, index: int) -> list[Record]:
-        """Return records from `index` on (or from the first that is left), in order; empty where none is."""
+        """Return records from `index` on (or from the first that exists), in order; empty where there are none."""
         index = max(index, self._first)
         if index >= self._next:
             return []
@@ -178,7 +181,7 @@ class Spool:
         return list(self._recent)
 
     def acknowledge(self, end: int, records: int) -> None:
-        """Forget everything before `end`: the broker has these `records`; any other could not be read and is lost."""
+        """Delete everything before `end`; `records` were acknowledged, any others could not be read and are lost."""
         if end > self._first:
             self.counters.acknowledged += records
             self.counters.dropped += max(0, end - self._first - records)
@@ -187,21 +190,21 @@ class Spool:
     def _move(self, first: int) -> None:
         self._first = first
         number = first.to_bytes(8, "little")
-        with suppress(OSError):  # then the next process sends some again, marked late
+        with suppress(OSError):  # if it fails, the next process sends some messages again, marked late
             os.pwrite(self._cursor_file, number + zlib.crc32(number).to_bytes(4, "little"), 0)
         if self._segments and self._segments[0].end <= first:
-            self._forget_acknowledged()
+            self._delete_acknowledged()
 
-    def _forget_acknowledged(self) -> None:
+    def _delete_acknowledged(self) -> None:
         while self._segments and self._segments[0].end <= self._first and self._segments[0] is not self._active:
             self._segments.pop(0).remove()
 
     def begin_sync(self) -> Callable[[], None]:
-        """Return what is to be called, in a thread, to bring everything that is stored by now to the disk."""
+        """Return a function that syncs everything stored by now to the disk; call it in a thread."""
         files = [file for segment in self._segments if (file := segment.duplicate()) is not None]
         directory = os.open(self.directory, os.O_RDONLY | os.O_CLOEXEC)
         for segment in self._segments[:-1]:
-            segment.close()  # complete: after this sync it needs none again
+            segment.close()  # complete: not written again, so this sync is its last
 
         def sync() -> None:
             for file in (*files, directory):
@@ -213,7 +216,7 @@ class Spool:
         return sync
 
     def close(self) -> None:
-        """Give the folder back; what waits stays."""
+        """Close the files and release the lock; waiting records stay on the disk."""
         for segment in self._segments:
             segment.close()
         if self._lock >= 0:
@@ -223,7 +226,7 @@ class Spool:
 
 
 def _readable(segment: Segment, index: int) -> list[Record]:
-    """Return what can be read from `index` on; what a failing disk keeps is counted when the next is acknowledged."""
+    """Return the readable records from `index` on; unreadable ones are counted at the next acknowledgement."""
     try:
         return [record for record in segment.read() if record.index >= index]
     except OSError:

@@ -23,7 +23,7 @@ import numpy as np
 import pytest
 
 from regolithd.daemon.config.configuration import Configuration
-from regolithd.daemon.pipeline.acquire import MEMORY, SYNCHRONOUS_WINDOW
+from regolithd.daemon.pipeline.acquire import AWAITED_WINDOWS, SYNCHRONOUS_WINDOW
 from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.recording.candump import read_log
 from regolithd.daemon.service import Service
@@ -203,7 +203,9 @@ async def test_no_snapshot_is_lost_and_none_is_stale(tmp_path: Path) -> None:
 
     # Nothing lost: every load that was on the bus in its window is in its snapshot, but where a late one before it had
     # cast doubt on which SYNC it answers.
-    doubtful = {(sync + later, wheel) for sync, wheel in late for later in range(max(MEMORY, RATE_HZ // 2) + 1)}
+    doubtful = {
+        (sync + later, wheel) for sync, wheel in late for later in range(max(AWAITED_WINDOWS, RATE_HZ // 2) + 1)
+    }
     measured = {(s.sequence, wheel) for s in snapshots for wheel in range(6) if np.isfinite(s.load_N[wheel])}
     assert way_ms.keys() - doubtful - measured <= {(len(snapshots), wheel) for wheel in range(6)}, report
     assert len(late) < 0.2 * len(way_ms), f"this computer is too busy to tell anything: {report}"

@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from regolithd.daemon.health.alarms import AlarmInputs, current_alarms, known_names
+from regolithd.daemon.health.alarms import AlarmInputs, alarm_names, current_alarms
 from regolithd.daemon.messages.alarm import Severity
 from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.devices.ground_speed import GROUND_SPEED_SENSOR
@@ -44,7 +44,7 @@ def test_each_trouble_is_one_alarm_with_its_cure(fact: str, value: object, name:
     assert alarms[name].severity is severity
     assert alarms[name].text
     assert alarms[name].cure
-    assert name in known_names([])
+    assert name in alarm_names([])
 
 
 @pytest.mark.parametrize("phase", [NodePhase.LOST, NodePhase.FAILED])
@@ -57,4 +57,4 @@ def test_a_node_that_is_missing_is_an_alarm_of_its_own(phase: NodePhase) -> None
         "node-22": Severity.WARNING,
     }
     assert alarms["node-13"].text == "silent"
-    assert set(alarms) <= set(known_names(nodes))
+    assert set(alarms) <= set(alarm_names(nodes))

@@ -49,9 +49,9 @@ def test_a_task_that_is_silent_for_too_long_is_named() -> None:
     liveness.expect("bus", 1.0)
     liveness.expect("recording", 3.0)
     now = 2_000_000_000
-    assert liveness.silent() == ["bus"]
+    assert liveness.overdue() == ["bus"]
     liveness.beat("bus")
-    assert liveness.silent() == []
+    assert liveness.overdue() == []
     now = 4_000_000_000
-    assert liveness.silent() == ["bus", "recording"]
+    assert liveness.overdue() == ["bus", "recording"]
     assert liveness.ages_s() == {"bus": 2.0, "recording": 4.0}

@@ -9,7 +9,7 @@ from regolithd.daemon.config.configuration import Configuration
 from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.pipeline.pipeline import Pipeline
 from regolithd.daemon.pipeline.snapshot import QUANTITIES, Snapshot, SoilChange
-from regolithd.daemon.pipeline.soil_change import SoilChangeDetector, change_text
+from regolithd.daemon.pipeline.soil_change import SoilChangeDetector, soil_change_text
 from regolithd.daemon.simulator.scenario import Ground, Scenario, Stretch
 from regolithd.daemon.simulator.virtual_rover import VirtualWorld
 
@@ -37,9 +37,9 @@ def test_a_fall_of_torque_raises_one_alarm_within_fifteen_seconds() -> None:
     assert alarm.direction == "fall"
     assert 0 < alarm.time_ns / HALF_SECOND_NS - 480 <= 30
     assert 0.1 < alarm.torque_ratio < 0.8
-    text = change_text(SoilChange(alarm, FallProbability(0.97, 0.6, 0.9)))
-    assert text.startswith("the soil gives way: torque fell to ")
-    assert "alarm at 10.8); that it fell is 97 % likely of the cohesion" in text
+    text = soil_change_text(SoilChange(alarm, FallProbability(0.97, 0.6, 0.9)))
+    assert text.startswith("the soil is weaker: wheel torque fell to ")
+    assert "threshold 10.8); probability of a decrease: cohesion 97 %" in text
 
 
 def test_a_steady_drive_momentary_drops_and_missing_wheels_raise_none() -> None:

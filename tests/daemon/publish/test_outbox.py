@@ -149,8 +149,8 @@ def test_the_current_states_are_said_again_to_a_broker_that_may_have_forgotten(o
 
 def test_of_live_messages_the_newest_counts(outbox: Outbox) -> None:
     """A slow connection shows now, not then."""
-    outbox.show({"wheel/1": b"old", "wheel/2": b"old"})
-    outbox.show({"wheel/1": b"new"})
+    outbox.add_live({"wheel/1": b"old", "wheel/2": b"old"})
+    outbox.add_live({"wheel/1": b"new"})
     assert outbox.take_live() == {"wheel/1": b"new", "wheel/2": b"old"}
     assert outbox.take_live() == {}
     assert not outbox.live_arrived.is_set()

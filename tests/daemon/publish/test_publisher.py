@@ -125,7 +125,7 @@ async def test_a_frozen_broker_is_noticed_and_nothing_is_lost(
     mosquitto: Mosquitto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its connections stay open and nothing answers: QoS 0 would call that a success."""
-    monkeypatch.setattr("regolithd.daemon.publish.connection.ACKNOWLEDGE_WITHIN_S", 0.5)
+    monkeypatch.setattr("regolithd.daemon.publish.connection.ACKNOWLEDGE_TIMEOUT_S", 0.5)
     publisher = new_publisher(tmp_path, mosquitto.port)
     async with listening(Subscriber(mosquitto.port)) as subscriber, running(publisher):
         await until(lambda: publisher.connected)
@@ -166,7 +166,7 @@ async def test_the_next_start_delivers_what_the_last_one_could_not(mosquitto: Mo
     async with running(first):
         for sequence in range(10):
             first.estimate(estimate(sequence))
-        first.say("event", EventMessage, kind="node-lost", node_id=3, text="node 3 is silent")
+        first.publish("event", EventMessage, kind="node-lost", node_id=3, text="node 3 is silent")
     first._spool.close()
     second = new_publisher(tmp_path / "spool", mosquitto.port)
     async with listening(Subscriber(mosquitto.port)) as subscriber, running(second):
@@ -202,13 +202,13 @@ async def test_the_retained_state_of_a_node_is_its_newest_also_after_an_outage(
     publisher = new_publisher(tmp_path, mosquitto.port)
     async with running(publisher):
         await until(lambda: publisher.connected)
-        publisher.say("node/3", NodeMessage, **node_fields("operational", "first"))
-        publisher.say("node/4", NodeMessage, **node_fields("operational", "untouched"))
+        publisher.publish("node/3", NodeMessage, **node_fields("operational", "first"))
+        publisher.publish("node/4", NodeMessage, **node_fields("operational", "untouched"))
         await until(lambda: publisher.report.queued == 0)
         await asyncio.to_thread(mosquitto.kill)  # no persistence: it forgets
         await until(lambda: not publisher.connected)
-        publisher.say("node/3", NodeMessage, **node_fields("lost", "second"))
-        publisher.say("node/3", NodeMessage, **node_fields("operational", "third"))
+        publisher.publish("node/3", NodeMessage, **node_fields("lost", "second"))
+        publisher.publish("node/3", NodeMessage, **node_fields("operational", "third"))
         await asyncio.to_thread(mosquitto.start)
         await until(lambda: publisher.connected and publisher.report.queued == 0)
         async with listening(Subscriber(mosquitto.port)) as latecomer:
@@ -222,8 +222,8 @@ async def test_the_retained_state_of_a_node_is_its_newest_also_after_an_outage(
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"host": "broker.invalid"}, "the name cannot be resolved. Mend [mqtt] host"),
-        ({}, "nobody listens there"),
+        ({"host": "broker.invalid"}, "the name cannot be resolved. Correct [mqtt] host"),
+        ({}, "connection refused"),
         ({"password_file": Path("/nowhere/password"), "username": "me"}, "/nowhere/password"),
     ],
 )
@@ -256,7 +256,7 @@ async def test_a_refused_password_is_told_and_tried_again_until_it_is_mended(
         mosquitto.settings = open_to_all
         await asyncio.to_thread(mosquitto.start)
         await until(lambda: publisher.connected)
-    assert sum("refused. Mend" in record.getMessage() for record in caplog.records) == 1
+    assert sum("refused. Correct" in record.getMessage() for record in caplog.records) == 1
 
 
 @pytest.fixture
@@ -300,7 +300,7 @@ async def test_two_of_the_same_name_are_told_so(mosquitto: Mosquitto, tmp_path: 
     rivals = [new_publisher(tmp_path / name, mosquitto.port) for name in "ab"]
     async with running(rivals[0]), running(rivals[1]):
         await until(lambda: all(rival.report.connections >= 3 for rival in rivals))
-        assert any("another client has the same [rover] name" in rival.problem for rival in rivals)
+        assert any("another client uses the same [rover] name" in rival.problem for rival in rivals)
 
 
 async def test_the_daemon_subscribes_to_nothing(mosquitto: Mosquitto, tmp_path: Path) -> None:
