@@ -63,7 +63,7 @@ scaling: $(VENV)/dev.ready
 mutants: $(VENV)/dev.ready
 	$(BIN)/python tests/mutation/sample.py --seed $(or $(SEED),1) --count $(or $(COUNT),200) $(if $(ONLY),--only $(ONLY))
 
-# What a frame costs, beside python-can and canopen, on vcan; and docs/bus.md as the code has it.
+# Time per frame, compared with python-can and canopen, on vcan; and docs/bus.md, generated from the device registry.
 frames: $(VENV)/dev.ready
 	tests/bench/with-vcan $(BIN)/python -m regolithd.drivers.benchmark
 	$(BIN)/python -m regolithd.drivers.reference > docs/bus.md

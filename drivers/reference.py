@@ -47,7 +47,7 @@ Of a new kind:
 2. Add it to `DEVICES` in `drivers/devices/registry.py`.
 
 Boot configuration, decoding, the key in `rover.toml`, snapshots, MQTT messages, recordings, exports, the virtual rover
-and this document follow. `make docs/bus.md` and `regolithd schema --write docs/messages` write the documents anew."""
+and this document follow from it."""
 
 
 def document() -> str:
