@@ -20,9 +20,10 @@ NO_INDEX = (
 )
 ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
 USE_BOTH = """
-import daemon, regolithd.daemon.service, resource, sys
-resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))  # DaemonContext closes every possible descriptor
+import daemon, sys
 with daemon.DaemonContext(detach_process=False, stdout=sys.stdout, stderr=sys.stderr):
+    # Imported here, as the context closes all descriptors, those of onnxruntime included, which then exits after 30 s.
+    import regolithd.daemon.service
     print(daemon.DaemonContext.__module__, regolithd.daemon.service.Service.__module__, flush=True)
 """
 
