@@ -1,4 +1,4 @@
-"""What every test may ask for, and what holds for all of them.
+"""Fixtures and rules for all tests.
 
 Markers: `vcan` – on a kernel with vcan0 and vcan1; `systemd` – where systemd is process 1 (`tests/bench/guests.py`).
 Fixtures: `shared_folder`, `mosquitto`, `free_port`.
@@ -22,20 +22,20 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parent.parent
 SHARED_IS_ABSENT = "recordings of others are not part of this repository: put the folder `shared` beside the checkout"
 
-# No example has a time limit of its own: on a busy machine that would be a test of the machine.
+# Examples have no time limit of their own: on a busy machine it would be exceeded.
 settings.register_profile("regolithd", settings.default, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("regolithd")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Be the inner side in a guest, else the outer one."""
+    """Register the nested pytest's plugin inside a guest."""
     if path := os.environ.get(REPORTS):
         config.pluginmanager.register(Reporter(config, Path(path)))
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Take the guests' folder from pytest's own temporary ones: a few runs are kept, then removed."""
+    """Register the outer pytest's plugin, with a folder among pytest's temporary ones, which it cleans up."""
     if not os.environ.get(REPORTS):
         factory: pytest.TempPathFactory = session.config._tmp_path_factory  # type: ignore[attr-defined]
         session.config.pluginmanager.register(Guests(factory.mktemp("guests")))
@@ -43,7 +43,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(call: pytest.CallInfo[None]) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Turn a skip into a failure where CI is set."""
+    """Report a skip as a failure where CI is set."""
     report = yield
     if os.environ.get("CI") and report.skipped and not hasattr(report, "wasxfail") and call.excinfo is not None:
         reason = str(call.excinfo.value)
@@ -55,7 +55,7 @@ def pytest_runtest_makereport(call: pytest.CallInfo[None]) -> Generator[None, py
 
 @pytest.fixture(scope="session")
 def shared_folder() -> Path:
-    """Real recordings and reference values of others, beside the checkout."""
+    """The folder of recordings and reference values that are not part of the repository, beside the checkout."""
     folder = ROOT.parent / "shared"
     if not folder.is_dir():
         pytest.skip(SHARED_IS_ABSENT)
@@ -64,13 +64,13 @@ def shared_folder() -> Path:
 
 @pytest.fixture
 def free_port() -> int:
-    """A TCP port of the loopback interface that nobody listens on."""
+    """An unused TCP port of the loopback interface."""
     return unused_port()
 
 
 @pytest.fixture
 def mosquitto(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Mosquitto]:
-    """A running broker for anybody; `mosquitto.port`, `.stop()`, `.start()`, `.kill()`, `.freeze()`, `.thaw()`."""
+    """A running broker without access control; see `Mosquitto` for its methods."""
     if mosquitto_program() is None:
         pytest.skip("no broker here: apt-get install mosquitto")
     broker = Mosquitto(tmp_path_factory.mktemp("mosquitto"))

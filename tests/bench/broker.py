@@ -1,4 +1,4 @@
-"""A real mosquitto on a free loopback port, to be stopped, frozen and started again as a test needs it."""
+"""A mosquitto broker on a free loopback port that tests can stop, freeze, kill and restart."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from pathlib import Path
 
-START_s = 20
+PROCESS_TIMEOUT_s = 20
 
 
 def mosquitto_program() -> str | None:
-    """Find the broker: Debian installs it where only root looks."""
+    """Return the path of mosquitto, also where Debian installs it (`/usr/sbin`); None if there is none."""
     return shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin:/usr/local/sbin")
 
 
 def unused_port() -> int:
-    """Return a TCP port of the loopback interface that nobody listens on."""
+    """Return an unused TCP port of the loopback interface."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
@@ -33,7 +33,7 @@ def unused_port() -> int:
 class Mosquitto:
     """A broker that keeps its port through restarts; `settings` are further lines of its configuration.
 
-    Its calls block for some tens of milliseconds; where a test's loop must go on meanwhile, use `asyncio.to_thread`.
+    The methods block for some tens of milliseconds; call them by `asyncio.to_thread` where the event loop must run on.
     """
 
     folder: Path
@@ -44,24 +44,24 @@ class Mosquitto:
 
     @property
     def log(self) -> str:
-        """What the broker has written so far."""
+        """The broker's log."""
         path = self.folder / "mosquitto.log"
         return path.read_text() if path.exists() else ""
 
     def start(self) -> None:
-        """Start the broker and return once it accepts connections; does nothing if it runs."""
+        """Start the broker and return once it accepts connections; do nothing if it runs."""
         if self.process is not None:
             return
         program = mosquitto_program()
         assert program is not None
         configuration = self.folder / "mosquitto.conf"
-        # Started by root it would become another user, who may not read the test's folder.
+        # Started by root it would change to user mosquitto, who may not read the test's folder.
         configuration.write_text(f"listener {self.port} {self.host}\nuser root\n{self.settings}")
         with (self.folder / "mosquitto.log").open("ab") as log:
             self.process = subprocess.Popen(
                 [program, "-c", configuration], stdout=log, stderr=log, stdin=subprocess.DEVNULL
             )
-        deadline = time.monotonic() + START_s
+        deadline = time.monotonic() + PROCESS_TIMEOUT_s
         while True:
             with contextlib.suppress(ConnectionRefusedError), socket.create_connection((self.host, self.port), 1):
                 return
@@ -70,26 +70,26 @@ class Mosquitto:
             time.sleep(0.02)
 
     def stop(self) -> None:
-        """Stop the broker as its service manager would; frozen or not running is no hindrance."""
+        """Stop the broker by SIGTERM, also if it is frozen; do nothing if it does not run."""
         if self.process is not None:
             self.thaw()
             self.process.terminate()
-            self.process.wait(START_s)
+            self.process.wait(PROCESS_TIMEOUT_s)
             self.process = None
 
     def kill(self) -> None:
-        """End the broker as a power cut would: connections are reset, nothing is said."""
+        """Kill the broker: connections are reset without a DISCONNECT."""
         if self.process is not None:
             self.process.kill()
-            self.process.wait(START_s)
+            self.process.wait(PROCESS_TIMEOUT_s)
             self.process = None
 
     def freeze(self) -> None:
-        """Keep the connections open while nothing answers any more, as a hung broker does."""
+        """Suspend the broker: connections stay open and nothing answers, as with a hung broker."""
         if self.process is not None:
             self.process.send_signal(signal.SIGSTOP)
 
     def thaw(self) -> None:
-        """Let a frozen broker go on."""
+        """Resume a frozen broker."""
         if self.process is not None:
             self.process.send_signal(signal.SIGCONT)

@@ -1,4 +1,4 @@
-"""Estimates to publish, where what they say does not matter."""
+"""Estimates with arbitrary values, to publish."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from regolithd.daemon.pipeline.snapshot import Estimate, SlipSource, Snapshot
 
 
 def estimate(sequence: int = 500, missing_wheel: int | None = None) -> Estimate:
-    """Return six wheels' numbers, none of which has a short decimal form; one wheel may have measured nothing."""
+    """Return an estimate whose numbers have no short decimal form; optionally one wheel is not measured."""
     random = np.random.default_rng(sequence)
     values = random.normal(1.0, 0.3, (10, 6))
     values[9] = 0x1237

@@ -1,9 +1,9 @@
-"""Runs the tests marked `vcan` or `systemd` inside one guest each, and reports them here under their own names.
+"""Run the tests marked `vcan` or `systemd` in a User Mode Linux guest each, and report them under their own names.
 
-The marked tests are moved to the end of the run. The first of them boots its guest (`with-vcan`; `with-systemd` as
-soon as the run begins), in which one nested pytest runs all of them and writes each report as a line of JSON; this
-pytest reads the lines as they come and reports them as if it had run the tests itself. Inside the guest, or where this
-kernel has the links already, the tests simply run.
+The marked tests are moved to the end of the run. The first of them boots its guest (`with-vcan`; `with-systemd` when
+the run begins), in which one nested pytest runs all of them and writes each report as a line of JSON. The outer pytest
+reads these lines and reports them as if it had run the tests itself. Inside the guest, or where this kernel has the
+links, the tests run directly.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 HERE = Path(__file__).parent
 INSIDE = "BENCH_GUEST"
 REPORTS = "BENCH_REPORTS"
-SILENCE_s = 600
-"""How long a guest may report nothing before it counts as hung: a boot and the longest test's own time limit."""
+NO_REPORT_TIMEOUT_s = 600
+"""A guest counts as hung after this time without a report: longer than its boot and the longest test's time limit."""
 WITH_WHEELS = '"$0" "$1" && exec env PIP_NO_INDEX=1 PIP_FIND_LINKS="$1" "${@:2}"'
 CURES = {
     "vcan": "apt-get install user-mode-linux iproute2 kmod hostname (Debian), or root on a kernel that has vcan",
@@ -36,13 +36,13 @@ CURES = {
 
 
 def links_are_up() -> bool:
-    """Whether this kernel has both vcan links, and they are up."""
+    """Return whether this kernel has both vcan links, and they are up."""
     flags = [Path("/sys/class/net", link, "flags") for link in ("vcan0", "vcan1")]
     return all(flag.exists() and int(flag.read_text(), 16) & 1 for flag in flags)
 
 
 def guest_of(item: pytest.Item) -> str | None:
-    """Name the guest that a test needs and is not in already."""
+    """Return the guest that a test needs; None if it needs none or already runs in it."""
     if os.environ.get(INSIDE):
         return None
     if item.get_closest_marker("systemd"):
@@ -53,7 +53,7 @@ def guest_of(item: pytest.Item) -> str | None:
 
 
 def why_not(guest: str) -> str | None:
-    """Say why a guest cannot run on this machine, and the cure."""
+    """Return why a guest cannot run on this machine, and the cure; None if it can."""
     if shutil.which("linux.uml") and shutil.which("ip") and Path("/usr/lib/uml/modules").is_dir():
         return None
     if guest == "vcan" and shutil.which("ip"):
@@ -67,7 +67,7 @@ def why_not(guest: str) -> str | None:
 
 @dataclass
 class Guest:
-    """One nested pytest inside a guest, and what it has reported so far."""
+    """One nested pytest inside a guest, and its reports so far."""
 
     name: str
     folder: Path
@@ -86,7 +86,7 @@ class Guest:
         lines.touch()
         pytest_command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--durations=0", f"@{selection}"]
         command: list[str | Path] = [HERE / f"with-{self.name}", *pytest_command]
-        if self.name == "systemd":  # there `make install` runs, and no network is
+        if self.name == "systemd":  # it runs `make install` and has no network
             command = ["bash", "-c", WITH_WHEELS, HERE / "wheelhouse", self.root / "build/wheelhouse", *command]
         inside = {INSIDE: self.name, REPORTS: str(lines), "BENCH_SHARED": str(self.folder)}
         with (self.folder / "output").open("wb") as output:
@@ -100,27 +100,27 @@ class Guest:
             )
 
     def runs(self) -> bool:
-        """Whether the guest is up."""
+        """Return whether the guest is up."""
         return self.process is not None and self.process.poll() is None
 
     def wait_for(self, node_id: str) -> bool:
-        """Read reports until a test is finished; false if the guest ended, or fell silent, before."""
-        heard = time.monotonic()
+        """Read reports until a test is finished; return false if the guest ended or hung before."""
+        last_report = time.monotonic()
         while node_id not in self.finished:
             ended = not self.runs()
             if self.read():
-                heard = time.monotonic()
-            elif ended or time.monotonic() - heard > SILENCE_s:
+                last_report = time.monotonic()
+            elif ended or time.monotonic() - last_report > NO_REPORT_TIMEOUT_s:
                 return False
             else:
                 time.sleep(0.1)
         return True
 
     def read(self) -> bool:
-        """Take in the lines that were written since; true if there were any."""
+        """Read the lines that were written since the last call; return whether there were any."""
         with (self.folder / "reports").open("rb") as file:
             file.seek(self.offset)
-            *lines, _ = file.read().split(b"\n")  # the last may be half a line still
+            *lines, _ = file.read().split(b"\n")  # the last may be incomplete
         self.offset += sum(len(line) + 1 for line in lines)
         for line in lines:
             message = json.loads(line)
@@ -131,11 +131,11 @@ class Guest:
         return bool(lines)
 
     def output(self) -> str:
-        """Return the end of what the guest printed."""
+        """Return the end of the guest's output."""
         return (self.folder / "output").read_text(errors="replace")[-8000:]
 
     def stop(self) -> None:
-        """End the guest, however far it is."""
+        """Terminate the guest; kill it after 20 s."""
         if self.process is None:
             return
         self.process.terminate()
@@ -147,7 +147,7 @@ class Guest:
 
 
 class Guests:
-    """The outer side: moves the marked tests to the end and replays what their guest reports."""
+    """Plugin of the outer pytest: moves the marked tests to the end and replays their guest's reports."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -156,15 +156,15 @@ class Guests:
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """Put the tests of each guest together, behind all others."""
+        """Sort the tests of each guest together, after all others."""
         items.sort(key=lambda item: {None: 0, "vcan": 1, "systemd": 2}[guest_of(item)])
         for item in items:
             if guest_of(item):
-                item.add_marker(pytest.mark.timeout(0), append=False)  # the nested run keeps the time
+                item.add_marker(pytest.mark.timeout(0), append=False)  # the nested run has the time limit
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> None:
-        """Let systemd's guest boot and install while the tests of this machine run: it takes a processor of its own."""
+        """Boot systemd's guest at once: it installs on a second processor while the other tests run."""
         first = next((item for item in session.items if guest_of(item) == "systemd"), None)
         if first and not session.config.option.collectonly:
             self.guest_for(first)
@@ -199,7 +199,7 @@ class Guests:
         return True
 
     def outcome(self, item: pytest.Item) -> Iterator[pytest.TestReport]:
-        """Yield a test's reports: what the guest says, or why there is nothing."""
+        """Yield a test's reports: the guest's, or one that says why there are none."""
         guest = self.guest_for(item)
         if guest is None:
             yield absent(item, self.missing[str(guest_of(item))])
@@ -207,19 +207,19 @@ class Guests:
         complete = guest.wait_for(item.nodeid)
         for message in guest.reports.get(item.nodeid, []):
             report = item.config.hook.pytest_report_from_serializable(config=item.config, data=message)
-            if isinstance(report.longrepr, list):  # a skip's place and reason: JSON has no tuples
+            if isinstance(report.longrepr, list):  # place and reason of a skip: JSON has no tuples
                 report.longrepr = tuple(report.longrepr)
             yield report
         if not complete:
-            how = f"said nothing for {SILENCE_s} s" if guest.runs() else "ended"
+            how = f"reported nothing for {NO_REPORT_TIMEOUT_s} s" if guest.runs() else "ended"
             guest.stop()
-            if guest.finished:  # it did run: this test took it down, and the others get a new one
+            if guest.finished:  # this test ended it: the remaining tests get a new guest
                 del self.guests[guest.name]
             text = f"the {guest.name} guest {how} before this test was done; it printed:\n{guest.output()}"
             yield pytest.TestReport(item.nodeid, item.location, {}, "failed", text, "call")
 
     def pytest_sessionfinish(self) -> None:
-        """End the guests; nothing of them outlives the run."""
+        """Stop all guests."""
         for guest in self.guests.values():
             guest.stop()
 
@@ -235,22 +235,22 @@ def absent(item: pytest.Item, reason: str) -> pytest.TestReport:
 
 
 class Reporter:
-    """The inner side: writes every report as a line, at once and through to the host."""
+    """Plugin of the nested pytest: writes every report as a line of JSON, flushed to the host."""
 
     def __init__(self, config: pytest.Config, path: Path) -> None:
         self.config = config
         self.lines = path.open("a")
 
     def write(self, message: dict[str, Any]) -> None:
-        """Append one line; the guest's kernel would keep it for itself without the fsync."""
+        """Append one line; without fsync the guest's kernel would buffer it."""
         self.lines.write(json.dumps(message) + "\n")
         self.lines.flush()
         os.fsync(self.lines.fileno())
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Pass on a phase's report."""
+        """Write the report of one phase."""
         self.write(self.config.hook.pytest_report_to_serializable(config=self.config, report=report))
 
     def pytest_runtest_logfinish(self, nodeid: str) -> None:
-        """Say that a test has nothing more to report."""
+        """Write that a test is finished."""
         self.write({"finished": nodeid})

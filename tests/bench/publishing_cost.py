@@ -1,4 +1,4 @@
-"""What a SYNC costs to publish, in CPU time: encoding, storing, sending one acknowledged and six live messages.
+"""Measure the CPU time of publishing one SYNC: encode, store and send one QoS 1 and six QoS 0 messages.
 
     python -m tests.bench.publishing_cost [RATE_Hz] [SECONDS]
 
@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 async def paced(count: int, rate_Hz: float, act: object) -> float:
-    """Call `act(k)` at a rate; return the CPU time used for each call, the pacing's own included [µs]."""
+    """Call `act(k)` at a rate; return the CPU time of each call, the event loop's included [µs]."""
     assert callable(act)
     loop = asyncio.get_running_loop()
     began, used = loop.time(), time.process_time()
@@ -45,7 +45,7 @@ def alone(act: object, times: int = 2000) -> float:
 
 
 async def measure(rate_Hz: float, seconds: float) -> dict[str, float | int]:
-    """Measure it all."""
+    """Return all figures by name."""
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         broker = Mosquitto(place)
@@ -54,7 +54,7 @@ async def measure(rate_Hz: float, seconds: float) -> dict[str, float | int]:
         spool = Spool(configuration.mqtt.spool_directory, 100_000_000)
         publisher = Publisher(configuration, spool)
         task = asyncio.create_task(publisher.run())
-        while not publisher.connected:  # noqa: ASYNC110  # it has no event for whoever is outside
+        while not publisher.connected:  # noqa: ASYNC110  # the publisher has no event for it
             await asyncio.sleep(0.05)
         estimates = [estimate(k) for k in range(100)]
         snapshot, wheels = encode(estimates[0], publisher.session)
@@ -84,8 +84,8 @@ async def measure(rate_Hz: float, seconds: float) -> dict[str, float | int]:
 
 
 def main() -> None:
-    """Print and keep the figures."""
-    given = [float(word) for word in sys.argv[1:]]
+    """Print the figures and write them."""
+    given = [float(argument) for argument in sys.argv[1:]]
     rate, seconds = (given + [100.0, 10.0][len(given) :])[:2]
     figures = asyncio.run(measure(rate, seconds))
     folder = ROOT / "build" / "figures"

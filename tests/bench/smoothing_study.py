@@ -1,6 +1,8 @@
-"""Which filter: measured on the noise of the paper's Table 4, with drops (`python tests/bench/smoothing_study.py`).
+"""Compare smoothing filters on the noise of the paper's Table 4, with momentary drops.
 
-Prints a table, and writes build/figures/smoothing.json. Every filter sees the same 360 wheel-minutes.
+    python tests/bench/smoothing_study.py
+
+Prints a table, and writes build/figures/smoothing.json. Every filter gets the same 360 wheel-minutes.
 """
 
 import json
@@ -21,7 +23,7 @@ SEEDS = range(30)
 
 
 def series(seed: int, rate_Hz: float, step: float, drops_per_s: float, drop_s: float, depth: float) -> Array:
-    """Return a current of 1 with noise, drops, and a step that stays; shape (time, 6)."""
+    """Return a current of 1 with noise, drops and a permanent step; shape (time, 6)."""
     noise_seed, drop_seed = np.random.SeedSequence(seed).spawn(2)
     noise, drops = CorrelatedNoise(noise_seed, 6, CORRELATION_S), MomentaryDrops(drop_seed, 6, drops_per_s, drop_s)
     times = np.arange(int(SECONDS * rate_Hz)) / rate_Hz
@@ -55,7 +57,7 @@ def trailing(function: Callable[..., Array], window_s: float) -> Filter:
 
 
 def then(first: Filter, second: Filter) -> Filter:
-    """Return both in a row."""
+    """Return both filters in series."""
     return lambda values, rate_Hz: second(first(values, rate_Hz), rate_Hz)
 
 
@@ -70,7 +72,7 @@ FILTERS: dict[str, Filter] = {
 
 
 def delay(step_response: Array, rate_Hz: float, share: float) -> float:
-    """Return how long after the step its share is reached [s], of the mean over all wheels."""
+    """Return the time after the step at which a share of it is reached [s], of the mean over all wheels."""
     times = np.arange(len(step_response)) / rate_Hz
     before = step_response[(times > SETTLED_S) & (times < STEP_AT_S)].mean()
     after = step_response[times > STEP_AT_S + 25].mean()
@@ -79,7 +81,7 @@ def delay(step_response: Array, rate_Hz: float, share: float) -> float:
 
 
 def dip(apply: Filter, rate_Hz: float, lasting_s: float) -> float:
-    """Return how deep one drop to a fifth shows, in percent of the level; mean over 400 wheels."""
+    """Return the largest deviation after one drop to a fifth, in percent of the level; mean over 400 wheels."""
     steady = 1 + 0.1 * np.random.default_rng(0).standard_normal((int(30 * rate_Hz), 6 * 66))
     begin, length = int(15 * rate_Hz), max(1, int(lasting_s * rate_Hz))
     dropped = steady.copy()

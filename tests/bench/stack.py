@@ -1,8 +1,7 @@
-"""The whole of it in processes of their own: virtual rover, daemon, and whoever commands it, over one CAN link."""
+"""Virtual rover, daemon and commands, each a process, on vcan0 and with a broker: the fixture `stack`."""
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import socket
@@ -10,7 +9,6 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -18,15 +16,16 @@ from broker import Mosquitto, mosquitto_program
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+    from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-PATIENCE_S = 60
+CHANNEL = "vcan0"
+TIMEOUT_S = 60
 
 
-def until(happened: Callable[[], object], what: Callable[[], str] | str, seconds: float = PATIENCE_S) -> None:
-    """Wait for something to happen, with a deadline that only a broken program misses; `what` says what did not."""
+def until(condition: Callable[[], object], what: Callable[[], str] | str, seconds: float = TIMEOUT_S) -> None:
+    """Wait until a condition holds; after `seconds` fail with `what`, which describes the condition."""
     deadline = time.monotonic() + seconds
-    while not happened():
+    while not condition():
         if time.monotonic() > deadline:
             raise AssertionError(f"not within {seconds:g} s: {what if isinstance(what, str) else what()}")
         time.sleep(0.05)
@@ -34,7 +33,7 @@ def until(happened: Callable[[], object], what: Callable[[], str] | str, seconds
 
 @dataclass
 class Stack:
-    """Starts and stops the processes; what they say goes to files in `folder`."""
+    """Starts and stops the processes; their output goes to `NAME.log` in `folder`."""
 
     folder: Path
     channel: str
@@ -48,7 +47,7 @@ class Stack:
         return self.folder / "rover.toml"
 
     def write_configuration(self) -> None:
-        """Write it."""
+        """Write the daemon's rover.toml."""
         self.configuration.write_text(
             f"""
 [bus]
@@ -56,7 +55,7 @@ channel = "{self.channel}"
 [sync]
 rate_Hz = {self.rate_Hz}
 [nodes]
-heartbeat_timeout_ms = 3000  # the guest has one processor: starting a command may hold everybody else up for a second
+heartbeat_timeout_ms = 3000  # the guest has one processor: starting a process may block the others for 1 s
 [recording]
 enabled = false
 [mqtt]
@@ -70,32 +69,32 @@ group = "{os.getgid()}"
         )
 
     def spawn(self, name: str, *arguments: str) -> subprocess.Popen[str]:
-        """Start `regolithd` with these arguments under a name."""
+        """Start `regolithd` with these arguments as process `name`; wait for an earlier one of that name."""
         command = [sys.executable, "-m", "regolithd", *arguments]
         if before := self.processes.get(name):
-            before.wait(PATIENCE_S)
-        environment = os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1", "COLUMNS": "120"}
+            before.wait(TIMEOUT_S)
+        environment = os.environ | {"PYTHONUNBUFFERED": "1", "COLUMNS": "120"}
         with (self.folder / f"{name}.log").open("a") as log:
             process = subprocess.Popen(command, stdout=log, stderr=log, text=True, env=environment, cwd=self.folder)
         self.processes[name] = process
         return process
 
-    def said(self, name: str) -> str:
-        """Return what a process has said so far."""
+    def output(self, name: str) -> str:
+        """Return the output of a process so far."""
         path = self.folder / f"{name}.log"
         return path.read_text() if path.exists() else ""
 
     def start_rover(self) -> None:
-        """Put the virtual rover on the bus."""
+        """Start the virtual rover and wait until it is on the bus."""
         control = str(self.folder / "rover.sock")
         self.spawn("rover", "bench", "--channel", self.channel, "--no-noise", "--control", control)
-        until(lambda: "ready" in self.said("rover"), "the virtual rover is ready")
+        until(lambda: "ready" in self.output("rover"), "the virtual rover is ready")
 
-    def tell_rover(self, words: str) -> None:
-        """Have something go wrong on the virtual rover."""
+    def inject_fault(self, command: str) -> None:
+        """Inject a fault into the virtual rover, such as `off 3`."""
         with socket.socket(socket.AF_UNIX) as connection:
             connection.connect(str(self.folder / "rover.sock"))
-            connection.sendall(f"{words}\n".encode())
+            connection.sendall(f"{command}\n".encode())
             answer = connection.recv(4096).decode()
         assert not answer.startswith("error"), answer
 
@@ -103,17 +102,17 @@ group = "{os.getgid()}"
         """Start the daemon, and wait until every node is operational."""
         self.write_configuration()
         self.spawn("daemon", "run", "--config", str(self.configuration))
-        until(self.ready, lambda: f"every node is operational: {self.said('daemon')}")
+        until(self.ready, lambda: f"every node is operational: {self.output('daemon')}")
 
     def recover(self) -> None:
-        """Bring everything back after whatever a test did: the daemon runs, and every node is operational."""
+        """Start the daemon if it does not run, and wait until every node is operational."""
         daemon = self.processes.get("daemon")
         if daemon is None or daemon.poll() is not None:
             self.start_daemon()
-        until(self.ready, lambda: f"every node is operational again: {self.said('daemon')}")
+        until(self.ready, lambda: f"every node is operational again: {self.output('daemon')}")
 
     def ready(self) -> bool:
-        """Whether the daemon answers and every node is operational."""
+        """Return whether the daemon answers and every node is operational."""
         try:
             nodes = self.ask({"command": "status"})["nodes"]
         except OSError:
@@ -123,7 +122,7 @@ group = "{os.getgid()}"
     def ask(self, request: dict[str, Any]) -> dict[str, Any]:
         """Return the daemon's answer to one request over the control socket."""
         with socket.socket(socket.AF_UNIX) as connection:
-            connection.settimeout(PATIENCE_S)
+            connection.settimeout(TIMEOUT_S)
             connection.connect(str(self.folder / "control.sock"))
             connection.sendall(json.dumps(request).encode() + b"\n")
             with connection.makefile() as lines:
@@ -131,13 +130,13 @@ group = "{os.getgid()}"
         return answer
 
     def stop(self, name: str) -> int:
-        """Stop a process as its service manager would, and return its exit status."""
+        """Stop a process by SIGTERM and return its exit status."""
         process = self.processes.pop(name)
         process.terminate()
-        return process.wait(PATIENCE_S)
+        return process.wait(TIMEOUT_S)
 
     def end(self) -> None:
-        """Leave nothing running."""
+        """Kill and wait for all processes."""
         for process in self.processes.values():
             if process.poll() is None:
                 process.kill()
@@ -145,13 +144,14 @@ group = "{os.getgid()}"
         self.processes.clear()
 
 
-@contextlib.contextmanager
-def stack_on(channel: str, folder: Path) -> Iterator[Stack]:
-    """A broker and a virtual rover, and the configuration of a daemon that does not run yet; at the end, nothing."""
+@pytest.fixture(scope="module")
+def stack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stack]:
+    """A broker and a virtual rover for all tests of a module; the daemon is configured and does not run yet."""
     if mosquitto_program() is None:
         pytest.skip("no broker here: apt-get install mosquitto")
+    folder = tmp_path_factory.mktemp("stack")
     broker = Mosquitto(folder)
-    stack = Stack(folder, channel, broker.port)
+    stack = Stack(folder, CHANNEL, broker.port)
     stack.write_configuration()
     try:
         broker.start()

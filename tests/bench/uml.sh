@@ -1,10 +1,10 @@
 # shellcheck shell=bash
-# Sourced by with-vcan and with-systemd: runs a command in User Mode Linux, a Linux kernel that is an ordinary program.
+# Sourced by with-vcan and with-systemd: runs a command in User Mode Linux, a Linux kernel that runs as a user process.
 #
 # The guest's root is this machine's / by hostfs, so that checkout and virtual environment are there at the same paths. The command
 # gets this environment (its TMPDIR becomes a tmpfs), this directory, an empty stdin, and this script's stdout and stderr.
 #
-#   uml_prepare FOLDER COMMAND [ARG…]   lays FOLDER/run: what the guest starts once it is up; it powers the guest off when done
+#   uml_prepare FOLDER COMMAND [ARG…]   writes FOLDER/run: the guest starts it once it is up; it powers the guest off at its end
 #   uml_boot FOLDER [KERNEL-ARGUMENT…]  boots with FOLDER/init as process 1, and exits with the command's status
 #
 # A guest that does not come up ends with 125, one that lasts longer than $GUEST_SECONDS with 124.
@@ -17,14 +17,13 @@ die() {
 uml_prepare() {
   local folder=$1
   shift
-  # NUL between them: whatever a variable or an argument contains arrives unchanged.
+  # NUL-separated, so that any content arrives unchanged.
   env -0 >"$folder/environment"
   printf '%s\0' "$@" >"$folder/arguments"
   printf '%s' "$PWD" >"$folder/directory"
   cat >"$folder/run" <<'RUN'
 #!/bin/bash
-# The command's stdout and stderr leave over two serial lines, set to pass bytes through; a FIFO stands between, so that the
-# command sees no terminal.
+# The command's stdout and stderr go over two raw serial lines, through a FIFO each, so that the command sees no terminal.
 here=$(dirname "$0")
 fifos=$(mktemp -d /run/fifos.XXXXXX)
 readers=()
@@ -41,7 +40,7 @@ mapfile -d '' -t arguments <"$here/arguments"
   exec env -i "${environment[@]}" TMPDIR=/dev/shm "${arguments[@]}"
 ) </dev/null >"$fifos/0" 2>"$fifos/1"
 status=$?
-# A background process of the command may still hold a FIFO: wait for what is on its way, but not for ever.
+# A background process of the command may still hold a FIFO: wait at most 5 s for remaining output.
 for reader in "${readers[@]}"; do timeout 5 tail -s 0.05 -f /dev/null --pid="$reader"; done
 echo "$status" >"$here/status"
 sync
@@ -58,12 +57,12 @@ uml_boot() {
   [ -r /usr/lib/uml/modules ] || die "the kernel modules of user-mode-linux are not installed"
   trap 'exit 130' INT
   trap 'exit 143' TERM HUP
-  # setpriv: should this script be killed outright, the guest ends all the same.
+  # setpriv: the guest ends also if this script is killed.
   setpriv --pdeathsig TERM timeout -k 5 "${GUEST_SECONDS:-0}" "$uml" umid=guest uml_dir="$folder" mem="${GUEST_MEMORY:-2048M}" \
     root=/dev/root rootfstype=hostfs rootflags=/ rw init="$folder/init" quiet con=null con0=null,fd:1 ssl0=null,fd:3 ssl1=null,fd:4 "$@" \
     3>&1 4>&2 </dev/null >"$folder/console" 2>&1 &
   guest=$!
-  # shellcheck disable=SC2064 # the number is known now
+  # shellcheck disable=SC2064 # expanded now: the number is known
   trap "kill -TERM $guest 2>/dev/null; wait $guest 2>/dev/null; rm -rf '$folder'" EXIT
   wait "$guest"
   ended=$?
@@ -77,5 +76,5 @@ uml_boot() {
   die "the guest ended ($ended) before the command did"
 }
 
-# Not below $TMPDIR: the guest's kernel takes no spaces in its arguments, and its control socket only a short path.
+# Not below $TMPDIR: the guest's kernel accepts no spaces in its arguments, and only a short path for its control socket.
 uml_folder() { mktemp -d /tmp/guest.XXXXXX || die "no temporary folder"; }

@@ -1,6 +1,6 @@
-"""A master for tests of the virtual nodes: no bus, no clock but its own, and none of the driver's code.
+"""A CANopen master to test the virtual nodes: without a bus, in simulated time, independent of the driver's code.
 
-It speaks CiA 301 byte by byte, so that a mistake the driver and the virtual node might share does not hide.
+It encodes CiA 301 messages byte by byte, so that an error common to driver and virtual node is detected.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ MASTER_ID = 127
 
 
 class AbortedError(Exception):
-    """The node aborted; `code` says why."""
+    """The node aborted an SDO transfer with this abort code."""
 
     def __init__(self, code: int) -> None:
         self.code = code
@@ -31,7 +31,7 @@ class AbortedError(Exception):
 
 
 class Master:
-    """Holds a virtual rover in memory and its clocks in hand. `seen` keeps every frame that the rover sent."""
+    """A virtual rover in memory, with simulated clocks. `seen` keeps every frame that the rover sent."""
 
     def __init__(self, nodes: Iterable[NodeDescription] = KAPVIK, plant: Plant | None = None) -> None:
         self.now = 0
@@ -47,7 +47,7 @@ class Master:
         return self.rover.nodes[node_id]
 
     def wait(self, seconds: float, step_s: float = 0.005) -> list[Frame]:
-        """Let time pass and return what is sent meanwhile."""
+        """Advance time and return the frames sent meanwhile."""
         before = len(self.seen)
         end = self.now + round(seconds * SECOND)
         while self.now < end:
@@ -57,26 +57,26 @@ class Master:
         return self.seen[before:]
 
     def send(self, can_id: int, data: bytes = b"") -> list[Frame]:
-        """Send a frame and return what is answered at once."""
+        """Send a frame and return the immediate answers."""
         before = len(self.seen)
         self.rover.take(Frame(1_700_000_000 * SECOND + self.now, can_id, data), self.now)
         self.seen += self.rover.outgoing(self.now)
         return self.seen[before:]
 
     def sync(self) -> dict[int, bytes]:
-        """Send a SYNC and return the PDOs that it brings, by COB-ID."""
+        """Send a SYNC and return the PDOs that answer it, by COB-ID."""
         return {frame.can_id: frame.data for frame in self.send(0x80)}
 
     def nmt(self, command: int, node_id: int = 0) -> list[Frame]:
-        """Command a node, or all."""
+        """Send an NMT command to a node, or to all (0)."""
         return self.send(0, bytes((command, node_id)))
 
     def heartbeat(self) -> None:
-        """Say that the master lives."""
+        """Send the master's heartbeat."""
         self.send(0x700 + MASTER_ID, b"\x05")
 
     def request(self, node_id: int, request: bytes) -> bytes:
-        """Send an SDO request and return its answer, or raise the abort."""
+        """Send an SDO request and return its answer; raise AbortedError for an abort."""
         answers = [f.data for f in self.send(0x600 + node_id, request) if f.can_id == 0x580 + node_id]
         assert len(answers) == 1, f"node {node_id} gave {len(answers)} answers to {request.hex()}"
         if answers[0][0] == 0x80:
@@ -84,13 +84,13 @@ class Master:
         return answers[0]
 
     def read(self, node_id: int, index: int, sub: int = 0) -> int:
-        """Return a number's unsigned value."""
+        """Return an object's value by expedited upload, as an unsigned number."""
         answer = self.request(node_id, struct.pack("<BHBI", 0x40, index, sub, 0))
         assert answer[0] & 0xF3 == 0x43, "not an expedited answer"
         return int.from_bytes(answer[4 : 8 - ((answer[0] >> 2) & 3)], "little")
 
     def write(self, node_id: int, index: int, sub: int, value: int, size: int) -> None:
-        """Write a number of `size` bytes."""
+        """Write a number of `size` bytes by expedited download."""
         data = value.to_bytes(size, "little", signed=value < 0).ljust(4, b"\0")
         answer = self.request(node_id, struct.pack("<BHB", 0x23 | (4 - size) << 2, index, sub) + data)
         assert answer[:4] == struct.pack("<BHB", 0x60, index, sub)
@@ -117,8 +117,8 @@ MOTOR_RPDO = (0x60400010, 0x60FF0020)
 LOAD_CELL_TPDO = (0x91300120, 0x61500108)
 
 
-class Drive:
-    """Motor controller 1 of a rover that has only that, configured and operational."""
+class DriveUnderTest:
+    """Motor controller 1, the only node of its rover, configured and operational."""
 
     def __init__(self) -> None:
         self.master = Master(KAPVIK[:1])
@@ -146,13 +146,13 @@ class Drive:
         return struct.unpack("<i", struct.pack("<I", self.master.read(1, 0x606C)))[0]
 
     def enable(self) -> None:
-        """Walk the ladder up to operation enabled."""
+        """Go through the states of CiA 402 to operation enabled."""
         for controlword in (0x06, 0x07, 0x0F):
             self.say(controlword)
         assert self.state == 0x27
 
     def run_at(self, rpm: int) -> None:
-        """Enable, and wait until it turns that fast."""
+        """Enable, and wait until it turns at this speed."""
         self.enable()
         self.say(0x0F, rpm)
         self.master.wait(2)

@@ -1,9 +1,9 @@
-"""Writes a recording (the mismatch tool's CSV) of the virtual rover's drive, without bus, nodes or waiting.
+"""Write a recording (CSV of `regolithd mismatch`) of the virtual rover, without bus, nodes or waiting.
 
     python virtual_recording.py OUT.csv [SCENARIO.toml]
 
-Twenty minutes at 2 Hz over six speeds, forwards and backwards, so that friction, slope and soil can be told apart. What
-the scenario's `[hidden]` holds is in it; the bus voltage sags with the very currents that are recorded, as a real one.
+Twenty minutes at 2 Hz with six speeds, forwards and backwards, so that friction, slope and soil can be distinguished.
+The effects of the scenario's `[hidden]` are in it; the bus voltage falls with the recorded currents.
 """
 
 from __future__ import annotations

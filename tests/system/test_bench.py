@@ -1,4 +1,4 @@
-"""The bench itself: the guests, their reports, and the broker do what the other tests rely on."""
+"""The test bench itself: the guest's vcan links and the broker, which other tests rely on."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 @pytest.mark.vcan
 @pytest.mark.parametrize("channel", ["vcan0", "vcan1"])
 def test_a_frame_crosses_the_link(channel: str) -> None:
-    """A frame sent on a vcan link arrives at another socket on it, with a kernel time."""
+    """A frame sent on a vcan link arrives at another socket on it, with a kernel time stamp."""
     with (
         can.Bus(channel, interface="socketcan") as sender,
         can.Bus(channel, interface="socketcan") as receiver,
@@ -29,8 +29,8 @@ def test_a_frame_crosses_the_link(channel: str) -> None:
 
 
 @pytest.mark.vcan
-async def test_the_broker_runs_beside_the_bus(mosquitto: Mosquitto) -> None:
-    """In the guest, the loopback interface carries MQTT."""
+async def test_the_broker_runs_in_the_guest(mosquitto: Mosquitto) -> None:
+    """The guest's loopback interface carries MQTT."""
     reader, writer = await asyncio.open_connection(mosquitto.host, mosquitto.port)
     writer.write(b"\x10\x0d\x00\x04MQTT\x04\x02\x00\x3c\x00\x01a")  # CONNECT, clean session, client "a"
     assert await reader.readexactly(4) == b"\x20\x02\x00\x00"  # CONNACK, accepted

@@ -1,4 +1,4 @@
-"""The unit that brings a CAN interface up, on a real can-dev link: slcan over a pty, to a small emulated adapter."""
+"""`regolithd-can@.service` on a real can-dev link: slcan over a pty, with an emulated LAWICEL adapter."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ LINKS = Path("/sys/class/net")
 
 
 class Adapter:
-    """A LAWICEL adapter on a pty: answers every command with a carriage return, and remembers them all."""
+    """A LAWICEL adapter on a pty: answers every command with a carriage return, and keeps all commands."""
 
     def __init__(self) -> None:
         self.commands: list[str] = []
@@ -42,7 +42,7 @@ class Adapter:
         self.thread.start()
 
     def answer(self) -> None:
-        """Answer until the kernel hangs up."""
+        """Answer until the kernel closes its side."""
         while True:
             try:
                 received = os.read(self.ours, 64)
@@ -52,7 +52,7 @@ class Adapter:
             os.write(self.ours, b"\r" * received.count(b"\r"))
 
     def close(self) -> None:
-        """Take the adapter out; the link goes with it."""
+        """Close the adapter, which removes the link."""
         os.close(self.kernels)
         self.thread.join()
         os.close(self.ours)
@@ -60,7 +60,7 @@ class Adapter:
 
 @pytest.fixture
 def adapter() -> Iterator[Adapter]:
-    """An adapter whose link exists, and is down."""
+    """An adapter whose link exists and is down."""
     plugged = Adapter()
     try:
         yield plugged
@@ -70,14 +70,14 @@ def adapter() -> Iterator[Adapter]:
 
 
 def run(*command: str) -> str:
-    """Run a command that must succeed."""
+    """Run a command that must succeed; return its output."""
     done = subprocess.run(command, check=False, capture_output=True, text=True)
     assert done.returncode == 0, f"{done.stdout}{done.stderr}\n{command}"
     return done.stdout
 
 
 def start(unit: str) -> None:
-    """Start the unit; where a busy machine made the adapter's answer late, the unit's next try is waited for."""
+    """Start the unit and wait until it is active; on a busy machine the first attempt may time out."""
     subprocess.run(["systemctl", "start", unit], check=False, capture_output=True)
     deadline = time.monotonic() + 90
     while subprocess.run(["systemctl", "is-active", "--quiet", unit], check=False).returncode:
@@ -87,7 +87,7 @@ def start(unit: str) -> None:
 
 @pytest.fixture(scope="module")
 def unit() -> Iterator[str]:
-    """The unit's name, known to systemd; a link's name is to be put in."""
+    """The unit's name with {} for the link, installed in /run."""
     place = Path("/run/systemd/system")
     shutil.copy(UNIT, place)
     run("systemctl", "daemon-reload")
@@ -111,7 +111,7 @@ def test_the_link_comes_up_with_bit_rate_and_queue(adapter: Adapter, unit: str) 
 
 
 def test_another_bit_rate_is_one_drop_in(adapter: Adapter, unit: str) -> None:
-    """`Environment=BITRATE=` in a drop-in, as the how-to says, changes the rate."""
+    """`Environment=BITRATE=` in a drop-in changes the bit rate."""
     unit = unit.format(adapter.link)
     drop_in = Path(f"/run/systemd/system/{unit}.d/rate.conf")
     drop_in.parent.mkdir(parents=True)
@@ -127,7 +127,7 @@ def test_another_bit_rate_is_one_drop_in(adapter: Adapter, unit: str) -> None:
 
 
 def test_without_the_interface_nothing_fails(unit: str) -> None:
-    """Where the interface does not exist the unit is passed over, so that the daemon can start and say so."""
+    """Where the interface does not exist the unit is skipped, so that the daemon can start and report it."""
     unit = unit.format("can9")
     run("systemctl", "start", unit)
     state = run("systemctl", "show", unit, "--property=ActiveState,ConditionResult")

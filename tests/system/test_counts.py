@@ -1,10 +1,10 @@
-"""Nothing is lost between the virtual rover and the snapshots, and nothing is stale: both ends count, for a minute.
+"""One minute of acquisition: every value that was on the bus in time is in the snapshot of its own SYNC.
 
 Natively at 100 Hz; in the guest, where a system call takes 41 µs and a frame half a millisecond, at 10 Hz.
 
-The rover's sensors tell the time (`tests/bench/counting_rover.py`), so every value says which SYNC it belongs to. The
-raw log says when it was on the bus. A computer that is too busy may let the rover's process answer too late: such an
-answer must be missing in its snapshot, and never be taken for the next one's.
+The rover's readings encode the time (`tests/bench/timestamp_rover.py`), so every value identifies its SYNC. The raw log
+has its time on the bus. On a busy computer the rover's process may answer too late: such an answer must be missing in
+its snapshot, and must not appear in the next one.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ FIGURES = ROOT / "build" / "figures"
 RATE_HZ = 10 if os.environ.get("VCAN_GUEST") else 100
 PERIOD_MS = 1000 / RATE_HZ
 SECONDS = 60
-CYCLE_MS = 2000  # after which the loads tell the same time again
+CYCLE_MS = 2000  # period of the time that the loads encode
 MOTORS, LOAD_CELLS = range(1, 7), range(11, 17)
 WHEEL = np.arange(1, 7)
 
 
-class Keep:
+class SnapshotLog:
     """A sink that keeps what it gets."""
 
     def __init__(self) -> None:
@@ -56,16 +56,16 @@ class Keep:
         self.snapshots.append(estimate.snapshot)
 
     def event(self, event: NetworkEvent) -> None:
-        """Pass."""
+        """Ignore the event."""
 
     async def run(self) -> None:
-        """Have nothing to do."""
+        """Wait until cancelled."""
         await asyncio.Event().wait()
 
 
 @dataclass(frozen=True)
 class Minute:
-    """What both ends say of the minute: `rover` counts by node, `log` the frames as (ms, COB-ID, data)."""
+    """Results: the rover's counters by node, the daemon's snapshots, and the frames as (ms, COB-ID, data)."""
 
     rover: dict[str, dict[str, int]]
     service: Service
@@ -74,17 +74,16 @@ class Minute:
 
     @property
     def sync_ms(self) -> np.ndarray:
-        """When each SYNC was on the bus."""
+        """Time of each SYNC on the bus, shape (SYNCs,)."""
         return np.array([time_ms for time_ms, cob_id, _ in self.log if cob_id == 0x80])
 
 
 @asynccontextmanager
-async def counting_rover(counts: dict[str, dict[str, int]]) -> AsyncIterator[None]:
-    """Run the rover in another process; when the context ends, `counts` holds what it counted."""
+async def timestamp_rover(counts: dict[str, dict[str, int]]) -> AsyncIterator[None]:
+    """Run the rover in another process; `counts` holds its counters after the context."""
     process = await asyncio.create_subprocess_exec(
-        *(sys.executable, str(ROOT / "tests" / "bench" / "counting_rover.py"), "vcan0"),
+        *(sys.executable, str(ROOT / "tests" / "bench" / "timestamp_rover.py"), "vcan0"),
         stdout=asyncio.subprocess.PIPE,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
     )
     assert process.stdout is not None
     try:
@@ -102,7 +101,7 @@ async def counting_rover(counts: dict[str, dict[str, int]]) -> AsyncIterator[Non
 
 
 async def run_for_a_minute(recording: Path) -> Minute:
-    """Run rover and daemon, and return what is left of it."""
+    """Run rover and daemon for a minute."""
     configuration = Configuration.model_validate(
         {
             "bus": {"channel": "vcan0"},
@@ -111,44 +110,44 @@ async def run_for_a_minute(recording: Path) -> Minute:
             "recording": {"directory": recording},
         }
     )
-    keep, rover = Keep(), dict[str, dict[str, int]]()
-    async with counting_rover(rover):
+    kept, rover = SnapshotLog(), dict[str, dict[str, int]]()
+    async with timestamp_rover(rover):
         service = Service(configuration, load_models(configuration))
-        service.sinks.append(keep)
+        service.sinks.append(kept)
         running = asyncio.ensure_future(service.run())
         network = await service.opened()
         async with asyncio.timeout(90):
-            # Under load a first boot may fail, and is tried again: `settled` would not wait for that.
+            # Under load a first boot may fail and is repeated, which `settled` would not wait for.
             while any(s.phase != NodePhase.OPERATIONAL for s in network.status.values()):  # noqa: ASYNC110  # no event
                 await asyncio.sleep(0.1)
         await asyncio.sleep(SECONDS)
         running.cancel()
         await asyncio.wait([running])
-    return Minute(rover, service, keep.snapshots, read_frames(recording))
+    return Minute(rover, service, kept.snapshots, read_frames(recording))
 
 
 def read_frames(recording: Path) -> list[tuple[float, int, bytes]]:
-    """Return the raw log."""
+    """Return the frames of the raw log."""
     (path,) = recording.glob("*.log")
     return [(frame.time_ns / 1e6, frame.can_id, frame.data) for frame in read_log(path)]
 
 
-def lag_ms(time_ms: np.ndarray, told_ms: np.ndarray, cycle_ms: float = CYCLE_MS) -> np.ndarray:
-    """Return how long before `time_ms` the told time was, once the clocks' constant difference is taken away."""
-    difference = (time_ms - told_ms) % cycle_ms
+def lag_ms(time_ms: np.ndarray, encoded_ms: np.ndarray, cycle_ms: float = CYCLE_MS) -> np.ndarray:
+    """Return how long before `time_ms` the encoded time is, without the constant difference between the clocks."""
+    difference = (time_ms - encoded_ms) % cycle_ms
     usual = np.median((difference - difference[0] + cycle_ms / 2) % cycle_ms) - cycle_ms / 2 + difference[0]
     return (difference - usual + cycle_ms / 2) % cycle_ms - cycle_ms / 2
 
 
 def answers(minute: Minute) -> dict[tuple[int, int], float]:
-    """Return from the raw log, for each SYNC (counted from 0) and wheel, how long [ms] its load was on the way."""
+    """Return from the raw log the delay [ms] of each load after its SYNC, by (SYNC counted from 0, wheel)."""
     loads = [(time_ms, cob_id - 0x18B, data) for time_ms, cob_id, data in minute.log if 0x18B <= cob_id <= 0x190]
     came_ms = np.array([time_ms for time_ms, _, _ in loads])
     wheel = np.array([wheel for _, wheel, _ in loads])
-    told_ms = np.array([int.from_bytes(data[:4], "little") for _, _, data in loads]) - 2000 * (wheel + 1)
-    # The SYNC that a value belongs to is the last whose time, by the rover's clock, is what the value tells.
+    encoded_ms = np.array([int.from_bytes(data[:4], "little") for _, _, data in loads]) - 2000 * (wheel + 1)
+    # A value belongs to the last SYNC whose time, by the rover's clock, is the encoded one.
     before = np.searchsorted(minute.sync_ms, came_ms) - 1
-    lag = lag_ms(minute.sync_ms[before], told_ms)
+    lag = lag_ms(minute.sync_ms[before], encoded_ms)
     own = before - np.rint(lag / PERIOD_MS).astype(int)
     return {
         (int(sync), int(of)): float(came - minute.sync_ms[sync])
@@ -159,15 +158,15 @@ def answers(minute: Minute) -> dict[tuple[int, int], float]:
 @pytest.mark.vcan
 @pytest.mark.timeout(300)
 async def test_no_snapshot_is_lost_and_none_is_stale(tmp_path: Path) -> None:
-    """Each SYNC becomes one snapshot of that SYNC's own values, and both ends count the same."""
+    """Each SYNC gives one snapshot with values of that SYNC only, and both ends count the same frames."""
     minute = await run_for_a_minute(tmp_path)
     rover, snapshots, network = minute.rover, minute.snapshots, minute.service.network
     assert network is not None
     bus, sync, acquired = network.bus.counters, network.counters.sync, minute.service.chain.acquisition.counters
-    way_ms = answers(minute)
-    # A window ends after nine tenths of the period, or with the next SYNC, should that follow a belated one sooner.
+    delay_ms = answers(minute)
+    # A window ends after nine tenths of the period, or with the next SYNC if that comes sooner after a late one.
     window_ms = np.minimum(np.diff(minute.sync_ms, append=np.inf), SYNCHRONOUS_WINDOW * PERIOD_MS)
-    late = {key for key, ms in way_ms.items() if ms > window_ms[key[0]]}
+    late = {key for key, ms in delay_ms.items() if ms > window_ms[key[0]]}
     report = {
         "rate_Hz": RATE_HZ,
         "syncs_sent": sync.produced,
@@ -178,9 +177,9 @@ async def test_no_snapshot_is_lost_and_none_is_stale(tmp_path: Path) -> None:
         "pdos_late": acquired.late,
         "pdos_duplicate": acquired.duplicate,
         "loads_late_on_bus": len(late),
-        "loads_not_in_a_snapshot": len(way_ms) - sum(int(np.isfinite(s.load_N).sum()) for s in snapshots),
-        "answer_ms_median": round(float(np.median(list(way_ms.values()))), 2),
-        "answer_ms_longest": round(max(way_ms.values()), 2),
+        "loads_not_in_a_snapshot": len(delay_ms) - sum(int(np.isfinite(s.load_N).sum()) for s in snapshots),
+        "answer_ms_median": round(float(np.median(list(delay_ms.values()))), 2),
+        "answer_ms_longest": round(max(delay_ms.values()), 2),
         "sync_late_ms_worst": round(sync.worst_late_ns / 1e6, 1),
         "kernel_drops_daemon": bus.kernel_drops,
         "kernel_drops_rover": rover["reader"]["kernel_drops"],
@@ -188,7 +187,7 @@ async def test_no_snapshot_is_lost_and_none_is_stale(tmp_path: Path) -> None:
     FIGURES.mkdir(parents=True, exist_ok=True)
     (FIGURES / "counts.json").write_text(json.dumps(report, indent=1))
 
-    # The bus: what one end sent, the other received, and the kernel dropped nothing.
+    # The bus: each end received what the other sent, and the kernel dropped nothing.
     assert sync.produced == rover["bus"]["sync"] == len(minute.sync_ms), report
     assert "unsent" not in rover["bus"], report
     assert bus.kernel_drops == rover["reader"]["kernel_drops"] == 0, report
@@ -201,16 +200,16 @@ async def test_no_snapshot_is_lost_and_none_is_stale(tmp_path: Path) -> None:
     assert sync.produced - len(snapshots) in {0, 1}, report
     assert len(snapshots) >= 0.9 * RATE_HZ * SECONDS, report
 
-    # Nothing lost: every load that was on the bus in its window is in its snapshot, but where a late one before it had
-    # cast doubt on which SYNC it answers.
-    doubtful = {
+    # Nothing lost: every load that was on the bus in its window is in its snapshot, except where a preceding late one
+    # made it ambiguous which SYNC it answers.
+    ambiguous = {
         (sync + later, wheel) for sync, wheel in late for later in range(max(AWAITED_WINDOWS, RATE_HZ // 2) + 1)
     }
     measured = {(s.sequence, wheel) for s in snapshots for wheel in range(6) if np.isfinite(s.load_N[wheel])}
-    assert way_ms.keys() - doubtful - measured <= {(len(snapshots), wheel) for wheel in range(6)}, report
-    assert len(late) < 0.2 * len(way_ms), f"this computer is too busy to tell anything: {report}"
+    assert delay_ms.keys() - ambiguous - measured <= {(len(snapshots), wheel) for wheel in range(6)}, report
+    assert len(late) < 0.2 * len(delay_ms), f"this computer is too busy for the test: {report}"
 
-    # Nothing stale: a load and a current tell the time of their own snapshot, and their own wheel's number.
+    # Nothing stale: loads and currents encode the time of their own snapshot and their own wheel's number.
     for values, unit, cycle_ms in (("load_N", 100.0, 2000), ("motor_current_A", 1000.0, 1000)):
         table = np.array([getattr(snapshot, values) for snapshot in snapshots]) * unit
         times_ms = np.array([snapshot.time_ns / 1e6 for snapshot in snapshots])

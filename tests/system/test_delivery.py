@@ -1,4 +1,4 @@
-"""What the daemon measured arrives, whatever happens to the broker, to the network, or to the daemon itself."""
+"""Every queued message arrives after an outage of the broker and after a SIGKILL of the daemon."""
 
 import asyncio
 import json
@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from broker import Mosquitto
-from listener import Subscriber, listening, until
+from subscriber import Subscriber, listening, until
 
 from regolithd.daemon.publish.segment import Segment
 
@@ -23,7 +23,7 @@ OUTAGE_S = 30
 
 
 class Daemon:
-    """The daemon's process."""
+    """A daemon without nodes, as a process."""
 
     def __init__(self, folder: Path, port: int) -> None:
         self.folder = folder
@@ -33,7 +33,7 @@ class Daemon:
             f"""
 [bus]
 interface = "virtual"
-channel = "lone"
+channel = "without-nodes"
 [sync]
 rate_Hz = {RATE_Hz}
 [recording]
@@ -50,27 +50,26 @@ group = "{os.getgid()}"
         self.process: subprocess.Popen[bytes] | None = None
 
     def start(self) -> None:
-        """Start it."""
-        environment = os.environ | {"PYTHONPATH": str(ROOT)}
-        command = [sys.executable, ROOT / "tests" / "bench" / "lone_daemon.py", self.configuration]
+        """Start the process."""
+        command = [sys.executable, ROOT / "tests" / "bench" / "daemon_without_nodes.py", self.configuration]
         with (self.folder / "daemon.log").open("ab") as log:
-            self.process = subprocess.Popen(command, env=environment, stderr=log)
+            self.process = subprocess.Popen(command, stderr=log)
 
     def kill(self) -> None:
-        """Kill it as nothing can be prepared for."""
+        """Kill the process (SIGKILL)."""
         assert self.process is not None
         assert self.process.poll() is None, (self.folder / "daemon.log").read_text()
         self.process.kill()
         self.process.wait()
 
     def stop(self) -> None:
-        """Stop it as its service manager would."""
+        """Stop the process (SIGTERM); it must exit with 0."""
         assert self.process is not None
         self.process.terminate()
         assert self.process.wait(30) == 0, (self.folder / "daemon.log").read_text()
 
     def queued(self) -> set[tuple[str, int]]:
-        """Return session and sequence of the snapshots on disk that wait, or waited, for the broker."""
+        """Return session and sequence of the snapshots in the spool."""
         found = set()
         for path in self.spool.glob("*.segment"):
             for record in Segment.found(path).read():
@@ -81,8 +80,8 @@ group = "{os.getgid()}"
 
 
 @pytest.fixture
-def lasting(mosquitto: Mosquitto) -> Mosquitto:
-    """A broker that remembers its subscribers through a restart and drops nothing for them, as the rover's does."""
+def persistent(mosquitto: Mosquitto) -> Mosquitto:
+    """A broker that keeps sessions through a restart and drops no queued message, as the rover's."""
     mosquitto.stop()
     mosquitto.settings += (
         f"persistence true\npersistence_location {mosquitto.folder}/\nmax_queued_messages 10000\n"
@@ -93,16 +92,16 @@ def lasting(mosquitto: Mosquitto) -> Mosquitto:
 
 
 @pytest.fixture
-def daemon(lasting: Mosquitto, tmp_path: Path) -> Iterator[Daemon]:
-    """A daemon that does not outlive its test."""
-    daemon = Daemon(tmp_path, lasting.port)
+def daemon(persistent: Mosquitto, tmp_path: Path) -> Iterator[Daemon]:
+    """A daemon that is killed after the test."""
+    daemon = Daemon(tmp_path, persistent.port)
     yield daemon
     if daemon.process is not None and daemon.process.poll() is None:
         daemon.kill()
 
 
 def snapshots(subscriber: Subscriber) -> dict[str, list[int]]:
-    """Return session → sequence numbers in the order of their first arrival."""
+    """Return the sequence numbers of each session in the order of their first arrival."""
     found: dict[str, list[int]] = defaultdict(list)
     for message in subscriber.of("snapshot"):
         if message["sequence"] not in found[message["session"]]:
@@ -110,8 +109,8 @@ def snapshots(subscriber: Subscriber) -> dict[str, list[int]]:
     return found
 
 
-def assert_told_once_or_marked(subscriber: Subscriber) -> None:
-    """Hold that nothing came twice unmarked, but for what the broker itself repeated."""
+def assert_repetitions_are_late(subscriber: Subscriber) -> None:
+    """Assert that a repeated message is marked late, unless the broker repeated it (DUP)."""
     times: Counter[tuple[str, str, int]] = Counter()
     for place, (topic, message, _) in enumerate(subscriber.messages):
         if topic in {"snapshot", "event", "emcy"}:
@@ -121,15 +120,15 @@ def assert_told_once_or_marked(subscriber: Subscriber) -> None:
 
 
 @pytest.mark.timeout(180)
-async def test_a_broker_that_was_away_for_half_a_minute_has_missed_nothing(lasting: Mosquitto, daemon: Daemon) -> None:
-    """Every SYNC of the whole time arrives, in order, those of the outage marked late; live ones are not marked."""
-    async with listening(Subscriber(lasting.port)) as subscriber:
+async def test_nothing_is_lost_in_an_outage_of_half_a_minute(persistent: Mosquitto, daemon: Daemon) -> None:
+    """Every snapshot arrives in order, and those of the outage are marked late."""
+    async with listening(Subscriber(persistent.port)) as subscriber:
         daemon.start()
         await until(lambda: len(subscriber.of("snapshot")) > RATE_Hz)
         before = subscriber.of("snapshot")[-1]["sequence"]
-        await asyncio.to_thread(lasting.stop)
+        await asyncio.to_thread(persistent.stop)
         await asyncio.sleep(OUTAGE_S)
-        await asyncio.to_thread(lasting.start)
+        await asyncio.to_thread(persistent.start)
         await until(lambda: subscriber.of("snapshot")[-1]["sequence"] > before + RATE_Hz * OUTAGE_S)
         await until(lambda: not subscriber.of("snapshot")[-1]["late"])
         after = subscriber.of("snapshot")[-1]["sequence"]
@@ -138,7 +137,7 @@ async def test_a_broker_that_was_away_for_half_a_minute_has_missed_nothing(lasti
     (sequences,) = snapshots(subscriber).values()
     assert sequences == list(range(sequences[-1] + 1))
     assert sequences[-1] >= after
-    assert_told_once_or_marked(subscriber)
+    assert_repetitions_are_late(subscriber)
     late = {message["sequence"] for message in subscriber.of("snapshot") if message["late"]}
     assert len(late) >= RATE_Hz * (OUTAGE_S - 2)
     times = {message["sequence"]: message["time"] for message in subscriber.of("snapshot")}
@@ -146,21 +145,23 @@ async def test_a_broker_that_was_away_for_half_a_minute_has_missed_nothing(lasti
 
 
 @pytest.mark.timeout(300)
-async def test_twenty_kills_at_random_moments_lose_nothing_that_was_queued(lasting: Mosquitto, daemon: Daemon) -> None:
-    """Some fall into an outage, or into a broker that hangs; whatever was in the store arrives after the next start."""
+async def test_twenty_kills_at_random_moments_lose_nothing_that_was_queued(
+    persistent: Mosquitto, daemon: Daemon
+) -> None:
+    """Every snapshot in the spool at a kill arrives after a restart, also if the broker hung meanwhile."""
     chance = random.Random(20130611)
     queued: set[tuple[str, int]] = set()
-    async with listening(Subscriber(lasting.port)) as subscriber:
+    async with listening(Subscriber(persistent.port)) as subscriber:
         for _ in range(KILLS):
             count = len(snapshots(subscriber))
             daemon.start()
             await until(lambda count=count: len(snapshots(subscriber)) > count)
             if chance.random() < 0.3:
-                lasting.freeze()
+                persistent.freeze()
             await asyncio.sleep(chance.uniform(0.0, 1.0))
             daemon.kill()
             queued |= daemon.queued()
-            lasting.thaw()
+            persistent.thaw()
         daemon.start()
         await until(lambda: len(snapshots(subscriber)) > KILLS)
         await asyncio.to_thread(daemon.stop)
@@ -172,12 +173,12 @@ async def test_twenty_kills_at_random_moments_lose_nothing_that_was_queued(lasti
     assert len(queued) > KILLS
     for sequences in arrived.values():
         assert sequences == list(range(len(sequences)))
-    assert_told_once_or_marked(subscriber)
-    assert_births_and_deaths_pair_up(subscriber)
+    assert_repetitions_are_late(subscriber)
+    assert_each_birth_has_a_death(subscriber)
 
 
-def assert_births_and_deaths_pair_up(subscriber: Subscriber) -> None:
-    """Every connection has been born once and has died: by the will where the daemon was killed."""
+def assert_each_birth_has_a_death(subscriber: Subscriber) -> None:
+    """Assert that each `online` is followed by `offline`: by the will where the daemon was killed."""
     states = [(m["session"], m["sequence"], m["state"], m["reason"]) for m in subscriber.of("state")]
     born = {(session, sequence) for session, sequence, state, _ in states if state == "online"}
     died = {(session, sequence): reason for session, sequence, state, reason in states if state == "offline"}

@@ -1,4 +1,4 @@
-"""`regolithd demo` ends by itself and leaves what it promises."""
+"""`regolithd demo` as a process, and what the daemon's modules import."""
 
 import json
 import subprocess
@@ -9,7 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_the_demo_runs_ends_and_leaves_a_recording_a_log_and_a_picture(tmp_path: Path) -> None:
-    """Without a terminal, as in a pipe; the log replays to the same numbers."""
+    """Without a terminal the demo prints tables and file names, and its log replays to the same numbers."""
     command = [sys.executable, "-m", "regolithd", "demo", "--seconds", "8", "--out", str(tmp_path / "demo")]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=100)
     assert done.returncode == 0, done.stderr
@@ -30,7 +30,7 @@ def test_the_demo_runs_ends_and_leaves_a_recording_a_log_and_a_picture(tmp_path:
 
 
 def test_importing_the_daemon_does_not_load_what_only_the_laptop_has() -> None:
-    """The rover starts quickly and needs none of it."""
+    """Service, sinks and command line import no library of the extras `demo` and `calibration`."""
     code = (
         "import sys, json, regolithd.daemon.service, regolithd.daemon.wiring, regolithd.daemon.cli;"
         "print(json.dumps([name for name in sys.modules if '.' not in name]))"

@@ -1,6 +1,6 @@
-"""The installed daemon where systemd is process 1, with the virtual rover on vcan0 and Debian's own mosquitto.
+"""The installed service under systemd, with the virtual rover on vcan0 and Debian's mosquitto.
 
-One installation serves all tests, as one machine would; each begins with a daemon freshly started.
+All tests use one installation; most start the daemon anew.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ RECEIVE_BUFFER_BYTES = 4 << 20
 CONFIGURATION = Path("/etc/regolithd/rover.toml")
 REGOLITHD = "/usr/local/bin/regolithd"
 PASSWORD = "a secret"
-WAIT_s = 60
+TIMEOUT_s = 60
 MOTORS = range(1, 7)
 HEARTBEAT_LOST = struct.pack("<H", 0x8130)  # the code in an EMCY message, CiA 301
 
 
 def run(*command: str | Path, check: bool = True, text: str | None = None) -> subprocess.CompletedProcess[str]:
-    """Run a command; if it fails where it must not, show what it said."""
+    """Run a command; fail with its output and the journal if it must succeed (`check`) and does not."""
     done = subprocess.run(command, cwd=ROOT, check=False, capture_output=True, text=True, input=text)
     if check and done.returncode:
         pytest.fail(f"{command} ended with {done.returncode}:\n{done.stdout}{done.stderr}\n{journal()}", pytrace=False)
@@ -46,28 +46,28 @@ def run(*command: str | Path, check: bool = True, text: str | None = None) -> su
 
 
 def journal(unit: str = "regolithd") -> str:
-    """Return the end of what a unit has said."""
+    """Return the last lines of a unit's journal."""
     command = ["journalctl", "--no-pager", "--output=short-monotonic", "--lines=60", "--unit", unit]
     return subprocess.run(command, check=False, capture_output=True, text=True).stdout
 
 
-def shown(*properties: str) -> dict[str, str]:
-    """Return properties of the daemon's unit."""
+def unit_properties(*properties: str) -> dict[str, str]:
+    """Return properties of regolithd.service."""
     listed = run("systemctl", "show", "regolithd", "--property", ",".join(properties)).stdout
     return dict(line.split("=", 1) for line in listed.splitlines())
 
 
-def until(happened: Callable[[], bool], what: str, seconds: float = WAIT_s) -> None:
-    """Wait for something to happen."""
+def until(condition: Callable[[], bool], what: str, seconds: float = TIMEOUT_s) -> None:
+    """Wait until a condition holds; after `seconds` fail with the journals."""
     deadline = time.monotonic() + seconds
-    while not happened():
+    while not condition():
         if time.monotonic() > deadline:
             pytest.fail(f"not within {seconds} s: {what}\n{journal()}\n{journal('virtual-rover')}", pytrace=False)
         time.sleep(0.1)
 
 
 def set_line(key: str, value: str) -> None:
-    """Change one line of the configuration, commented out or not."""
+    """Set a key of the configuration, which may be commented out."""
     text, changes = re.subn(rf"(?m)^#? ?{key} = .*$", f"{key} = {value}", CONFIGURATION.read_text())
     assert changes == 1, key
     CONFIGURATION.write_text(text)
@@ -98,51 +98,51 @@ def _machine() -> Iterator[None]:
 
 @pytest.fixture
 def pid() -> int:
-    """The process number of a daemon that has just said READY."""
+    """The process id of a daemon that has just become ready."""
     run("systemctl", "stop", "regolithd")
     run("systemctl", "reset-failed", "regolithd", check=False)
     run("systemctl", "start", "regolithd")
-    return int(shown("MainPID")["MainPID"])
+    return int(unit_properties("MainPID")["MainPID"])
 
 
 @dataclass(frozen=True)
 class Drives:
-    """What the six motor controllers say of themselves."""
+    """Statuswords and speeds of the six motor controllers."""
 
     statuswords: tuple[int, ...]
     speeds_rpm: tuple[int, ...]
 
     @property
     def enabled(self) -> bool:
-        """Whether any is in `operation enabled` (CiA 402)."""
+        """Whether any is in state operation enabled (CiA 402)."""
         return any(word & 0x6F == 0x27 for word in self.statuswords)
 
 
-def heard_drives() -> Drives:
-    """Listen for the next TPDO1 of each: statusword U16, current I16, velocity I32."""
-    said: dict[int, tuple[int, int]] = {}
-    deadline = time.monotonic() + WAIT_s
+def drives_by_pdo() -> Drives:
+    """Receive the next TPDO 1 of each: statusword U16, current I16, velocity I32."""
+    received: dict[int, tuple[int, int]] = {}
+    deadline = time.monotonic() + TIMEOUT_s
     with can.Bus("vcan0", interface="socketcan") as bus:
-        while len(said) < len(MOTORS):
-            assert time.monotonic() < deadline, f"only {sorted(said)} are heard\n{journal()}"
+        while len(received) < len(MOTORS):
+            assert time.monotonic() < deadline, f"only {sorted(received)} are received\n{journal()}"
             message = bus.recv(1)
             if message and message.arbitration_id - 0x180 in MOTORS:
                 word, _, speed = struct.unpack("<Hhi", message.data)
-                said[message.arbitration_id - 0x180] = (word, speed)
-    return Drives(*zip(*said.values(), strict=True))
+                received[message.arbitration_id - 0x180] = (word, speed)
+    return Drives(*zip(*received.values(), strict=True))
 
 
-def asked_drives() -> Drives:
-    """Read statusword and velocity by SDO (CiA 301, expedited upload): without a daemon nothing is sent unasked."""
+def drives_by_sdo() -> Drives:
+    """Read statusword and velocity by SDO (CiA 301, expedited upload): without a daemon there are no PDOs."""
     with can.Bus("vcan0", interface="socketcan") as bus:
-        words = tuple(asked(bus, node, 0x6041, "<H") for node in MOTORS)
-        return Drives(words, tuple(asked(bus, node, 0x606C, "<i") for node in MOTORS))
+        words = tuple(read_object(bus, node, 0x6041, "<H") for node in MOTORS)
+        return Drives(words, tuple(read_object(bus, node, 0x606C, "<i") for node in MOTORS))
 
 
-def asked(bus: can.BusABC, node: int, index: int, layout: str) -> int:
-    """Read one object of one node."""
+def read_object(bus: can.BusABC, node: int, index: int, layout: str) -> int:
+    """Read one object of one node by SDO."""
     request = struct.pack("<BHB4x", 0x40, index, 0)
-    deadline = time.monotonic() + WAIT_s
+    deadline = time.monotonic() + TIMEOUT_s
     bus.send(can.Message(arbitration_id=0x600 + node, data=request, is_extended_id=False))
     while time.monotonic() < deadline:
         message = bus.recv(1)
@@ -153,59 +153,59 @@ def asked(bus: can.BusABC, node: int, index: int, layout: str) -> int:
 
 @pytest.fixture
 def traverse(pid: int) -> Iterator[subprocess.Popen[str]]:
-    """A traverse under way, far from its end."""
+    """A running traverse of 10 m, all wheels turning."""
     assert pid
     until(lambda: run(REGOLITHD, "status", check=False).returncode == 0, "every node is operational")
     drive = [REGOLITHD, "traverse", "--distance", "10", "--speed", "0.022"]
     with subprocess.Popen(drive, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         try:
-            until(lambda: process.poll() is not None or all(heard_drives().speeds_rpm), "all wheels turn")
+            until(lambda: process.poll() is not None or all(drives_by_pdo().speeds_rpm), "all wheels turn")
             if process.poll() is not None:
-                said = process.stdout.read() if process.stdout else ""
-                pytest.fail(f"traverse ended at once ({process.returncode}):\n{said}\n{journal()}", pytrace=False)
+                output = process.stdout.read() if process.stdout else ""
+                pytest.fail(f"traverse ended at once ({process.returncode}):\n{output}\n{journal()}", pytrace=False)
             yield process
         finally:
             process.kill()
 
 
 async def snapshot() -> dict[str, object]:
-    """Return the next complete snapshot that an operator hears from the daemon."""
+    """Return the next snapshot with all wheels measured, as an operator receives it."""
     async with (
-        asyncio.timeout(WAIT_s),
+        asyncio.timeout(TIMEOUT_s),
         aiomqtt.Client("localhost", username="operator", password=PASSWORD) as client,
     ):
         await client.subscribe("regolith/kapvik/snapshot")
         async for message in client.messages:
-            said = json.loads(bytes(message.payload))
-            if all(said["measured"]):
-                return dict(said)
+            content = json.loads(bytes(message.payload))
+            if all(content["measured"]):
+                return dict(content)
     raise AssertionError("the broker ended the connection")
 
 
-def test_the_units_are_right() -> None:
-    """Once everything is installed, systemd finds nothing to say about the units."""
+def test_systemd_verifies_the_units() -> None:
+    """`systemd-analyze verify` reports nothing about the installed units."""
     done = run("systemd-analyze", "verify", "regolithd.service", "regolithd-can@can0.service")
     assert done.stdout + done.stderr == ""
 
 
-def test_the_receive_buffer_may_be_as_large_as_the_daemon_asks_for() -> None:
-    """At once, and after the next boot."""
+def test_the_kernel_allows_the_receive_buffer_of_the_driver() -> None:
+    """The limit is large enough after the installation, and again after a boot."""
     assert int(RMEM_MAX.read_text()) >= RECEIVE_BUFFER_BYTES
-    RMEM_MAX.write_text("212992")  # as the kernel boots
+    RMEM_MAX.write_text("212992")  # the kernel's default
     run("/lib/systemd/systemd-sysctl")
     assert int(RMEM_MAX.read_text()) >= RECEIVE_BUFFER_BYTES
 
 
 async def test_it_is_ready_and_acquires_under_the_hardening(pid: int) -> None:
-    """`systemctl start` returns with a daemon, not root, that hears all six wheels over CAN and says so over MQTT."""
-    assert shown("ActiveState", "SubState") == {"ActiveState": "active", "SubState": "running"}
+    """`systemctl start` returns with a daemon of user regolithd that publishes readings of all six wheels."""
+    assert unit_properties("ActiveState", "SubState") == {"ActiveState": "active", "SubState": "running"}
     assert run("ps", "-o", "user=", "-p", str(pid)).stdout.strip() == "regolithd"
-    said = await snapshot()
-    assert all(load is not None for load in said["load_N"])  # type: ignore[attr-defined]
+    content = await snapshot()
+    assert all(load is not None for load in content["load_N"])  # type: ignore[attr-defined]
 
 
 def test_the_running_service_exposes_little(pid: int) -> None:
-    """The loaded unit's exposure is 2.0 or less, and the kernel agrees that it can gain nothing."""
+    """The loaded unit's exposure is 2.0 or less, and its process has no capabilities and a seccomp filter."""
     assert pid
     listed = run("systemd-analyze", "security", "regolithd.service", "--no-pager").stdout
     exposure = re.search(r"Overall exposure level for \S+: ([\d.]+)", listed)
@@ -218,74 +218,74 @@ def test_the_running_service_exposes_little(pid: int) -> None:
 
 
 def test_only_its_group_may_command_it(pid: int) -> None:
-    """The control socket and the configuration are closed to everybody outside the group."""
+    """Control socket and configuration are accessible only to the group, and a traverse of another user is refused."""
     assert pid
     for path in (Path("/run/regolithd/control.sock"), CONFIGURATION):
         assert path.group() == "regolithd"
         assert path.stat().st_mode & 0o007 == 0
     refused = run("setpriv", "--reuid=nobody", "--clear-groups", REGOLITHD, "traverse", "--distance", "1", check=False)
     assert refused.returncode
-    assert not heard_drives().enabled
+    assert not drives_by_pdo().enabled
 
 
 def test_a_hung_daemon_is_killed_and_started_again(pid: int) -> None:
-    """A daemon that does not answer gets SIGABRT from the watchdog, and another takes its place."""
+    """A suspended daemon gets SIGABRT from the watchdog and is restarted."""
     os.kill(pid, signal.SIGSTOP)
-    until(lambda: shown("NRestarts")["NRestarts"] != "0", "the watchdog bites")
-    until(lambda: shown("ActiveState")["ActiveState"] == "active", "it is ready again")
-    assert shown("MainPID")["MainPID"] not in {"0", str(pid)}
-    said = journal()
-    assert "Watchdog timeout" in said
-    assert "status=6/ABRT" in said
+    until(lambda: unit_properties("NRestarts")["NRestarts"] != "0", "the watchdog restarts it")
+    until(lambda: unit_properties("ActiveState")["ActiveState"] == "active", "it is ready again")
+    assert unit_properties("MainPID")["MainPID"] not in {"0", str(pid)}
+    log = journal()
+    assert "Watchdog timeout" in log
+    assert "status=6/ABRT" in log
 
 
 def test_a_clean_stop_stops_the_drives(traverse: subprocess.Popen[str]) -> None:
-    """When `systemctl stop` returns, no wheel turns and no drive is enabled; the traverse says that it failed."""
+    """After `systemctl stop` no wheel turns and no drive is enabled, and the traverse command fails."""
     run("systemctl", "stop", "regolithd")
-    drives = asked_drives()
+    drives = drives_by_sdo()
     assert not any(drives.speeds_rpm)
     assert not drives.enabled
-    assert traverse.wait(WAIT_s) != 0
-    assert shown("Result")["Result"] == "success"
+    assert traverse.wait(TIMEOUT_s) != 0
+    assert unit_properties("Result")["Result"] == "success"
 
 
 def test_the_drives_stop_when_the_daemon_dies(traverse: subprocess.Popen[str]) -> None:
-    """After kill -9 each drive misses the heartbeat and stops; all stand still when the daemon is back."""
-    noticed: set[int] = set()
+    """After SIGKILL each drive misses the heartbeat and stops, and all stand still when the daemon is back."""
+    missed: set[int] = set()
     with can.Bus("vcan0", interface="socketcan") as bus:
         run("systemctl", "kill", "--signal=KILL", "regolithd")
-        deadline = time.monotonic() + WAIT_s
-        while len(noticed) < len(MOTORS):
-            assert time.monotonic() < deadline, f"only {noticed} noticed\n{journal('virtual-rover')}"
+        deadline = time.monotonic() + TIMEOUT_s
+        while len(missed) < len(MOTORS):
+            assert time.monotonic() < deadline, f"only {missed} missed\n{journal('virtual-rover')}"
             message = bus.recv(1)
             if message and message.arbitration_id - 0x80 in MOTORS and message.data[:2] == HEARTBEAT_LOST:
-                noticed.add(message.arbitration_id - 0x80)
-    until(lambda: shown("NRestarts")["NRestarts"] != "0", "it is started again")
-    until(lambda: shown("ActiveState")["ActiveState"] == "active", "it is ready again")
+                missed.add(message.arbitration_id - 0x80)
+    until(lambda: unit_properties("NRestarts")["NRestarts"] != "0", "it is started again")
+    until(lambda: unit_properties("ActiveState")["ActiveState"] == "active", "it is ready again")
     asyncio.run(snapshot())
-    drives = heard_drives()
+    drives = drives_by_pdo()
     assert not any(drives.speeds_rpm)
     assert not drives.enabled
-    assert traverse.wait(WAIT_s) != 0
+    assert traverse.wait(TIMEOUT_s) != 0
 
 
-def test_a_wrong_configuration_is_not_tried_again(pid: int) -> None:
-    """A configuration that is wrong ends the service with 78 and its reason in the journal, once."""
+def test_with_an_invalid_configuration_the_service_is_not_restarted(pid: int) -> None:
+    """An invalid configuration ends the service with status 78 and the key in the journal, without a restart."""
     assert pid
-    right = CONFIGURATION.read_text()
+    valid = CONFIGURATION.read_text()
     try:
         set_line("rate_Hz", "2000")
         assert run("systemctl", "restart", "regolithd", check=False).returncode
-        assert shown("ExecMainStatus", "NRestarts") == {"ExecMainStatus": "78", "NRestarts": "0"}
+        assert unit_properties("ExecMainStatus", "NRestarts") == {"ExecMainStatus": "78", "NRestarts": "0"}
         assert "rate_Hz" in journal()
     finally:
-        CONFIGURATION.write_text(right)
+        CONFIGURATION.write_text(valid)
 
 
 @pytest.mark.timeout(600)  # two installations
-def test_an_upgrade_keeps_what_was_configured(pid: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A version that would refuse the configuration changes nothing; one that reads it replaces the running one."""
-    monkeypatch.setenv("PIP_NO_COMPILE", "1")  # half the time, and not what this is about
+def test_an_upgrade_keeps_the_configuration(pid: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A version that refuses the configuration is not installed; one that reads it replaces the running one."""
+    monkeypatch.setenv("PIP_NO_COMPILE", "1")  # halves the time
     configured = CONFIGURATION.read_text()
     before = Path("/opt/regolithd/current").resolve()
     set_line("rate_Hz", "2000")
@@ -294,18 +294,18 @@ def test_an_upgrade_keeps_what_was_configured(pid: int, monkeypatch: pytest.Monk
     assert refused.returncode == 78
     assert "rate_Hz" in refused.stdout + refused.stderr
     assert Path("/opt/regolithd/current").resolve() == before
-    assert int(shown("MainPID")["MainPID"]) == pid
+    assert int(unit_properties("MainPID")["MainPID"]) == pid
 
     run("systemd/install")
     assert CONFIGURATION.read_text() == configured
     assert Path("/opt/regolithd/previous").resolve() == before
     assert Path("/opt/regolithd/current").resolve() != before
-    until(lambda: shown("ActiveState")["ActiveState"] == "active", "the new version is ready")
-    assert int(shown("MainPID")["MainPID"]) != pid
+    until(lambda: unit_properties("ActiveState")["ActiveState"] == "active", "the new version is ready")
+    assert int(unit_properties("MainPID")["MainPID"]) != pid
 
 
-def test_zz_what_uninstall_leaves(pid: int) -> None:
-    """Removing it ends the daemon and leaves configuration and recordings, nothing else; it can be installed again."""
+def test_zz_uninstalling_keeps_configuration_and_recordings(pid: int) -> None:
+    """Uninstalling stops the daemon and removes everything but configuration and recordings."""
     assert pid
     run("systemd/uninstall")
     assert not Path("/opt/regolithd").exists()

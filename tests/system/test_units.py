@@ -1,4 +1,4 @@
-"""The units and the broker's example configuration, on this machine: no guest needed."""
+"""The systemd units and the broker's example configuration, without a guest."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ EXPOSURE = re.compile(r"Overall exposure level for \S+: ([\d.]+)")
 
 @pytest.mark.parametrize(("unit", "highest"), [("regolithd.service", 2.0), ("regolithd-can@.service", 3.0)])
 def test_a_unit_exposes_little(unit: str, highest: float) -> None:
-    """The service manager's own assessment of a unit's exposure stays below what was promised."""
+    """The exposure level of `systemd-analyze security` stays below its limit."""
     if shutil.which("systemd-analyze") is None:
         pytest.skip("no systemd here: apt-get install systemd")
     command = ["systemd-analyze", "security", "--offline=true", "--no-pager", SYSTEMD / unit]
     done = subprocess.run(command, check=False, capture_output=True, text=True)
-    said = EXPOSURE.search(done.stdout)
-    assert said, done.stderr
-    assert float(said[1]) <= highest
+    exposure = EXPOSURE.search(done.stdout)
+    assert exposure, done.stderr
+    assert float(exposure[1]) <= highest
 
 
 @pytest.fixture
 def guarded(tmp_path: Path) -> Iterator[Mosquitto]:
-    """A broker with the example's access rules, the daemon's account and a listener's."""
+    """A broker with the example's access rules, and accounts of the daemon and an operator."""
     passwords = tmp_path / "passwords"
     accounts = tmp_path / "regolith.acl"
     accounts.write_text((SYSTEMD / "mosquitto/regolith.acl").read_text())
@@ -58,7 +58,7 @@ def guarded(tmp_path: Path) -> Iterator[Mosquitto]:
 
 
 async def test_only_the_daemon_publishes(guarded: Mosquitto) -> None:
-    """With the example configuration a listener hears the daemon, but cannot speak in its name."""
+    """With the example configuration an operator receives the daemon's messages and cannot publish."""
     account = {"hostname": guarded.host, "port": guarded.port, "password": "secret"}
     async with (
         aiomqtt.Client(username="operator", **account) as operator,
@@ -72,17 +72,17 @@ async def test_only_the_daemon_publishes(guarded: Mosquitto) -> None:
         assert first.payload == b"the truth"
 
 
-async def test_nobody_is_anonymous(guarded: Mosquitto) -> None:
+async def test_anonymous_clients_are_refused(guarded: Mosquitto) -> None:
     """With the example configuration a client without a password is refused."""
     with pytest.raises(aiomqtt.MqttError):
         async with aiomqtt.Client(guarded.host, guarded.port):
             pass
 
 
-def test_the_kernel_is_asked_for_the_receive_buffer_that_the_daemon_asks_for() -> None:
-    """The limit that the installation sets is what the driver's socket wants, and both scripts know its file."""
-    said = re.search(r"(?m)^-net\.core\.rmem_max = (\d+)$", (SYSTEMD / "sysctl.conf").read_text())
-    assert said
-    assert int(said[1]) == socketcan._RECEIVE_BUFFER_BYTES  # the two files must agree
+def test_the_kernel_limit_is_the_receive_buffer_of_the_driver() -> None:
+    """The installed sysctl limit equals the driver's receive buffer, and both scripts handle its file."""
+    limit = re.search(r"(?m)^-net\.core\.rmem_max = (\d+)$", (SYSTEMD / "sysctl.conf").read_text())
+    assert limit
+    assert int(limit[1]) == socketcan._RECEIVE_BUFFER_BYTES
     for script in ("install", "uninstall"):
         assert "/usr/local/lib/sysctl.d/10-regolithd.conf" in (SYSTEMD / script).read_text()

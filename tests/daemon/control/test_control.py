@@ -19,7 +19,7 @@ import pytest
 from estimates import estimate
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from listener import until
+from subscriber import until
 
 from regolithd.daemon.config.configuration import Configuration, Control
 from regolithd.daemon.control.client import ControlError, conversation

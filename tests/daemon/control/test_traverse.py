@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import pytest
-from listener import until
+from subscriber import until
 
 from regolithd.daemon.control.traverse import Clock, Ending, Outcome, Plan, Traverse, TraverseError, plan_traverse
 from regolithd.drivers.errors import DriveError

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from broker import Mosquitto, unused_port
 from estimates import estimate
-from listener import Subscriber, assert_complete, listening, until
+from subscriber import Subscriber, assert_complete, listening, until
 
 from regolithd.daemon.config.configuration import Configuration, Mqtt
 from regolithd.daemon.messages.bus import EventMessage, NodeMessage

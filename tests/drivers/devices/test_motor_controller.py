@@ -5,12 +5,12 @@ from __future__ import annotations
 import struct
 
 import pytest
-from virtual_master import MASTER_ID, Drive
+from virtual_master import MASTER_ID, DriveUnderTest
 
 
 def test_it_follows_its_ramps() -> None:
     """Speed rises by 0x6083 and falls by 0x6084, rpm per second, to the target and no further."""
-    drive = Drive()
+    drive = DriveUnderTest()
     drive.master.write(1, 0x6083, 0, 1000, 4)
     drive.master.write(1, 0x6084, 0, 2000, 4)
     drive.enable()
@@ -31,7 +31,7 @@ def test_it_follows_its_ramps() -> None:
 
 def test_it_turns_only_in_operation_enabled() -> None:
     """A target alone moves nothing; halt stops without leaving the state; disabling stops."""
-    drive = Drive()
+    drive = DriveUnderTest()
     drive.say(0x06, 1000)
     drive.master.wait(1)
     assert drive.speed_rpm == 0
@@ -50,7 +50,7 @@ def test_it_turns_only_in_operation_enabled() -> None:
 
 def test_the_speed_is_limited() -> None:
     """No faster than 0x607F."""
-    drive = Drive()
+    drive = DriveUnderTest()
     drive.master.write(1, 0x607F, 0, 600, 4)
     drive.enable()
     drive.say(0x0F, 5000)
@@ -64,7 +64,7 @@ def test_the_speed_is_limited() -> None:
 )
 def test_quick_stop_brakes_as_its_option_says(option: int, ramp: int, after: int) -> None:
     """0x605A chooses the ramp, and whether the drive then leaves quick stop active by itself (transition 12)."""
-    drive = Drive()
+    drive = DriveUnderTest()
     drive.master.write(1, 0x6084, 0, 1000, 4)
     drive.master.write(1, 0x6085, 0, 4000, 4)
     drive.master.write(1, 0x605A, 0, option, 2)
@@ -79,7 +79,7 @@ def test_quick_stop_brakes_as_its_option_says(option: int, ramp: int, after: int
 
 def test_from_a_holding_quick_stop_it_may_go_on() -> None:
     """Transition 16, with option 6 only."""
-    drive = Drive()
+    drive = DriveUnderTest()
     drive.master.write(1, 0x605A, 0, 6, 2)
     drive.run_at(1000)
     drive.say(0x02)
@@ -89,7 +89,7 @@ def test_from_a_holding_quick_stop_it_may_go_on() -> None:
 
 def test_a_fault_stops_it_tells_why_and_lasts() -> None:
     """EMCY, 0x603F, 0x1001 and 0x1003 name it; fault reaction while it brakes, then fault; reset clears and says so."""
-    drive = Drive()
+    drive = DriveUnderTest()
     drive.run_at(3000)
     master = drive.master
     master.rover.tell("fault 1 0x2310")
@@ -110,7 +110,7 @@ def test_a_fault_stops_it_tells_why_and_lasts() -> None:
 @pytest.mark.parametrize(("option", "state"), [(0, 0x27), (1, 0x08), (2, 0x40), (3, 0x40)])
 def test_the_masters_silence_stops_it(option: int, state: int) -> None:
     """Heartbeat consumer (0x1016): EMCY 0x8130, and 0x6007's reaction; only after the master was heard once."""
-    drive = Drive()
+    drive = DriveUnderTest()
     master = drive.master
     master.write(1, 0x6007, 0, option, 2)
     master.write(1, 0x1016, 1, MASTER_ID << 16 | 500, 4)
@@ -128,7 +128,7 @@ def test_the_masters_silence_stops_it(option: int, state: int) -> None:
 
 def test_a_master_that_is_heard_again_does_not_start_it() -> None:
     """After the loss it takes a fault reset and the whole ladder."""
-    drive = Drive()
+    drive = DriveUnderTest()
     drive.master.write(1, 0x1016, 1, MASTER_ID << 16 | 100, 4)
     drive.run_at(1000)
     drive.master.heartbeat()
@@ -142,7 +142,7 @@ def test_a_master_that_is_heard_again_does_not_start_it() -> None:
 
 def test_stopping_the_node_stops_the_motor() -> None:
     """NMT stop is a lost connection as well (CiA 402-2, 0x6007)."""
-    drive = Drive()
+    drive = DriveUnderTest()
     drive.run_at(1000)
     drive.master.nmt(2)
     drive.master.wait(1)
@@ -153,7 +153,7 @@ def test_stopping_the_node_stops_the_motor() -> None:
 
 def test_it_refuses_any_other_mode() -> None:
     """Only profile velocity (3) is supported; 0x6061 goes on saying so."""
-    drive = Drive()
+    drive = DriveUnderTest()
     with pytest.raises(Exception, match="0x06090030"):
         drive.master.write(1, 0x6060, 0, 1, 1)
     drive.master.write(1, 0x6060, 0, 3, 1)

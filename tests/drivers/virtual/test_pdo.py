@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from virtual_master import LOAD_CELL_TPDO, MOTOR_TPDO, Drive, Master
+from virtual_master import LOAD_CELL_TPDO, MOTOR_TPDO, DriveUnderTest, Master
 
 from regolithd.drivers.virtual import Bench, Measurement
 
@@ -116,7 +116,7 @@ def test_every_sensor_says_what_the_plant_says() -> None:
 
 def test_a_synchronous_rpdo_waits_for_the_sync() -> None:
     """Type 1: what came is done at the next SYNC; type 255: at once."""
-    drive = Drive()
+    drive = DriveUnderTest()
     assert drive.say(0x06) == 0x21
     drive.master.write(1, 0x1400, 2, 1, 1)
     assert drive.say(0x07) == 0x21
@@ -127,7 +127,7 @@ def test_a_synchronous_rpdo_waits_for_the_sync() -> None:
 @pytest.mark.parametrize(("length", "code", "obeyed"), [(5, 0x8210, False), (7, 0x8220, True)])
 def test_an_rpdo_of_the_wrong_length_is_reported(length: int, code: int, *, obeyed: bool) -> None:
     """Too short brings EMCY 0x8210 and does nothing; too long brings 0x8220, and what is mapped is done."""
-    drive = Drive()
+    drive = DriveUnderTest()
     frames = drive.master.send(0x201, struct.pack("<Hi", 0x06, 0).ljust(8, b"\0")[:length])
     assert [struct.unpack_from("<H", f.data)[0] for f in frames if f.can_id == 0x81] == [code]
     assert (drive.state == 0x21) is obeyed

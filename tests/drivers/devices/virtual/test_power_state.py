@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 
 import pytest
-from virtual_master import Drive
+from virtual_master import DriveUnderTest
 
 from regolithd.drivers.devices.virtual.power_state import PowerState, next_state
 
@@ -87,7 +87,7 @@ def test_each_state_has_its_bits_in_the_statusword(state: PowerState, mask: int,
 
 def test_the_ladder_up_and_down_over_the_bus() -> None:
     """By controlword in a PDO, each rung shows in the statusword; what skips a rung is ignored."""
-    drive = Drive()
+    drive = DriveUnderTest()
     assert drive.state == 0x40
     assert drive.say(0x0F) == 0x40  # enable operation: illegal from here
     assert drive.say(0x07) == 0x40
@@ -101,7 +101,7 @@ def test_the_ladder_up_and_down_over_the_bus() -> None:
 
 def test_a_fault_is_reset_by_a_rising_edge_only() -> None:
     """Bit 7 that stands already, or falls, resets nothing; nor does any other command leave fault."""
-    drive = Drive()
+    drive = DriveUnderTest()
     drive.say(0x80)
     drive.master.rover.tell("fault 1 0x2310")
     assert drive.state == 0x08

@@ -1,9 +1,9 @@
-"""A virtual rover whose sensors tell the time, to the millisecond. For tests that run it in another process.
+"""A virtual rover whose readings encode the time of the SYNC, to 1 ms. For tests that run it in another process.
 
-    python counting_rover.py CHANNEL
+    python timestamp_rover.py CHANNEL
 
-Wheel n reads 20 n + (t mod 2 s) · 10 N/s and n + (t mod 1 s) · 1 A/s, t being the time of the SYNC: so a value that is
-lost, repeated, of another SYNC or of another wheel shows. Prints `ready`; at its end (SIGTERM) what it counted, as a
+Wheel n reads 20 n + (t mod 2 s) · 10 N/s and n + (t mod 1 s) · 1 A/s, t being the time of the SYNC: a reading that is
+lost, repeated, or of another SYNC or wheel can be identified. Prints `ready`; at its end (SIGTERM) its counters, as a
 line of JSON.
 """
 
@@ -22,11 +22,11 @@ from regolithd.drivers.virtual import Measurement, VirtualRover
 WHEEL = np.arange(1, 7)
 
 
-class Clock:
-    """The plant: nothing but time."""
+class TimestampPlant:
+    """A plant whose loads and currents encode the time."""
 
     def measure(self, time_s: float, motor_speed_rad_s: np.ndarray) -> Measurement:
-        """Return the time in every channel."""
+        """Return loads and currents that encode the wheel's number and the time."""
         del motor_speed_rad_s
         time_ms = round(1000 * time_s)
         return Measurement(
@@ -37,7 +37,7 @@ class Clock:
 
 async def main(channel: str) -> None:
     """Run until SIGTERM."""
-    rover = VirtualRover(Clock())
+    rover = VirtualRover(TimestampPlant())
     ended = asyncio.Event()
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, ended.set)
     async with open_bus("socketcan", channel) as bus, asyncio.TaskGroup() as tasks:

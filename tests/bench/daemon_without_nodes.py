@@ -1,8 +1,8 @@
-"""A whole daemon in a process of its own, on an in-process bus without any node: to be killed.
+"""A daemon on an in-process bus without any node, as a process that tests can kill.
 
-    python lone_daemon.py CONFIG
+    python daemon_without_nodes.py CONFIG
 
-Every SYNC still gives a snapshot, in which nothing was measured.
+Every SYNC gives a snapshot in which nothing was measured.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Somebody who listens to the broker, and what must hold for what they heard."""
+"""An MQTT subscriber with a persistent session that keeps all messages, and assertions about them."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ if TYPE_CHECKING:
 
 @dataclass
 class Subscriber:
-    """Whoever listens: remembers everything, and comes back to the same session at the broker."""
+    """Keeps every message as (topic, content, retained), and reconnects to the same session (`clean_session=False`)."""
 
     port: int
     topic: str = "regolith/#"
     name: str = "subscriber"
     messages: list[tuple[str, dict[str, Any], bool]] = field(default_factory=list)
-    repeated_by_broker: set[int] = field(default_factory=set)  # indices of messages with MQTT's own DUP flag
+    repeated_by_broker: set[int] = field(default_factory=set)  # indices of messages with MQTT's DUP flag
     ready: asyncio.Event = field(default_factory=asyncio.Event)
 
     async def run(self) -> None:
-        """Listen until cancelled."""
+        """Receive until cancelled; reconnect after an error."""
         while True:
             with suppress(aiomqtt.MqttError):
                 async with aiomqtt.Client("127.0.0.1", self.port, identifier=self.name, clean_session=False) as client:
-                    client._client.on_message = self._take  # aiomqtt's own messages do not tell `dup`
+                    client._client.on_message = self._take  # aiomqtt's messages have no `dup`
                     await client.subscribe(self.topic, qos=1)
                     self.ready.set()
                     async for _ in client.messages:
@@ -47,25 +47,25 @@ class Subscriber:
             self.repeated_by_broker.add(len(self.messages) - 1)
 
     def of(self, topic: str) -> list[dict[str, Any]]:
-        """Return what came on a topic."""
+        """Return the messages of a topic."""
         return [message for at, message, _ in self.messages if at == topic]
 
     def sequences(self, topic: str = "snapshot") -> list[int]:
-        """Return the sequence numbers of what came on a topic, late repetitions left out."""
+        """Return the sequence numbers of a topic's messages, without late repetitions."""
         seen = [message["sequence"] for message in self.of(topic)]
         return list(dict.fromkeys(seen))
 
 
 async def until(condition: Callable[[], object], seconds: float = 30) -> None:
-    """Wait for something to become true, with a deadline that only a broken program misses."""
+    """Wait until a condition holds; TimeoutError after `seconds`."""
     async with asyncio.timeout(seconds):
-        while not condition():  # noqa: ASYNC110  # anything may be waited for
+        while not condition():  # noqa: ASYNC110  # a condition has no event
             await asyncio.sleep(0.02)
 
 
 @asynccontextmanager
 async def listening(subscriber: Subscriber) -> AsyncIterator[Subscriber]:
-    """Let a subscriber listen."""
+    """Run a subscriber while the context lasts."""
     task = asyncio.create_task(subscriber.run())
     try:
         await until(subscriber.ready.is_set)
@@ -77,7 +77,7 @@ async def listening(subscriber: Subscriber) -> AsyncIterator[Subscriber]:
 
 
 def assert_complete(subscriber: Subscriber, count: int) -> None:
-    """All snapshots came, in order; what the daemon said twice is marked the second time."""
+    """Assert that `count` snapshots came, in order, and that a repetition is marked late."""
     assert subscriber.sequences() == list(range(count))
     seen: set[int] = set()
     for place, (topic, message, _) in enumerate(subscriber.messages):

@@ -1,8 +1,8 @@
-"""A daemon that records, with its rover in the same process: made to be killed.
+"""A recording daemon and its virtual rover in one process that tests can kill.
 
-    python tests/bench/recorded_drive.py FOLDER RATE_HZ
+    python tests/bench/recording_daemon.py FOLDER RATE_HZ
 
-Prints a line for each snapshot once it is on its way: its sequence, and its time in ns.
+Prints a line for each snapshot that is handed to the recorder: its sequence and its time in ns.
 """
 
 import asyncio
@@ -22,14 +22,14 @@ class Printer:
     """A sink to standard output."""
 
     def estimate(self, estimate: Estimate) -> None:
-        """Say which snapshot was handed to the recording."""
+        """Print sequence and time of the snapshot."""
         print(estimate.snapshot.sequence, estimate.snapshot.time_ns, flush=True)
 
     def event(self, event: NetworkEvent) -> None:
-        """Say nothing."""
+        """Ignore the event."""
 
     async def run(self) -> None:
-        """Wait for the end, which is a kill."""
+        """Wait until the process is killed."""
         await asyncio.Event().wait()
 
 

@@ -1,0 +1,5 @@
+"""Fixtures of the system tests."""
+
+from stack import stack
+
+__all__ = ["stack"]
