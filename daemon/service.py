@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from regolithd.daemon.health.liveness import TaskLiveness
 from regolithd.daemon.health.sd_notify import READY, STOPPING, WATCHDOG, notify, watchdog_period_s
-from regolithd.daemon.pipeline.chain import Chain
+from regolithd.daemon.pipeline.pipeline import Chain
 from regolithd.daemon.recording.recorder import FLUSH_S, Recorder
 from regolithd.drivers.can.open_bus import open_bus
 from regolithd.drivers.errors import BusOpenError

@@ -1,4 +1,9 @@
-"""Torque, smoothing, slip, terrain network and posterior: from one snapshot to one estimate.
+"""From CAN frames to estimates: the same code, and the same numbers, for a live bus and for a replayed log.
+
+    chain = Chain(configuration, load_models(configuration))
+    for estimate in chain.feed(frames): …
+
+`Chain` joins decoder (frames ─▶ signals), acquisition (signals ─▶ snapshots) and `Pipeline` (snapshots ─▶ estimates):
 
 | stage | module | in ─▶ out, each of shape (6,) |
 |---|---|---|
@@ -18,15 +23,48 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.drivetrain.torque import wheel_torque
+from regolithd.daemon.pipeline.acquire import Acquisition
 from regolithd.daemon.pipeline.posterior import PosteriorStage
 from regolithd.daemon.pipeline.slip import choose_slip, wheel_slip
 from regolithd.daemon.pipeline.smooth import Smoother
 from regolithd.daemon.pipeline.snapshot import WHEELS, Estimate
+from regolithd.drivers.devices.decoding.decoder import Decoder
+from regolithd.drivers.devices.decoding.signals import Reading, Sync
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from regolithd.daemon.config.configuration import Configuration
     from regolithd.daemon.pipeline.onnx_models import OnnxModels
     from regolithd.daemon.pipeline.snapshot import Array, Snapshot
+    from regolithd.drivers.can.frame import Frame
+    from regolithd.drivers.devices.decoding.signals import Signal
+
+
+class Chain:
+    """Decoder, acquisition and pipeline in a row; no clock, no input or output."""
+
+    def __init__(self, configuration: Configuration, models: OnnxModels) -> None:
+        nodes = configuration.nodes.described()
+        self.decoder = Decoder(nodes)
+        period_ns = int(1e9 / configuration.sync.rate_Hz)
+        self.acquisition = Acquisition(nodes, self.decoder.expected, period_ns)
+        self.pipeline = Pipeline(configuration, models)
+
+    def feed(self, frames: Iterable[Frame]) -> list[Estimate]:
+        """Take the next frames of the bus; return an estimate for each snapshot that they complete."""
+        decode = self.decoder.decode
+        return self.take([signal for frame in frames if (signal := decode(frame)) is not None])
+
+    def take(self, signals: Iterable[Signal]) -> list[Estimate]:
+        """Take the next decoded signals; return an estimate for each snapshot that they complete."""
+        estimates = []
+        for signal in signals:
+            if isinstance(signal, Reading | Sync):
+                snapshot = self.acquisition.accept(signal)
+                if snapshot is not None:
+                    estimates.append(self.pipeline.step(snapshot))
+        return estimates
 
 
 class Pipeline:

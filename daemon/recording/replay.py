@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass, field
 from typing import IO, TYPE_CHECKING, Any
 
-from regolithd.daemon.pipeline.chain import Chain
+from regolithd.daemon.pipeline.pipeline import Chain
 from regolithd.daemon.recording.candump import open_log, read_log
 from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, estimate_json, snapshot_json, with_current_names
 from regolithd.daemon.recording.digest import Digest

@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from regolithd.daemon.config.configuration import Configuration, Recording
-from regolithd.daemon.pipeline.chain import Chain
 from regolithd.daemon.pipeline.onnx_models import load_models
+from regolithd.daemon.pipeline.pipeline import Chain
 from regolithd.daemon.pipeline.snapshot import SlipSource
 from regolithd.daemon.publish.encode import encode
 from regolithd.daemon.recording.recorder import Recorder

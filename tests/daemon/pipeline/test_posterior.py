@@ -7,8 +7,8 @@ import pytest
 from regolithd.calibration.parameters import Drivetrain
 from regolithd.calibration.posterior.estimator import PosteriorModelError
 from regolithd.daemon.config.configuration import Configuration
-from regolithd.daemon.pipeline.chain import Chain
 from regolithd.daemon.pipeline.onnx_models import load_models, load_posterior
+from regolithd.daemon.pipeline.pipeline import Chain
 from regolithd.daemon.pipeline.posterior import gain_relative_std
 from regolithd.daemon.pipeline.snapshot import Estimate
 

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from regolithd.daemon.config.configuration import Configuration, Recording
-from regolithd.daemon.pipeline.chain import Chain
 from regolithd.daemon.pipeline.onnx_models import load_models
+from regolithd.daemon.pipeline.pipeline import Chain
 from regolithd.daemon.recording.candump import frame_line, parse_line, read_log
 from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, snapshot_from_json
 from regolithd.daemon.recording.digest import Digest
