@@ -1,17 +1,17 @@
-"""The running daemon: one task for each thing that is owned, all in one group, cancelled together.
+"""The running daemon: one task for each resource, all in one task group, cancelled together.
 
-    bus ─▶ record frames ▸ decode ▸ acquire ▸ torque ▸ smooth ▸ slip ▸ estimate ─▶ record, publish
+    bus ─▶ record frames ▸ decode ▸ acquire ▸ torque ▸ smooth ▸ slip ▸ estimate ▸ posterior ─▶ record, publish
 
 | task | owns |
 |---|---|
 | network | the bus: reads it, boots and supervises the nodes, sends SYNC and heartbeat |
 | recording | the files |
 | each sink | its connection, or its socket |
-| watchdog | systemd's attention: fed only while all others answer |
+| watchdog | systemd's watchdog, fed only while all other tasks report that they run |
 
-What comes from the bus goes through the whole pipeline within the network's task, a few hundred microseconds for each
-SYNC, so nothing can fall behind or overtake. To stop is to be cancelled: the drives stop first, then the recording is
-closed and the sinks say goodbye.
+Frames go through the whole pipeline within the network's task, a few hundred microseconds for each SYNC, so estimates
+come in order and without a queue. Cancelling `run` is the way to stop: the drives stop first, then the sinks finish and
+the recording is closed.
 """
 
 from __future__ import annotations
@@ -49,12 +49,13 @@ _log = logging.getLogger(__name__)
 
 NETWORK, RECORDING = "network", "recording"
 TASK_TIMEOUT_S = 5.0
+"""The network and recording tasks count as hung when they have not reported for this long."""
 WATCHDOG_POLL_S = 0.5
 BUS_RETRY_S = 2.0
 
 
 class Sink(Protocol):
-    """Where estimates and events go. Neither call may block; `run` does what takes time, and beats its pulse."""
+    """A receiver of estimates and events. Neither call may block; `run` does what takes time, and reports liveness."""
 
     def estimate(self, estimate: Estimate) -> None:
         """Take one more estimate."""
@@ -67,19 +68,19 @@ class Sink(Protocol):
 
 
 class Service:
-    """Everything that runs for one rover. `sinks` may be added until `run`.
+    """The daemon of one rover: bus, pipeline, recording and sinks. `sinks` may be added until `run`.
 
     Attributes
     ----------
     configuration, models
-        What it was started with.
+        The configuration, and the ONNX models that it names.
     chain
         From frames to estimates, with its counters.
     recorder
         The recording, or None where it is switched off.
     liveness
-        Who has answered lately.
-    bus_trouble
+        When each task last reported that it runs.
+    bus_problem
         Why the bus cannot be opened; empty where it is open.
     """
 
@@ -89,7 +90,7 @@ class Service:
         self.chain = Chain(configuration, models)
         self.recorder = _recorder(configuration, models.terrain) if configuration.recording.enabled else None
         self.liveness = TaskLiveness()
-        self.bus_trouble = ""
+        self.bus_problem = ""
         self.sinks: list[Sink] = []
         self._network: Network | None = None
         self._opened = asyncio.Event()
@@ -97,17 +98,17 @@ class Service:
 
     @property
     def network(self) -> Network | None:
-        """The nodes, once the bus is open; commands may come from any task."""
+        """The CANopen network, or None while the bus is not open; commands may come from any task."""
         return self._network
 
     async def opened(self) -> Network:
-        """Wait until the bus is open, and return its nodes."""
+        """Wait until the bus is open, and return the network."""
         await self._opened.wait()
         assert self._network is not None  # noqa: S101  # set before the event
         return self._network
 
     async def run(self) -> None:
-        """Run until cancelled; then stop the drives, let the sinks say goodbye, and close the recording."""
+        """Run until cancelled; then stop the drives, let the sinks finish, and close the recording."""
         try:
             async with asyncio.TaskGroup() as group:
                 tasks = [group.create_task(sink.run()) for sink in self.sinks]
@@ -137,7 +138,7 @@ class Service:
             await self._network.run()
 
     async def _open_bus(self, opened: AsyncExitStack) -> Bus:
-        """Open the bus; while it is not there, say why and try again."""
+        """Open the bus; while that fails, log why and try again."""
         settings = self.configuration.bus
         while True:
             try:
@@ -145,12 +146,12 @@ class Service:
                     open_bus(settings.interface, settings.channel, bitrate=settings.bitrate)
                 )
             except BusOpenError as error:
-                if str(error) != self.bus_trouble:
-                    _log.warning("%s It is tried again every %g s.", error, BUS_RETRY_S)
-                self.bus_trouble = str(error)
+                if str(error) != self.bus_problem:
+                    _log.warning("%s Trying again every %g s.", error, BUS_RETRY_S)
+                self.bus_problem = str(error)
                 await asyncio.sleep(BUS_RETRY_S)
             else:
-                self.bus_trouble = ""
+                self.bus_problem = ""
                 return bus
 
     def _take_frames(self, batch: Sequence[Frame]) -> None:
@@ -179,13 +180,13 @@ class Service:
             await asyncio.sleep(FLUSH_S)
 
     async def _feed_watchdog(self) -> None:
-        """Feed the watchdog while every task answers; let it bite when one does not."""
+        """Feed systemd's watchdog while every task reports; otherwise let it expire, and name the tasks in STATUS."""
         period_s = watchdog_period_s()
         pause_s = min(WATCHDOG_POLL_S, period_s or WATCHDOG_POLL_S)
         try:
             while self._network is None:
-                # systemd shall wait for the bus, however long it takes, and show why.
-                notify(f"EXTEND_TIMEOUT_USEC=10000000\nSTATUS=waiting for the bus. {self.bus_trouble}")
+                # systemd is to wait for the bus without a time limit, and to show why.
+                notify(f"EXTEND_TIMEOUT_USEC=10000000\nSTATUS=waiting for the bus. {self.bus_problem}")
                 await asyncio.sleep(pause_s)
             self.liveness.expect(NETWORK, TASK_TIMEOUT_S)
             notify(f"{READY}\nSTATUS=acquiring at {self.configuration.sync.rate_Hz:g} Hz")
@@ -200,7 +201,7 @@ class Service:
             notify(STOPPING)
 
     def _check_sync_progress(self, network: Network) -> None:
-        """Take the network for alive while it tries to send SYNCs: a dead link brings no frames."""
+        """Report the network task as running while its SYNC counters increase: a link that is down brings no frames."""
         sync = network.counters.sync
         tried = sync.produced + sync.failed + sync.skipped
         if tried != self._syncs_tried:
@@ -209,7 +210,7 @@ class Service:
 
 
 def network_settings(configuration: Configuration) -> NetworkSettings:
-    """Return what the drivers' network is to be."""
+    """Return the settings of the CANopen network."""
     nodes = configuration.nodes
     return NetworkSettings(
         nodes=nodes.described(),
@@ -223,11 +224,11 @@ def network_settings(configuration: Configuration) -> NetworkSettings:
 
 
 def event_json(event: NetworkEvent) -> bytes:
-    """Return an event as JSON: the name of its class, its time, and what it tells."""
+    """Return an event as JSON: the name of its class, and its fields."""
     return json.dumps({"event": type(event).__name__, **asdict(event)}, default=_plain).encode()
 
 
-def _plain(value: Any) -> Any:  # noqa: ANN401  # whatever an event may hold
+def _plain(value: Any) -> Any:  # noqa: ANN401  # any field of an event
     if isinstance(value, bytes):
         return value.hex()
     return value.value if isinstance(value, Enum) else str(value)

@@ -37,4 +37,4 @@ def connect_sinks(service: Service) -> None:
         beat=lambda: liveness.beat(CONTROL),
     )
     liveness.expect(CONTROL, CONTROL_TIMEOUT_S)
-    service.sinks += [MqttSink(service, publisher, control_trouble=lambda: control.problem), control]
+    service.sinks += [MqttSink(service, publisher, control_problem=lambda: control.problem), control]

@@ -7,7 +7,7 @@ import os
 from typing import TYPE_CHECKING
 
 from regolithd.daemon.check.finding import Finding, good, unknown, warning, wrong
-from regolithd.daemon.control.client import EX_NOPERM, ControlError, conversation
+from regolithd.daemon.control.client import EX_NOPERM, ControlError, control_connection
 from regolithd.daemon.control.protocol import Status, StatusRequest
 from regolithd.daemon.control.socket import ControlSocketError, group_id
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 async def running_daemon(configuration: Configuration) -> Status | ControlError | None:
     """Return what the running daemon says of itself, why it may not be asked, or None where none is running."""
     try:
-        async with asyncio.timeout(5), conversation(configuration.control.socket) as daemon:
-            daemon.ask(StatusRequest())
+        async with asyncio.timeout(5), control_connection(configuration.control.socket) as daemon:
+            daemon.send(StatusRequest())
             reply = await daemon.reply()
     except ControlError as error:
         return error if error.exit_status == EX_NOPERM else None

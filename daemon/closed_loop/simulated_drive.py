@@ -61,7 +61,7 @@ def record(drive: SimulatedDrive, configuration: Configuration, network: Terrain
     settings = configuration.recording.model_copy(update={"directory": folder})
     recorder = Recorder(settings, configuration.bus.channel, {"rover": configuration.rover.name}, lambda: START_NS)
     if recorder.paths is None:
-        raise OSError(recorder.trouble)
+        raise OSError(recorder.problem)
     mcap, _ = recorder.paths
     for number, batch in enumerate(drive.frames):
         recorder.frames(batch)
@@ -72,6 +72,6 @@ def record(drive: SimulatedDrive, configuration: Configuration, network: Terrain
         if number % 20 == 0:
             recorder.flush()
     recorder.close()
-    if recorder.trouble:
-        raise OSError(recorder.trouble)
+    if recorder.problem:
+        raise OSError(recorder.problem)
     return mcap

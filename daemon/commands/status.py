@@ -27,19 +27,19 @@ def status(
 
     Exit status: 0 if every node is operational, else 1.
     """
-    from regolithd.daemon.control.client import converse
+    from regolithd.daemon.control.client import run_client
 
-    raise typer.Exit(converse(config, lambda path: _status(path, as_json=json)))
+    raise typer.Exit(run_client(config, lambda path: _status(path, as_json=json)))
 
 
 async def _status(path: Path, *, as_json: bool) -> int:
     from rich.console import Console
 
-    from regolithd.daemon.control.client import conversation
+    from regolithd.daemon.control.client import control_connection
     from regolithd.daemon.control.protocol import Status, StatusRequest
 
-    async with conversation(path) as daemon:
-        daemon.ask(StatusRequest())
+    async with control_connection(path) as daemon:
+        daemon.send(StatusRequest())
         reply = await daemon.reply()
     if not isinstance(reply, Status):
         typer.echo(f"Unexpected answer of the daemon: {reply}", err=True)

@@ -10,7 +10,7 @@ import typer
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
 
-    from regolithd.daemon.control.client import Conversation
+    from regolithd.daemon.control.client import ControlConnection
     from regolithd.daemon.control.protocol import Ended, Refused
 
 Config = Annotated[Path | None, typer.Option(help="The rover.toml of the running daemon.")]
@@ -33,16 +33,16 @@ def traverse(
 
     Ctrl-C, a lost node, or any other end of this command quick-stops the wheels.
     """
-    from regolithd.daemon.control.client import converse
+    from regolithd.daemon.control.client import run_client
 
-    raise typer.Exit(converse(config, lambda path: _traverse(path, distance, speed)))
+    raise typer.Exit(run_client(config, lambda path: _traverse(path, distance, speed)))
 
 
 async def _traverse(path: Path, distance_m: float, speed_m_s: float) -> int:
     import asyncio
     import signal
 
-    from regolithd.daemon.control.client import conversation
+    from regolithd.daemon.control.client import control_connection
     from regolithd.daemon.control.protocol import Refused, StopRequest, TraverseRequest
 
     interrupted = False
@@ -52,12 +52,12 @@ async def _traverse(path: Path, distance_m: float, speed_m_s: float) -> int:
         if interrupted:  # a second Ctrl-C ends at once; the daemon quick-stops then too
             raise SystemExit(INTERRUPTED)
         interrupted = True
-        daemon.ask(StopRequest(quick=True))
+        daemon.send(StopRequest(quick=True))
 
-    async with conversation(path) as daemon:
+    async with control_connection(path) as daemon:
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGTSTP):
             asyncio.get_running_loop().add_signal_handler(number, interrupt)
-        daemon.ask(TraverseRequest(distance_m=distance_m, speed_m_s=speed_m_s))
+        daemon.send(TraverseRequest(distance_m=distance_m, speed_m_s=speed_m_s))
         end = await _follow(daemon)
     if isinstance(end, Refused):
         typer.echo(f"Not driven: {end.text} {end.cure}".rstrip(), err=True)
@@ -68,7 +68,7 @@ async def _traverse(path: Path, distance_m: float, speed_m_s: float) -> int:
     return INTERRUPTED if interrupted else 1
 
 
-async def _follow(daemon: Conversation) -> Ended | Refused:
+async def _follow(daemon: ControlConnection) -> Ended | Refused:
     """Show the progress until the traverse has ended or was refused."""
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -109,17 +109,17 @@ def stop(
     config: Config = None,
 ) -> None:
     """Stop the wheels, also those of a traverse that another user commanded."""
-    from regolithd.daemon.control.client import converse
+    from regolithd.daemon.control.client import run_client
 
-    raise typer.Exit(converse(config, lambda path: _stop(path, quick=quick)))
+    raise typer.Exit(run_client(config, lambda path: _stop(path, quick=quick)))
 
 
 async def _stop(path: Path, *, quick: bool) -> int:
-    from regolithd.daemon.control.client import conversation
+    from regolithd.daemon.control.client import control_connection
     from regolithd.daemon.control.protocol import Done, StopRequest
 
-    async with conversation(path) as daemon:
-        daemon.ask(StopRequest(quick=quick))
+    async with control_connection(path) as daemon:
+        daemon.send(StopRequest(quick=quick))
         reply = await daemon.reply()
     if isinstance(reply, Done):
         typer.echo(reply.text)

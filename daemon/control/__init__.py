@@ -1,1 +1,1 @@
-"""The local control socket: the only way to move the rover."""
+"""The control socket, a local UNIX socket: the only way to command the rover."""

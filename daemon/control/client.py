@@ -1,4 +1,4 @@
-"""The other end of the control socket: what the commands speak to the daemon with."""
+"""Client of the control socket, for the commands `traverse`, `stop` and `status`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class ControlError(Exception):
-    """The daemon cannot be spoken to; the message says why, and the cure. `exit_status` is of sysexits.h."""
+    """The daemon cannot be reached; the message says why, and what to do. `exit_status` is one of sysexits.h."""
 
     def __init__(self, message: str, exit_status: int) -> None:
         super().__init__(message)
@@ -33,7 +33,7 @@ INSTALLED = Path("/etc/regolithd/rover.toml")
 
 
 def control_socket_path(config: Path | None) -> Path:
-    """Return where the daemon of this configuration answers; of the installed one where none is given.
+    """Return the control socket's path from a configuration file, by default the installed one.
 
     Raises
     ------
@@ -44,55 +44,55 @@ def control_socket_path(config: Path | None) -> Path:
     return (Configuration() if path is None else read_configuration(path)).control.socket
 
 
-class Conversation:
-    """A connection to the daemon: ask, and read what it says."""
+class ControlConnection:
+    """A connection to the daemon: send requests, read replies."""
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self._reader = reader
         self._writer = writer
 
-    def ask(self, request: _Line) -> None:
+    def send(self, request: _Line) -> None:
         """Send a request."""
         self._writer.write(request.line())
 
     async def reply(self) -> Accepted | Progress | Ended | Done | Refused | Status:
-        """Return the next thing that the daemon says."""
+        """Return the next reply of the daemon."""
         try:
             line = await self._reader.readline()
         except ConnectionError:
             line = b""
         if not line:
-            raise ControlError("The daemon closed the connection: it was stopped, or it died.", EX_UNAVAILABLE)
+            raise ControlError("The daemon closed the connection: it was stopped, or it failed.", EX_UNAVAILABLE)
         return REPLY.validate_json(line)
 
 
 @asynccontextmanager
-async def conversation(path: Path) -> AsyncIterator[Conversation]:
+async def control_connection(path: Path) -> AsyncIterator[ControlConnection]:
     """Open the control socket."""
     try:
         reader, writer = await asyncio.open_unix_connection(path, limit=LINE_LIMIT)
     except (FileNotFoundError, ConnectionRefusedError) as error:
         cure = "Start it (`systemctl start regolithd`), or give its configuration with --config."
-        raise ControlError(f"No daemon is running: nobody answers at {path}. {cure}", EX_UNAVAILABLE) from error
+        raise ControlError(f"No daemon is running: no answer at {path}. {cure}", EX_UNAVAILABLE) from error
     except PermissionError as error:
         cure = (
-            "Only members of the control group may command the rover: `sudo usermod -aG regolithd $USER`, log in anew."
+            "Only the control group's members may command the rover: `sudo usermod -aG regolithd $USER`; log in again."
         )
         raise ControlError(f"No permission to open {path}. {cure}", EX_NOPERM) from error
     except OSError as error:
         raise ControlError(f"{path}: {error.strerror or error}.", EX_UNAVAILABLE) from error
     try:
-        yield Conversation(reader, writer)
+        yield ControlConnection(reader, writer)
     finally:
         writer.close()
 
 
-def converse(config: Path | None, talk: Callable[[Path], Coroutine[None, None, int]]) -> int:
-    """Run a command's talk with the daemon and return its exit status; say what is wrong where it cannot be held."""
+def run_client(config: Path | None, session: Callable[[Path], Coroutine[None, None, int]]) -> int:
+    """Run a command's session with the daemon and return its exit status; print the error if there is no connection."""
     try:
-        return asyncio.run(talk(control_socket_path(config)))
+        return asyncio.run(session(control_socket_path(config)))
     except ConfigurationError as error:
-        print(error, file=sys.stderr)  # noqa: T201  # a command speaks to a person
+        print(error, file=sys.stderr)  # noqa: T201  # a command's output
         return EXIT_STATUS
     except ControlError as error:
         print(error, file=sys.stderr)  # noqa: T201  # likewise

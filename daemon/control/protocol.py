@@ -1,6 +1,6 @@
-"""What is said over the control socket: one JSON object a line, in UTF-8, over a UNIX stream socket.
+"""The protocol of the control socket: one JSON object a line, in UTF-8, over a UNIX stream socket.
 
-A client asks; the daemon answers with one line, or, while a traverse is driven, with many:
+A client sends a request; the daemon replies with one line, or, during a traverse, with many:
 
     → {"command": "traverse", "distance_m": 10.0, "speed_m_s": 0.022}
     ← {"event": "accepted", "duration_s": 454.5454545454545, "wheel_speed_rad_s": 0.29333333333333333}
@@ -17,8 +17,8 @@ A client asks; the daemon answers with one line, or, while a traverse is driven,
     → {"command": "dance"}
     ← {"event": "refused", "code": "bad-request", "text": "…", "cure": "…"}
 
-A client that commanded a traverse keeps its connection open: when it closes, however, the wheels are quick-stopped. It
-may send `stop` meanwhile. Any other client may stop the traverse too; there is one at a time.
+A client that commanded a traverse keeps its connection open: when the connection closes, for any reason, the wheels are
+quick-stopped. It may send `stop` in the meantime. Any other client may stop the traverse too; there is one at a time.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ class _Line(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     def line(self) -> bytes:
-        """Return it as it is sent."""
+        """Return the line as it is sent."""
         return self.model_dump_json().encode() + b"\n"
 
 
 class TraverseRequest(_Line):
-    """Drive so far at constant wheel speed."""
+    """Drive a distance at constant wheel speed."""
 
     command: Literal["traverse"] = "traverse"
     distance_m: float
@@ -50,14 +50,14 @@ class TraverseRequest(_Line):
 
 
 class StopRequest(_Line):
-    """Stop the traverse that is driven: with the drives' ramp, or at once."""
+    """Stop the traverse: with the drives' ramp, or by a quick stop."""
 
     command: Literal["stop"] = "stop"
     quick: bool = False
 
 
 class StatusRequest(_Line):
-    """Say how things are."""
+    """Request the status."""
 
     command: Literal["status"] = "status"
 
@@ -71,7 +71,7 @@ class Accepted(_Line):
 
 
 class Progress(_Line):
-    """The traverse goes on; `turned_m` is what the wheels' rims have moved."""
+    """Progress of a traverse; `turned_m` is the distance that the wheels' rims have moved."""
 
     event: Literal["progress"] = "progress"
     elapsed_s: float
@@ -89,14 +89,14 @@ class Ended(_Line):
 
 
 class Done(_Line):
-    """What was asked is done."""
+    """The request was carried out."""
 
     event: Literal["done"] = "done"
     text: str
 
 
 class Code(StrEnum):
-    """Why something was refused."""
+    """Why a request was refused."""
 
     BAD_REQUEST = "bad-request"
     LIMIT = "limit"
@@ -105,7 +105,7 @@ class Code(StrEnum):
 
 
 class Refused(_Line):
-    """What was asked is not done."""
+    """The request was refused."""
 
     event: Literal["refused"] = "refused"
     code: Code
@@ -114,7 +114,7 @@ class Refused(_Line):
 
 
 class NodeLine(_Line):
-    """A node in a status."""
+    """One node in `Status`."""
 
     node_id: int
     kind: str
@@ -125,7 +125,7 @@ class NodeLine(_Line):
 
 
 class Status(_Line):
-    """How things are."""
+    """Status of the daemon, the bus and the nodes."""
 
     event: Literal["status"] = "status"
     rover: str

@@ -1,7 +1,7 @@
-"""The daemon's end of the control socket: a sink of the service that also lets something in.
+"""Server of the control socket: takes requests from clients, and drives traverses.
 
-It alone commands the wheels. One traverse at a time; when the connection that commanded it is closed, when a node is
-lost, when a drive faults or when the daemon stops, the wheels are stopped.
+Nothing else commands the wheels. There is one traverse at a time. The wheels are stopped when the connection that
+commanded it is closed, when a node is lost, when a drive faults, and when the daemon stops.
 """
 
 from __future__ import annotations
@@ -51,26 +51,26 @@ RETRY_S = 5.0
 
 
 class Rover(Wheels, Protocol):
-    """What the control socket needs of `drivers.master.network.Network`."""
+    """The part of `drivers.master.network.Network` that the control socket needs."""
 
     @property
     def status(self) -> Mapping[int, NodeStatus]:
-        """What is known of each node."""
+        """State of each node, by node-ID."""
 
 
 class ControlSink:
-    """Takes commands from the socket, and what the bus says from the service.
+    """Serves the control socket; as a sink of the service, it gets wheel speeds and bus events.
 
     Parameters
     ----------
     configuration
         `[control]`, `[wheel]`, `[slip]`, `[drivetrain]` and the rover's name.
     rover
-        Returns the nodes, or None while the bus is not open.
+        Returns the network, or None while the bus is not open.
     broker
-        Returns how the connection to the broker is, in words.
+        Returns the state of the connection to the broker, as text.
     beat
-        Called at least once a second while this task answers.
+        Called at least once a second while this task runs.
     """
 
     def __init__(
@@ -96,17 +96,17 @@ class ControlSink:
         self.problem = ""
 
     def estimate(self, estimate: Estimate) -> None:
-        """Remember how fast the wheels turn."""
+        """Keep the newest snapshot, for the wheel speeds."""
         self._last = estimate.snapshot
         self._snapshots += 1
 
     def event(self, event: NetworkEvent) -> None:
-        """End the traverse when the bus has stopped the wheels."""
+        """End the traverse when the network has stopped the wheels."""
         if isinstance(event, MotionStopped) and self._traverse is not None:
             self._traverse.stop(event.text, quick=True)
 
     async def run(self) -> None:
-        """Serve until cancelled. Where the socket cannot be made, say why, try again, and let the rest go on."""
+        """Serve until cancelled. If the socket cannot be created, log why, and try again every `RETRY_S`."""
         settings = self._configuration.control
         while True:
             try:
@@ -134,7 +134,7 @@ class ControlSink:
             self._tasks = tasks
 
             def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-                tasks.create_task(self._talk(reader, writer))
+                tasks.create_task(self._serve_client(reader, writer))
 
             server = await asyncio.start_unix_server(accept, sock=listener, limit=LINE_LIMIT)
             try:
@@ -144,17 +144,17 @@ class ControlSink:
             finally:
                 server.close()
 
-    async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Answer one client until it goes."""
+    async def _serve_client(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Answer one client until it closes the connection."""
         try:
             while line := await reader.readline():
                 _send(writer, await self._answer(line, writer))
                 await writer.drain()
-        except (ConnectionError, ValueError) as error:  # ValueError: a line without end
-            _log.info("a client of the control socket was cut off: %s", error)
+        except (ConnectionError, ValueError) as error:  # ValueError: a line over LINE_LIMIT
+            _log.info("a client of the control socket was disconnected: %s", error)
         finally:
             if self._owner is writer and self._traverse is not None:
-                self._traverse.stop("the client that commanded it is gone", quick=True)
+                self._traverse.stop("the client that commanded it disconnected", quick=True)
             writer.close()
 
     async def _answer(self, line: bytes, writer: asyncio.StreamWriter) -> _Line:
@@ -188,11 +188,15 @@ class ControlSink:
         rover = self._rover()
         if refusal := _not_ready(rover):
             return refusal
-        assert rover is not None  # noqa: S101  # else it is not ready
-        assert self._tasks is not None  # noqa: S101  # a client is served within it
-        _log.info("traverse of %g m at %g m/s, commanded by %s", plan.distance_m, plan.speed_m_s, _who(writer))
+        assert rover is not None  # noqa: S101  # checked by _not_ready
+        assert self._tasks is not None  # noqa: S101  # set before a client is served
+        _log.info("traverse of %g m at %g m/s, commanded by %s", plan.distance_m, plan.speed_m_s, _client_name(writer))
         self._traverse = Traverse(
-            plan, rover, self._watch, lambda elapsed: self._tell(elapsed, plan, writer), self._clock
+            plan,
+            rover,
+            self._standstill_detector,
+            lambda elapsed: self._report_progress(elapsed, plan, writer),
+            self._clock,
         )
         self._owner = writer
         self._tasks.create_task(self._drive(self._traverse, writer))
@@ -208,37 +212,37 @@ class ControlSink:
         with suppress(ConnectionError):
             await writer.drain()
 
-    def _tell(self, elapsed_s: float, plan: Plan, writer: asyncio.StreamWriter) -> None:
+    def _report_progress(self, elapsed_s: float, plan: Plan, writer: asyncio.StreamWriter) -> None:
         self._progress = Progress(elapsed_s=elapsed_s, turned_m=elapsed_s * abs(plan.speed_m_s))
         _send(writer, self._progress)
 
-    def _watch(self) -> Callable[[], bool]:
-        """Return what says whether all wheels stand, by a snapshot whose SYNC came after this call."""
+    def _standstill_detector(self) -> Callable[[], bool]:
+        """Return a function that says whether all wheels stand still, by a snapshot whose SYNC came after this call."""
         begun = self._snapshots
 
         def standing() -> bool:
-            if self._last is None or self._snapshots < begun + 2:  # the first may have been on its way already
+            if self._last is None or self._snapshots < begun + 2:  # the first SYNC may have come before this call
                 return False
             wheel_speed = self._last.motor_speed_rad_s / self._configuration.drivetrain.ratio
-            # A wheel that says nothing, NaN, may turn.
+            # A wheel that was not measured (NaN) may turn.
             return bool(np.all(np.abs(wheel_speed) < self._configuration.slip.standstill_rad_s))
 
         return standing
 
     async def _stop(self, request: StopRequest, writer: asyncio.StreamWriter) -> _Line:
-        who = _who(writer)
+        who = _client_name(writer)
         _log.info("stop commanded by %s", who)
         if self._traverse is not None:
             self._traverse.stop(f"stopped by {who}", quick=request.quick)
             return Done(text="The traverse is being stopped.")
         rover = self._rover()
         if rover is None:
-            return Done(text="The bus is not open: nothing is driven by this daemon.")
+            return Done(text="The bus is not open: this daemon drives nothing.")
         try:
             await rover.disable()
         except DriverError as error:
-            return Refused(code=Code.NOT_READY, text=str(error), cure="Cut the motors' power.")
-        return Done(text="No traverse was being driven; the drives are without power.")
+            return Refused(code=Code.NOT_READY, text=str(error), cure="Cut the power of the motors.")
+        return Done(text="No traverse was being driven; the drives are disabled.")
 
     def _status(self) -> Status:
         rover = self._rover()
@@ -270,11 +274,9 @@ def _ended(outcome: Outcome, plan: Plan) -> Ended:
 
 
 def _not_ready(rover: Rover | None) -> Refused | None:
-    """Return why no traverse can begin now, or None."""
+    """Return the refusal if no traverse can begin now, or None."""
     if rover is None:
-        return Refused(
-            code=Code.NOT_READY, text="The CAN bus is not open.", cure="`regolithd check` says what is wrong with it."
-        )
+        return Refused(code=Code.NOT_READY, text="The CAN bus is not open.", cure="`regolithd check` says why.")
     missing = [
         f"{status.node.kind} {node_id} is {status.phase.value}"
         for node_id, status in rover.status.items()
@@ -285,7 +287,7 @@ def _not_ready(rover: Rover | None) -> Refused | None:
     return Refused(
         code=Code.NOT_READY,
         text=f"Not every node is operational: {', '.join(missing)}.",
-        cure="`regolithd status` says why; power them, or mend [nodes].",
+        cure="`regolithd status` says why; power them, or correct [nodes].",
     )
 
 
@@ -301,8 +303,8 @@ def _node_line(status: NodeStatus) -> NodeLine:
     )
 
 
-def _who(writer: asyncio.StreamWriter) -> str:
-    """Return who is at the other end, as the kernel knows them."""
+def _client_name(writer: asyncio.StreamWriter) -> str:
+    """Return user and process of the client, from the kernel (SO_PEERCRED)."""
     connection = writer.get_extra_info("socket")
     try:
         raw = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)

@@ -1,4 +1,4 @@
-"""The file that the control socket is: made so that only its group may open it, from the first moment on."""
+"""Creates the control socket's file with permissions for its group only, without a moment of wider permissions."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ MODE = 0o660
 
 
 class ControlSocketError(Exception):
-    """The control socket cannot be offered; the message says why, and the cure."""
+    """The control socket cannot be created; the message says why, and what to do."""
 
 
 def group_id(group: str) -> int:
-    """Return a group's number."""
+    """Return the number of a group, given its name or number."""
     try:
         return int(group) if group.isdigit() else grp.getgrnam(group).gr_gid
     except KeyError:
-        cure = f"Make it (`groupadd --system {group}`), or name another: [control] group."
+        cure = f"Create it (`groupadd --system {group}`), or name another: [control] group."
         raise ControlSocketError(f"there is no group {group!r}. {cure}") from None
 
 
 def open_control_socket(path: Path, group: str) -> socket.socket:
     """Return a listening socket at `path`, which only the group's members (and root) may open."""
     number = group_id(group)
-    _clear(path)
+    _remove_stale(path)
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK | socket.SOCK_CLOEXEC)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        mask = os.umask(0o177)  # nobody but us, until the group is right
+        mask = os.umask(0o177)  # only the daemon's user, until the group is set
         try:
             listener.bind(str(path))
         finally:
@@ -50,13 +50,13 @@ def open_control_socket(path: Path, group: str) -> socket.socket:
     return listener
 
 
-def _clear(path: Path) -> None:
-    """Remove the socket of a daemon that was killed; never that of one that runs, and never another kind of file."""
+def _remove_stale(path: Path) -> None:
+    """Remove the socket of a daemon that was killed; refuse if a daemon answers on it, or if it is no socket."""
     try:
         if not stat.S_ISSOCK(path.lstat().st_mode):
             raise ControlSocketError(f"{path}: is not a socket. Choose another path: [control] socket.")
     except OSError:
-        return  # nothing there, or binding will say why not
+        return  # there is no file, or bind will fail with the reason
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
         try:
             probe.connect(str(path))
@@ -65,4 +65,4 @@ def _clear(path: Path) -> None:
         except OSError as error:
             raise ControlSocketError(f"{path}: {error.strerror}.") from error
         else:
-            raise ControlSocketError(f"{path}: another regolithd answers there. Stop that one first.")
+            raise ControlSocketError(f"{path}: another regolithd answers there. Stop that process first.")

@@ -1,7 +1,16 @@
-"""A traverse as Kapvik did it: so far, at constant wheel speed, then a clean stop.
+"""Drives a traverse: a distance at constant wheel speed, then a stop.
 
-The time follows from distance and wheel speed (10 m at 2.2 cm/s: 454.54 s); how far the rover comes in it depends on
-the slip, which is what is to be measured. Whatever goes wrong on the way ends in a quick stop.
+The duration follows from distance and wheel speed (10 m at 2.2 cm/s: 454.54 s); how far the rover moves in it depends
+on the slip.
+
+| condition | the wheels are | ending |
+|---|---|---|
+| the duration has passed | set to speed 0; once measured to stand still, disabled | finished |
+| `stop(quick=False)` | the same | stopped |
+| not at a standstill `STANDSTILL_TIMEOUT_S` after speed 0 | quick-stopped, disabled | quick-stopped |
+| `stop(quick=True)`, or a drive fails | quick-stopped, disabled | quick-stopped |
+| a quick stop is not confirmed in `QUICK_STOP_TIMEOUT_S` | sent both commands | failed |
+| the drives cannot be enabled | not driven | failed |
 """
 
 from __future__ import annotations
@@ -18,15 +27,15 @@ from regolithd.drivers.errors import DriverError
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-REPORT_EVERY_S = 0.5
-STAND_WITHIN_S = 5.0
-"""A clean stop may take this long; then it becomes a quick stop."""
-GIVE_UP_AFTER_S = 3.0
-"""A quick stop that is not confirmed by then: the drives' own heartbeat consumers are what is left."""
+REPORT_PERIOD_S = 0.5
+STANDSTILL_TIMEOUT_S = 5.0
+"""Time for a stop with the drives' ramp; then it becomes a quick stop."""
+QUICK_STOP_TIMEOUT_S = 3.0
+"""Time for the confirmation of a quick stop. Without one, only the drives' heartbeat consumers can stop them."""
 
 
 class TraverseError(ValueError):
-    """A traverse that is not to be driven; `problems` says everything that is wrong with it."""
+    """A traverse that is refused; `problems` lists every reason."""
 
     def __init__(self, problems: list[str]) -> None:
         super().__init__(" ".join(problems))
@@ -35,7 +44,7 @@ class TraverseError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """What is to be driven. Negative speeds drive backwards; the distance is positive."""
+    """Distance and speed of a traverse. Negative speeds drive backwards; the distance is positive."""
 
     distance_m: float
     speed_m_s: float
@@ -43,19 +52,19 @@ class Plan:
 
     @property
     def duration_s(self) -> float:
-        """How long the wheels turn."""
+        """Time for which the wheels turn [s]."""
         return self.distance_m / abs(self.speed_m_s)
 
     @property
     def wheel_speed_rad_s(self) -> float:
-        """How fast each wheel turns: its rim moves at the speed wanted, ω = v/r."""
+        """Angular speed of each wheel [rad/s]: ω = v/r."""
         return self.speed_m_s / self.radius_m
 
 
 def plan_traverse(
     distance_m: float, speed_m_s: float, *, radius_m: float, speed_limit_m_s: float, distance_limit_m: float
 ) -> Plan:
-    """Return the plan of a traverse; raise `TraverseError` with everything that speaks against it."""
+    """Return the plan of a traverse, or raise `TraverseError` with every limit that it exceeds."""
     problems = []
     if not 0 < distance_m <= distance_limit_m:
         problems.append(f"The distance must be above 0 and at most {distance_limit_m:g} m, not {distance_m:g}.")
@@ -69,12 +78,12 @@ def plan_traverse(
 
 
 class Ending(StrEnum):
-    """How a traverse ended."""
+    """How a traverse ended (table above)."""
 
-    FINISHED = "finished"  # all of it driven, and stopped clean
-    STOPPED = "stopped"  # stopped clean before its time, because somebody wanted it
-    QUICK_STOPPED = "quick-stopped"  # stopped at once, because it had to be
-    FAILED = "failed"  # the drives could not be enabled, or did not confirm that they stand
+    FINISHED = "finished"  # complete, and stopped with the drives' ramp
+    STOPPED = "stopped"  # stopped early with the drives' ramp, on request
+    QUICK_STOPPED = "quick-stopped"  # stopped by a quick stop
+    FAILED = "failed"  # the drives could not be enabled, or did not confirm the stop
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,27 +99,27 @@ class Wheels(Protocol):
     """The rover's wheels, as `drivers.master.network.Network` offers them."""
 
     async def enable(self) -> None:
-        """Bring all drives to operation enabled, standing still."""
+        """Bring all drives to operation enabled, at speed 0."""
 
     async def set_speed(self, wheel_speed_rad_s: Sequence[float]) -> None:
-        """Turn the six wheels at these speeds, with the drives' own ramps."""
+        """Turn the six wheels at these speeds, with the drives' ramps."""
 
     async def quick_stop(self) -> None:
-        """Stop all wheels now."""
+        """Stop all wheels by a quick stop (CiA 402)."""
 
     async def disable(self) -> None:
-        """Take the power off the motors."""
+        """Disable all drives: no torque."""
 
 
 class Clock:
-    """The time that a traverse is driven by; tests have one of their own."""
+    """The monotonic clock; tests replace it."""
 
     def now_s(self) -> float:
-        """Return the time [s] since whenever; it never jumps."""
+        """Return the time [s] of a monotonic clock."""
         return time.monotonic()
 
     async def wait(self, event: asyncio.Event, seconds: float) -> None:
-        """Return when the event is set or the time is over."""
+        """Return when the event is set or the time has passed."""
         with suppress(TimeoutError):
             async with asyncio.timeout(seconds):
                 await event.wait()
@@ -118,23 +127,24 @@ class Clock:
 
 @dataclass(slots=True)
 class Traverse:
-    """One traverse, from enabling the drives to taking their power off.
+    """One traverse, from enabling the drives to disabling them.
 
     Parameters
     ----------
     plan
-        What to drive.
+        Distance and speed.
     wheels
-        What to drive it with.
-    watch
-        Begins to watch the wheels, and returns what says whether all six have been measured to stand since.
+        The drives.
+    standstill_detector
+        Called when the wheels are told to stop; returns a function that says whether all six have been measured to
+        stand still since.
     report
-        Called with the seconds driven, about twice a second.
+        Called with the seconds driven, every `REPORT_PERIOD_S`.
     """
 
     plan: Plan
     wheels: Wheels
-    watch: Callable[[], Callable[[], bool]]
+    standstill_detector: Callable[[], Callable[[], bool]]
     report: Callable[[float], None]
     clock: Clock = field(default_factory=Clock)
     _interrupted: asyncio.Event = field(default_factory=asyncio.Event)
@@ -143,72 +153,72 @@ class Traverse:
     _began: float | None = None
 
     def stop(self, why: str, *, quick: bool) -> None:
-        """Have it end before its time: with the drives' ramp, or at once. A quick stop overrides a clean one."""
+        """Stop the traverse early: with the drives' ramp, or by a quick stop, which overrides the former."""
         if not self._interrupted.is_set() or (quick and not self._quick):
             self._quick, self._why = quick, why
         self._interrupted.set()
 
     async def run(self) -> Outcome:
-        """Drive it. However it ends, also by cancellation, the wheels are told to stop."""
+        """Drive it. However it ends, by cancellation too, the wheels are told to stop."""
         try:
             await self.wheels.enable()
             self._began = self.clock.now_s()
-            trouble = await self._drive()
+            problem = await self._drive()
         except asyncio.CancelledError:
-            await self._stop_at_once()
+            await self._quick_stop()
             raise
         except DriverError as error:
-            trouble = self._why or str(error)
+            problem = self._why or str(error)
         if self._began is None:
-            return Outcome(Ending.FAILED, 0.0, trouble)
+            return Outcome(Ending.FAILED, 0.0, problem)
         elapsed = min(self.clock.now_s() - self._began, self.plan.duration_s)
-        if trouble:
-            return await self._end_quickly(elapsed, trouble)
+        if problem:
+            return await self._end_by_quick_stop(elapsed, problem)
         if self._interrupted.is_set():
             return Outcome(Ending.STOPPED, elapsed, self._why)
         return Outcome(Ending.FINISHED, elapsed, "the traverse is complete")
 
     async def _drive(self) -> str:
-        """Drive and stop clean; return why this must become a quick stop, or nothing."""
-        if not self._interrupted.is_set():  # it may have been while the drives were being enabled
+        """Drive, and stop with the drives' ramp; return why a quick stop is needed, or an empty text."""
+        if not self._interrupted.is_set():  # `stop` may have been called while the drives were being enabled
             await self.wheels.set_speed((self.plan.wheel_speed_rad_s,) * 6)
         while not self._interrupted.is_set() and (left := self._left_s()) > 0:
             self.report(self.plan.duration_s - left)
-            await self.clock.wait(self._interrupted, min(REPORT_EVERY_S, left))
+            await self.clock.wait(self._interrupted, min(REPORT_PERIOD_S, left))
         if self._quick:
             return self._why
-        return await self._stop_clean()
+        return await self._stop_with_ramp()
 
     def _left_s(self) -> float:
         began = self.clock.now_s() if self._began is None else self._began
         return began + self.plan.duration_s - self.clock.now_s()
 
-    async def _stop_clean(self) -> str:
+    async def _stop_with_ramp(self) -> str:
         await self.wheels.set_speed((0.0,) * 6)
-        standing = self.watch()
-        deadline = self.clock.now_s() + STAND_WITHIN_S
+        standing = self.standstill_detector()
+        deadline = self.clock.now_s() + STANDSTILL_TIMEOUT_S
         while not standing():
             if self._quick:
                 return self._why
             if self.clock.now_s() >= deadline:
-                return f"the wheels still turned {STAND_WITHIN_S:g} s after they were told to stop"
+                return f"the wheels still turned {STANDSTILL_TIMEOUT_S:g} s after they were told to stop"
             await self.clock.wait(asyncio.Event(), 0.05)
         await self.wheels.disable()
         return ""
 
-    async def _end_quickly(self, elapsed: float, why: str) -> Outcome:
-        trouble = await self._stop_at_once()
-        if trouble:
-            return Outcome(Ending.FAILED, elapsed, f"{why}; and not every drive confirmed its stop: {trouble}")
+    async def _end_by_quick_stop(self, elapsed: float, why: str) -> Outcome:
+        problem = await self._quick_stop()
+        if problem:
+            return Outcome(Ending.FAILED, elapsed, f"{why}; and not every drive confirmed its stop: {problem}")
         return Outcome(Ending.QUICK_STOPPED, elapsed, why)
 
-    async def _stop_at_once(self) -> str:
-        """Quick-stop and take the power off; return what went wrong, or nothing."""
-        trouble = ""
+    async def _quick_stop(self) -> str:
+        """Quick-stop and disable; return the first error, or an empty text."""
+        problem = ""
         for command in (self.wheels.quick_stop, self.wheels.disable):
             try:
-                async with asyncio.timeout(GIVE_UP_AFTER_S):
+                async with asyncio.timeout(QUICK_STOP_TIMEOUT_S):
                     await command()
             except (DriverError, TimeoutError) as error:
-                trouble = trouble or str(error) or "no answer"
-        return trouble
+                problem = problem or str(error) or "no answer"
+        return problem

@@ -112,7 +112,7 @@ async def run_demo(folder: Path, seconds: float, show: Callable[[LiveTable, floa
         for task in background:
             task.cancel()
     if paths is None:
-        raise OSError("the recording failed: " + (service.recorder.trouble or "" if service.recorder else ""))
+        raise OSError("the recording failed: " + (service.recorder.problem or "" if service.recorder else ""))
     return DemoRun(ground_truth, *paths)
 
 

@@ -38,13 +38,13 @@ class AlarmInputs:
     """The values that alarms are decided from. An empty text means no problem; counts are since the start."""
 
     nodes: Mapping[int, NodeStatus] = field(default_factory=dict)
-    bus_trouble: str = ""
+    bus_problem: str = ""
     bus_state: BusState = BusState.ACTIVE
     kernel_drops: int = 0
     store_dropped: int = 0
     store_unstored: int = 0
-    recording_trouble: str = ""
-    control_trouble: str = ""
+    recording_problem: str = ""
+    control_problem: str = ""
     clock_jump_s: float = 0.0
     soil_change: str = ""
     stuck: tuple[tuple[Quantity, int], ...] = ()
@@ -82,8 +82,8 @@ def _node_alarms(nodes: Iterable[NodeStatus]) -> Iterable[Alarm]:
 
 
 def _bus_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
-    if inputs.bus_trouble:
-        yield Alarm("bus", Severity.CRITICAL, inputs.bus_trouble, "`regolithd check` gives details.")
+    if inputs.bus_problem:
+        yield Alarm("bus", Severity.CRITICAL, inputs.bus_problem, "`regolithd check` gives details.")
     elif severity := _BUS_SEVERITY.get(inputs.bus_state):
         cure = (
             "Check cable, termination (120 Ω at both ends) and bit rate; `ip -details link` shows the error counters."
@@ -103,18 +103,18 @@ def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
     elif inputs.store_unstored:
         text = f"the disk refused {inputs.store_unstored} messages; they are kept in memory only"
         yield Alarm("store", Severity.WARNING, text, "Free space on the disk of [mqtt] spool_directory.")
-    if inputs.recording_trouble:
+    if inputs.recording_problem:
         yield Alarm(
             "recording",
             Severity.ERROR,
-            inputs.recording_trouble,
+            inputs.recording_problem,
             "Free space on the disk, or correct [recording] directory.",
         )
-    if inputs.control_trouble:
+    if inputs.control_problem:
         yield Alarm(
             "control",
             Severity.WARNING,
-            inputs.control_trouble,
+            inputs.control_problem,
             "The rover cannot be commanded until this is corrected.",
         )
     if inputs.stuck:

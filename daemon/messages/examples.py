@@ -92,7 +92,7 @@ _HEALTH = {
         "unstored": 0,
         "torn": 0,
     },
-    "recording": {"file": "/var/lib/regolithd/recordings/20130611T140312Z.mcap", "free_MB": 21000.0, "trouble": None},
+    "recording": {"file": "/var/lib/regolithd/recordings/20130611T140312Z.mcap", "free_MB": 21000.0, "problem": None},
     "tasks": {"network": 0.1, "recording": 0.2, "publishing": 0.3, "control": 0.2},
 }
 _INTERVAL = ("mean", "low_90", "low_50", "median", "high_50", "high_90")

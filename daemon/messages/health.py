@@ -57,7 +57,7 @@ class RecordingReport(BaseModel):
 
     file: str | None
     free_MB: float | None
-    trouble: str | None
+    problem: str | None
 
 
 class HealthMessage(Header):

@@ -50,16 +50,16 @@ class MqttSink:
         The service whose estimates, events and state are published.
     publisher
         The publisher that delivers the messages.
-    control_trouble
+    control_problem
         Returns why no commands can be taken, or an empty text.
     """
 
     def __init__(
-        self, service: Service, publisher: Publisher, *, control_trouble: Callable[[], str] = lambda: ""
+        self, service: Service, publisher: Publisher, *, control_problem: Callable[[], str] = lambda: ""
     ) -> None:
         self.publisher = publisher
         self._service = service
-        self._control_trouble = control_trouble
+        self._control_problem = control_problem
         self._started_ns = time.monotonic_ns()
         self._published_nodes: dict[int, tuple[object, ...]] = {}
         self._published_alarms: dict[str, Alarm | None] = {}
@@ -148,13 +148,13 @@ class MqttSink:
         network, recorder, report = service.network, service.recorder, self.publisher.report
         return AlarmInputs(
             nodes=network.status if network is not None else {},
-            bus_trouble=service.bus_trouble,
+            bus_problem=service.bus_problem,
             bus_state=network.bus.state if network is not None else BusState.ACTIVE,
             kernel_drops=network.bus.counters.kernel_drops if network is not None else 0,
             store_dropped=report.dropped,
             store_unstored=report.unstored,
-            recording_trouble=(recorder.trouble or "") if recorder is not None else "",
-            control_trouble=self._control_trouble(),
+            recording_problem=(recorder.problem or "") if recorder is not None else "",
+            control_problem=self._control_problem(),
             clock_jump_s=self._jump_s,
             soil_change=self._soil_change if time.monotonic_ns() < self._soil_change_until_ns else "",
             stuck=self._stuck_sensors.stuck,
@@ -167,7 +167,7 @@ class MqttSink:
             "uptime_s": (time.monotonic_ns() - self._started_ns) / 1e9,
             "cpu_s": time.process_time(),
             "memory_MB": _resident_MB(),
-            "bus_state": service.bus_trouble or (network.bus.state.value if network is not None else None),
+            "bus_state": service.bus_problem or (network.bus.state.value if network is not None else None),
             "bus": network.bus.counters.as_dict() if network is not None else {},
             "sync": _sync_report(service),
             "acquisition": AcquisitionReport(**asdict(service.chain.acquisition.counters)),
@@ -241,7 +241,7 @@ def _recording_report(service: Service) -> RecordingReport | None:
         free = shutil.disk_usage(service.configuration.recording.directory).free / 1e6
     except OSError:
         free = None
-    return RecordingReport(file=str(paths[0]) if paths else None, free_MB=free, trouble=recorder.trouble)
+    return RecordingReport(file=str(paths[0]) if paths else None, free_MB=free, problem=recorder.problem)
 
 
 def _resident_MB() -> float:

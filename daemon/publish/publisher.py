@@ -231,9 +231,9 @@ class Publisher:
         _log.log(level, "%s The daemon goes on, stores messages, and tries again.", reason)
         self._problem = reason
 
-    def _log_once(self, trouble: str) -> None:
-        _log.log(logging.DEBUG if trouble in self._logged else logging.WARNING, "%s", trouble)
-        self._logged.add(trouble)
+    def _log_once(self, problem: str) -> None:
+        _log.log(logging.DEBUG if problem in self._logged else logging.WARNING, "%s", problem)
+        self._logged.add(problem)
 
     async def _sync_to_disk(self) -> None:
         """Sync to the disk what has waited for a second; while the broker acknowledges in time, nothing is synced."""

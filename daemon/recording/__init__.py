@@ -1,1 +1,1 @@
-"""What is kept: every frame in a candump log, every snapshot, estimate and event in an MCAP file beside it."""
+"""Recording of frames (candump log) and of snapshots, estimates and events (MCAP); replay and export of both."""

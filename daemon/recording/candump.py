@@ -4,7 +4,8 @@
 
 Time in seconds with microseconds, interface, identifier in hex (three digits; eight where extended, or with the error
 flag 0x20000000), data in hex (`R` for a remote request), and `T` for a frame that this computer sent, `R` for one that
-it received. Microseconds are what all of can-utils read, and one bit at 1 Mbit/s; kernel times are cut to them.
+it received. All of can-utils read microseconds, the duration of one bit at 1 Mbit/s; kernel times are
+truncated to them.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ def open_log(path: Path) -> AbstractContextManager[IO[str]]:
 
 
 def read_log(path: Path, opening: Callable[[Path], AbstractContextManager[IO[str]]] = open_log) -> Iterator[Frame]:
-    """Yield the frames of a log in their order. Lines that are cut off, or no frames, are passed over."""
+    """Yield the frames of a log in their order; incomplete lines and lines that are not frames are skipped."""
     with opening(path) as lines:
         for line in lines:
             frame = parse_line(line)

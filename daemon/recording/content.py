@@ -1,4 +1,4 @@
-"""Snapshots and estimates as the JSON that an MCAP file holds; a number read back is the same to the last bit."""
+"""Snapshots and estimates as the JSON of an MCAP file; a number that is read back is the same to the last bit."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ ESTIMATE = "estimate"
 EVENT = "event"
 
 _RENAMED = {"belief": "posterior"}
-"""Fields of an estimate whose name has changed: in recordings of version 0.1, and now."""
+"""Fields of an estimate that were renamed: name in recordings of version 0.1, current name."""
 
 
 def _write(content: dict[str, Any]) -> bytes:
-    return to_json(content, inf_nan_mode="null")  # pydantic's writer: all digits, five times as fast as json's
+    return to_json(
+        content, inf_nan_mode="null"
+    )  # pydantic's writer: all digits, and five times as fast as the json module
 
 
 def snapshot_json(snapshot: Snapshot) -> bytes:
@@ -46,7 +48,7 @@ def snapshot_from_json(content: dict[str, Any]) -> Snapshot:
 
 
 def estimate_json(estimate: Estimate) -> bytes:
-    """Return what the stages made of a snapshot as JSON, six numbers or null for each name."""
+    """Return an estimate as JSON: for each name six values, null where there is none."""
     content: dict[str, Any] = {
         "sequence": estimate.snapshot.sequence,
         "time_ns": estimate.snapshot.time_ns,

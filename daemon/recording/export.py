@@ -1,4 +1,4 @@
-"""A recording as the long table of the comparison tool: one row per instant and wheel, blank where not measured."""
+"""Exports a recording as a table: one row per instant and wheel, blank where not measured, for `regolithd mismatch`."""
 
 from __future__ import annotations
 
@@ -54,19 +54,19 @@ def export(
     out: Path,
     opening: Callable[[Path], AbstractContextManager[IO[bytes]]] = open_mcap,
 ) -> int:
-    """Write `out`, CSV or Parquet by its name; return the number of rows. `opening` may show how far it is.
+    """Write `out`, CSV or Parquet by its name; return the number of rows. `opening` may show progress.
 
     Raises
     ------
     ExportError
-        It is neither, or nothing can write it.
+        `out` has another suffix, or pyarrow is missing.
     """
     table = rows(recorded_snapshots(recordings, opening))
     if out.suffix == ".csv":
         return _write_csv(table, out)
     if out.suffix == ".parquet":
         return _write_parquet(table, out)
-    raise ExportError(f"{out}: what is {out.suffix or 'no ending'}? Name it .csv or .parquet.")
+    raise ExportError(f"{out}: the suffix {out.suffix!r} is not supported. Name it .csv or .parquet.")
 
 
 def _write_csv(table: Iterator[Row], out: Path) -> int:

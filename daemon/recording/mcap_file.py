@@ -1,7 +1,8 @@
 """One MCAP file: snapshots, estimates and events as JSON, in chunks that are closed on every flush.
 
-MCAP closes a chunk when it is full and writes the index at the end, so what a killed process leaves lacks both. Here
-`flush` is called twice a second; `read_messages` takes whole chunks as far as they go and needs no index.
+MCAP writes a chunk when it is full and the index at the end, so a killed process leaves a file without its last chunk
+and without index. Here `flush` ends a chunk twice a second; `read_messages` reads all complete chunks, without the
+index.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 _CUT_OFF = (McapError, ValueError, struct.error, zstandard.ZstdError)
-"""What the reader may say where a file ends in the middle of something."""
+"""Errors of the reader where a file ends within a record."""
 
 _SCHEMA = json.dumps({"type": "object"}).encode()
 
@@ -47,7 +48,7 @@ class McapFile:
         self._writer.add_message(channel, time_ns, content, time_ns, sequence)
 
     def flush(self) -> None:
-        """Close the chunk and hand everything to the kernel: it survives this process."""
+        """Close the chunk and write everything to the kernel, so that it survives this process."""
         self._writer.flush()  # type: ignore[no-untyped-call]
 
     def close(self) -> None:
@@ -80,7 +81,7 @@ def open_mcap(path: Path) -> AbstractContextManager[IO[bytes]]:
 def read_messages(
     path: Path, opening: Callable[[Path], AbstractContextManager[IO[bytes]]] = open_mcap
 ) -> Iterator[Recorded]:
-    """Yield the messages of a file in their order, as far as its whole chunks go."""
+    """Yield the messages of all complete chunks of a file, in their order."""
     topics: dict[int, str] = {}
     for record in _records(path, opening):
         if isinstance(record, Channel):
@@ -90,7 +91,7 @@ def read_messages(
 
 
 def read_metadata(path: Path) -> dict[str, str]:
-    """Return what was written about the recording at its start; empty where nothing was."""
+    """Return the metadata that were written at the start of the recording; empty where there are none."""
     return next((record.metadata for record in _records(path, open_mcap) if isinstance(record, Metadata)), {})
 
 
@@ -101,5 +102,5 @@ def _records(path: Path, opening: Callable[[Path], AbstractContextManager[IO[byt
             try:
                 record = next(records)
             except (StopIteration, *_CUT_OFF):
-                return  # the end, or where the writer was killed
+                return  # the end of the file, or of its last complete record
             yield record

@@ -1,4 +1,4 @@
-"""Opens a file to be read while a bar on the terminal shows how far; nothing is shown where nobody watches."""
+"""Opens a file for reading with a progress bar on the terminal; without a terminal, no bar is shown."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def open_text(path: Path) -> AbstractContextManager[IO[str]]:
-    """Open a text file with a bar."""
+    """Open a text file with a progress bar."""
     console = Console(stderr=True)
     return open_with_bar(
         path,
@@ -28,7 +28,7 @@ def open_text(path: Path) -> AbstractContextManager[IO[str]]:
 
 
 def open_binary(path: Path) -> AbstractContextManager[IO[bytes]]:
-    """Open a binary file with a bar."""
+    """Open a binary file with a progress bar."""
     console = Console(stderr=True)
     return open_with_bar(
         path, "rb", description=path.name, console=console, transient=True, disable=not console.is_terminal

@@ -1,7 +1,11 @@
-"""Keeps everything that was acquired, within a bound of disk space: pairs of `TIME.mcap` and `TIME.log`.
+"""Records frames, snapshots, estimates and events in pairs of files, `rover-TIME.log` and `rover-TIME.mcap`.
 
-What is written is handed to the kernel twice a second, so a killed daemon loses less than the last second. A disk that
-is full or gone stops the recording and nothing else: `trouble` says why, and a new pair is tried every ten seconds.
+| event | what the recorder does |
+|---|---|
+| `flush`, called every `FLUSH_S` | writes to the kernel, so that a killed daemon loses less than the last second |
+| `file_minutes` have passed | closes the pair, begins a new one |
+| all files together exceed `limit_MB`, or the disk has less than `RESERVE` of it left | deletes the oldest files |
+| the disk fails or is full | closes the pair, sets `problem`, tries a new pair every `RETRY_S`; nothing else stops |
 """
 
 from __future__ import annotations
@@ -28,7 +32,7 @@ FLUSH_S = 0.4
 RETRY_S = 10.0
 MEGABYTE = 1_000_000
 RESERVE = 0.05
-"""Of the limit: what the disk must have left, or old recordings go."""
+"""Share of the limit that must stay free on the disk; otherwise the oldest recordings are deleted."""
 
 
 @dataclass(slots=True)
@@ -53,18 +57,18 @@ class _Pair:
 
 
 class Recorder:
-    """Owns the recording's files; call `flush` every `FLUSH_S`, everything else only appends.
+    """Owns the recording's files. Call `flush` every `FLUSH_S`; the other methods only append.
 
     Parameters
     ----------
     settings
-        Where, how much, how long a file.
+        `[recording]`: folder, limit, length of a file.
     interface
         The CAN interface's name in the log.
     metadata
-        What every file says about itself: configuration, network, version.
+        Metadata of every file: configuration, version of the terrain network, start.
     now_ns
-        The clock that names the files.
+        The clock from which the files are named.
     """
 
     def __init__(
@@ -80,7 +84,7 @@ class Recorder:
         self._now_ns = now_ns
         self._pair: _Pair | None = None
         self._retry_ns = 0
-        self.trouble: str | None = None
+        self.problem: str | None = None
         self.lost = 0  # frames that could not be written
         self._attempt(self._open)
 
@@ -99,7 +103,7 @@ class Recorder:
         self._attempt(lambda: pair.log.write(lines))
 
     def estimate(self, estimate: Estimate) -> None:
-        """Append a snapshot and what the stages made of it."""
+        """Append a snapshot and its estimate."""
         if pair := self._pair:
             time_ns, sequence = estimate.snapshot.time_ns, estimate.snapshot.sequence
             raw, made = snapshot_json(estimate.snapshot), estimate_json(estimate)
@@ -112,7 +116,7 @@ class Recorder:
             self._attempt(lambda: pair.mcap.write(EVENT, time_ns, content))
 
     def flush(self) -> None:
-        """Hand everything to the kernel; begin a new pair when it is time, or when the last one failed."""
+        """Write everything to the kernel; begin a new pair when it is due, or after a failure."""
         now = self._now_ns()
         if self._pair is None:
             if now >= self._retry_ns:
@@ -120,7 +124,7 @@ class Recorder:
             return
         self._attempt(self._pair.flush)
         if self._pair and now - self._pair.begun_ns > self._settings.file_minutes * 60e9:
-            self._attempt(self._turn_over)
+            self._attempt(self._begin_new_pair)
 
     def close(self) -> None:
         """Write the indexes and close both files."""
@@ -128,7 +132,7 @@ class Recorder:
         if pair:
             self._attempt(pair.close)
 
-    def _turn_over(self) -> None:
+    def _begin_new_pair(self) -> None:
         self.close()
         self._open()
 
@@ -141,10 +145,10 @@ class Recorder:
         log = stem.with_suffix(".log").open("x", encoding="ascii")
         mcap = McapFile(stem.with_suffix(".mcap").open("xb"), self._metadata)
         self._pair = _Pair(mcap, log, stem.with_suffix(".mcap"), stem.with_suffix(".log"), begun)
-        self.trouble = None
+        self.problem = None
 
     def _make_room(self) -> None:
-        """Remove the oldest files until all of them are within the limit, and the disk has a reserve."""
+        """Delete the oldest files until all of them are within the limit and the disk has its reserve."""
         folder = self._settings.directory
         limit = self._settings.limit_MB * MEGABYTE
         ours = [path for path in folder.glob("rover-*") if path.suffix in {".mcap", ".log"}]
@@ -157,11 +161,11 @@ class Recorder:
             total -= size
 
     def _attempt(self, action: Callable[[], object]) -> None:
-        """Do what touches the disk; its failure ends this pair, and nothing else."""
+        """Run an action that writes to the disk; if it fails, close this pair and set `problem`."""
         try:
             action()
         except OSError as error:
-            self.trouble = f"{self._settings.directory}: {error.strerror or error}"
+            self.problem = f"{self._settings.directory}: {error.strerror or error}"
             self._retry_ns = self._now_ns() + int(RETRY_S * 1e9)
             pair, self._pair = self._pair, None
             if pair:
@@ -173,7 +177,7 @@ def _abandon(pair: _Pair) -> None:
         try:
             close()
         except OSError:
-            continue  # the reason is told already
+            continue  # `problem` already holds the reason
 
 
 def _unused_stem(folder: Path, begun_ns: int) -> Path:

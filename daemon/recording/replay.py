@@ -1,4 +1,4 @@
-"""Replays logs and says whether the numbers are those of then."""
+"""Replays candump logs through the pipeline, and compares the numbers with those recorded."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from regolithd.drivers.can.frame import Frame
 
 BATCH = 256
-"""Frames at a time; the numbers do not depend on it."""
+"""Frames that are processed at a time; the numbers do not depend on it."""
 
 
 @dataclass(slots=True)
 class Replayed:
-    """What came of a replay. `compared` counts the recorded messages, `different` names those that are not the same."""
+    """The result of a replay: `compared` recorded messages, of which those listed in `different` were not the same."""
 
     frames: int = 0
     digest: Digest = field(default_factory=Digest)
@@ -44,9 +44,9 @@ def replay_logs(
     models: OnnxModels,
     opening: Callable[[Path], AbstractContextManager[IO[str]]] = open_log,
 ) -> Replayed:
-    """Feed the logs through the pipeline, in their order; compare with the recordings beside them, where there are any.
+    """Feed the logs through the pipeline in their order, and compare with the MCAP files beside them, if any.
 
-    `opening` opens a log; it may show how far the reading is.
+    `opening` opens a log; it may show progress.
     """
     result = Replayed()
     chain = Chain(configuration, models)
@@ -60,7 +60,9 @@ def replay_logs(
                 _compare(estimate, recorded, result)
     result.counters = chain.acquisition.counters
     result.undecodable = {str(reason): count for reason, count in chain.decoder.undecodable.items()}
-    result.different += [f"{topic} {sequence} was recorded, and is not in the log" for topic, sequence in recorded]
+    result.different += [
+        f"{topic} {sequence} was recorded, but the log does not give it" for topic, sequence in recorded
+    ]
     return result
 
 

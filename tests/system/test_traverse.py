@@ -168,7 +168,7 @@ def test_the_drives_stop_by_themselves_when_the_daemon_dies(
     until(lambda: wheels.heartbeat_missed() == {*MOTORS}, "every drive has missed the daemon's heartbeat")
     until(wheels.at_rest, "all six wheels stand")
     assert driving.wait(60) == 69, stack.output("traverse")
-    assert "it was stopped, or it died" in stack.output("traverse")
+    assert "it was stopped, or it failed" in stack.output("traverse")
 
 
 def test_stopping_the_daemon_stops_the_wheels_first(

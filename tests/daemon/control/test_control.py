@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 from subscriber import until
 
 from regolithd.daemon.config.configuration import Configuration, Control
-from regolithd.daemon.control.client import ControlError, conversation
+from regolithd.daemon.control.client import ControlError, control_connection
 from regolithd.daemon.control.protocol import LINE_LIMIT, REPLY, Accepted, Ended, Progress, Refused, StatusRequest
 from regolithd.daemon.control.server import ControlSink
 from regolithd.daemon.control.socket import ControlSocketError, open_control_socket
@@ -42,7 +42,7 @@ class Rover:
 
     told: list[str] = field(default_factory=list)
     phase: NodePhase = NodePhase.OPERATIONAL
-    trouble: str = ""
+    problem: str = ""
 
     @property
     def status(self) -> Mapping[int, NodeStatus]:
@@ -71,8 +71,8 @@ class Rover:
     async def disable(self) -> None:
         """Disable."""
         self.told.append("disable")
-        if self.trouble:
-            raise DriveError(self.trouble, node_id=3)
+        if self.problem:
+            raise DriveError(self.problem, node_id=3)
 
 
 @asynccontextmanager
@@ -258,10 +258,10 @@ async def test_stop_without_a_traverse_takes_the_power_off_all_the_same(tmp_path
     rover = Rover()
     async with serving(tmp_path, rover) as (_, path):
         client = await Client.to(path)
-        assert "without power" in (await client.ask({"command": "stop"})).text
+        assert "drives are disabled" in (await client.ask({"command": "stop"})).text
         assert rover.told == ["disable"]
-        rover.trouble = "does not stop"
-        assert (await client.ask({"command": "stop"})).cure == "Cut the motors' power."
+        rover.problem = "does not stop"
+        assert (await client.ask({"command": "stop"})).cure == "Cut the power of the motors."
 
 
 @pytest.mark.parametrize(
@@ -362,7 +362,7 @@ async def test_clients_are_told_why_they_cannot_speak_to_the_daemon(
     async def failure(prepare: Callable[[], object] = lambda: None) -> ControlError:
         prepare()
         with pytest.raises(ControlError) as caught:
-            async with conversation(path):
+            async with control_connection(path):
                 pass
         return caught.value
 
@@ -378,7 +378,7 @@ async def test_clients_are_told_why_they_cannot_speak_to_the_daemon(
         assert error.exit_status == 77
 
     gone = await asyncio.start_unix_server(lambda _, writer: writer.close(), path)
-    async with gone, conversation(path) as daemon:
-        daemon.ask(StatusRequest())
-        with pytest.raises(ControlError, match="it was stopped, or it died"):
+    async with gone, control_connection(path) as daemon:
+        daemon.send(StatusRequest())
+        with pytest.raises(ControlError, match="it was stopped, or it failed"):
             await daemon.reply()

@@ -16,7 +16,7 @@ CELL = NodeDescription(13, LOAD_CELL, 2)
 SPEED = NodeDescription(22, GROUND_SPEED_SENSOR, None, required=False)
 
 TROUBLES = [
-    ("bus_trouble", "no such link", "bus", Severity.CRITICAL),
+    ("bus_problem", "no such link", "bus", Severity.CRITICAL),
     ("bus_state", BusState.WARNING, "bus", Severity.WARNING),
     ("bus_state", BusState.PASSIVE, "bus", Severity.ERROR),
     ("bus_state", BusState.OFF, "bus", Severity.CRITICAL),
@@ -24,8 +24,8 @@ TROUBLES = [
     ("kernel_drops", 3, "kernel", Severity.ERROR),
     ("store_dropped", 3, "store", Severity.ERROR),
     ("store_unstored", 3, "store", Severity.WARNING),
-    ("recording_trouble", "no room", "recording", Severity.ERROR),
-    ("control_trouble", "no such group", "control", Severity.WARNING),
+    ("recording_problem", "no room", "recording", Severity.ERROR),
+    ("control_problem", "no such group", "control", Severity.WARNING),
     ("clock_jump_s", -3.0, "clock", Severity.WARNING),
 ]
 

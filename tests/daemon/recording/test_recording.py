@@ -191,8 +191,8 @@ def test_a_disk_that_fails_stops_the_recording_and_nothing_else(tmp_path: Path, 
     place = tmp_path / "recordings"
     place.write_text("a file where a folder should be")
     recorder = Recorder(Recording(directory=place), "can0", {}, now_ns=lambda: now)
-    assert recorder.trouble is not None
-    assert str(place) in recorder.trouble
+    assert recorder.problem is not None
+    assert str(place) in recorder.problem
     recorder.frames(list(drive().frames(1)))
     assert recorder.lost == 16
     place.unlink()
@@ -201,7 +201,7 @@ def test_a_disk_that_fails_stops_the_recording_and_nothing_else(tmp_path: Path, 
     now += 11 * 10**9
     recorder.flush()
     assert recorder.paths is not None
-    assert recorder.trouble is None
+    assert recorder.problem is None
     recorder.close()
 
 
