@@ -57,7 +57,7 @@ real: $(VENV)/dev.ready
 
 # How time and memory of a comparison grow with rows and candidates.
 scaling: $(VENV)/dev.ready
-	$(BIN)/python -m regolithd.calibration.validation.blind_trials.scaling build/figures/scaling.json docs/mismatch-scaling.svg
+	$(BIN)/python -m regolithd.calibration.validation.blind_trials.figures.cost_scaling build/figures/scaling.json docs/mismatch-scaling.svg
 
 # Mutation testing on a random sample; hours. SEED=… COUNT=… ONLY=drivers/can narrows it.
 mutants: $(VENV)/dev.ready
@@ -70,7 +70,7 @@ frames: $(VENV)/dev.ready
 
 # The README's first figure: the head of a real report. Needs chromium.
 picture: $(VENV)/dev.ready
-	$(BIN)/python -m regolithd.calibration.validation.blind_trials.picture docs/mismatch-report.png build/picture
+	$(BIN)/python -m regolithd.calibration.validation.blind_trials.figures.report_screenshot docs/mismatch-report.png build/picture
 
 # On a rover or a bench, as root: docs/install.md.
 install:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from regolithd.calibration.drivetrain.bench.from_corrected_simulation import copy_drivetrain
-from regolithd.calibration.validation.blind_trials.isolation import run_alone
+from regolithd.calibration.validation.blind_trials.isolation import run_isolated
 from regolithd.daemon.closed_loop.case import first_scenario, rover_toml, second_scenario, sim_toml
 from regolithd.daemon.closed_loop.simulated_drive import record, simulate
 from regolithd.daemon.closed_loop.soil_estimates import SoilEstimates, soil_estimates
@@ -120,7 +120,7 @@ def _compare(folder: Path, simulation: str, answer: str, corrected: str) -> dict
         When the comparison fails.
     """
     command = [sys.executable, "-m", "regolithd", "mismatch", "drive.mcap", "--simulation", simulation]
-    run_alone(
+    run_isolated(
         [*command, "--json", answer, "--corrected", corrected, "--report", f"{simulation[:-5]}.html"],
         folder,
         threads=1,

@@ -45,7 +45,7 @@ def prove(  # each is an option of the command line
     """
     from rich.console import Console
 
-    from regolithd.calibration.validation.blind_trials.batch import PEERS, SOLVER, Batch
+    from regolithd.calibration.validation.blind_trials.batch import BASELINES, SOLVER, Batch
     from regolithd.calibration.validation.blind_trials.errors import ProofError
     from regolithd.calibration.validation.blind_trials.isolation import describe
 
@@ -57,7 +57,7 @@ def prove(  # each is an option of the command line
         recordings=recordings,
         jobs=jobs or os.cpu_count() or 1,
         solver=solver or SOLVER,
-        peers=None if no_baselines else PEERS,
+        baselines=None if no_baselines else BASELINES,
         keep=keep,
         duration_s=duration,
         groups=tuple(group or ()),
@@ -100,12 +100,12 @@ def _report(outcomes: list[Outcome], console: Console, paths: list[Path]) -> Fig
     import math
 
     from regolithd.calibration.validation.blind_trials.score import figures_of
-    from regolithd.calibration.validation.blind_trials.table import peers_table, score_table
+    from regolithd.calibration.validation.blind_trials.table import baselines_table, score_table
 
     figures = figures_of(outcomes)
     console.print(score_table(figures))
     if any(key.startswith("peer_") for key in figures):
-        console.print(peers_table(figures))
+        console.print(baselines_table(figures))
     known = {key: None if math.isnan(float(value)) else value for key, value in figures.items()}
     for path in paths:
         path.parent.mkdir(parents=True, exist_ok=True)

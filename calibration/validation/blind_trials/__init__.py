@@ -1,6 +1,12 @@
-"""The proof: recordings with an effect concealed, sealed envelopes, a solver that cannot see in, and the score.
+"""Blind trials of a mismatch solver: recordings with concealed effects, commitments to the truth, isolation, score.
 
-`generator` writes the recordings and shares no code with what solves them: its own wheel on soil (`ground`), its own
-drives (`drive`), its own forms of every effect (`concealed`, `outside`). `envelope` commits to the truth before the
-solver starts. `score` opens it afterwards; `peers` are the tools that people would otherwise reach for.
+| module | content |
+|---|---|
+| `recordings` | generates the recordings; shares no code with the solver |
+| `commitment` | commits to the truth by a salted digest before the solver starts |
+| `isolation` | runs the solver where it has no access to the truth |
+| `batch` | one batch: generate, commit, solve, open, in this order |
+| `score`, `table` | compares answers with the truth; tables for the terminal |
+| `baselines` | other tools on the same recordings: PySINDy, stepwise BIC, lasso |
+| `figures` | figures for the documentation |
 """

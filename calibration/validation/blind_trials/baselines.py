@@ -1,11 +1,11 @@
-"""The tools that people reach for first, on the same two files: PySINDy, stepwise BIC, lasso with stability selection.
+"""Baselines on the same two files: PySINDy, stepwise BIC, lasso with stability selection.
 
     python -m regolithd.calibration.validation.blind_trials.baselines RECORDING SIM.toml OUT.json
 
-Each is given a fair library: for every name of the contract the columns that an engineer would write down, those of the
-one-wheel effects once a wheel, the onset and the ripple's order already found for it by a search. The base simulation's
-own parameters (gain, cohesion, friction angle) are always in the model and never count as a name. What a tool selects
-is read as the names of its columns.
+Each is given a library of columns: for every effect that can be named the usual term of a textbook, for effects on one
+wheel a column for each wheel, with onset and order of the ripple already determined by a search. The parameters of the
+base simulation (gain, cohesion, friction angle) are always in the model and are no names. The answer of a tool is the
+set of names of the columns that it selects.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.validation.blind_trials.drive import FORE_AFT
-from regolithd.calibration.validation.blind_trials.files import COLUMNS
-from regolithd.calibration.validation.blind_trials.ground import Ground, TorqueTable
+from regolithd.calibration.validation.blind_trials.recordings.files import COLUMNS
+from regolithd.calibration.validation.blind_trials.recordings.ground import Ground, TorqueTable
+from regolithd.calibration.validation.blind_trials.recordings.traverse import FORE_AFT
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -32,14 +32,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 BLOCK_S = 30.0
-"""Length of the blocks that stability selection draws, so that noise within one stays together."""
+"""Length of the blocks that stability selection draws, longer than the noise's correlation time [s]."""
 
 
 @dataclass(frozen=True)
-class Problem:
-    """A regression: residual [A] (rows,), columns (rows, columns) of unit rms, a name for each, and each row's block.
+class Regression:
+    """A regression: residual [A] (rows,), columns of unit rms (rows, columns), their names, each row's block.
 
-    Residual and columns have the base parameters' tangents projected out.
+    The derivatives with respect to the base parameters are projected out of residual and columns.
     """
 
     residual: Array
@@ -55,7 +55,7 @@ def read_recording(path: Path) -> dict[str, Array]:
 
 
 def ground_of(tables: dict[str, Any]) -> Ground:
-    """Return the stated soil under the stated wheel."""
+    """Return wheel and soil of SIM.toml."""
     soil, wheel = tables["soil"], tables["wheel"]
     return Ground(
         cohesion_Pa=soil["cohesion_Pa"],
@@ -68,8 +68,8 @@ def ground_of(tables: dict[str, Any]) -> Ground:
     )
 
 
-def pose(recording: dict[str, Array], tables: dict[str, Any]) -> Problem:
-    """Return the regression that all peers are given."""
+def regression_of(recording: dict[str, Array], tables: dict[str, Any]) -> Regression:
+    """Return the regression that all baselines are given."""
     drivetrain = tables["drivetrain"]
     gears = drivetrain["planetary_ratio"] * drivetrain["harmonic_ratio"]
     loss = drivetrain["planetary_efficiency"] * drivetrain["harmonic_efficiency"]
@@ -95,18 +95,18 @@ def pose(recording: dict[str, Array], tables: dict[str, Any]) -> Problem:
     )
     names = tuple(name for name, _ in library)
     columns = np.column_stack([np.broadcast_to(column, base.shape)[moving] for _, column in library])
-    outside = np.linalg.qr(tangents)[0]
-    columns -= outside @ (outside.T @ columns)
-    left = residual[moving] - outside @ (outside.T @ residual[moving])
+    basis = np.linalg.qr(tangents)[0]
+    columns -= basis @ (basis.T @ columns)
+    left = residual[moving] - basis @ (basis.T @ residual[moving])
     columns /= np.sqrt(np.mean(columns**2, axis=0)) + 1e-15
     block = (np.broadcast_to(recording["t_s"], base.shape)[moving] // BLOCK_S).astype(np.int64)
-    return Problem(left, columns, names, block)
+    return Regression(left, columns, names, block)
 
 
 def write_library(
     recording: dict[str, Array], *, speed: Array, slip: Array, base: Array, per_newton: Array, residual: Array
 ) -> list[tuple[str, Array]]:
-    """Return (name, column of shape (time, 6)) for every name; one-wheel effects have six columns."""
+    """Return (name, column of shape (time, 6)) for every name; effects on one wheel have six columns."""
     t_s, sign = recording["t_s"], np.sign(speed)
     warm, slow = recording["motor_temperature_degC"], np.abs(speed)
     rows = 1 - FORE_AFT[None, :]
@@ -135,7 +135,7 @@ def write_library(
 
 
 def best_step(t_s: Array, shape: Array, residual: Array) -> Array:
-    """Return a step in time, at the one of nineteen times at which it takes most from the residual."""
+    """Return a step in time at that of nineteen times at which it reduces the residual most."""
     product, power = np.sum(shape * residual, axis=1), np.sum(shape**2, axis=1)
     ends = t_s[-1, 0] * np.arange(1, 20) / 20
     gains = [product[t_s[:, 0] >= at].sum() ** 2 / (power[t_s[:, 0] >= at].sum() + 1e-15) for at in ends]
@@ -143,42 +143,44 @@ def best_step(t_s: Array, shape: Array, residual: Array) -> Array:
 
 
 def best_order(t_s: Array, speed: Array, residual: Array) -> int:
-    """Return the number of cycles per wheel turn, 1–24, that takes most from the six wheels' residuals."""
+    """Return the number of cycles per wheel turn, 1–24, with the largest power in the six wheels' residuals."""
     angle = np.cumsum(speed, axis=0) * (t_s[1, 0] - t_s[0, 0])
     power = [np.sum(np.abs(np.sum(residual * np.exp(-1j * order * angle), axis=0)) ** 2) for order in range(1, 25)]
     return 1 + int(np.argmax(power))
 
 
-def pysindy_aic(problem: Problem) -> set[str]:
-    """Return what sequentially thresholded least squares keeps, its threshold chosen by AIC."""
-    from pysindy import STLSQ  # noqa: PLC0415  # a peer is loaded when it is its turn
+def pysindy_aic(regression: Regression) -> set[str]:
+    """Return the names that sequentially thresholded least squares keeps, with the threshold of the lowest AIC."""
+    from pysindy import STLSQ  # noqa: PLC0415  # loaded only when this baseline runs
 
-    rows = len(problem.residual)
-    scale = float(np.sqrt(np.mean(problem.residual**2)))
-    best, chosen = np.inf, np.zeros(len(problem.names), bool)
+    rows = len(regression.residual)
+    scale = float(np.sqrt(np.mean(regression.residual**2)))
+    best, chosen = np.inf, np.zeros(len(regression.names), bool)
     for threshold in np.geomspace(0.003, 0.3, 12):
         fit = STLSQ(threshold=threshold, alpha=1e-6, max_iter=20)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that a threshold removes everything is one of the answers
-            fit.fit(problem.columns, problem.residual[:, None] / scale)
-        left = problem.residual / scale - problem.columns @ np.ravel(fit.coef_)
+            warnings.simplefilter(
+                "ignore"
+            )  # pysindy warns when a threshold removes every term, which is a valid result here
+            fit.fit(regression.columns, regression.residual[:, None] / scale)
+        left = regression.residual / scale - regression.columns @ np.ravel(fit.coef_)
         kept = np.ravel(fit.coef_) != 0
         aic = rows * np.log(np.mean(left**2)) + 2 * kept.sum()
         if aic < best:
             best, chosen = aic, kept
-    return {name for name, kept in zip(problem.names, chosen, strict=True) if kept}
+    return {name for name, kept in zip(regression.names, chosen, strict=True) if kept}
 
 
-def stepwise_bic(problem: Problem) -> set[str]:
-    """Return what forward selection adds as long as the Bayesian information criterion falls."""
-    rows = len(problem.residual)
-    gram, towards = problem.columns.T @ problem.columns, problem.columns.T @ problem.residual
-    total = float(problem.residual @ problem.residual)
+def stepwise_bic(regression: Regression) -> set[str]:
+    """Return the names that forward selection adds while the Bayesian information criterion decreases."""
+    rows = len(regression.residual)
+    gram, towards = regression.columns.T @ regression.columns, regression.columns.T @ regression.residual
+    total = float(regression.residual @ regression.residual)
     chosen: list[int] = []
     best = rows * np.log(total / rows)
-    while len(chosen) < len(problem.names):
+    while len(chosen) < len(regression.names):
         tried = []
-        for extra in (j for j in range(len(problem.names)) if j not in chosen):
+        for extra in (j for j in range(len(regression.names)) if j not in chosen):
             at = [*chosen, extra]
             fitted = np.linalg.lstsq(gram[np.ix_(at, at)], towards[at], rcond=1e-10)[0]
             left = max(total - float(fitted @ towards[at]), 1e-30)
@@ -187,18 +189,18 @@ def stepwise_bic(problem: Problem) -> set[str]:
         if bic >= best:
             break
         best, chosen = bic, [*chosen, extra]
-    return {problem.names[j] for j in chosen}
+    return {regression.names[j] for j in chosen}
 
 
-def lasso_stability(problem: Problem, *, draws: int = 60, first: int = 6, often: float = 0.8) -> set[str]:
-    """Return what is among the first columns of the lasso's path in most random halves of the 30 s blocks."""
-    from sklearn.linear_model import lars_path_gram  # noqa: PLC0415  # a peer is loaded when it is its turn
+def lasso_stability(regression: Regression, *, draws: int = 60, first: int = 6, often: float = 0.8) -> set[str]:
+    """Return the names among the first columns of the lasso path in at least `often` of random halves of the blocks."""
+    from sklearn.linear_model import lars_path_gram  # noqa: PLC0415  # loaded only when this baseline runs
 
-    blocks = np.unique(problem.block)
-    parts = [problem.block == block for block in blocks]
-    grams = np.array([problem.columns[part].T @ problem.columns[part] for part in parts])
-    towards = np.array([problem.columns[part].T @ problem.residual[part] for part in parts])
-    rng, seen = np.random.default_rng(0), np.zeros(len(problem.names))
+    blocks = np.unique(regression.block)
+    parts = [regression.block == block for block in blocks]
+    grams = np.array([regression.columns[part].T @ regression.columns[part] for part in parts])
+    towards = np.array([regression.columns[part].T @ regression.residual[part] for part in parts])
+    rng, seen = np.random.default_rng(0), np.zeros(len(regression.names))
     for _ in range(draws):
         half = rng.permutation(len(blocks))[: len(blocks) // 2]
         rows = sum(int(parts[at].sum()) for at in half)
@@ -206,26 +208,26 @@ def lasso_stability(problem: Problem, *, draws: int = 60, first: int = 6, often:
             towards[half].sum(axis=0), grams[half].sum(axis=0), n_samples=rows, max_iter=first, method="lasso"
         )
         seen[list(active)] += 1
-    return {name for name, share in zip(problem.names, seen / draws, strict=True) if share >= often}
+    return {name for name, share in zip(regression.names, seen / draws, strict=True) if share >= often}
 
 
-PEERS: dict[str, Callable[[Problem], set[str]]] = {
+BASELINES: dict[str, Callable[[Regression], set[str]]] = {
     "pysindy-stlsq-aic": pysindy_aic,
     "stepwise-bic": stepwise_bic,
     "lasso-stability-selection": lasso_stability,
 }
-"""Who else answers."""
+"""The baselines by name."""
 
 
 def main(recording: str, simulation: str, out: str) -> None:
-    """Let every peer answer one trial."""
-    problem = pose(read_recording(Path(recording)), tomllib.loads(Path(simulation).read_text()))
-    said = {}
-    for name, peer in PEERS.items():
+    """Run every baseline on one trial and write their answers."""
+    regression = regression_of(read_recording(Path(recording)), tomllib.loads(Path(simulation).read_text()))
+    answers = {}
+    for name, baseline in BASELINES.items():
         started = time.perf_counter()
-        names = sorted(peer(problem))
-        said[name] = {"names": names, "seconds": time.perf_counter() - started}
-    Path(out).write_text(json.dumps(said))
+        names = sorted(baseline(regression))
+        answers[name] = {"names": names, "seconds": time.perf_counter() - started}
+    Path(out).write_text(json.dumps(answers))
 
 
 if __name__ == "__main__":

@@ -1,22 +1,22 @@
-"""What can go wrong in a proof.
+"""Errors of the blind trials.
 
 ProofError
- ├── BrokenSealError    an envelope does not hold what was committed to
+ ├── CommitmentError    a truth does not have the digest that was committed to
  ├── OtherBatchError    the folder holds answers to another seed's recordings
  └── SolverError        the solver gave no answer
 """
 
 
 class ProofError(Exception):
-    """A proof cannot go on."""
+    """A batch of blind trials cannot continue."""
 
 
-class BrokenSealError(ProofError):
-    """An envelope does not hold what was committed to."""
+class CommitmentError(ProofError):
+    """A truth does not have the digest that was committed to."""
 
 
 class OtherBatchError(ProofError):
-    """The folder holds the answers to other recordings: take another seed's folder, or another folder."""
+    """The folder holds the answers to another seed's recordings: use that seed, or another folder."""
 
 
 class SolverError(ProofError):

@@ -1,7 +1,14 @@
-"""The score: what counts as right, by the contract.
+"""The score of a batch: answers compared with the truth.
 
-Right is the exact set of names; on nothing, no name at all; on what has no name, no name either, but the place. Wheels
-and onset are judged on what was rightly named; intervals where the truth has a value in the contract's own terms.
+| group | right answer |
+|---|---|
+| nothing | verdict `consistent`, no name |
+| single, pair | the exact set of names |
+| outside (effects out of the library) | verdict `unexplained`, no name, and the right covariate or wheel |
+| constant (one speed) | a set of indistinguishable effects that contains the truth, and an experiment |
+
+Wheels and onsets are compared for effects that were named correctly, intervals for parameters that truth and answer
+have in common.
 """
 
 from __future__ import annotations
@@ -22,7 +29,7 @@ Figures = dict[str, float | int]
 
 @dataclass(frozen=True)
 class Verdict:
-    """How one trial came out. None where a question does not arise."""
+    """The result of one trial; None where a question does not apply."""
 
     group: str
     kinds: tuple[str, ...]
@@ -35,23 +42,23 @@ class Verdict:
     intervals: tuple[bool, ...]
     held_out_ratio: float | None
     undecided: bool | None
-    """On one constant speed: whether the answer says what cannot be told apart, with an experiment."""
+    """At constant speed: whether the answer has the indistinguishable set and an experiment."""
     decided: bool | None
-    """Whether the experiment that it proposed, once driven, led to the right name."""
+    """At constant speed: whether the answer after the proposed experiment has the right name, and no other."""
     seconds: float
 
     @property
     def right(self) -> bool:
-        """Whether the trial as a whole came out as the contract asks of its group."""
+        """Whether the answer is right for its group."""
         if self.group == "outside":
             return self.exact and bool(self.located)
         return bool(self.undecided) if self.group == "constant" else self.exact
 
 
 def judge(outcome: Outcome) -> Verdict:
-    """Return how the solver did on one trial."""
-    truth, said = outcome.truth, outcome.answer["answer"]
-    effects = said.get("effects", [])
+    """Return the result of one trial."""
+    truth, answer = outcome.truth, outcome.answer["answer"]
+    effects = answer.get("effects", [])
     named = frozenset(effect["name"] for effect in effects)
     wanted = frozenset(effect["name"] for effect in truth["effects"] if effect["name"])
     pairs = [(one, other) for one in truth["effects"] for other in effects if one["name"] == other["name"]]
@@ -59,29 +66,29 @@ def judge(outcome: Outcome) -> Verdict:
         group=truth["group"],
         kinds=tuple(effect["kind"] for effect in truth["effects"]),
         named=named,
-        exact="failed" not in said and named == wanted and _verdict_fits(truth, said),
+        exact="failed" not in answer and named == wanted and _verdict_fits(truth, answer),
         named_something=bool(named),
-        located=_located(truth, said) if truth["group"] == "outside" else None,
+        located=_located(truth, answer) if truth["group"] == "outside" else None,
         wheels=all(set(one["wheels"]) == set(other["wheels"]) for one, other in pairs) if pairs else None,
         onset=_onset(truth, pairs),
         intervals=tuple(_intervals(pairs)),
-        held_out_ratio=_held_out(truth, said),
-        undecided=_undecided(truth, said) if truth["group"] == "constant" else None,
+        held_out_ratio=_held_out(truth, answer),
+        undecided=_undecided(truth, answer) if truth["group"] == "constant" else None,
         decided=_decided(wanted, outcome) if truth["group"] == "constant" else None,
         seconds=float(outcome.answer["seconds"]),
     )
 
 
-def _verdict_fits(truth: Truth, said: dict[str, Any]) -> bool:
-    """On nothing the verdict must be `consistent`, on what has no name `unexplained`; names speak for themselves."""
+def _verdict_fits(truth: Truth, answer: dict[str, Any]) -> bool:
+    """Whether the verdict is the group's: `consistent` for nothing, `unexplained` for outside, any for the others."""
     wanted = {"nothing": {"consistent"}, "outside": {"unexplained"}}.get(truth["group"])
-    return wanted is None or said.get("verdict") in wanted
+    return wanted is None or answer.get("verdict") in wanted
 
 
-def _located(truth: Truth, said: dict[str, Any]) -> bool:
-    """Whether the unexplained is where it is: its covariate; or, for one wheel's trouble, its wheel."""
+def _located(truth: Truth, answer: dict[str, Any]) -> bool:
+    """Whether an unexplained part has the effect's covariate or, for an effect on one wheel, that wheel."""
     (hidden,) = truth["effects"]
-    for found in said.get("unexplained", []):
+    for found in answer.get("unexplained", []):
         if found.get("covariate") == hidden["covariate"]:
             return True
         if len(hidden["wheels"]) == 1 and found.get("wheels") == hidden["wheels"]:
@@ -98,40 +105,40 @@ def _onset(truth: Truth, pairs: list[tuple[dict[str, Any], dict[str, Any]]]) -> 
 
 
 def _intervals(pairs: list[tuple[dict[str, Any], dict[str, Any]]]) -> Iterable[bool]:
-    """Whether each 90 % interval holds the true value, for the values that truth and answer share by name and unit."""
+    """Whether each 90 % interval contains the true value, for parameters that truth and answer have in common."""
     for one, other in pairs:
         for key, true in one["parameters"].items():
             if (found := other["parameters"].get(key)) is not None:
                 yield found["low"] <= true <= found["high"]
 
 
-def _held_out(truth: Truth, said: dict[str, Any]) -> float | None:
-    """Held-out RMSE over what the true model leaves of the same recording."""
-    after = said.get("fit", {}).get("held_out_rmse_after")
+def _held_out(truth: Truth, answer: dict[str, Any]) -> float | None:
+    """Held-out RMSE over the RMSE of the true model on the same recording."""
+    after = answer.get("fit", {}).get("held_out_rmse_after")
     return None if after is None or truth["group"] in {"outside", "constant"} else float(after) / truth["true_rmse_A"]
 
 
-def _undecided(truth: Truth, said: dict[str, Any]) -> bool:
-    """Whether a set of at least two that holds the truth is called indistinguishable, with an experiment."""
+def _undecided(truth: Truth, answer: dict[str, Any]) -> bool:
+    """Whether the answer has an indistinguishable set of at least two with the true effect, and an experiment."""
     (hidden,) = truth["effects"]
-    sets = said.get("indistinguishable", [])
+    sets = answer.get("indistinguishable", [])
     return any(hidden["name"] in one["effects"] and len(one["effects"]) > 1 and one.get("experiment") for one in sets)
 
 
 def _decided(wanted: frozenset[str], outcome: Outcome) -> bool:
-    """Whether the experiment led to the right name, and to no other."""
-    said = outcome.experiment or {}
-    return frozenset(effect["name"] for effect in said.get("effects", [])) == wanted
+    """Whether the answer after the experiment has exactly the right names."""
+    answer = outcome.experiment or {}
+    return frozenset(effect["name"] for effect in answer.get("effects", [])) == wanted
 
 
-def share(answers: Iterable[bool | None]) -> float:
-    """Return how many of the questions that arose were answered yes; NaN if none arose."""
-    asked = [answer for answer in answers if answer is not None]
-    return sum(asked) / len(asked) if asked else math.nan
+def share(results: Iterable[bool | None]) -> float:
+    """Return the share of true values among those that are not None; NaN if all are None."""
+    known = [result for result in results if result is not None]
+    return sum(known) / len(known) if known else math.nan
 
 
 def figures(verdicts: list[Verdict]) -> Figures:
-    """Return the score as one flat object: shares between 0 and 1, and how many each is a share of."""
+    """Return the solver's score as one flat dictionary: shares between 0 and 1, and counts."""
     by_group = {group: [v for v in verdicts if v.group == group] for group in Counter(v.group for v in verdicts)}
     concealed = [*by_group.get("nothing", []), *by_group.get("single", []), *by_group.get("pair", [])]
     intervals = [held for verdict in verdicts for held in verdict.intervals]
@@ -159,17 +166,17 @@ def figures(verdicts: list[Verdict]) -> Figures:
 
 
 def figures_of(outcomes: list[Outcome]) -> Figures:
-    """Return the whole score, solver and peers, as one flat object."""
-    return {**figures([judge(outcome) for outcome in outcomes]), **peer_figures(outcomes)}
+    """Return the score of solver and baselines as one flat dictionary."""
+    return {**figures([judge(outcome) for outcome in outcomes]), **baseline_figures(outcomes)}
 
 
-def peer_figures(outcomes: list[Outcome]) -> Figures:
-    """Return the peers' rows: exact set, names on nothing, and the unknown taken for something known."""
+def baseline_figures(outcomes: list[Outcome]) -> Figures:
+    """Return the baselines' scores; the keys begin with `peer_`, which other programs read."""
     score: Figures = {}
-    for peer in sorted({name for outcome in outcomes for name in outcome.peers if name != "failed"}):
-        given = [outcome for outcome in outcomes if peer in outcome.peers]
-        rows = [(o.truth, frozenset(o.peers[peer]["names"]), o.peers[peer]["seconds"]) for o in given]
-        key = "peer_" + peer.replace("-", "_")
+    for baseline in sorted({name for outcome in outcomes for name in outcome.baselines if name != "failed"}):
+        given = [outcome for outcome in outcomes if baseline in outcome.baselines]
+        rows = [(o.truth, frozenset(o.baselines[baseline]["names"]), o.baselines[baseline]["seconds"]) for o in given]
+        key = "peer_" + baseline.replace("-", "_")
         inside = [row for row in rows if row[0]["group"] in {"nothing", "single", "pair"}]
         score[f"{key}_exact_set"] = share(
             named == {effect["name"] for effect in truth["effects"]} for truth, named, _ in inside

@@ -1,4 +1,4 @@
-"""The score as people read it: one table for the solver, one for the peers beside it."""
+"""The score as tables for the terminal: the solver with its goals, and the baselines beside it."""
 
 from __future__ import annotations
 
@@ -13,44 +13,44 @@ if TYPE_CHECKING:
 ROWS = (
     ("exact_set", "exact set of names", "≥ 95 %", 0.95, None),
     ("false_name_on_nothing", "a name where nothing is concealed", "≤ 2 %", None, 0.02),
-    ("outside_unexplained_and_located", "outside the list: unexplained, and where", "≥ 90 %", 0.90, None),
+    ("outside_unexplained_and_located", "out of library: unexplained and located", "≥ 90 %", 0.90, None),
     ("wheels_right", "the right wheels", "≥ 98 %", 0.98, None),
     ("onset_within_tenth", "onset within 10 % of the length", "all", 1.0, None),
-    ("intervals_hold", "90 % intervals that hold the truth", "88–92 %", 0.88, 0.92),
+    ("intervals_hold", "90 % intervals that contain the truth", "88–92 %", 0.88, 0.92),
     ("held_out_within_2_percent", "held-out error within 2 % of the true model's", "all", 1.0, None),
-    ("constant_speed_undecided", "constant speed: what cannot be told apart, and the experiment", "≥ 95 %", 0.95, None),
+    ("constant_speed_undecided", "constant speed: indistinguishable set and experiment", "≥ 95 %", 0.95, None),
     (
         "constant_speed_decided_by_experiment",
-        "that experiment, driven, leads to the right name",
+        "its experiment leads to the right name",
         "≥ 95 %",
         0.95,
         None,
     ),
 )
-"""Figure, words, goal in words, least and most."""
+"""Key of the figure, label, goal as text, lowest and highest value of the goal."""
 
 
 def score_table(figures: Figures) -> Table:
-    """Return the solver's score beside its goals."""
-    table = Table(title=f"{figures['recordings']} recordings, envelopes opened", title_justify="left")
-    table.add_column("what")
+    """Return the solver's score with its goals."""
+    table = Table(title=f"{figures['recordings']} recordings, commitments opened", title_justify="left")
+    table.add_column("figure")
     table.add_column("reached", justify="right")
     table.add_column("goal", justify="right", style="dim")
-    for key, words, goal, least, most in ROWS:
+    for key, label, goal, lowest, highest in ROWS:
         value = float(figures.get(key, math.nan))
         if math.isnan(value):
-            table.add_row(words, "–", goal)
+            table.add_row(label, "–", goal)
             continue
-        good = (least is None or value >= least) and (most is None or value <= most)
-        table.add_row(words, f"[{'green' if good else 'red'}]{100 * value:.1f} %[/]", goal)
-    table.add_row("seconds a recording, median", f"{float(figures['seconds_median']):.1f}", "20")
+        good = (lowest is None or value >= lowest) and (highest is None or value <= highest)
+        table.add_row(label, f"[{'green' if good else 'red'}]{100 * value:.1f} %[/]", goal)
+    table.add_row("seconds per recording, median", f"{float(figures['seconds_median']):.1f}", "20")
     return table
 
 
-def peers_table(figures: Figures) -> Table:
-    """Return solver and peers side by side."""
-    table = Table(title="the same recordings, other tools", title_justify="left")
-    for heading in ("tool", "exact set", "names something on nothing", "names the unknown", "s"):
+def baselines_table(figures: Figures) -> Table:
+    """Return the scores of solver and baselines."""
+    table = Table(title="baselines on the same recordings", title_justify="left")
+    for heading in ("tool", "exact set", "a name on nothing", "a name out of library", "s"):
         table.add_column(heading, justify="left" if heading == "tool" else "right")
     rows = [("regolithd mismatch", "")] + [
         (key.removeprefix("peer_").removesuffix("_exact_set").replace("_", " "), key.removesuffix("exact_set"))

@@ -1,4 +1,4 @@
-"""The peers: the same two files, a fair library, and answers in the contract's names."""
+"""The baselines: a library with every name, and answers in the names of the effects."""
 
 from __future__ import annotations
 
@@ -9,51 +9,51 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.validation.blind_trials.baselines import (
-    PEERS,
+    BASELINES,
     lasso_stability,
     main,
-    pose,
     pysindy_aic,
     read_recording,
+    regression_of,
     stepwise_bic,
 )
-from regolithd.calibration.validation.blind_trials.concealed import EFFECTS
-from regolithd.calibration.validation.blind_trials.files import toml_text, write_trial
-from regolithd.calibration.validation.blind_trials.generator import Plan, make_trial
+from regolithd.calibration.validation.blind_trials.recordings.files import toml_text, write_trial
+from regolithd.calibration.validation.blind_trials.recordings.generator import Plan, make_trial
+from regolithd.calibration.validation.blind_trials.recordings.library_effects import LIBRARY_EFFECTS
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
 def test_the_library_has_every_name(tmp_path: Path) -> None:
-    """A peer could name each of the sixteen, and the base parameters' tangents are taken out of every column."""
+    """The library has a column for each of the sixteen effects, and all its columns are finite."""
     trial = make_trial(Plan(1, 2, "nothing", ()), duration_s=240)
     recording, _ = write_trial(trial, tmp_path)
-    problem = pose(read_recording(recording), trial.tables)
-    assert set(problem.names) == set(EFFECTS)
-    assert np.all(np.isfinite(problem.columns))
+    regression = regression_of(read_recording(recording), trial.tables)
+    assert set(regression.names) == set(LIBRARY_EFFECTS)
+    assert np.all(np.isfinite(regression.columns))
     assert "[soil]" in toml_text(trial.tables)
 
 
-@pytest.mark.parametrize("peer", [pysindy_aic, stepwise_bic, lasso_stability], ids=list(PEERS))
-def test_each_peer_finds_what_is_plain_to_see(peer: object, tmp_path: Path) -> None:
-    """Against white noise, with its exact column in the library, every peer has the truth in its set."""
+@pytest.mark.parametrize("baseline", [pysindy_aic, stepwise_bic, lasso_stability], ids=list(BASELINES))
+def test_each_baseline_finds_an_obvious_effect(baseline: object, tmp_path: Path) -> None:
+    """With white noise and the effect's exact column in the library, every baseline selects the effect."""
     trial = make_trial(Plan(1, 2, "nothing", ()), duration_s=240)
     recording, _ = write_trial(trial, tmp_path)
-    problem = pose(read_recording(recording), trial.tables)
-    noise = np.random.default_rng(1).normal(size=problem.residual.shape)
-    column = problem.columns[:, problem.names.index("viscous-friction")]
-    plain = type(problem)(column + 0.1 * noise, problem.columns, problem.names, problem.block)
-    assert callable(peer)
-    assert "viscous-friction" in peer(plain)
+    regression = regression_of(read_recording(recording), trial.tables)
+    noise = np.random.default_rng(1).normal(size=regression.residual.shape)
+    column = regression.columns[:, regression.names.index("viscous-friction")]
+    plain = type(regression)(column + 0.1 * noise, regression.columns, regression.names, regression.block)
+    assert callable(baseline)
+    assert "viscous-friction" in baseline(plain)
 
 
-def test_the_peers_write_one_answer_each(tmp_path: Path) -> None:
-    """As a program, they read a recording and a simulation and write names and seconds."""
+def test_the_baselines_write_one_answer_each(tmp_path: Path) -> None:
+    """As a program they read a recording and a simulation, and write names and seconds."""
     recording, simulation = write_trial(
         make_trial(Plan(1, 2, "single", ("grade-resistance",)), duration_s=240), tmp_path
     )
-    main(str(recording), str(simulation), str(tmp_path / "said.json"))
-    said = json.loads((tmp_path / "said.json").read_text())
-    assert set(said) == set(PEERS)
-    assert all(set(answer["names"]) <= set(EFFECTS) for answer in said.values())
+    main(str(recording), str(simulation), str(tmp_path / "answers.json"))
+    answers = json.loads((tmp_path / "answers.json").read_text())
+    assert set(answers) == set(BASELINES)
+    assert all(set(answer["names"]) <= set(LIBRARY_EFFECTS) for answer in answers.values())

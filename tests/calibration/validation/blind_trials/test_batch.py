@@ -1,4 +1,4 @@
-"""A batch: commitments come first, the solver sees two files, what is done is not done again, and right is right."""
+"""A batch: order of commitment and solver, isolation, resumption, and the score."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from regolithd.calibration.validation.blind_trials.batch import Batch, Outcome, run_batch
-from regolithd.calibration.validation.blind_trials.commitment import read_opened, seal
+from regolithd.calibration.validation.blind_trials.commitment import commitment_digest, read_opened
 from regolithd.calibration.validation.blind_trials.errors import OtherBatchError
-from regolithd.calibration.validation.blind_trials.isolation import can_be_alone
+from regolithd.calibration.validation.blind_trials.isolation import namespaces_available
 from regolithd.calibration.validation.blind_trials.score import figures_of, judge
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ json.dump(said | {'speeds': len(speeds)}, open(sys.argv[1], 'w'))
 
 @pytest.fixture
 def batch(tmp_path: Path) -> Batch:
-    """Ten recordings of two minutes, solved by a program that looks around and finds nothing wrong."""
+    """Ten recordings of two minutes; the solver writes what it can see of its surroundings, and `consistent`."""
     spy = tmp_path / "spy.py"
     spy.write_text(SPY)
     return Batch(
@@ -49,31 +49,31 @@ def batch(tmp_path: Path) -> Batch:
         seed=4,
         recordings=10,
         solver=f"{sys.executable} {spy} {{answer}}",
-        peers=None,
+        baselines=None,
         duration_s=120,
     )
 
 
 def test_the_solver_is_given_two_files_and_the_commitment_is_older(batch: Batch) -> None:
-    """When the n-th solver starts there are n commitments, fewer opened envelopes, and nothing beside its two files."""
+    """When the n-th solver starts there are n commitments, n − 1 opened ones, and nothing beside its two files."""
     outcomes = sorted(run_batch(batch), key=lambda outcome: outcome.number)
     for before, outcome in enumerate(outcomes):
         seen = outcome.answer["answer"]
         assert seen["files"] == ["SIM.toml", "recording.csv.gz"]
         assert seen["committed"] == before + 1
         assert seen["opened"] == before
-        if can_be_alone():
+        if namespaces_available():
             assert seen["processes"] == []
     with (batch.folder / "commitments.csv").open() as lines:
         committed = {int(number): digest for number, digest, _ in csv.reader(lines)}
     for number, digest in committed.items():
         opened = json.loads(batch.path("opened", number).read_text())
-        assert seal(opened["salt"], opened["truth"]) == digest
+        assert commitment_digest(opened["salt"], opened["truth"]) == digest
         assert "seed" not in json.dumps(opened)
 
 
-def test_what_is_done_is_not_done_again(batch: Batch) -> None:
-    """A batch that stopped goes on; the folder of another seed is refused."""
+def test_a_finished_trial_is_not_repeated(batch: Batch) -> None:
+    """An interrupted batch resumes without repeating trials; the folder of another seed is refused."""
     first = replace(batch, groups=("nothing", "pair"))
     few = len(list(run_batch(first)))
     lines = (batch.folder / "commitments.csv").read_text().splitlines()
@@ -85,8 +85,8 @@ def test_what_is_done_is_not_done_again(batch: Batch) -> None:
         list(run_batch(replace(batch, seed=5)))
 
 
-def test_a_solver_that_fails_is_not_right_by_silence(batch: Batch) -> None:
-    """No answer on nothing is no right answer."""
+def test_a_solver_that_fails_is_not_right(batch: Batch) -> None:
+    """A solver that fails on a recording without effects is not scored as right."""
     broken = replace(batch, solver="false", groups=("nothing",))
     verdicts = [judge(outcome) for outcome in run_batch(broken)]
     assert verdicts
@@ -117,7 +117,7 @@ FOUND = {
 
 
 def test_right_is_the_exact_set_the_wheels_and_the_onset() -> None:
-    """A name, a wheel or an interval that is wrong, an onset too late: each is counted where it belongs."""
+    """A wrong name, wheel, interval or onset is counted in its own figure."""
     right = judge(answered("single", [BEARING], verdict="missing-physics", effects=[FOUND]))
     assert (right.right, right.wheels, right.onset, right.intervals) == (True, True, True, (False,))
     late = judge(answered("single", [BEARING], effects=[{**FOUND, "onset_s": 701.0, "wheels": [3, 4]}]))
@@ -126,8 +126,8 @@ def test_right_is_the_exact_set_the_wheels_and_the_onset() -> None:
     assert not both.right
 
 
-def test_silence_on_nothing_and_a_place_for_the_unknown() -> None:
-    """Nothing must be consistent; what has no name must be unexplained, unnamed and rightly located."""
+def test_right_is_consistent_on_nothing_and_located_out_of_library() -> None:
+    """Nothing must be `consistent`; an effect out of the library `unexplained`, without a name, and located."""
     assert judge(answered("nothing", [])).right
     assert not judge(answered("nothing", [], verdict="unexplained")).right
     unknown = {"name": None, "kind": "voltage", "wheels": [1, 2, 3, 4, 5, 6], "covariate": "voltage"}
@@ -139,8 +139,8 @@ def test_silence_on_nothing_and_a_place_for_the_unknown() -> None:
     assert not named.right
 
 
-def test_the_proposed_experiment_is_driven_with_the_same_truth(batch: Batch, tmp_path: Path) -> None:
-    """Where one speed tells nothing apart, the drive that the answer proposes is made, and answered under the seal."""
+def test_the_proposed_experiment_is_run_with_the_same_truth(batch: Batch, tmp_path: Path) -> None:
+    """At constant speed the proposed experiment is recorded, and answered before the commitment is opened."""
     asks = tmp_path / "asks.py"
     asks.write_text(ASKS)
     asking = replace(batch, recordings=12, solver=f"{sys.executable} {asks} {{answer}}", groups=("constant",))
@@ -154,14 +154,14 @@ def test_the_proposed_experiment_is_driven_with_the_same_truth(batch: Batch, tmp
 
 
 def test_figures_are_flat(batch: Batch) -> None:
-    """What is written for others to read is one object of numbers."""
+    """The figures are one flat dictionary of numbers."""
     figures = figures_of(list(run_batch(replace(batch, groups=("nothing", "single")))))
     assert figures["exact_set_nothing"] == 1.0
     assert figures["exact_set_single"] == 0.0
     assert all(isinstance(value, float | int) for value in figures.values())
 
 
-def test_opened_envelopes_are_read_with_their_seal_checked(batch: Batch) -> None:
-    """The truth that is scored is the truth that was committed to."""
+def test_the_scored_truth_is_the_committed_one(batch: Batch) -> None:
+    """The truth that is scored is the opened one, whose digest was verified."""
     for outcome in run_batch(replace(batch, groups=("single",))):
         assert read_opened(batch.path("opened", outcome.number)) == outcome.truth

@@ -1,4 +1,4 @@
-"""`regolithd prove` as a person runs it: tables on the terminal, figures in a file, and again where it stopped."""
+"""`regolithd prove`: tables on the terminal, figures in a file, resumption."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def prove(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
 
 
-def test_silence_is_right_where_nothing_is_and_nowhere_else(tmp_path: Path) -> None:
-    """A tool that always says `consistent` never names anything on nothing, and finds nothing either."""
+def test_consistent_is_right_on_nothing_only(tmp_path: Path) -> None:
+    """A solver that always answers `consistent` is right on nothing, and on no other group."""
     figures = tmp_path / "prove.json"
     done = prove(tmp_path, "--seed", "3", "--figures", str(figures))
     assert done.returncode == 0, done.stderr
-    assert "4 recordings, envelopes opened" in done.stdout
+    assert "4 recordings, commitments opened" in done.stdout
     score = json.loads(figures.read_text())
     assert score["false_name_on_nothing"] == 0
     assert score["exact_set_nothing"] == 1
@@ -42,7 +42,7 @@ def test_silence_is_right_where_nothing_is_and_nowhere_else(tmp_path: Path) -> N
 
 
 def test_another_seed_in_the_same_folder_is_refused(tmp_path: Path) -> None:
-    """Answers to other recordings are not counted."""
+    """A folder with the answers to another seed's recordings is an error."""
     assert prove(tmp_path, "--seed", "3").returncode == 0
     other = prove(tmp_path, "--seed", "4")
     assert other.returncode == 1

@@ -1,9 +1,9 @@
-"""How time and memory of a comparison grow with the recording's rows and with the candidates that are looked for.
+"""Time and memory of a comparison against the number of rows of the recording and of candidates.
 
-    python -m regolithd.calibration.validation.blind_trials.scaling FIGURES.json PICTURE.svg
+    python -m regolithd.calibration.validation.blind_trials.figures.cost_scaling FIGURES.json PICTURE.svg
 
-Each point is the command line in a process of its own, on a generated recording that conceals one effect: what a user
-would wait for, reading and writing included.
+Each point is one run of the command line in a separate process, reading and writing included, on a generated recording
+with one concealed effect.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ import regolithd
 from regolithd.calibration.mismatch.report.axes import Panel, axes, box, line, svg, text
 from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel
 from regolithd.calibration.validation.blind_trials.errors import ProofError
-from regolithd.calibration.validation.blind_trials.files import toml_text, write_trial
-from regolithd.calibration.validation.blind_trials.generator import Plan, make_trial
+from regolithd.calibration.validation.blind_trials.recordings.files import toml_text, write_trial
+from regolithd.calibration.validation.blind_trials.recordings.generator import Plan, make_trial
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,14 +35,14 @@ COUNTS = (2, 4, 8, 16)
 FULL = 1800.0
 GOAL_CPU_S, GOAL_MIB = 40.0, 1024.0
 GOALS = {GOAL_CPU_S: "20 s on two cores", GOAL_MIB: "1 GiB"}
-"""What a comparison of half an hour may take. Processor time is drawn, as it does not depend on who else computes."""
+"""Goals for a recording of half an hour. CPU time is drawn because it does not depend on other processes."""
 STYLE = """<style>text{font:12px sans-serif;fill:#5c6570}.ground{fill:#f5f6f8}.axis{stroke:#d9dde2;fill:none}
 .after{fill:none;stroke:#23679b;stroke-width:1.6}.dot{fill:#23679b}.zero{stroke:#b5482a;stroke-dasharray:3 3;fill:none}
 .paper{fill:#fff}</style><rect class="paper" width="850" height="220"/>"""
 
 
-class Fewer(RoverWheel):
-    """The rover's simulation with only the first few candidates of the library."""
+class LimitedLibrary(RoverWheel):
+    """The rover's simulation with the first `count` candidates of the library."""
 
     count: ClassVar[int] = 16
 
@@ -51,34 +51,34 @@ class Fewer(RoverWheel):
         return library[: self.count]
 
 
-class Two(Fewer):
+class TwoCandidates(LimitedLibrary):
     """Two candidates."""
 
     count = 2
 
 
-class Four(Fewer):
+class FourCandidates(LimitedLibrary):
     """Four candidates."""
 
     count = 4
 
 
-class Eight(Fewer):
+class EightCandidates(LimitedLibrary):
     """Eight candidates."""
 
     count = 8
 
 
-class Sixteen(Fewer):
+class SixteenCandidates(LimitedLibrary):
     """All sixteen."""
 
 
-WITH = {2: Two, 4: Four, 8: Eight, 16: Sixteen}
+SIMULATIONS = {2: TwoCandidates, 4: FourCandidates, 8: EightCandidates, 16: SixteenCandidates}
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What one comparison took."""
+    """Cost of one comparison: wall time, CPU time, peak memory."""
 
     rows: int
     candidates: int
@@ -88,11 +88,11 @@ class Cost:
 
 
 def measure(folder: Path, rows: int, candidates: int) -> Cost:
-    """Run one comparison in the folder and return what it took."""
+    """Run one comparison in the folder and return its cost."""
     command = [sys.executable, "-m", "regolithd", "mismatch", "recording.csv.gz", "--simulation", "SIM.toml"]
     environment = {**os.environ, "PYTHONPATH": str(Path(regolithd.__file__).parent.parent)}
     started = time.perf_counter()
-    child = subprocess.Popen(  # noqa: S603  # our own command; waited for below, with what it used
+    child = subprocess.Popen(  # noqa: S603  # a command of this package; `os.wait4` below returns its resource usage
         [*command, "--json", "answer.json"], cwd=folder, env=environment, stdout=subprocess.DEVNULL
     )
     _, status, usage = os.wait4(child.pid, 0)
@@ -104,13 +104,13 @@ def measure(folder: Path, rows: int, candidates: int) -> Cost:
 
 
 def costs(scratch: Path) -> list[Cost]:
-    """Return the cost of every length with all candidates, and of the full length with fewer."""
+    """Return the costs: each duration with all candidates, and the full duration with fewer."""
     found = []
     for duration_s, counts in [(d, COUNTS if d == FULL else COUNTS[-1:]) for d in DURATIONS_S]:
         trial = make_trial(Plan(1, 3, "single", ("viscous-friction",)), duration_s=duration_s)
         write_trial(trial, scratch)
         for count in counts:
-            model = f"regolithd.calibration.validation.blind_trials.scaling:{WITH[count].__name__}"
+            model = f"regolithd.calibration.validation.blind_trials.figures.cost_scaling:{SIMULATIONS[count].__name__}"
             tables = {**trial.tables, "simulation": {**trial.tables["simulation"], "model": model}}
             (scratch / "SIM.toml").write_text(toml_text(tables))
             found.append(measure(scratch, trial.load_N.size, count))

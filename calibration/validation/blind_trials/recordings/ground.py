@@ -1,9 +1,9 @@
-"""A rigid wheel on soil, solved apart from `terrain.wheel_soil`: stresses integrated numerically, then tabulated.
+"""Rigid wheel on soil by quadrature and bisection: an implementation independent of `terrain.wheel_soil`.
 
-The stress distribution is the paper's (Eqs 1–5): normal and shear stress rise linearly from the front edge θ_C to
-θ_m = θ_C/2 and fall linearly behind it, the shear to the cohesion c at the exit. Load and torque are integrals of
-them over the contact (Eqs 2, 3), taken here by Gauss–Legendre quadrature on either side of θ_m, and the contact angle
-that carries a load is found by bisection. No closed form (Eqs 6, 7) is used.
+The stresses are those of the paper's Eqs 1, 4 and 5: linear from the entry θ_C to θ_m = θ_C/2 and from there to the
+exit, where the normal stress is zero and the shear stress is the cohesion c. Load and torque are their integrals (Eqs
+2 and 3) by Gauss–Legendre quadrature on either side of θ_m; the contact angle that carries a load is found by
+bisection. The closed forms (Eqs 6 and 7) are not used. The torque is tabulated for speed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 
 @dataclass(frozen=True)
 class Ground:
-    """One soil under one wheel; SI units, the friction angle in radians, stiffness k_c/w + k_φ in Pa/m^n."""
+    """Soil and wheel; SI units, `stiffness` is k_c/w + k_φ in Pa/m^n."""
 
     cohesion_Pa: float
     friction_angle_rad: float
@@ -33,7 +33,7 @@ class Ground:
 
 
 def _peaks(ground: Ground, angle: Array, slip: Array) -> tuple[Array, Array]:
-    """Return normal and shear stress [Pa] at θ_m, with the shear displacement taken there as well."""
+    """Return normal and shear stress at θ_m [Pa], with the shear displacement at θ_m."""
     middle = angle / 2
     normal = ground.stiffness * (ground.radius_m * (np.cos(middle) - np.cos(angle))) ** ground.exponent
     moved_m = ground.radius_m * ((angle - middle) - (1 - slip) * (np.sin(angle) - np.sin(middle)))
@@ -42,7 +42,7 @@ def _peaks(ground: Ground, angle: Array, slip: Array) -> tuple[Array, Array]:
 
 
 def load_and_torque(ground: Ground, angle: Array, slip: Array) -> tuple[Array, Array]:
-    """Return load [N] and torque [N·m] that a contact of this angle carries (Eqs 2–5 by quadrature)."""
+    """Return load [N] and torque [N·m] at a contact angle [rad] and slip (Eqs 2–5 by quadrature)."""
     normal, shear = _peaks(ground, angle, slip)
     load, torque = np.zeros_like(angle), np.zeros_like(angle)
     for node, weight in zip(_NODES, _WEIGHTS, strict=True):
@@ -60,7 +60,7 @@ def load_and_torque(ground: Ground, angle: Array, slip: Array) -> tuple[Array, A
 
 
 def contact(ground: Ground, load_N: Array, slip: Array) -> Array:
-    """Return the contact angle [rad] that carries the load, by bisection between 0 and a quarter turn."""
+    """Return the contact angle that carries a load [rad], by bisection between 0 and π/2."""
     low, high = np.full(np.shape(load_N), 1e-4), np.full(np.shape(load_N), np.pi / 2)
     for _ in range(48):
         middle = (low + high) / 2
@@ -70,16 +70,16 @@ def contact(ground: Ground, load_N: Array, slip: Array) -> Array:
 
 
 def sunk_deeper(ground: Ground, angle: Array, factor: Array) -> Array:
-    """Return the contact angle [rad] after the sinkage grew by a factor: θ = arccos(1 − z/r) (Eq. 9)."""
+    """Return the contact angle after the sinkage increased by a factor [rad]: θ = arccos(1 − z/r) (Eq. 9)."""
     sinkage = (1 - np.cos(angle)) * factor
     return np.arccos(1 - np.minimum(sinkage, 1.0)) + 0 * ground.radius_m
 
 
 class TorqueTable:
-    """Torque [N·m] over load and slip for one ground, as a bicubic spline: exact to about 1 part in 10⁵."""
+    """Torque [N·m] against load and slip for one ground: a bicubic spline with a relative error of about 1e-5."""
 
     def __init__(self, ground: Ground, slip_sinkage: float = 0.0) -> None:
-        """Tabulate; `slip_sinkage` a > 0 deepens the sinkage by (1 + a·i)/(1 − a·i/2) at slip i."""
+        """Tabulate; `slip_sinkage` a > 0 multiplies the sinkage by (1 + a·i)/(1 − a·i/2) at slip i."""
         loads, slips = np.linspace(2.0, 150.0, 60), np.linspace(-0.15, 0.6, 50)
         load, slip = np.meshgrid(loads, slips, indexing="ij")
         angle = contact(ground, load, slip)
@@ -89,6 +89,6 @@ class TorqueTable:
         self._spline = RectBivariateSpline(loads, slips, load_and_torque(ground, angle, slip)[1])
 
     def __call__(self, load_N: Array, slip: Array) -> Array:
-        """Return the torque [N·m], shape of the broadcast arguments; none where a wheel carries nothing."""
+        """Return the torque [N·m], shape of the broadcast arguments; zero where the load is zero."""
         torque = self._spline.ev(np.clip(load_N, 2, 150), np.clip(slip, -0.15, 0.6))
         return np.where(np.asarray(load_N) == 0, 0.0, np.asarray(torque, np.float64))

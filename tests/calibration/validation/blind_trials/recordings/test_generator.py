@@ -1,4 +1,4 @@
-"""The generator: apart from the solver, faithful to the contract's files, and honest about what it conceals."""
+"""The generator: independent of the solver, reproducible, with effects of the stated strength."""
 
 from __future__ import annotations
 
@@ -13,15 +13,25 @@ import pytest
 
 from regolithd.calibration.parameters import SOILS, Wheel
 from regolithd.calibration.terrain.wheel_soil import contact_angle, wheel_torque
-from regolithd.calibration.validation import blind_trials as prove
-from regolithd.calibration.validation.blind_trials.concealed import EFFECTS
-from regolithd.calibration.validation.blind_trials.files import COLUMNS, write_trial
-from regolithd.calibration.validation.blind_trials.generator import SHARES, Plan, Trial, make_trial, plan_batch
-from regolithd.calibration.validation.blind_trials.ground import Ground, TorqueTable, contact, load_and_torque
-from regolithd.calibration.validation.blind_trials.out_of_library import OUTSIDE
+from regolithd.calibration.validation.blind_trials import recordings
+from regolithd.calibration.validation.blind_trials.recordings.files import COLUMNS, write_trial
+from regolithd.calibration.validation.blind_trials.recordings.generator import (
+    SHARES,
+    Plan,
+    Trial,
+    make_trial,
+    plan_batch,
+)
+from regolithd.calibration.validation.blind_trials.recordings.ground import (
+    Ground,
+    TorqueTable,
+    contact,
+    load_and_torque,
+)
+from regolithd.calibration.validation.blind_trials.recordings.library_effects import LIBRARY_EFFECTS
+from regolithd.calibration.validation.blind_trials.recordings.out_of_library import OUT_OF_LIBRARY
 
-ROOM = Path(prove.__file__).parent
-GENERATOR = ("generator.py", "concealed.py", "out_of_library.py", "scene.py", "drive.py", "ground.py", "files.py")
+FOLDER = Path(recordings.__file__).parent
 
 
 def short(group: str, *names: str, number: int = 3) -> Trial:
@@ -29,19 +39,19 @@ def short(group: str, *names: str, number: int = 3) -> Trial:
     return make_trial(Plan(number, 11, group, names), duration_s=300)
 
 
-@pytest.mark.parametrize("file", GENERATOR)
-def test_the_generator_imports_nothing_of_the_solver(file: str) -> None:
-    """Of this project the generator imports its own room alone."""
-    tree = ast.parse((ROOM / file).read_text())
+@pytest.mark.parametrize("file", sorted(FOLDER.glob("*.py")), ids=lambda path: path.name)
+def test_the_generator_imports_nothing_of_the_solver(file: Path) -> None:
+    """Of this project the generator imports only its own folder."""
+    tree = ast.parse(file.read_text())
     froms = {node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
     names = froms | {alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names}
     ours = {name for name in names if name.split(".")[0] == "regolithd"}
-    assert all(name.startswith("regolithd.calibration.validation.blind_trials.") for name in ours), ours
+    assert all(name.startswith("regolithd.calibration.validation.blind_trials.recordings.") for name in ours), ours
 
 
 @pytest.mark.parametrize("soil", list(SOILS))
 def test_two_solutions_of_the_wheel_on_soil_agree(soil: str) -> None:
-    """Quadrature and bisection here, closed forms and a secant there: the same contact and torque."""
+    """Quadrature and bisection give the contact angle and torque of closed forms and secant method."""
     known, wheel = SOILS[soil], Wheel()
     ground = Ground(
         known.cohesion_Pa,
@@ -62,7 +72,7 @@ def test_two_solutions_of_the_wheel_on_soil_agree(soil: str) -> None:
 
 
 def test_same_plan_same_recording(tmp_path: Path) -> None:
-    """Seed and number make a trial, to the last byte; another number makes another."""
+    """Seed and number determine the recording to the byte; another number gives another."""
     first, second, other = (
         write_trial(short("single", "coulomb-friction", number=number), tmp_path / str(at))[0].read_bytes()
         for at, number in enumerate((3, 3, 4))
@@ -71,8 +81,8 @@ def test_same_plan_same_recording(tmp_path: Path) -> None:
     assert first != other
 
 
-def test_recording_has_the_contract_s_columns_and_says_nothing_else(tmp_path: Path) -> None:
-    """One row per instant and wheel, units in the names, and a folder that holds two files."""
+def test_the_folder_has_the_two_input_files_only(tmp_path: Path) -> None:
+    """The recording has one row for each instant and wheel and the documented columns; beside it is SIM.toml alone."""
     recording, _ = write_trial(short("nothing"), tmp_path)
     with gzip.open(recording, "rt") as text:
         rows = list(csv.reader(text))
@@ -82,9 +92,9 @@ def test_recording_has_the_contract_s_columns_and_says_nothing_else(tmp_path: Pa
     assert sorted(path.name for path in tmp_path.iterdir()) == ["SIM.toml", "recording.csv.gz"]
 
 
-@pytest.mark.parametrize("name", [*EFFECTS, *OUTSIDE])
+@pytest.mark.parametrize("name", [*LIBRARY_EFFECTS, *OUT_OF_LIBRARY])
 def test_each_effect_is_concealed_at_its_strength(name: str) -> None:
-    """Every effect has 5–25 % of the mean current, on the wheels and from the time that it says, under 30 % noise."""
+    """Each effect has 5–25 % of the mean current, acts on its wheels only, and the noise is about 30 %."""
     trial = short("single", name)
     (effect,) = trial.effects
     assert 0.049 < effect.strength < 0.251
@@ -96,47 +106,47 @@ def test_each_effect_is_concealed_at_its_strength(name: str) -> None:
 
 
 def test_nothing_concealed_leaves_nothing_but_noise() -> None:
-    """Where nothing is hidden, the true model leaves noise without bias."""
+    """Without an effect the RMSE of the true model does not depend on the list of effects."""
     trial = short("nothing")
     assert trial.effects == ()
     with_effect = replace(trial, effects=())
     assert with_effect.true_rmse_A == trial.true_rmse_A
 
 
-def test_an_experiment_moves_what_it_asks_for_and_keeps_the_effect() -> None:
-    """The same rover with the same drag drives a staircase both ways, on ground as flat as before."""
+def test_an_experiment_varies_what_it_asks_for_and_keeps_the_effect() -> None:
+    """The same rover with the same drag drives several speeds in both directions, on level ground as before."""
     plan = Plan(3, 11, "constant", ("coulomb-friction",))
     before, after = (
         make_trial(plan, duration_s=400, experiment=told) for told in ("", "a staircase of speeds, both ways")
     )
     assert before.tables == after.tables
     assert before.effects[0].size == after.effects[0].size
-    assert np.ptp(before.drive.wheel_speed_rad_s) == 0
-    assert after.drive.wheel_speed_rad_s.min() < -0.05 < 0.05 < after.drive.wheel_speed_rad_s.max()
-    assert not after.drive.pitch_rad.any()
-    assert np.ptp(after.drive.temperature_degC[:, 0]) == 0
+    assert np.ptp(before.traverse.wheel_speed_rad_s) == 0
+    assert after.traverse.wheel_speed_rad_s.min() < -0.05 < 0.05 < after.traverse.wheel_speed_rad_s.max()
+    assert not after.traverse.pitch_rad.any()
+    assert np.ptp(after.traverse.temperature_degC[:, 0]) == 0
 
 
 def test_an_experiment_lasts_as_long_as_it_asks_and_lifts_the_wheels_where_it_says_so() -> None:
-    """The last third is driven on a block: no load, hubs at rest, and nothing but the concealed drag in the current."""
+    """In the last third loads and hub speeds are zero, and the current is the concealed drag alone."""
     plan = Plan(3, 11, "constant", ("coulomb-friction",))
     trial = make_trial(plan, duration_s=300, experiment="a staircase, both ways; lift the wheels; 10 minutes in all.")
-    drive = trial.drive
-    assert drive.t_s[-1] == pytest.approx(600, abs=1)
-    lifted = drive.t_s > 2 / 3 * drive.t_s[-1]
-    assert not drive.load_N[lifted].any()
-    assert not drive.hub_speed_m_s[lifted].any()
-    assert drive.load_N[~lifted].min() > 5
-    turning = drive.moving & lifted[:, None]
-    drag = float(np.mean((trial.current_A * np.sign(drive.wheel_speed_rad_s))[turning]))
+    traverse = trial.traverse
+    assert traverse.t_s[-1] == pytest.approx(600, abs=1)
+    lifted = traverse.t_s > 2 / 3 * traverse.t_s[-1]
+    assert not traverse.load_N[lifted].any()
+    assert not traverse.hub_speed_m_s[lifted].any()
+    assert traverse.load_N[~lifted].min() > 5
+    turning = traverse.moving & lifted[:, None]
+    drag = float(np.mean((trial.current_A * np.sign(traverse.wheel_speed_rad_s))[turning]))
     assert drag == pytest.approx(trial.effects[0].size, rel=0.25)
 
 
-def test_a_batch_gives_every_name_its_turn() -> None:
-    """Two hundred recordings hold every name and every unnamed effect, and the groups in their shares."""
+def test_a_batch_contains_every_effect() -> None:
+    """Two hundred recordings contain every effect, and the groups in their shares."""
     plans = plan_batch(5, 200)
     named = {name for plan in plans for name in plan.names}
-    assert named == {*EFFECTS, *OUTSIDE}
+    assert named == {*LIBRARY_EFFECTS, *OUT_OF_LIBRARY}
     for group, share in SHARES.items():
         assert sum(plan.group == group for plan in plans) == round(200 * share)
     assert [plan.number for plan in plans] == list(range(200))

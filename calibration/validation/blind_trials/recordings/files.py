@@ -1,4 +1,4 @@
-"""A trial as the files that a solver may see: the recording in the contract's columns, and the simulation's TOML."""
+"""The input files of a solver: the recording as CSV, and the simulation's parameters as TOML."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import tomlkit
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from regolithd.calibration.validation.blind_trials.generator import Tables, Trial
+    from regolithd.calibration.validation.blind_trials.recordings.generator import Tables, Trial
 
 COLUMNS = (
     "t_s",
@@ -26,7 +26,7 @@ COLUMNS = (
     "motor_temperature_degC",
     "bus_voltage_V",
 )
-"""The recording's columns, in the contract's order and units."""
+"""Columns of a recording; the units are in the names."""
 
 
 def toml_text(tables: Tables) -> str:
@@ -35,22 +35,22 @@ def toml_text(tables: Tables) -> str:
 
 
 def recording_text(trial: Trial) -> str:
-    """Return the recording as CSV: one row per instant and wheel, seven digits."""
-    drive = trial.drive
+    """Return the recording as CSV: one row for each instant and wheel, seven significant digits."""
+    traverse = trial.traverse
     gears = float(trial.tables["drivetrain"]["planetary_ratio"]) * float(trial.tables["drivetrain"]["harmonic_ratio"])
-    rows, wheels = drive.load_N.shape
-    spread = [np.repeat(each, wheels) for each in (trial.pitch_rad, trial.roll_rad, trial.yaw_rate_rad_s)]
+    rows, wheels = traverse.load_N.shape
+    body = [np.repeat(each, wheels) for each in (trial.pitch_rad, trial.roll_rad, trial.yaw_rate_rad_s)]
     table = np.column_stack(
         [
-            np.repeat(drive.t_s, wheels),
+            np.repeat(traverse.t_s, wheels),
             np.tile(np.arange(1, wheels + 1), rows),
             trial.current_A.ravel(),
-            (drive.wheel_speed_rad_s * gears).ravel(),
+            (traverse.wheel_speed_rad_s * gears).ravel(),
             trial.load_N.ravel(),
             trial.ground_speed_m_s.ravel(),
-            *spread,
+            *body,
             trial.temperature_degC.ravel(),
-            np.repeat(drive.voltage_V, wheels),
+            np.repeat(traverse.voltage_V, wheels),
         ]
     )
     line = ",".join(["%.6g", "%d", *["%.7g"] * (len(COLUMNS) - 2)])
@@ -58,7 +58,7 @@ def recording_text(trial: Trial) -> str:
 
 
 def write_trial(trial: Trial, folder: Path) -> tuple[Path, Path]:
-    """Write `recording.csv.gz` and `SIM.toml` into the folder and return their paths; nothing else is said there."""
+    """Write `recording.csv.gz` and `SIM.toml` into the folder, and nothing else; return their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     recording, simulation = folder / "recording.csv.gz", folder / "SIM.toml"
     recording.write_bytes(gzip.compress(recording_text(trial).encode(), compresslevel=3, mtime=0))
