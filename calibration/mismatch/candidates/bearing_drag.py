@@ -1,4 +1,4 @@
-"""One wheel's drag grows from some time on: a bearing that fails, sand in a seal."""
+"""Drag of one wheel that grows from an onset on: a failing bearing, sand in a seal."""
 
 from __future__ import annotations
 
@@ -18,9 +18,17 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.problem.problem import Problem
 
+RISES = (0.03, 0.15)
+"""Time constants of the exponential rises, as shares of the recording (a choice: quick and slow)."""
+POWERS, FURTHER_POWERS = (0.25, 0.5, 2.0), (0.12, 0.18, 0.35, 0.7, 1.4)
+"""Powers of the time since the onset that are searched, and those that its interval takes in too (a choice: running-in
+wear slows down, spalling accelerates)."""
+FIRST_ONSET, LAST_ONSET = 0.01, 0.97
+"""Range of the optimised onset, as shares of the recording (a choice)."""
+
 
 class BearingDrag(Candidate):
-    """Drag against one wheel's rotation that was not there before."""
+    """Coulomb drag on one wheel, absent before its onset, constant or growing after it."""
 
     name = "bearing-drag"
     covariate = "time"
@@ -28,23 +36,23 @@ class BearingDrag(Candidate):
     words = "drag that was not there before"
     signature = "one wheel's residual along sign(ω), none before its onset, growing after"
     experiment = "drive back over the same ground, and lift the wheels and spin all six at one speed"
-    source = "seal and bearing failures: from percents of rated current to stalling"
+    source = "reports of seal and bearing failures: from some percent of rated current up to stalling"
     requires = ("direction",)
     coefficients: ClassVar = (Coefficient("drag_current", "{unit}"),)
     sharing: ClassVar = ("one",)
     free: ClassVar = {"onset_s": (0.0, float("inf"))}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """At each of many times: at once, within minutes, or on and on, slower or faster with time."""
+        """For each onset: a step, two exponential rises, and growth by a power of the time since the onset."""
         at = onset_grid(problem)
-        rises = (0.0, 0.03 * problem.length_s, 0.15 * problem.length_s, float("inf"))
-        soon: list[Shape] = [{"onset_s": t, "rise_s": rise} for t in at for rise in rises]
-        wear: list[Shape] = [{"onset_s": t, "rise_s": float("inf"), "power": p} for t in at for p in (0.25, 0.5, 2.0)]
-        return [*soon, *wear]
+        rises = (0.0, *(share * problem.length_s for share in RISES), float("inf"))
+        rising: list[Shape] = [{"onset_s": t, "rise_s": rise} for t in at for rise in rises]
+        wear: list[Shape] = [{"onset_s": t, "rise_s": float("inf"), "power": p} for t in at for p in POWERS]
+        return [*rising, *wear]
 
     def onset_profiles(self, problem: Problem) -> Sequence[Shape]:
-        """Add wear by more powers of time than are worth a search: an onset is only as sure as what follows it."""
-        wear: list[Shape] = [{"rise_s": float("inf"), "power": p} for p in (0.12, 0.18, 0.35, 0.7, 1.4)]
+        """Add more powers of time than the search has: the onset's interval depends on how the drag grows after it."""
+        wear: list[Shape] = [{"rise_s": float("inf"), "power": p} for p in FURTHER_POWERS]
         return [*super().onset_profiles(problem), *wear]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
@@ -53,5 +61,5 @@ class BearingDrag(Candidate):
         return (problem.covariates["direction"] * grown)[None]
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
-        """Anywhere but at the very ends."""
-        return {"onset_s": (0.01 * problem.length_s, 0.97 * problem.length_s)}
+        """Return the recording without its ends: drag must be seen without and with the fault."""
+        return {"onset_s": (FIRST_ONSET * problem.length_s, LAST_ONSET * problem.length_s)}

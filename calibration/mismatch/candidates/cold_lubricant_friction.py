@@ -1,4 +1,4 @@
-"""Drag that grows as the gearbox gets colder: grease stiffens."""
+"""Drag of a lubricant whose viscosity grows as it gets colder."""
 
 from __future__ import annotations
 
@@ -21,13 +21,21 @@ if TYPE_CHECKING:
 
 
 POLES_DEGC = (-125.0, -95.0)
-"""Between which Vogel's law for low-temperature greases has its pole."""
+"""Pole temperatures of Vogel's law that bracket low-temperature greases [°C] (data sheets)."""
+SCALES_K = (6.0, 11.0, 20.0, 45.0)
+"""Temperature changes for a factor e near the coldest reading, as searched [K] (a choice: in steps of about two)."""
 STEEPEST_K = 5.0
-"""No grease thins by a factor e, or loses all its drag, within less."""
+"""Least temperature change for a factor e, or for the whole drag to vanish [K] (a choice: greases have 10 to 40 K)."""
+COLDEST_QUANTILE = 0.005
+"""Quantile of the temperature that counts as the coldest, so that single readings do not."""
+END_QUANTILES = (0.35, 0.6, 0.85)
+"""Quantiles of the temperature at which a linear drag may end (a choice)."""
+BEYOND_K = 20.0
+"""A linear drag may end this far above the warmest reading too [K] (a choice)."""
 
 
 class ColdLubricantFriction(Candidate):
-    """Grease viscosity over temperature: a constant drag or one proportional to speed, times a falling function."""
+    """Coulomb (power 0) or viscous (power 1) drag times a falling function of temperature: Vogel's law or a line."""
 
     name = "cold-lubricant-friction"
     covariate = "temperature"
@@ -42,27 +50,25 @@ class ColdLubricantFriction(Candidate):
     free: ClassVar = {"scale_K": (STEEPEST_K, 80.0), "no_drag_above_degC": (-60.0, 80.0)}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """Vogel's law of several steepnesses, and straight lines that end at several temperatures."""
+        """Return Vogel's law with several scales, and straight lines that end at several temperatures."""
         temperature = problem.covariates["temperature"][problem.mask]
         soonest = _coldest(problem) + STEEPEST_K
         top = max(float(np.nanmax(temperature)), soonest)
-        ends = np.unique(np.maximum([*np.nanquantile(temperature, [0.35, 0.6, 0.85]), top], soonest)).tolist()
+        ends = np.unique(np.maximum([*np.nanquantile(temperature, END_QUANTILES), top], soonest)).tolist()
         found: list[Shape] = []
         for power in (0.0, 1.0):
             found += [
-                {"power": power, "pole_degC": pole, "scale_K": scale}
-                for pole in POLES_DEGC
-                for scale in (6.0, 11.0, 20.0, 45.0)
+                {"power": power, "pole_degC": pole, "scale_K": scale} for pole in POLES_DEGC for scale in SCALES_K
             ]
-            found += [{"power": power, "no_drag_above_degC": end} for end in (*ends, top + 20)]
+            found += [{"power": power, "no_drag_above_degC": end} for end in (*ends, top + BEYOND_K)]
         return found
 
     def prior_penalty(self, problem: Problem, shape: Shape) -> float:
-        """Charge a drag that no wheel's own temperature changes: Coulomb and viscous friction are the plainer names."""
+        """Charge a drag that does not change on any wheel: there Coulomb or viscous friction is the simpler model."""
         return 0.0 if problem.changes_within(self._growth(problem, shape)) else UNLIKELY_SHAPE_PENALTY
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return g(T) sign(ω)|ω|^p; g is 1 at the coldest that was driven."""
+        """Return g(T) sign(ω)|ω|^p; g is 1 at the coldest reading."""
         drag = problem.covariates["direction"] * self._growth(problem, shape)
         if float(shape["power"]) and "wheel_speed" in problem.covariates:
             drag = drag * np.abs(problem.covariates["wheel_speed"])
@@ -73,7 +79,7 @@ class ColdLubricantFriction(Candidate):
         temperature = np.nan_to_num(problem.covariates["temperature"])
         coldest = _coldest(problem)
         if "scale_K" in shape:
-            # Vogel: ln of viscosity goes with 1/(T − T_0); near the coldest it falls by e over the scale.
+            # Vogel: ln η = A + B/(T − T_0); near the coldest reading the viscosity falls by a factor e over the scale.
             pole = float(shape["pole_degC"])
             above, coldest_above = np.maximum(temperature - pole, 5.0), max(coldest - pole, 5.0)
             return np.asarray(np.exp(coldest_above / float(shape["scale_K"]) * (coldest_above / above - 1)))
@@ -81,7 +87,7 @@ class ColdLubricantFriction(Candidate):
         return np.maximum(end - temperature, 0.0) / max(end - coldest, STEEPEST_K)
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
-        """Only the parameter that this shape has."""
+        """Return the range of the one parameter that this shape has."""
         temperature = problem.covariates["temperature"][problem.mask]
         soonest = max(float(np.nanquantile(temperature, 0.2)), _coldest(problem) + STEEPEST_K)
         ends = (soonest, max(float(np.nanmax(temperature)), soonest) + 40)
@@ -89,5 +95,5 @@ class ColdLubricantFriction(Candidate):
 
 
 def _coldest(problem: Problem) -> float:
-    """Return the coldest that was driven [°C], single readings aside."""
-    return float(np.nanquantile(problem.covariates["temperature"][problem.mask], 0.005))
+    """Return the coldest temperature [°C], single readings aside."""
+    return float(np.nanquantile(problem.covariates["temperature"][problem.mask], COLDEST_QUANTILE))

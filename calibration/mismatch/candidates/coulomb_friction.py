@@ -1,4 +1,4 @@
-"""Constant drag against rotation: a motor's no-load current, dry friction of seals and gears."""
+"""Constant drag against the motion: a motor's no-load current, dry friction of seals and gears."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class CoulombFriction(Candidate):
-    """A constant against the motion."""
+    """A constant that changes sign with the direction of motion (Coulomb, 1785)."""
 
     name = "coulomb-friction"
     covariate = "direction"

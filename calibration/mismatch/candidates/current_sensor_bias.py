@@ -1,4 +1,4 @@
-"""One current reading is offset, whatever the direction."""
+"""Constant offset of one sensor reading, independent of the direction of motion."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class CurrentSensorBias(Candidate):
-    """A constant on one reading, which does not change sign with rotation."""
+    """A constant on one wheel's reading."""
 
     name = "current-sensor-bias"
     covariate = "none"
@@ -21,11 +21,11 @@ class CurrentSensorBias(Candidate):
     words = "an offset of one reading, whatever the direction"
     signature = "one wheel's residual is constant and keeps its sign when the wheel reverses"
     experiment = "stand still with the motors unpowered, then drive one stretch both ways"
-    source = "shunt amplifiers: offsets of milliamperes"
+    source = "data sheets of shunt amplifiers: offsets of milliamperes"
     along_motion = False
     coefficients: ClassVar = (Coefficient("offset", "{unit}", 0),)
     sharing: ClassVar = ("one",)
 
     def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002
-        """Return 1."""
+        """Return a constant 1."""
         return np.ones((1, *problem.mask.shape))

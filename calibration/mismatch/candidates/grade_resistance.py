@@ -1,4 +1,4 @@
-"""The weight's component along the slope, shared among the wheels."""
+"""Grade resistance: the weight's component along the slope, shared among the wheels."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class GradeResistance(Candidate):
-    """Uphill costs current whichever way the wheels turn: nose up, the soil must push forwards."""
+    """Current in proportion to sin(pitch), whichever way the wheels turn: nose up, traction must act forwards."""
 
     name = "grade-resistance"
     covariate = "pitch"
@@ -31,7 +31,7 @@ class GradeResistance(Candidate):
     sharing: ClassVar = ("all",)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """Shared by what each wheel carries, or evenly."""
+        """Return sharing in proportion to each wheel's load, where it is known, or evenly."""
         return [{"shared": "by load"}, {"shared": "evenly"}] if "load" in problem.covariates else [{"shared": "evenly"}]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:

@@ -1,4 +1,4 @@
-"""One load cell wanders: the simulation is told a load that is not there."""
+"""Drift of one load cell: the simulation gets a wrong load as its input."""
 
 from __future__ import annotations
 
@@ -17,27 +17,28 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 WANDER_KNOTS, POSTURE_KNOTS = 24, 4
-"""Of the line that a drift follows; and of the one that is fitted beside what pitch and roll say."""
+"""Knots of the broken line through a drift, and of the one that is fitted together with pitch and roll (a choice: one
+for each 4 % of the recording; few enough not to follow the posture)."""
 OFFSETS = (-3.0, -2.2, -1.6, -1.1, -0.8, -0.55, -0.4, -0.2, 0.0, 0.15, 0.3, 0.4, 0.5, 0.7, 0.85)
-"""Mean readings that a drift may have been off by, at which it is simulated."""
+"""Offsets of the drift in mean readings, at which the simulation runs; a parabola interpolates between them (a choice:
+dense where the current depends on the load most)."""
 
 
 class LoadCellDrift(Candidate):
-    """A reading that creeps away; the current does not follow it.
+    """A load reading that drifts while the current does not follow it.
 
-    Seen twice: in the current, which does not answer to the load that the cell claims, and in the cell itself,
-    against what pitch and roll say it should carry. Both are asked for: what the cell does not show is another
-    effect, and a load that the current follows is a load.
+    Two channels have to show it: the current, which does not respond to the load that the cell reports, and the cell
+    itself, whose reading departs from what pitch and roll explain.
     """
 
     name = "load-cell-drift"
     covariate = "time"
     channel = "load_N"
     equation = "W = W_cell − D(t);  ΔI = −(∂I/∂W) D(t)"
-    words = "a load cell that wanders"
-    signature = "one wheel's load leaves what pitch and roll explain, and its current does not follow"
+    words = "a load cell whose reading drifts"
+    signature = "one wheel's load departs from what pitch and roll explain, and its current does not follow"
     experiment = "drive back over the same ground, and lift the wheels and spin all six at one speed"
-    source = "strain-gauge creep and temperature: percents of full scale per hour when faulty"
+    source = "creep and temperature drift of faulty strain gauges: some percent of full scale per hour"
     requires = ("load", "pitch", "roll")
     acts_unloaded = False
     coefficients: ClassVar = (Coefficient("drift_as_the_cell_shows_it", "1", 1),)
@@ -45,15 +46,16 @@ class LoadCellDrift(Candidate):
     free: ClassVar = {"relative_offset": (-3.0, 0.85)}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
-        """As the cell itself shows it, from several readings that were wrong on the mean already."""
+        """Return the drift as the cell shows it, with several offsets of its mean."""
         return [{"relative_offset": offset} for offset in OFFSETS[2:-2]]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return what the simulation says to the load without the drift, less what it said.
+        """Return the change of the prediction when the drift is taken out of the load.
 
-        The cell shows how the drift went, but not what it was on the mean: that is the offset, in mean readings.
+        The cell shows how the drift varied, but not its mean: that is the shape parameter `relative_offset`, in mean
+        readings.
         """
-        # Simulated at a few offsets, since a search asks for hundreds; the parabola through the nearest three between.
+        # The search needs hundreds of offsets: the simulation runs at a few, a parabola through three interpolates.
         offset = float(shape["relative_offset"])
         middle = int(np.clip(np.argmin(np.abs(np.array(OFFSETS) - offset)), 1, len(OFFSETS) - 2))
         at = OFFSETS[middle - 1 : middle + 2]
@@ -64,13 +66,13 @@ class LoadCellDrift(Candidate):
         return total[None]
 
     def own_channel_evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array]:  # noqa: ARG002
-        """Return, for each wheel, what this drift explains of its own cell's reading, and how large it is there."""
+        """Return Δχ² of the drift in each cell's own reading, and its coefficient there, which is 1."""
         key = ("drift seen by the cell", 0.0)
         if key not in problem.made:
             reading, drift = self._unexplained_load(problem), self._drift(problem)
             noise = estimate_noise(np.nan_to_num(reading - drift), np.isfinite(reading))
             seen = np.nansum(np.where(np.isfinite(reading), drift**2, 0.0), axis=0) * noise.weights
-            # A line of many pieces follows noise too: each piece gains 1 by chance. And the ground: that all cells do.
+            # Each knot gains 1 by chance; what half of the cells show is the ground, not a fault.
             usual = float(np.median(seen)) if len(seen) > 2 else 0.0
             problem.made[key] = np.maximum(seen - max(usual, WANDER_KNOTS), 0.0)
         return problem.made[key], np.ones(problem.mask.shape[1])
@@ -100,10 +102,10 @@ class LoadCellDrift(Candidate):
 
 
 def _without_posture(problem: Problem, values: Array) -> Array:
-    """Return each column less its mean and what pitch and roll say, fitted beside a line of few pieces over time.
+    """Return each column less its mean and its regression on pitch and roll.
 
-    Over half an hour a slope that changes slowly looks like a drift: fitted alone, posture would take the drift along.
-    A line of many pieces, though, would take the posture along.
+    The regression has a broken line over time beside it: a slope that changes slowly resembles a drift, and without the
+    line the regression would absorb the drift. A line with many knots would absorb the posture instead.
     """
     left = np.full(values.shape, np.nan)
     for k in range(values.shape[1]):
@@ -120,7 +122,7 @@ def _without_posture(problem: Problem, values: Array) -> Array:
 
 
 def _wander(problem: Problem, reading: Array) -> Array:
-    """Return a broken line over time through a reading."""
+    """Return the least-squares broken line over time through one cell's reading."""
     known = np.isfinite(reading)
     hats = broken_lines(problem.time_s[:, 0], known, WANDER_KNOTS)
     if not hats:

@@ -1,4 +1,4 @@
-"""Losses that depend on the torque carried: gears that are less efficient at some loads than at others."""
+"""Gear losses that depend on the transmitted torque."""
 
 from __future__ import annotations
 
@@ -20,19 +20,25 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.problem.problem import Problem
 
+LARGEST_LOSS = 2 / 3
+"""Largest share of the stated efficiency that may be lost at any torque (a choice: a third is left)."""
+POWERS, LIGHT_LOADS, SLOPES = (0.0, 0.5, 1.0, 2.0, 3.5), (0.5, 1.0), (-0.2, 0.0, 0.3)
+"""Grid of the three forms: powers of torque, decay scales in mean torques, slopes of the efficiency (a choice)."""
+
 
 class LoadDependentEfficiency(Candidate):
-    """An efficiency that is not one number: the loss grows as a power of the torque.
+    """An efficiency that varies with torque, in one of three forms.
 
-    With power 0 the loss is proportional to torque: the stated efficiency is wrong by more than its stated
-    uncertainty. A loss that does not grow with torque at all is Coulomb friction. Or the stated efficiency holds at the
-    mean torque and falls or rises in proportion to what is above it: then the current is I/(1 − a x).
+    `power`: the relative loss grows as a power of the torque; with power 0 it is constant, so that the stated gain is
+    wrong by more than its stated uncertainty. `light`: the loss decays exponentially with torque. `bent`: the
+    efficiency is the stated one at the mean torque and falls linearly with the torque above it, so that the current is
+    I/(1 − a x).
     """
 
     name = "load-dependent-efficiency"
     covariate = "torque"
     equation = "ΔI = a I_sim |I_sim/Ī|^p,  or I_sim (1/(1 − a x) − 1) with x = |I_sim|/Ī − 1"
-    words = "a loss that depends on the torque carried"
+    words = "a loss that depends on the transmitted torque"
     signature = "a residual along the predicted current, curved against it"
     experiment = "repeat at one speed with and without ballast, and up and down a slope"
     source = "CSF-11 efficiency over load (maker's chart): 0.3 to 0.7 from a tenth of rated torque to rated"
@@ -40,23 +46,23 @@ class LoadDependentEfficiency(Candidate):
     coefficients: ClassVar = (Coefficient("relative_loss", "1", 0),)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
-        """From proportional to strongly curved, losses at light loads, and an efficiency that is right on the mean."""
-        curved: list[Shape] = [{"power": p} for p in (0.0, 0.5, 1.0, 2.0, 3.5)]
-        light: list[Shape] = [{"light": s} for s in (0.5, 1.0)]
-        bent: list[Shape] = [{"bent": b} for b in (-0.2, 0.0, 0.3)]
+        """Return powers from proportional to strongly curved, losses at light load, and linear efficiencies."""
+        curved: list[Shape] = [{"power": p} for p in POWERS]
+        light: list[Shape] = [{"light": s} for s in LIGHT_LOADS]
+        bent: list[Shape] = [{"bent": b} for b in SLOPES]
         return [*curved, *light, *bent]
 
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
-        """Bend the current by the fitted loss, as far as the gears keep a third of their efficiency."""
+        """Return the linear efficiency with the fitted slope, as long as at least a third of the efficiency is left."""
         if "bent" not in shape:
             return shape
         above = self._relative(problem)[problem.mask] - 1
-        least, most = 2 / 3 / min(float(np.min(above)), -1e-9), 2 / 3 / max(float(np.max(above)), 1e-9)
+        least, most = LARGEST_LOSS / min(float(np.min(above)), -1e-9), LARGEST_LOSS / max(float(np.max(above)), 1e-9)
         bent = float(np.clip(values[0], least, most))
         return shape if abs(bent - float(shape["bent"])) <= SHAPE_TOLERANCE * abs(bent) else {"bent": bent}
 
     def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
-        """Charge a loss in proportion: it is the stated gain far outside its own doubt."""
+        """Charge a loss proportional to torque: it contradicts the stated gain's standard deviation."""
         return UNLIKELY_SHAPE_PENALTY if shape.get("power") == 0.0 else 0.0
 
     def columns(self, problem: Problem, shape: Shape) -> Array:

@@ -1,4 +1,4 @@
-"""Later wheels run in the ruts of earlier ones, on soil already compacted."""
+"""Multi-pass effect: later wheels run in the ruts of earlier ones, on compacted soil."""
 
 from __future__ import annotations
 
@@ -19,12 +19,17 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.problem.problem import Problem
 
+KEPT = (0.0, 0.5, 1.0)
+"""Change by each further pass over that by the first (tests: most of it by the first pass)."""
+STEP = 0.3
+"""Relative change of stiffness and shear modulus of the prediction's difference quotient (a choice: as in a rut)."""
+
 
 class MultiPassCompaction(Candidate):
-    """Resistance that changes from row to row, by number of passes before.
+    """A change of the current or of the soil that depends on the number of earlier passes.
 
-    What a pass does to the soil is one number (the current, or the stiffness, changes by so much), or three: a rut is
-    stiffer, shears sooner, and coheres more.
+    `by` says what a pass changes: the current, the soil's stiffness, or stiffness, shear modulus and cohesion. `kept`
+    is the change by each further pass over that by the first; `leads` the end from which passes are counted.
     """
 
     name = "multi-pass-compaction"
@@ -44,35 +49,35 @@ class MultiPassCompaction(Candidate):
     sharing: ClassVar = ("all",)
 
     def applies(self, problem: Problem) -> bool:
-        """Only where there are rows."""
+        """Return whether the machine has rows of wheels."""
         return super().applies(problem) and problem.row is not None and bool(np.ptp(problem.row) > 0)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """All at the first pass, or evenly; counted from the front, or from whichever end leads."""
+        """Return compaction from the first pass alone to equal in each, counted from the front or the leading end."""
         leads = ("front", "travel") if "direction" in problem.covariates else ("front",)
         ways = ["current"]
         ways += ["stiffness"] if "stiffness_factor" in problem.simulation.variants() else []
         ways += ["soil"] if {"shear_factor", "cohesion_Pa"} <= {*problem.simulation.variants(), *problem.values} else []
-        return [{"kept": kept, "leads": lead, "by": way} for kept in (0.0, 0.5, 1.0) for lead in leads for way in ways]
+        return [{"kept": kept, "leads": lead, "by": way} for kept in KEPT for lead in leads for way in ways]
 
     def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
-        """Charge three numbers for a rut where mostly one will do."""
+        """Charge the form with three coefficients: mostly one explains a rut."""
         return UNLIKELY_SHAPE_PENALTY if shape["by"] == "soil" else 0.0
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return the prediction (or its answer to stiffer soil) times what the passes before have done."""
-        assert problem.row is not None  # noqa: S101  # applies() said so
+        """Return the prediction, or its derivatives with respect to the soil's parameters, times the earlier passes."""
+        assert problem.row is not None  # noqa: S101  # applies() asks for rows
         last = np.max(problem.row)
         passes = np.broadcast_to(problem.row, problem.mask.shape)
         if shape["leads"] == "travel":
             passes = np.where(problem.covariates["direction"] >= 0, passes, last - passes)
-        # 1 + k + k² …: what each further pass adds is the fraction k of what the one before did.
+        # Each further pass adds the fraction k of the change by the first one.
         kept = float(shape["kept"])
         done = np.where(passes > 0, 1.0, 0.0) + np.where(passes > 1, kept * (passes - 1), 0.0)
         if shape["by"] == "current":
             return (problem.filled * done)[None]
-        stiffer = problem.secant("stiffness_factor", 0.3)
+        stiffer = problem.secant("stiffness_factor", STEP)
         if shape["by"] == "stiffness":
             return (stiffer * done)[None]
         coheres = problem.values["cohesion_Pa"] * problem.tangent("cohesion_Pa")
-        return np.stack((stiffer * done, problem.secant("shear_factor", -0.3) * done, coheres * done))
+        return np.stack((stiffer * done, problem.secant("shear_factor", -STEP) * done, coheres * done))

@@ -15,13 +15,15 @@ if TYPE_CHECKING:
 
 
 MOST_READINGS = 4
-"""By which the current may lag."""
+"""Largest lag of the current in readings (a choice)."""
+LAGS = (0.0, 0.5, 1.5)
+"""Lags that are searched, in readings (a choice)."""
 
 
 class RotorInertia(Candidate):
-    """Inertia as seen at the wheel: the rotor's times the gear ratio squared dominates.
+    """Current in proportion to the acceleration; the rotor's inertia times the gear ratio squared dominates.
 
-    The current may come some readings after the acceleration: drives give way, and controllers filter what they report.
+    The current may lag behind the acceleration: drivetrains are elastic, and controllers low-pass what they report.
     """
 
     name = "rotor-inertia"
@@ -37,11 +39,11 @@ class RotorInertia(Candidate):
     free: ClassVar = {"lag_s": (0.0, 1.0)}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """At once, and half a reading and one and a half later."""
-        return [{"lag_s": readings * problem.recording.step_s} for readings in (0.0, 0.5, 1.5)]
+        """Return no lag, and lags of half a reading and of one and a half."""
+        return [{"lag_s": readings * problem.recording.step_s} for readings in LAGS]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return dω/dt as it was the lag before, between readings on a straight line."""
+        """Return dω/dt delayed by the lag, interpolated linearly between readings."""
         late = float(shape.get("lag_s", 0.0)) / problem.recording.step_s
         whole = int(late)
         before = np.pad(problem.covariates["wheel_acceleration"], ((whole + 1, 0), (0, 0)))
@@ -49,5 +51,5 @@ class RotorInertia(Candidate):
         return ((1 - late + whole) * before[1 : count + 1] + (late - whole) * before[:count])[None]
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
-        """Return a few readings at most."""
+        """Return lags of a few readings at most."""
         return {"lag_s": (0.0, min(MOST_READINGS * problem.recording.step_s, self.free["lag_s"][1]))}

@@ -1,4 +1,4 @@
-"""Extra sinkage with slip: a wheel that slips digs itself in (Eq. 8)."""
+"""Slip sinkage: a slipping wheel sinks deeper (Eq. 8)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class SlipSinkage(Candidate):
-    """Lyasko's factor on the sinkage, through the soil model where the simulation has one."""
+    """Lyasko's factor on the sinkage, by way of the simulation's soil model where it has one."""
 
     name = "slip-sinkage"
     covariate = "slip"
@@ -30,13 +30,13 @@ class SlipSinkage(Candidate):
     sharing: ClassVar = ("all",)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """Through the soil model at small and full strength; else in proportion to slip."""
+        """Return the soil model at small and full strength, and a law proportional to slip."""
         has_soil = "slip_sinkage" in problem.simulation.variants()
         through: list[Shape] = [{"step": 0.3}, {"step": 1.0}] if has_soil else []
         return [*through, {"power": 1.0}]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return what the soil model says to more sinkage, or prediction × slip."""
+        """Return the change of the prediction for more sinkage per unit of strength, or prediction × slip."""
         if "step" in shape:
             return problem.secant("slip_sinkage", float(shape["step"]))[None]
         slip = np.maximum(np.nan_to_num(problem.covariates["slip"]), 0.0)

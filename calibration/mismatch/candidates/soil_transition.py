@@ -1,4 +1,4 @@
-"""The soil's strength changes at some time: the rover has driven onto other ground."""
+"""Change of the soil's strength from some time on: the rover drives onto another soil."""
 
 from __future__ import annotations
 
@@ -15,11 +15,15 @@ if TYPE_CHECKING:
 
 
 BORDERS_M = (0.01, 0.5)
-"""Over how much ground one soil becomes the other: a line, or a blend as long as the rover is."""
+"""Length over which one soil turns into the other [m] (a choice: a line, and a blend of about the rover's length)."""
+ONSETS = 40
+"""Onsets that are searched (a choice: one in each 2 % of the recording, as a border lies between two wheels)."""
+FIRST_ONSET, LAST_ONSET = 0.02, 0.97
+"""Range of the optimised onset, as shares of the recording (a choice)."""
 
 
 class SoilTransition(Candidate):
-    """Cohesion and the tangent of the friction angle change in one proportion, from some time on."""
+    """Cohesion and tan φ change by the same factor, from a time on or beyond a place on the track."""
 
     name = "soil-transition"
     covariate = "time"
@@ -34,15 +38,15 @@ class SoilTransition(Candidate):
     free: ClassVar = {"onset_s": (0.0, float("inf"))}
 
     def applies(self, problem: Problem) -> bool:
-        """Only where the simulation has a soil."""
+        """Return whether the simulation has cohesion and friction angle as parameters."""
         return {"cohesion_Pa", "friction_angle_deg"} <= set(problem.simulation.parameters)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """At each of many times: under all wheels at once, or where each wheel comes to the border in its turn."""
-        return [{"onset_s": t, **way} for t in onset_grid(problem, 40) for way in self.onset_profiles(problem)]
+        """Return, for each onset, a change under all wheels at once, or as each wheel crosses the border."""
+        return [{"onset_s": t, **way} for t in onset_grid(problem, ONSETS) for way in self.onset_profiles(problem)]
 
     def onset_profiles(self, problem: Problem) -> Sequence[Shape]:
-        """At once everywhere, or along the way: at a line, or over half a metre."""
+        """Return a change in time, and where the place is known, along the track at a line or over half a metre."""
         everywhere: Shape = {"along": "time", "of": "strength"}
         if "place" not in problem.covariates:
             return [everywhere]
@@ -50,7 +54,7 @@ class SoilTransition(Candidate):
         return [everywhere, *borders]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return the prediction's answer to stronger soil, after the onset."""
+        """Return the prediction's derivative with respect to the relative strength, beyond the onset."""
         values = problem.values
         cohesion = values["cohesion_Pa"] * problem.tangent("cohesion_Pa")
         # d tan φ / tan φ = dφ · 2 / sin 2φ; to a few percent the angle itself scales alike.
@@ -59,12 +63,12 @@ class SoilTransition(Candidate):
         return (of * _beyond(problem, shape))[None]
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
-        """Anywhere but at the very ends."""
-        return {"onset_s": (0.02 * problem.length_s, 0.97 * problem.length_s)}
+        """Return the recording without its ends: both soils must be seen."""
+        return {"onset_s": (FIRST_ONSET * problem.length_s, LAST_ONSET * problem.length_s)}
 
 
 def _beyond(problem: Problem, shape: Shape) -> Array:
-    """Return how far it is the other soil, 0 to 1, shape (time, wheel); the rover's middle meets it at the onset."""
+    """Return the share of the other soil, shape (time, wheel); the rover's centre crosses the border at the onset."""
     onset_s = float(shape["onset_s"])
     if shape["along"] == "time":
         return np.broadcast_to(problem.time_s >= onset_s, problem.mask.shape).astype(np.float64)

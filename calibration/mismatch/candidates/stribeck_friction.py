@@ -1,4 +1,4 @@
-"""Extra drag near standstill that fades as a lubricating film builds up."""
+"""Stribeck effect: extra drag near standstill that decays as a lubricating film builds up."""
 
 from __future__ import annotations
 
@@ -19,16 +19,21 @@ FADES: dict[str, Callable[[Array], Array]] = {
     "exponent 2": lambda ratio: np.exp(-(ratio**2)),
     "quotient": lambda ratio: 1 / (1 + ratio**2),
 }
-"""What is left of the extra drag, over speed in Stribeck speeds."""
+"""Share of the extra drag that is left, as a function of speed over the Stribeck speed."""
+SPEED_COUNT = 6
+"""Stribeck speeds that are searched, in geometric steps (a choice)."""
+SLOWEST, MIDDLE = (0.5, 0.02), (0.8, 0.5)
+"""Ends of their range, as a factor on a quantile of the speed: below the first the effect decays before the slowest
+reading, above the second it resembles viscous friction (a choice)."""
 
 
 class StribeckFriction(Candidate):
-    """Boundary friction above the Coulomb level, gone at several times the Stribeck speed."""
+    """Boundary friction above the Coulomb level, negligible at several times the Stribeck speed."""
 
     name = "stribeck-friction"
     covariate = "wheel_speed"
     equation = "ΔI = I_s sign(ω) exp(−(|ω|/ω_s)^δ), or I_s sign(ω) / (1 + (ω/ω_s)²)"
-    words = "extra drag near standstill that fades with speed"
+    words = "extra drag near standstill that decays with speed"
     signature = "a residual along sign(ω) that is largest at the slowest speeds"
     experiment = "drive a staircase of at least four constant speeds, from creeping to full speed, both ways"
     source = "Armstrong-Hélouvry, Dupont and Canudas de Wit (1994): δ from 1 to 2; Hess and Soom (1990): the quotient"
@@ -39,24 +44,25 @@ class StribeckFriction(Candidate):
     free: ClassVar = {"stribeck_speed_rad_s": (0.0, np.inf)}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """Stribeck speeds between the slowest and the median speed driven."""
+        """Return Stribeck speeds between the slowest and the median speed, in three forms."""
         return [
             {"stribeck_speed_rad_s": float(speed), "fades": fades}
-            for fades in ("exponent 1", "exponent 2", "quotient")
-            for speed in np.geomspace(*self._range(problem), 6)
+            for fades in FADES
+            for speed in np.geomspace(*self._range(problem), SPEED_COUNT)
         ]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return sign(ω) times what is left of the extra drag at this speed."""
+        """Return sign(ω) times the share of the extra drag that is left at this speed."""
         speed = problem.covariates["wheel_speed"]
         ratio = np.abs(speed) / float(shape["stribeck_speed_rad_s"])
         return (np.sign(speed) * FADES[str(shape["fades"])](ratio))[None]
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
-        """Below the slowest speed driven it cannot be told from nothing, above the median not from viscous."""
+        """Return the range in which it can be told from nothing and from viscous friction."""
         return {"stribeck_speed_rad_s": self._range(problem)}
 
     def _range(self, problem: Problem) -> tuple[float, float]:
         speed = np.abs(problem.covariates["wheel_speed"][problem.mask])
         speed = speed[speed > 0]
-        return 0.5 * float(np.quantile(speed, 0.02)), 0.8 * float(np.quantile(speed, 0.5))
+        low, high = (factor * float(np.quantile(speed, quantile)) for factor, quantile in (SLOWEST, MIDDLE))
+        return low, high

@@ -1,4 +1,4 @@
-"""Torque constant that falls as the magnets warm: the same torque then needs more current."""
+"""Torque constant that falls as the magnets warm up: the same torque needs more current."""
 
 from __future__ import annotations
 
@@ -20,9 +20,14 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.problem.problem import Problem
 
+REFERENCES_DEGC = (25.0, 20.0, 0.0)
+"""Reference temperatures of data sheets, and of a cold calibration."""
+LARGEST_LOSS = 2 / 3
+"""Largest share of the torque constant that may be lost (a choice: a third is left)."""
+
 
 class TorqueConstantTemperature(Candidate):
-    """Remanence falls with temperature; the current rises in proportion to the torque."""
+    """k_t = k_0 (1 − α (T − T_0)): remanence falls with temperature, and the current is the torque over k_t."""
 
     name = "torque-constant-temperature"
     covariate = "temperature"
@@ -30,30 +35,30 @@ class TorqueConstantTemperature(Candidate):
     words = "a torque constant that falls as the motor warms"
     signature = "a residual along the predicted current that grows with temperature, through zero at T_0"
     experiment = "start cold, warm up, stop until cold again and repeat, so that temperature does not follow time"
-    source = "NdFeB −0.1 %/K, ferrite −0.2 %/K; T_0 20 to 25 °C on data sheets"
+    source = "magnet data sheets: NdFeB −0.1 %/K, ferrite −0.2 %/K, T_0 20 to 25 °C"
     requires = ("temperature",)
     coefficients: ClassVar = (Coefficient("temperature_coefficient", "1/K"),)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the reference temperatures of data sheets, and the recording's mean."""
         middle = float(np.nanmean(problem.covariates["temperature"][problem.mask]))
-        return [{"reference_degC": t, "bent_per_K": 0.0} for t in (25.0, 20.0, 0.0, middle)]
+        return [{"reference_degC": t, "bent_per_K": 0.0} for t in (*REFERENCES_DEGC, middle)]
 
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
-        """Bend the column by the coefficient that was fitted to it, as far as the magnets keep a third."""
+        """Return the shape with α as fitted, as long as a third of the torque constant is left."""
         warmest = float(np.max(self._warmer(problem, shape)[problem.mask]))
-        most = 2 / 3 / warmest if warmest > 0 else np.inf
+        most = LARGEST_LOSS / warmest if warmest > 0 else np.inf
         bent = float(np.clip(values[0], 0.0, most))
         return (
             shape if abs(bent - float(shape["bent_per_K"])) < SHAPE_TOLERANCE * bent else {**shape, "bent_per_K": bent}
         )
 
     def prior_penalty(self, problem: Problem, shape: Shape) -> float:
-        """Charge a factor that no wheel's own temperature changes: that is a gain that was stated wrongly."""
+        """Charge a factor that does not change on any wheel: there a wrong gain is the simpler model."""
         return 0.0 if problem.changes_within(self._warmer(problem, shape)) else UNLIKELY_SHAPE_PENALTY
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return (T − T_0)/(1 − α (T − T_0)) times the prediction, for the α that bends it."""
+        """Return (T − T_0)/(1 − α (T − T_0)) times the prediction, with α from the shape."""
         warmer = self._warmer(problem, shape)
         return (warmer / (1 - float(shape.get("bent_per_K", 0.0)) * warmer) * problem.filled)[None]
 

@@ -1,4 +1,4 @@
-"""Scrub while the machine turns: wheels slide sideways, and the two sides work against each other."""
+"""Turning resistance: wheels scrub sideways, and the two sides work against each other."""
 
 from __future__ import annotations
 
@@ -14,16 +14,22 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 HALVES = {"rate": (0.3, 1.0, 100.0), "angle": (0.3, 1.0, 3.0)}
-"""Where scrub has reached half of what it can, in multiples of the typical turn's."""
+"""Turn at which the effect has half its limit, in multiples of the mean turn (a choice: saturated to proportional)."""
+ENDS = (0.0, 0.5, 1.0)
+"""How much more the end rows scrub than the middle one: 0 alike, 1 the middle not at all (a choice)."""
+NO_TURN_STD = 3.0
+"""A yaw rate within this many standard errors is no turn: its sign would be noise."""
+CREEP_SHARE = 0.1
+"""Share of the mean speed that is added to the speed below a slip angle, which else has no limit (a choice)."""
 
 
 class TurningResistance(Candidate):
-    """Two parts: drag against each wheel's own rotation, and the moment that outer wheels push and inner ones brake."""
+    """Drag against each wheel's own rotation, and a moment: the outer side drives more, the inner one less."""
 
     name = "turning-resistance"
     covariate = "yaw_rate"
     equation = "ΔI = a g(|ψ̇|) sign(ω) + m g(|ψ̇|) sign(ψ̇) side,  g rising"
-    words = "scrub while the rover turns"
+    words = "scrub of the wheels while the machine turns"
     signature = "a residual only while turning: alike on all wheels (drag) or opposite on the two sides (moment)"
     experiment = "turn on the spot and along arcs of several radii, both ways"
     source = "skid-steer terramechanics: lateral friction saturates within a few degrees of side slip"
@@ -33,23 +39,22 @@ class TurningResistance(Candidate):
     sharing: ClassVar = ("all",)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """Proportional or saturating with yaw rate, or with the slip angle: on all rows alike, or more at the ends."""
-        ends = (0.0, 0.5, 1.0) if problem.row is not None and np.ptp(problem.row) > 1 else (0.0,)
+        """Return saturating laws of yaw rate or slip angle, on all rows alike or more at the ends."""
+        ends = ENDS if problem.row is not None and np.ptp(problem.row) > 1 else (0.0,)
         by = ("rate", "angle") if "wheel_speed" in problem.covariates else ("rate",)
-        # An angle cannot grow without end, a rate may.
+        # A rate has no limit, an angle has one: its grid has no proportional law.
         return [{"half_at": h, "ends": end, "by": b} for b in by for h in HALVES[b] for end in ends]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return drag and moment, in multiples of what the typical turn has."""
+        """Return drag and moment, relative to those of the mean turn; drag alone where the machine has no sides."""
         yaw = np.nan_to_num(problem.covariates["yaw_rate"])
         noise = problem.simulation.sensors.get("yaw_rate_rad_s")
-        # What is within the sensor's error of no turn is no turn: its sign would be noise.
-        yaw = np.where(np.abs(yaw) > 3 * noise.absolute, yaw, 0.0) if noise else yaw
+        yaw = np.where(np.abs(yaw) > NO_TURN_STD * noise.absolute, yaw, 0.0) if noise else yaw
         turned = np.abs(yaw) * self._lever(problem, float(shape["ends"]))
         if shape["by"] == "angle":
-            # Where a wheel points is off from where it goes by yaw rate × lever over its speed.
+            # The slip angle is yaw rate × lever over the speed.
             speed = np.abs(np.nan_to_num(problem.covariates["wheel_speed"]))
-            turned = turned / (speed + 0.1 * np.mean(speed[problem.mask]))
+            turned = turned / (speed + CREEP_SHARE * np.mean(speed[problem.mask]))
         typical = float(np.mean(turned[yaw != 0])) if np.any(yaw != 0) else 1.0
         relative = turned / typical
         half = float(shape["half_at"])
@@ -60,7 +65,7 @@ class TurningResistance(Candidate):
         return np.stack((drag, size * np.sign(yaw) * problem.side))
 
     def _lever(self, problem: Problem, ends: float) -> Array | float:
-        """Return how far each wheel's row is swept sideways by a turn, over its mean: `ends` 1 leaves the middle be."""
+        """Return each row's distance from the centre over its mean, mixed with 1 by `ends` (0: 1 for every row)."""
         if problem.row is None:
             return 1.0
         away = np.abs(problem.row - np.mean(problem.row))

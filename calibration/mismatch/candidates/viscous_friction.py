@@ -1,4 +1,4 @@
-"""Drag that grows with speed: grease, and a motor's iron losses."""
+"""Viscous friction: drag that grows with speed, from grease and a motor's iron losses."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class ViscousFriction(Candidate):
-    """Drag proportional to speed, or to a power of it near 1 (grease shears thin)."""
+    """Drag proportional to a power of speed near 1 (below: shear-thinning grease)."""
 
     name = "viscous-friction"
     covariate = "wheel_speed"
@@ -29,7 +29,7 @@ class ViscousFriction(Candidate):
     free: ClassVar = {"power": (0.7, 1.4)}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
-        """Proportional first; then thinner and thicker."""
+        """Return the law proportional to speed, then a shear-thinning and a churning one."""
         return [{"power": 1.0}, {"power": 0.75}, {"power": 1.35}]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:

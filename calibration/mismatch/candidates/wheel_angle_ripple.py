@@ -1,4 +1,4 @@
-"""Current that is periodic in the wheel's angle: grousers biting, gear teeth, an eccentric wheel."""
+"""Ripple that is periodic in the wheel's angle: grousers, gear teeth, an eccentric wheel."""
 
 from __future__ import annotations
 
@@ -15,14 +15,23 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 BINS_PER_TURN = 256
+"""Angle bins in a turn for the spectrum: four in a cycle of the highest order."""
 HIGHEST_ORDER = 64
+"""Cycles per turn (a choice: above any number of grousers; ripples of single teeth are faster than the readings)."""
 LAGS = (0.0, -0.5, 0.5)
+"""Lags of the angle in readings: a speed may be of the instant, or a mean before or after it."""
+OVERSAMPLING = 10.0
+"""Factor on the number of resolved lines (a choice): a line's power is a sum of two squares for each wheel, and the
+largest of these sums exceeds the 2 ln of their number that is charged."""
+SIDE_BAND = (0.1, 1.5)
+"""Distance in orders of the neighbours that tell the noise around a line (a choice: beyond its width, before the next
+order)."""
 READINGS_PER_CYCLE = 2.5
-"""Of fewer, a line is the image of another: at one speed a constant drag can look like a ripple of high order."""
+"""Least readings in a cycle (Nyquist: 2): with fewer, a constant drag is an alias of a ripple of high order."""
 
 
 class WheelAngleRipple(Candidate):
-    """A sine of the wheel's angle, perhaps with an overtone, each wheel at its own phase."""
+    """A sine of the wheel's angle, with or without its first overtone, each wheel with a phase of its own."""
 
     name = "wheel-angle-ripple"
     covariate = "wheel_angle"
@@ -37,21 +46,18 @@ class WheelAngleRipple(Candidate):
     free: ClassVar = {"order": (0.9, HIGHEST_ORDER)}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
-        """None: orders are sought in the residual, where thousands can be tried at once."""
+        """Return none: a spectrum of the residual finds the order among thousands at once."""
         return []
 
     def shape_count(self, problem: Problem) -> float:
-        """Return the number of lines that the angle turned can resolve, of each kind.
-
-        And ten times as many: of sums of twelve squares the largest is larger than two logarithms allow.
-        """
+        """Return the number of lines that the turned angle can resolve, for each kind, with a factor for safety."""
         turns = float(np.ptp(problem.covariates["wheel_angle"])) / (2 * np.pi)
-        return max(10 * 3 * HIGHEST_ORDER * turns, 1.0)
+        return max(OVERSAMPLING * 3 * HIGHEST_ORDER * turns, 1.0)
 
     def propose_shapes(self, problem: Problem, residual: Array) -> Sequence[Shape]:
-        """Return the strongest order of each kind, as a sine and with its overtone.
+        """Return the strongest order of each kind, with and without its overtone.
 
-        The residual is summed over angle bins, and its spectrum taken.
+        The order is where the spectrum of the residual over angle has its maximum.
         """
         kinds = ("drag", "torque", "load") if "direction" in problem.covariates else ("torque",)
         found: list[Shape] = []
@@ -75,7 +81,7 @@ class WheelAngleRipple(Candidate):
         return found.reshape(-1, *problem.mask.shape)
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
-        """Within one line's width of where it was found."""
+        """Return the width of a spectral line around the order."""
         width = np.pi / max(float(np.ptp(problem.covariates["wheel_angle"])), 1.0)
         order = float(shape["order"])
         return {"order": (order - width, order + width)}
@@ -88,15 +94,15 @@ class WheelAngleRipple(Candidate):
         return {"amplitude": amplitude, "order": float(shape["order"])}
 
     def _base(self, problem: Problem, kind: str) -> Array:
-        """Return a torque that ripples whichever way the wheel turns, a drag, or a ripple in proportion to the load."""
+        """Return the factor of the sine: 1 (torque), the direction (drag), or the relative prediction (load)."""
         if kind == "drag":
             return problem.covariates["direction"]
         return np.ones(problem.mask.shape) if kind == "torque" else problem.filled / problem.mean_size
 
     def autocorrelation_time_at(self, problem: Problem, residual: Array, shape: Shape) -> float:
-        """Return the noise's power around this order, over that of white noise: lines stand out of their neighbours.
+        """Return the residual's power around this order over that of white noise: the autocorrelation time.
 
-        It is the louder one's of torque and drag, so that no kind of ripple is preferred for its estimate.
+        The larger of torque and drag counts for every kind, so that the estimate prefers none.
         """
         kinds = ("drag", "torque") if "direction" in problem.covariates else ("torque",)
         return max(
@@ -107,9 +113,9 @@ class WheelAngleRipple(Candidate):
     def _autocorrelation_time(self, problem: Problem, weighted: Array, at: float) -> float:
         order, power = self._spectrum(problem, weighted)
         above = order - at
-        # Slow noise has more power at lower orders: the louder side counts.
-        sides = [power[(side * above > 0.1) & (side * above < 1.5)] for side in (-1, 1)]
-        # Half of all squares are below their median: of two a wheel, 1 − 1/9n of the mean, cubed (Wilson, Hilferty).
+        # Noise has more power at lower orders: the side with more counts.
+        sides = [power[(side * above > SIDE_BAND[0]) & (side * above < SIDE_BAND[1])] for side in (-1, 1)]
+        # Median of χ² with 2n degrees of freedom over its mean: (1 − 1/9n)³ (Wilson and Hilferty, 1931).
         wheels = max(int(problem.mask.any(axis=0).sum()), 1)
         usual = max((float(np.median(side)) for side in sides if side.size), default=float("inf"))
         return usual / (wheels * (1 - 1 / (9 * wheels)) ** 3)
@@ -120,12 +126,12 @@ class WheelAngleRipple(Candidate):
         return float(order[np.argmax(np.where(sought, power, 0.0))])
 
     def _lag(self, problem: Problem, weighted: Array, order: float) -> float:
-        """Return by how many readings the angle lags: a speed may be of the instant, or a mean before or after it."""
+        """Return the lag of the angle [readings] at which the line is strongest."""
         waves = {lag: np.exp(1j * order * _angle(problem, lag)) for lag in LAGS}
         return max(waves, key=lambda lag: float(np.sum(np.abs(np.sum(weighted * waves[lag], axis=0)) ** 2)))
 
     def _spectrum(self, problem: Problem, weighted: Array) -> tuple[Array, Array]:
-        """Return orders and the power of a residual at each, summed over the wheels; white noise has 1 on each."""
+        """Return orders and the residual's power at each, summed over the wheels; white noise has 1 on each wheel."""
         angle = problem.covariates["wheel_angle"]
         low = np.min(angle, axis=0)
         bins = np.rint((angle - low) * BINS_PER_TURN / (2 * np.pi)).astype(np.int64)
@@ -140,12 +146,12 @@ class WheelAngleRipple(Candidate):
 
 
 def _resolved(problem: Problem) -> float:
-    """Return the highest order that a wheel at its usual speed shows in enough readings a cycle."""
+    """Return the highest order with enough readings in a cycle at the median speed."""
     usual = float(np.median(np.abs(problem.covariates["wheel_speed"][problem.mask])))
     return min(HIGHEST_ORDER, 2 * np.pi / (READINGS_PER_CYCLE * problem.recording.step_s * max(usual, 1e-9)))
 
 
 def _angle(problem: Problem, lag: float) -> Array:
-    """Return the angle turned [rad] by so many readings before each instant, shape (time, wheel)."""
+    """Return the turned angle [rad] `lag` readings before each instant, shape (time, wheel)."""
     speed = np.nan_to_num(problem.covariates["wheel_speed"])
     return problem.covariates["wheel_angle"] - lag * problem.recording.step_s * speed
