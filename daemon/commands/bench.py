@@ -51,13 +51,13 @@ def bench(
     from regolithd.daemon.simulator.virtual_rover import VirtualWorld
     from regolithd.drivers.errors import BusError
     from regolithd.drivers.virtual import KAPVIK, VirtualRover
-    from regolithd.drivers.virtual.control_socket import ControlError
+    from regolithd.drivers.virtual.fault_socket import FaultSocketError
 
     settings = _scenario(scenario, soil or [], seed, no_noise=no_noise)
     nodes = KAPVIK if config is None else configuration_or_exit(config).nodes.described()
     try:
         counts = asyncio.run(_run(interface, channel, VirtualRover(VirtualWorld(settings), nodes), control, seconds))
-    except (BusError, ControlError) as error:
+    except (BusError, FaultSocketError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error
     typer.echo(json.dumps(counts))
@@ -68,11 +68,11 @@ def bench_fault(
     control: Control = _CONTROL,
 ) -> None:
     """Inject a fault into the running virtual rover, such as `regolithd bench-fault off 3`."""
-    from regolithd.drivers.virtual.control_socket import ControlError, ask
+    from regolithd.drivers.virtual.fault_socket import FaultSocketError, send_command
 
     try:
-        answer = ask(control, " ".join(fault))
-    except ControlError as error:
+        answer = send_command(control, " ".join(fault))
+    except FaultSocketError as error:
         answer = f"error: {error}"
     typer.echo(answer)
     if answer.startswith("error:"):
@@ -112,12 +112,12 @@ async def _run(
     import signal
 
     from regolithd.drivers.can.open_bus import open_bus
-    from regolithd.drivers.virtual.control_socket import control_socket
+    from regolithd.drivers.virtual.fault_socket import fault_socket
 
     ended = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, ended.set)
-    async with open_bus(interface, channel) as bus, control_socket(rover, control), asyncio.TaskGroup() as tasks:
+    async with open_bus(interface, channel) as bus, fault_socket(rover, control), asyncio.TaskGroup() as tasks:
         running = tasks.create_task(rover.run(bus))
         typer.echo(f"ready: {len(rover.nodes)} nodes on {interface} {channel}; commands at {control}")
         try:

@@ -1,15 +1,15 @@
-"""One CAN bus, opened for an asyncio program: batches of frames in, frames out, everything counted.
+"""An open CAN bus for asyncio: frames received in batches, sent one by one, all counted.
 
     async with open_bus("socketcan", "can0") as bus:
         await bus.send(sync_frame)
         async for batch in bus:
             for frame in batch: …
 
-SocketCAN is read by ourselves (`drivers.can.socketcan`: one system call brings up to 64 frames, with kernel times and
-drop counter). Every other interface of python-can goes through one thread (`drivers.can.python_can_bus`).
+SocketCAN is read by `drivers.can.socketcan`: one system call returns up to 64 frames, with kernel times and drop
+counter. Every other interface of python-can is read by one thread (`drivers.can.python_can_bus`).
 
-An empty batch says that `bus.state` changed. The iteration ends only by cancellation: a link that goes down and comes
-up again is a state of the bus, never the end of it.
+An empty batch means that `bus.state` changed. The iteration ends only by cancellation: a link that goes down and comes
+up again changes the state and does not end it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _MOST_PENDING = 20_000  # frames: two seconds of a full bus
 
 
 class BusState(StrEnum):
-    """The controller's error state (ISO 11898-1), or that there is no link at all."""
+    """The controller's error state (ISO 11898-1), or that the link is down."""
 
     ACTIVE = "active"
     WARNING = "warning"  # an error counter passed 96
@@ -85,20 +85,20 @@ class Bus(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Give the bus back; pending frames are lost."""
+        """Close the bus; pending frames are lost."""
 
-    # For those who implement a bus
+    # For implementations of a bus
 
     @abstractmethod
     def pause_reading(self) -> None:
-        """Leave frames where they are: the consumer is too slow."""
+        """Stop reading, because the consumer is too slow; frames stay in the kernel or the adapter."""
 
     @abstractmethod
     def resume_reading(self) -> None:
-        """Read on: the consumer has caught up."""
+        """Resume reading after the consumer has caught up."""
 
     def deliver(self, frames: list[Frame]) -> None:
-        """Count frames that were read, and hand them to whoever waits in `receive`."""
+        """Count frames that were read, and pass them to `receive`."""
         counters = self.counters
         counters.batches += 1
         counters.largest_batch = max(counters.largest_batch, len(frames))
@@ -112,7 +112,7 @@ class Bus(ABC):
             self.pause_reading()
 
     def change_state(self, state: BusState) -> None:
-        """Note the controller's or the link's state, count it, and wake whoever waits in `receive`."""
+        """Set the controller's or the link's state, count it, and wake `receive`."""
         if state is self.state:
             return
         self.state = state

@@ -1,4 +1,4 @@
-"""What is counted on the bus: nothing is lost without a number going up."""
+"""Counters of a bus: every lost frame and every error is counted."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from dataclasses import dataclass, field, fields
 
 @dataclass(slots=True)
 class BusCounters:
-    """Counts since the bus was opened; its owner alone writes them."""
+    """Counts since the bus was opened; only the bus writes them."""
 
-    received: int = 0  # frames of others
+    received: int = 0  # frames of other nodes
     echoed: int = 0  # our own frames, seen on the bus
     sent: int = 0  # handed to the kernel or the adapter
     batches: int = 0  # wake-ups that brought frames
     largest_batch: int = 0
-    kernel_drops: int = 0  # received by the kernel, thrown away because nobody read (SO_RXQ_OVFL)
+    kernel_drops: int = 0  # received by the kernel, discarded because the receive queue was full (SO_RXQ_OVFL)
     transmit_retries: int = 0  # ENOBUFS: the transmit queue was full, tried again
     transmit_failures: int = 0  # given up: queue full for too long, or link down
     bus_off: int = 0
@@ -24,6 +24,6 @@ class BusCounters:
     errors: Counter[str] = field(default_factory=Counter)  # error frames by class (linux/can/error.h)
 
     def as_dict(self) -> dict[str, int]:
-        """Return all counts flat, for messages and logs: error frames as `error_…`."""
+        """Return all counts by name, for messages and logs; error frames as `error_…`."""
         flat = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "errors"}
         return flat | {f"error_{name}": count for name, count in self.errors.items()}

@@ -35,7 +35,7 @@ _ACTIVE = 0x40
 
 
 def error_classes(frame: Frame) -> list[str]:
-    """Return what an error frame reports, in words for the counters."""
+    """Return the names of the error classes in an error frame."""
     names = [name for bit, name in CLASSES.items() if frame.can_id & bit]
     if frame.can_id & _CONTROLLER and len(frame.data) > 1:
         names += [name for bit, name in _OVERFLOWS.items() if frame.data[1] & bit]

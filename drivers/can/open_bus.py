@@ -1,4 +1,4 @@
-"""Which kind of bus an interface is: the one place that knows them all."""
+"""Opens a bus: chooses the implementation by the interface's name."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @asynccontextmanager
 async def open_bus(interface: str, channel: str, *, bitrate: int | None = None) -> AsyncIterator[Bus]:
-    """Open `channel` of any python-can interface (`socketcan`, `virtual`, `slcan`, …) for the time of the context.
+    """Open `channel` of any python-can interface (`socketcan`, `virtual`, `slcan`, …) until the end of the context.
 
     `bitrate` (bit/s) is for adapters that set it themselves; a SocketCAN link gets its own when it is brought up.
 
@@ -24,13 +24,13 @@ async def open_bus(interface: str, channel: str, *, bitrate: int | None = None) 
     """
     bus: Bus
     if interface == "socketcan":
-        from regolithd.drivers.can.socketcan import SocketCanBus  # noqa: PLC0415  # Linux only: `virtual` works anywhere
+        from regolithd.drivers.can.socketcan import SocketCanBus  # noqa: PLC0415  # Linux only; `virtual` works on every system
 
         bus = SocketCanBus(channel)
     else:
-        from regolithd.drivers.can.python_can_bus import AdapterBus  # noqa: PLC0415  # likewise: not where the kernel does it all
+        from regolithd.drivers.can.python_can_bus import PythonCanBus  # noqa: PLC0415  # likewise: not needed for SocketCAN
 
-        bus = AdapterBus(interface, channel, bitrate=bitrate)
+        bus = PythonCanBus(interface, channel, bitrate=bitrate)
     try:
         yield bus
     finally:

@@ -1,8 +1,8 @@
-"""Any python-can interface but SocketCAN, read by one thread.
+"""Every python-can interface except SocketCAN, read by one thread.
 
-python-can promises a blocking `recv` for every interface and a file descriptor for few, so one thread per bus blocks in
-`recv` and hands what it got to the loop. It is the only thread in the drivers. Times are python-can's: of the adapter
-where it stamps frames, else of the computer, with the resolution of a float (0.2 µs).
+python-can has a blocking `recv` for every interface and a file descriptor for few, so one thread per bus blocks in
+`recv` and passes the frames to the event loop. It is the only thread in the drivers. Times are python-can's: the
+adapter's where it stamps frames, else the computer's, with the resolution of a float (0.2 µs).
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from regolithd.drivers.can.bus import Bus, BusState
 from regolithd.drivers.can.frame import Frame
 from regolithd.drivers.errors import BusDownError, BusFullError, BusOpenError
 
-_RECV_TIMEOUT_S = 0.05  # how long closing may take
+_RECV_TIMEOUT_S = 0.05  # also the longest time that closing takes
 _SEND_TIMEOUT_S = 0.1
 _REOPEN_S = 1.0
-_MOST_AT_ONCE = 1000  # frames handed over together
+_MOST_AT_ONCE = 1000  # frames in one batch
 
 
-class AdapterBus(Bus):
-    """A bus behind python-can."""
+class PythonCanBus(Bus):
+    """A bus that python-can opens."""
 
     def __init__(self, interface: str, channel: str, *, bitrate: int | None = None) -> None:
         super().__init__(interface, channel)
@@ -58,7 +58,7 @@ class AdapterBus(Bus):
         self.counters.sent += 1
 
     def close(self) -> None:
-        """Stop the thread and give the adapter back."""
+        """Stop the thread and close the adapter."""
         self._closing.set()
         self._may_read.set()
         self._thread.join(timeout=1.0)
@@ -66,11 +66,11 @@ class AdapterBus(Bus):
             self._bus.shutdown()
 
     def pause_reading(self) -> None:
-        """Leave frames to the adapter's own queue."""
+        """Stop reading; frames stay in the adapter's own queue."""
         self._may_read.clear()
 
     def resume_reading(self) -> None:
-        """Read on."""
+        """Resume reading."""
         self._may_read.set()
 
     def _open(self) -> can.BusABC:
@@ -84,7 +84,7 @@ class AdapterBus(Bus):
             ) from error
 
     def _read(self) -> None:
-        """Run in the thread: read until closed; an adapter that vanishes is waited for."""
+        """Read until closed (runs in the thread); an adapter that was unplugged is opened again."""
         while not self._closing.is_set():
             self._may_read.wait()
             try:
@@ -96,7 +96,7 @@ class AdapterBus(Bus):
                     self._call(self._take, batch)
 
     def _read_batch(self) -> list[Frame]:
-        """Block for one frame, then drain what else is there."""
+        """Wait for one frame, then read all that are available."""
         message = self._bus.recv(_RECV_TIMEOUT_S)
         batch = []
         while message is not None:
@@ -119,7 +119,7 @@ class AdapterBus(Bus):
     def _take(self, batch: list[Frame]) -> None:
         for frame in batch:
             if frame.error:
-                self.counters.errors["adapter"] += 1  # python-can does not say which
+                self.counters.errors["adapter"] += 1  # python-can does not report the class
         self.deliver(batch)
 
     def _call(self, function: object, *arguments: object) -> None:

@@ -1,11 +1,11 @@
-"""`recvmmsg`: up to 64 CAN frames, their kernel times and the drop counter with one system call.
+"""`recvmmsg`: receives up to 64 CAN frames, their kernel times and the drop counter with one system call.
 
-Python has no call for it, so it is made through ctypes, into buffers that are laid out once and parsed with three
-structs that run over all messages of the batch. Sizes follow the platform's C types.
+Python's socket module does not have it, so it is called through ctypes, with buffers that are allocated once and parsed
+by three structs that iterate over all messages of the batch. Sizes follow the platform's C types.
 
     frames    64 × struct can_frame          identifier and flags, length, 8 data bytes
     control   64 × 64 bytes                  cmsg SO_TIMESTAMPNS, then, once frames were dropped, cmsg SO_RXQ_OVFL
-    headers   64 × struct mmsghdr            where the two lie; flags and length as the kernel returns them
+    headers   64 × struct mmsghdr            addresses of the two; flags and length as the kernel returns them
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ _recvmmsg.argtypes = (ctypes.c_int, ctypes.c_void_p, ctypes.c_uint, ctypes.c_int
 _recvmmsg.restype = ctypes.c_int
 
 
-class KernelBatch:
-    """The buffers of one socket, and the call that fills them."""
+class RecvmmsgBuffers:
+    """The buffers of one socket, and the system call that fills them."""
 
     def __init__(self) -> None:
         self._frames = bytearray(BATCH * CAN_FRAME.size)
@@ -89,14 +89,14 @@ class KernelBatch:
         self._address = ctypes.addressof(self._headers)
 
     def receive(self, descriptor: int, counters: BusCounters) -> list[Frame]:
-        """Return the frames that wait at a non-blocking socket, at most `BATCH`; none: nothing waits.
+        """Return the frames waiting at a non-blocking socket, at most `BATCH`; empty where there are none.
 
-        Counts drops and what is no classic frame into `counters`.
+        Counts dropped and malformed frames in `counters`.
 
         Raises
         ------
         OSError
-            As the kernel says: ENETDOWN, ENODEV, …
+            The kernel's error: ENETDOWN, ENODEV, …
         """
         self._header_bytes[:] = self._fresh_headers
         count = _recvmmsg(descriptor, self._address, BATCH, _MSG_DONTWAIT, None)
@@ -129,7 +129,7 @@ class KernelBatch:
         return frames
 
     def _count_drops(self, total: int, counters: BusCounters) -> None:
-        """Count by difference: the kernel's counter runs for the socket's whole life, modulo 2³²."""
+        """Count the difference: the kernel counts since the socket was opened, modulo 2³²."""
         counters.kernel_drops += (total - (self._drops or 0)) & 0xFFFFFFFF
         self._drops = total
 

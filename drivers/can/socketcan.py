@@ -1,12 +1,12 @@
-"""SocketCAN by its own socket: one asyncio reader that drains it, kernel times, error frames, and the drop counter.
+"""SocketCAN with its own raw socket: an asyncio reader with kernel times, error frames and the drop counter.
 
-    CAN_RAW_RECV_OWN_MSGS   our own frames come back with the kernel's time (the SYNC's is the snapshot's)
-    CAN_RAW_ERR_FILTER      the controller's error frames come as well
+    CAN_RAW_RECV_OWN_MSGS   receive our own frames with their kernel time (a SYNC's is the snapshot's time)
+    CAN_RAW_ERR_FILTER      receive the controller's error frames
     SO_TIMESTAMPNS          kernel receive time, CLOCK_REALTIME in ns
-    SO_RXQ_OVFL             how many frames the kernel threw away because nobody read
-    SO_RCVBUF               as large as the kernel allows; SO_RCVBUFFORCE where we may
+    SO_RXQ_OVFL             number of frames that the kernel discarded because the receive queue was full
+    SO_RCVBUF               receive buffer as large as the kernel allows; SO_RCVBUFFORCE where permitted
 
-The socket survives its link: down and up again is a state, and an adapter that is unplugged is waited for.
+The socket stays open while its link is down; after an adapter was unplugged it is opened again.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from regolithd.drivers.can.bus import Bus, BusState
 from regolithd.drivers.can.error_frame import error_classes, reported_state
-from regolithd.drivers.can.recvmmsg import BATCH, CAN_FRAME, SO_RXQ_OVFL, SO_TIMESTAMPNS, KernelBatch
+from regolithd.drivers.can.recvmmsg import BATCH, CAN_FRAME, SO_RXQ_OVFL, SO_TIMESTAMPNS, RecvmmsgBuffers
 from regolithd.drivers.errors import BusDownError, BusFullError, BusOpenError
 
 if TYPE_CHECKING:
@@ -27,15 +27,15 @@ if TYPE_CHECKING:
 
 _EXTENDED = 0x80000000
 _REMOTE = 0x40000000
-_CAN_RAW_ERR_FILTER = 2  # linux/can/raw.h; Python's socket module has not it everywhere
+_CAN_RAW_ERR_FILTER = 2  # linux/can/raw.h; not in every build of Python's socket module
 _ALL_ERRORS = 0x1FFFFFFF
 _SO_RCVBUFFORCE = 33
 _RECEIVE_BUFFER_BYTES = 4 << 20
-_ROUNDS = 8  # batches per wake-up, so that a flood does not starve the rest of the program
+_ROUNDS = 8  # batches per wake-up, so that a flood of frames leaves time for other tasks
 _FULL = (errno.ENOBUFS, errno.EAGAIN)
 _GONE = (errno.ENETDOWN, errno.ENODEV, errno.ENXIO, errno.ENETUNREACH)
 _RETRY_FIRST_S = 0.0005
-_RETRY_TOTAL_S = 0.1  # longer than any frame waits for a bus that works
+_RETRY_TOTAL_S = 0.1  # longer than any frame waits on a working bus
 _REOPEN_S = 1.0
 
 
@@ -45,7 +45,7 @@ class SocketCanBus(Bus):
     def __init__(self, channel: str) -> None:
         super().__init__("socketcan", channel)
         self._loop = asyncio.get_running_loop()
-        self._batch = KernelBatch()
+        self._batch = RecvmmsgBuffers()
         self._socket = _open_socket(channel)
         self._reopening: asyncio.TimerHandle | None = None
         self._loop.add_reader(self._socket, self._drain)
@@ -76,22 +76,22 @@ class SocketCanBus(Bus):
                 return
 
     def close(self) -> None:
-        """Give the socket back."""
+        """Close the socket."""
         if self._reopening is not None:
             self._reopening.cancel()
         self._loop.remove_reader(self._socket)
         self._socket.close()
 
     def resume_reading(self) -> None:
-        """Read on after the consumer has caught up; what the kernel had to drop meanwhile it has counted."""
+        """Resume reading after the consumer has caught up; the kernel has counted what it dropped meanwhile."""
         self._loop.add_reader(self._socket, self._drain)
 
     def pause_reading(self) -> None:
-        """Leave frames to the kernel, which counts what it drops."""
+        """Stop reading; the kernel keeps frames, and counts what it drops."""
         self._loop.remove_reader(self._socket)
 
     def _drain(self) -> None:
-        """Take what waits at the socket, batch by batch."""
+        """Read the frames waiting at the socket, batch by batch."""
         try:
             for _ in range(_ROUNDS):
                 frames = self._batch.receive(self._socket.fileno(), self.counters)
@@ -125,7 +125,7 @@ class SocketCanBus(Bus):
         )
 
     def _lost(self, error: OSError) -> None:
-        """Note that the link is down; where the device itself is gone, look for it again."""
+        """Set the state to down; where the network device is gone, try to open it again."""
         self.change_state(BusState.DOWN)
         if error.errno in (errno.ENODEV, errno.ENXIO) and self._reopening is None:
             self._loop.remove_reader(self._socket)
@@ -140,7 +140,7 @@ class SocketCanBus(Bus):
         self._reopening = None
         self._socket.close()
         self._socket = fresh
-        self._batch = KernelBatch()
+        self._batch = RecvmmsgBuffers()
         self._loop.add_reader(fresh, self._drain)
 
 

@@ -1,13 +1,13 @@
-"""Service data objects (CiA 301, 7.2.4): one object's value read or written, as request and answer of eight bytes.
+"""Service data objects (CiA 301, 7.2.4): read and write of one object, as requests and answers of eight bytes.
 
-This file is the protocol alone, with no bus and no clock: a transfer is a generator that yields a request and is sent
-the answer. `drivers.canopen.sdo_client` runs it.
+This module is the protocol only, without bus or clock: a transfer is a generator that yields a request and is sent the
+answer. `drivers.canopen.sdo_client` runs it.
 
     expedited (up to 4 bytes)      segmented (7 bytes at a time, a toggle bit in each)
     → initiate   ← answer          → initiate ← answer, → segment ← answer, → segment ← answer, …
 
-The first byte of each is the command specifier (3 bits) and its flags; initiate frames go on with index, subindex and 4
-bytes of data or the size. Either side may answer `abort` with a code of 32 bits.
+The first byte of each is the command specifier (3 bits) and its flags; in initiate frames index, subindex and 4
+bytes of data or the size follow. Either side may answer `abort` with a code of 32 bits.
 """
 
 from __future__ import annotations
@@ -17,7 +17,9 @@ from collections.abc import Generator
 
 from regolithd.drivers.errors import SdoAbortError, SdoProtocolError
 
-Transfer = Generator[bytes | None, bytes, bytes]  # yields a request (None: only wait on), gets answers, returns data
+Transfer = Generator[
+    bytes | None, bytes, bytes
+]  # yields a request (None: wait for the next answer), receives answers, returns data
 
 _INITIATE = struct.Struct("<BHB4s")
 _EXPEDITED_BYTES = 4
@@ -107,7 +109,7 @@ def upload(index: int, subindex: int) -> Transfer:
 
 
 def download(index: int, subindex: int, data: bytes) -> Transfer:
-    """Write an object; the transfer returns nothing of interest."""
+    """Write an object; the transfer returns no data."""
     if 0 < len(data) <= _EXPEDITED_BYTES:
         unused = _EXPEDITED_BYTES - len(data)
         command = _DOWNLOAD_INITIATE | unused << 2 | _EXPEDITED | _SIZE_GIVEN
@@ -127,12 +129,12 @@ def download(index: int, subindex: int, data: bytes) -> Transfer:
 
 
 def abort_request(index: int, subindex: int, code: int) -> bytes:
-    """Return the request that ends a transfer from our side."""
+    """Return the request by which the client aborts a transfer."""
     return _INITIATE.pack(_ABORT, index, subindex, code.to_bytes(4, "little"))
 
 
 def abort_text(code: int) -> str:
-    """Return an abort code in words."""
+    """Return the meaning of an abort code."""
     return ABORT_TEXTS.get(code, "an abort code that CiA 301 does not define")
 
 
@@ -140,7 +142,7 @@ _FIRMWARE = "The node's SDO server breaks CiA 301; check its firmware"
 
 
 def _initiate(command: int, index: int, subindex: int, data: bytes, expected: int) -> Transfer:
-    """Ask, and return the answer for this object; a late answer for another (timed out before) is passed over."""
+    """Send an initiate request and return its answer; a late answer for another object is ignored."""
     answer = yield _INITIATE.pack(command, index, subindex, data)
     while _length_checked(answer, index, subindex)[1:4] != struct.pack("<HB", index, subindex):
         answer = yield None

@@ -1,4 +1,4 @@
-"""Why an SDO request is refused (CiA 301, 7.2.4.3.17)."""
+"""SDO abort codes (CiA 301, 7.2.4.3.17) that the virtual nodes send."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Abort(IntEnum):
-    """The abort codes that the virtual nodes use."""
+    """An abort code."""
 
     TOGGLE = 0x0503_0000  # toggle bit not alternated
     COMMAND = 0x0504_0001  # client command specifier not valid or unknown
@@ -28,7 +28,7 @@ class Abort(IntEnum):
 
 
 class AbortError(Exception):
-    """A request that the node refuses."""
+    """A virtual node refuses a request."""
 
     def __init__(self, code: Abort) -> None:
         self.code = code

@@ -1,6 +1,6 @@
 """The SYNC producer (CiA 301, 7.2.5): one frame on 0x080 per period, on a schedule that does not drift.
 
-The n-th SYNC is due at start + n·period, whatever became of those before (`canopen.timer`); how late each is sent is
+The n-th SYNC is due at start + n·period, however late earlier ones were (`canopen.timer`); the lateness of each is
 measured. A snapshot's time is the kernel's receive time of the SYNC's echo, not the scheduled one.
 """
 
@@ -24,10 +24,10 @@ RATE_LIMITS_Hz = (1.0, 200.0)
 
 @dataclass(slots=True)
 class SyncCounters:
-    """How the producer keeps its time: how many, and how late against the schedule [ns]."""
+    """Number of SYNCs, and their lateness against the schedule [ns]."""
 
     produced: int = 0
-    skipped: int = 0  # the loop was late by a whole period: left out, never sent in a burst
+    skipped: int = 0  # the event loop was late by a whole period: skipped, not sent in a burst
     failed: int = 0  # could not be sent: link down or queue full
     worst_late_ns: int = 0
     mean_late_ns: float = 0.0
@@ -48,7 +48,7 @@ class SyncCounters:
 
 
 async def produce_sync(bus: Bus, rate_Hz: float, counters: SyncCounters) -> None:
-    """Send a SYNC at this rate until cancelled; one that cannot be sent is counted, and the schedule goes on."""
+    """Send a SYNC at this rate until cancelled; one that cannot be sent is counted and skipped."""
     with periodic(round(1e9 / rate_Hz)) as timer:
         while True:
             tick = await timer.tick()

@@ -1,8 +1,8 @@
-"""A periodic timer that does not drift: the n-th tick is due at start + n·period, whatever became of those before.
+"""A periodic timer that does not drift: the n-th tick is due at start + n·period, however late earlier ticks were.
 
-On Linux the kernel keeps the schedule (timerfd), and the event loop wakes up by a file descriptor: half of the ticks
-come within 0.1 ms. asyncio's own timers count whole milliseconds (epoll), and half of theirs come 0.8 ms late or more;
-they serve where there is no timerfd.
+On Linux the kernel keeps the schedule (timerfd), and the event loop wakes up by a file descriptor: the median
+tick is 0.1 ms late. asyncio's own timers have a resolution of 1 ms (epoll) and are 0.8 ms late in the median; they are
+used on systems without timerfd.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ _TFD_TIMER_ABSTIME = 1
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """A tick: how late it is seen, and how many before it were left out because nobody looked in time."""
+    """A tick: its lateness, and how many ticks before it were skipped because the program was late."""
 
     late_ns: int
     missed: int
 
 
 class Timer(Protocol):
-    """Something that ticks."""
+    """A periodic timer."""
 
     async def tick(self) -> Tick:
         """Wait for the next tick."""
@@ -62,7 +62,7 @@ class Schedule:
         self._number = 0
 
     def following(self, now_ns: int) -> tuple[int, int]:
-        """Return when the next one is due, and how many had to be left out because `now_ns` is past them."""
+        """Return the next due time, and how many were skipped because `now_ns` is past them."""
         self._number += 1
         missed = max(0, math.floor((now_ns - self._start_ns) / self._period_ns) - self._number)
         self._number += missed
@@ -70,7 +70,7 @@ class Schedule:
 
 
 class LoopTimer:
-    """Ticks by asyncio's own timers."""
+    """A periodic timer by `asyncio.sleep`."""
 
     def __init__(self, period_ns: int) -> None:
         self._schedule = Schedule(time.monotonic_ns(), period_ns)
@@ -94,7 +94,7 @@ class _TimerSpec(ctypes.Structure):
 
 
 class KernelTimer:
-    """Ticks by a timerfd, which Python offers itself only from 3.13 on."""
+    """A periodic timer by timerfd, which is in Python's `os` module from 3.13 on only."""
 
     def __init__(self, period_ns: int) -> None:
         library = ctypes.CDLL(None, use_errno=True)
@@ -117,7 +117,7 @@ class KernelTimer:
         return Tick(max(0, time.monotonic_ns() - self._due_ns), count - 1)
 
     def close(self) -> None:
-        """Give the descriptor back."""
+        """Close the file descriptor."""
         self._loop.remove_reader(self._descriptor)
         os.close(self._descriptor)
 

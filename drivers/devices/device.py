@@ -1,4 +1,4 @@
-"""What describes a kind of device: one frozen `Device` for each, listed in `devices.registry`.
+"""Description of a kind of device: one frozen `Device` for each, listed in `devices.registry`.
 
 Everything that depends on the kind follows from it: boot configuration, PDO decoding, the key in `rover.toml`, the rows
 of a snapshot, MQTT fields, recorded and exported columns, `docs/bus.md`, and the virtual rover's node.
@@ -29,7 +29,7 @@ class Quantity:
     name
         Its column in recordings, exports and messages; ends in the unit.
     description
-        What it is and which sign is positive; stands in the message schemas.
+        Meaning and sign convention, as in the message schemas.
     per_wheel
         Six values, one a wheel; otherwise one value for the body.
     mirrored

@@ -2,13 +2,13 @@
 
     NMT reset ─▶ boot-up ─▶ 0x1000, 0x1018 ─▶ each write, read back ─▶ heartbeat ─▶ NMT start ─▶ operational
 
-Each way to fail has a `BootReason` and a cure. Beside the letters of CiA 302-2:
+Each failure has a `BootReason` and a remedy. Compared with the error letters of CiA 302-2:
 
     B, C, D, M, N, O, J, K      the same, one reason each (see `BootReason`)
-    E, F                        no boot-up: every node is reset, so its state need not be asked for
-    A                           cannot be: only configured nodes are booted
-    G, H, I                     software download: not done here
-    L                           cannot be: the reset ends whatever the node was at
+    E, F                        no boot-up: every node is reset, so its state is not read first
+    A                           does not occur: only configured nodes are booted
+    G, H, I                     software download: not supported
+    L                           does not occur: the reset ends the operational state
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ if TYPE_CHECKING:
 
 DEVICE_TYPE = 0x1000
 IDENTITY = 0x1018
-_MAJOR = 0xFFFF0000  # of a revision: the CANopen behaviour; the minor number may be newer
-_HEARTBEATS = 5  # how many may pass before the node must have said the state that was asked for
+_MAJOR = 0xFFFF0000  # major revision number: the CANopen behaviour; the minor number may differ
+_HEARTBEATS = 5  # within which the node must report the commanded state
 
 
 @dataclass(frozen=True, slots=True)
 class BootSettings:
-    """What every node is booted with; times in seconds."""
+    """Settings of the boot process, the same for every node; times in seconds."""
 
     heartbeat_s: float
     master_id: int
@@ -52,12 +52,12 @@ class BootSettings:
 
 
 async def boot(remote: RemoteNode, settings: BootSettings) -> Identity:
-    """Boot one node into operational and return who it is.
+    """Boot one node into operational and return its identity.
 
     Raises
     ------
     BootError
-        With its reason; the node is left as it is, not operational.
+        It could not be booted; it stays in the state in which that happened, not operational.
     """
     try:
         return await _Boot(remote, settings).run()
@@ -74,7 +74,7 @@ async def boot(remote: RemoteNode, settings: BootSettings) -> Identity:
 
 
 async def read_identity(remote: RemoteNode) -> Identity:
-    """Return a node's device type (0x1000) and identity (0x1018); an optional entry that it has not is 0."""
+    """Return a node's device type (0x1000) and identity (0x1018); an optional entry that it lacks is 0."""
     device_type = await remote.sdo.read_number(DEVICE_TYPE)
     vendor = await remote.sdo.read_number(IDENTITY, 1)
     rest = []
@@ -87,7 +87,7 @@ async def read_identity(remote: RemoteNode) -> Identity:
 
 
 def compare_identity(node: NodeDescription, found: Identity) -> tuple[BootReason, str] | None:
-    """Return in what a node is not the one that its EDS and description say, or None."""
+    """Return the first difference between a node's identity and its EDS and description, or None."""
     all_bits = 0xFFFFFFFF
     checks = (
         (BootReason.WRONG_DEVICE_TYPE, "device type", found.device_type, _expected(node, DEVICE_TYPE), all_bits),
@@ -103,13 +103,13 @@ def compare_identity(node: NodeDescription, found: Identity) -> tuple[BootReason
 
 
 def _expected(node: NodeDescription, index: int, subindex: int = 0) -> int | None:
-    """Return what the EDS says, or None where it says nothing."""
+    """Return the EDS's default of an object, or None where it has none."""
     entry = object_dictionary(node.device.eds).get_variable(index, subindex)
     return None if entry is None else entry.default
 
 
 class _Boot:
-    """One run through the process."""
+    """One run of the boot process."""
 
     def __init__(self, remote: RemoteNode, settings: BootSettings) -> None:
         self._remote = remote
@@ -139,9 +139,9 @@ class _Boot:
         self._boot_ups = remote.boot_ups
 
     async def _identify_restarted(self) -> Identity:
-        """Identify the node; a boot-up meanwhile does no harm, as nothing has been written yet.
+        """Identify the node; once more where it boots up meanwhile, as nothing has been written yet.
 
-        It happens when the node has just got its power: the boot-up that was taken for the reset's was of before.
+        That happens after power-on: the boot-up message taken for the answer to the reset was the one of power-on.
         """
         try:
             return await self._identify()

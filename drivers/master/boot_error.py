@@ -18,13 +18,13 @@ class BootReason(StrEnum):
     WRONG_REVISION = "wrong-revision"  # N: 0x1018:03
     WRONG_SERIAL = "wrong-serial"  # O: 0x1018:04
     CONFIGURATION_REFUSED = "configuration-refused"  # J: the node aborted a write
-    CONFIGURATION_NOT_KEPT = "configuration-not-kept"  # J: it took a write, but reads back something else
-    FELL_SILENT = "fell-silent"  # J: it stopped answering in the middle
-    RESTARTED = "restarted"  # it booted up again in the middle
-    MALFORMED_ANSWER = "malformed-answer"  # its SDO answers are not CiA 301's
-    NO_HEARTBEAT = "no-heartbeat"  # K: it was told to produce one
+    CONFIGURATION_NOT_KEPT = "configuration-not-kept"  # J: a write was acknowledged, but another value is read back
+    FELL_SILENT = "fell-silent"  # J: it stopped answering during the configuration
+    RESTARTED = "restarted"  # it booted up again during the configuration
+    MALFORMED_ANSWER = "malformed-answer"  # its SDO answers do not comply with CiA 301
+    NO_HEARTBEAT = "no-heartbeat"  # K: although one is configured
     NOT_OPERATIONAL = "not-operational"  # it does not enter operational
-    UNUSABLE_EDS = "unusable-eds"  # the EDS lacks an object that the driver needs
+    UNUSABLE_EDS = "unusable-eds"  # the EDS lacks an object that the boot configuration needs
     BUS_DOWN = "bus-down"  # nothing can be sent
 
 

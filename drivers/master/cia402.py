@@ -1,4 +1,4 @@
-"""The drive's power state machine (CiA 402-2, clause 6), as its master sees it. Pure: statusword in, controlword out.
+"""The drive's power state machine (CiA 402-2, clause 6), in the master: a pure function from statusword to controlword.
 
     not ready ──▶ switch-on disabled ──2──▶ ready to switch on ──3──▶ switched on ──4──▶ operation enabled
                          ▲                                                                    │11
@@ -23,7 +23,7 @@ from enum import IntEnum, StrEnum
 
 
 class DriveState(StrEnum):
-    """Where the drive says it is (statusword 0x6041)."""
+    """State of the power drive system, from the statusword (0x6041)."""
 
     NOT_READY = "not-ready-to-switch-on"
     SWITCH_ON_DISABLED = "switch-on-disabled"
@@ -37,7 +37,7 @@ class DriveState(StrEnum):
 
 
 class Controlword(IntEnum):
-    """What the master writes to 0x6040; every one has bit 7 (fault reset) at 0 but the last."""
+    """Values of the controlword (0x6040); only the last one sets bit 7 (fault reset)."""
 
     DISABLE_VOLTAGE = 0x0000
     QUICK_STOP = 0x0002
@@ -58,13 +58,13 @@ _STATES = (
     (0x004F, 0x000F, DriveState.FAULT_REACTION),
     (0x004F, 0x0008, DriveState.FAULT),
 )
-_REMOTE = 1 << 9  # the controlword is obeyed
+_REMOTE = 1 << 9  # the drive follows the controlword
 _TARGET_REACHED = 1 << 10
 _SPEED_ZERO = 1 << 12  # profile velocity mode
 
 
 def state_of(statusword: int) -> DriveState:
-    """Return the state that a statusword says."""
+    """Return the state in a statusword."""
     for mask, value, state in _STATES:
         if statusword & mask == value:
             return state
@@ -76,16 +76,16 @@ def target_reached(statusword: int) -> bool:
     return bool(statusword & _TARGET_REACHED)
 
 
-def standing(statusword: int) -> bool:
-    """Whether the drive says that it stands still (profile velocity mode)."""
+def at_standstill(statusword: int) -> bool:
+    """Whether the drive is at standstill (profile velocity mode)."""
     return bool(statusword & _SPEED_ZERO)
 
 
 def enabling_step(state: DriveState, last: Controlword) -> Controlword | None:
-    """Return the controlword that brings a drive one step nearer to operation enabled.
+    """Return the controlword of the next transition towards operation enabled.
 
-    None: it is there, or it moves on by itself. A fault is reset by a rising edge of bit 7, so where the last word had
-    the bit set already (a reset that did not take), the bit goes to 0 first.
+    None: the drive is there, or the next transition is automatic. A fault is reset by a rising edge of bit 7, so where
+    the last word had the bit set already (a reset without effect), the bit goes to 0 first.
     """
     match state:
         case DriveState.FAULT:

@@ -1,7 +1,7 @@
 """The master of one motor controller (CiA 402, profile velocity mode).
 
 States are changed by SDO, which is confirmed and does not wait for a SYNC; speeds and stops go by RPDO 1, one frame
-with the controlword and the target velocity, so that no drive receives one without the other.
+with the controlword and the target velocity, so that no drive receives only one of them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from regolithd.drivers.devices.motor_controller import (
     TARGET_VELOCITY,
 )
 from regolithd.drivers.errors import DriveError
-from regolithd.drivers.master.cia402 import Controlword, DriveState, enabling_step, standing, state_of
+from regolithd.drivers.master.cia402 import Controlword, DriveState, at_standstill, enabling_step, state_of
 
 if TYPE_CHECKING:
     from regolithd.drivers.can.bus import Bus
@@ -126,7 +126,7 @@ class Drive:
         await self._write_controlword(Controlword.DISABLE_VOLTAGE)
 
     def _standing(self) -> bool:
-        return self.statusword is not None and standing(self.statusword)
+        return self.statusword is not None and at_standstill(self.statusword)
 
     async def _command(self, word: Controlword, velocity_rpm: int) -> None:
         data = self._rpdo.pack(word, velocity_rpm)

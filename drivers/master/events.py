@@ -1,7 +1,7 @@
-"""What happens to the nodes and the bus, as `drivers.master.network` tells it while it happens.
+"""The events that the network reports: boot, loss and return of nodes, emergencies, drive and bus states.
 
-Each event is a frozen dataclass with a time (ns, CLOCK_REALTIME) and a `text` for the person who reads it at night.
-A consumer matches on the class:
+Each event is a frozen dataclass with a time (ns, CLOCK_REALTIME) and a `text` that says what happened. A
+consumer matches on the class:
 
     match event:
         case NodeBooted(node_id=node_id, identity=identity): …
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Who a node says it is: 0x1000 and 0x1018."""
+    """A node's identity: objects 0x1000 and 0x1018."""
 
     device_type: int
     vendor: int
@@ -44,7 +44,7 @@ class NodeBooted:
 
 @dataclass(frozen=True, slots=True)
 class NodeBootFailed:
-    """The node could not be booted; it is tried again when it is heard, and from time to time."""
+    """The node could not be booted; it is tried again when it sends something, and from time to time."""
 
     time_ns: int
     node_id: int
@@ -55,7 +55,7 @@ class NodeBootFailed:
 
 @dataclass(frozen=True, slots=True)
 class NodeLost:
-    """An operational node is so no more: its heartbeat stopped, it restarted, or it left operational."""
+    """An operational node is lost: its heartbeat stopped, it restarted, or it left operational."""
 
     time_ns: int
     node_id: int
@@ -64,7 +64,7 @@ class NodeLost:
 
 @dataclass(frozen=True, slots=True)
 class NodeReturned:
-    """A node that was lost, or had failed to boot, is heard again; it is now booted anew."""
+    """A node that was lost, or had failed to boot, sends again; it is booted anew."""
 
     time_ns: int
     node_id: int
@@ -83,7 +83,7 @@ class NodeEmergency:
 
 @dataclass(frozen=True, slots=True)
 class DriveStateChanged:
-    """A drive's statusword says another state of CiA 402 than before."""
+    """The CiA 402 state in a drive's statusword has changed."""
 
     time_ns: int
     node_id: int
@@ -93,7 +93,7 @@ class DriveStateChanged:
 
 @dataclass(frozen=True, slots=True)
 class MotionStopped:
-    """The wheels were turning, and the network stopped them by itself, because a node was lost or a drive faulted."""
+    """The wheels were turning, and the network stopped them, because a node was lost or a drive faulted."""
 
     time_ns: int
     node_id: int

@@ -1,7 +1,7 @@
-"""All drives of the rover, commanded as one.
+"""Commands to all drives of the rover together.
 
-Speeds are obeyed only between `enable` and whatever stops the wheels: a quick stop – anybody's – locks them until they
-are enabled anew, so that a command that is still under way cannot start again what was just stopped.
+Speeds are accepted only after `enable`. Every stop locks the wheels until they are enabled anew, so that a command that
+is still under way cannot restart them.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 
 class Motion:
-    """The drives, by node-ID; `status` tells of a node whether it is on the bus."""
+    """The drives, by node-ID; `status` returns the status of a node."""
 
     def __init__(self, drives: Mapping[int, Drive], status: Callable[[int], NodeStatus], *, gear_ratio: float) -> None:
-        self.moving = False  # the last speeds were not all 0
+        self.moving = False  # not all of the last speeds were 0
         self._drives = drives
         self._status = status
         self._gear_ratio = gear_ratio
-        self._stops = 0  # how often they were stopped or disabled
+        self._stops = 0  # number of stops
         self._locked = "they have not been enabled yet"
 
     def live(self) -> list[Drive]:
@@ -44,7 +44,7 @@ class Motion:
         stops = self._stops
         failures = await each(drive.enable() for drive in self._drives.values())
         if self._stops != stops:
-            failures.append(DriveError(f"they were stopped meanwhile: {self._locked}"))
+            failures.append(DriveError(f"the wheels were stopped meanwhile: {self._locked}"))
         if failures:
             await each(drive.disable() for drive in self.live())
             raise _drive_error(failures)
@@ -97,7 +97,7 @@ class Motion:
 
 
 async def each(actions: Iterable[Awaitable[None]]) -> list[DriverError]:
-    """Do all at once and return what went wrong, so that one drive's trouble does not keep the others from acting."""
+    """Run all concurrently and return the errors, so that the failure of one drive does not affect the others."""
     results = await asyncio.gather(*actions, return_exceptions=True)
     failures = []
     for result in results:

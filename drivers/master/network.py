@@ -55,12 +55,12 @@ if TYPE_CHECKING:
 
 __all__ = ["Network", "NetworkCounters", "NetworkSettings", "NodePhase", "NodeStatus"]
 
-_LEAVE_TIMEOUT_S = 5.0  # a stop that is not confirmed must not keep the program from ending
+_LEAVE_TIMEOUT_S = 5.0  # after it the program ends, even if the stop is not confirmed
 _BUS_STATES = {
-    BusState.ACTIVE: "the bus works",
-    BusState.WARNING: "many errors on the bus: check terminators (60 Ω between the wires), length and plugs",
+    BusState.ACTIVE: "the bus is error active",
+    BusState.WARNING: "many errors on the bus: check the terminators (60 Ω between the wires), cable length and plugs",
     BusState.PASSIVE: "the controller is error passive: is any other node powered, and is the bit rate right?",
-    BusState.OFF: "bus-off: the controller left the bus. `ip link set {channel} type can restart-ms 100` mends that",
+    BusState.OFF: "bus-off: the controller left the bus. `ip link set {channel} type can restart-ms 100` recovers it",
     BusState.DOWN: "the link is down or the adapter is gone: `ip link set {channel} up`, or plug it in",
 }
 
@@ -75,14 +75,14 @@ class Network:
     on_frames
         Called with each batch of frames, in order, before they are decoded. Must not block.
     on_signals
-        Called with what a batch of frames decodes to, in order. Must not block.
+        Called with the signals of a batch of frames, in order. Must not block.
     on_event
         Called with each event as it happens. Must not block.
 
     Attributes
     ----------
     decoder
-        Decodes the frames; counts what it cannot decode.
+        Decodes the frames, and counts those that it cannot decode.
     """
 
     def __init__(
@@ -113,12 +113,12 @@ class Network:
 
     @property
     def status(self) -> Mapping[int, NodeStatus]:
-        """What is known of each node, by node-ID."""
+        """Status of each node, by node-ID."""
         return {node_id: self._status(node_id) for node_id in self._supervisors}
 
     @property
     def counters(self) -> NetworkCounters:
-        """What the network counts of itself."""
+        """Counters of SYNC, heartbeat and SDO."""
         clients = [supervisor.remote.sdo for supervisor in self._supervisors.values()]
         self._counters.sdo_transfers = sum(client.transfers for client in clients)
         self._counters.sdo_failures = sum(client.failures for client in clients)
@@ -154,7 +154,7 @@ class Network:
         Raises
         ------
         DriveError
-            A drive is not on the bus, or does not get there; the message names it and its state. None stays enabled.
+            A drive is not on the bus, or does not reach the state; the message names both. No drive stays enabled.
         """
         await self._motion.enable()
 
@@ -166,22 +166,22 @@ class Network:
         DriveError
             A drive is not in operation enabled, or the wheels were stopped since; nothing has been sent then.
         BusError
-            The bus does not take it; all are stopped, or stop by themselves when no heartbeat arrives either.
+            It could not be sent; all drives are stopped, or stop by themselves without the master's heartbeat.
         """
         await self._motion.set_speed(wheel_speed_rad_s)
 
     async def quick_stop(self) -> None:
-        """Stop all wheels with the quick-stop ramp, now, and wait until they stand; then they are locked.
+        """Stop all wheels with the quick-stop ramp, now, and wait for standstill; then they are locked.
 
         Raises
         ------
         DriveError
-            A drive that is on the bus does not stop. One that is lost does not keep the others from stopping.
+            A drive that is on the bus does not stop. The others are stopped even where one is lost.
         """
         await self._motion.quick_stop()
 
     async def disable(self) -> None:
-        """Take the power off the motors; wheels that turn are stopped first. Raises as `quick_stop` does."""
+        """Disable the motors' voltage; wheels that turn are stopped first. Raises as `quick_stop` does."""
         await self._motion.disable()
 
     def _add(self, node: NodeDescription) -> None:

@@ -1,4 +1,4 @@
-"""One node as its master sees it: its NMT state, and its SDO client."""
+"""The master's view of one node: its NMT state, and its SDO client."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class RemoteNode:
-    """What a node has reported, and the means to talk to it.
+    """A node on the bus: what it has reported, its SDO client, and NMT commands.
 
     The reader of the bus passes its heartbeats to `take_state` and its SDO answers (`answer_cob_id`) to `sdo.handle`.
 

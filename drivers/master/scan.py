@@ -1,7 +1,7 @@
 """A scan of the bus that changes nothing: which nodes answer, and their identity.
 
-Each node is asked for 0x1000 and 0x1018 by SDO, and its heartbeat is listened for. Nothing is reset, written or moved.
-A node that sends no heartbeat (none was configured) has no known NMT state, which is no problem by itself.
+Objects 0x1000 and 0x1018 of each node are read by SDO, and its heartbeat is awaited. Nothing is reset or written.
+The NMT state of a node without heartbeat (none is configured) is unknown, which is not a fault.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ async def probe(
 ) -> list[Probe]:
     """Read every node's identity, all at once, and listen for heartbeats for `listen_s`.
 
-    The bus must have no other reader in this program. Beside a daemon that is booting nodes an answer may be taken for
-    another's; beside one that runs it is safe.
+    The bus must have no other reader in this program. While a daemon is booting nodes, its SDO answers may be mistaken
+    for those to this scan; while it only acquires, that cannot happen.
     """
     remotes = [RemoteNode(bus, node, sdo_timeout_s=sdo_timeout_s) for node in nodes]
     async with asyncio.TaskGroup() as tasks:
@@ -81,7 +81,7 @@ def _probe(remote: RemoteNode, found: Identity | SdoError | BusError) -> Probe:
     if isinstance(found, BusError):
         return Probe(node, answers=False, identity=None, nmt_state=state, problem=str(found), cure=found.cure)
     if isinstance(found, SdoError):
-        problem, cure = _silence(remote, found)
+        problem, cure = _no_answer(remote, found)
         return Probe(node, answers=False, identity=None, nmt_state=state, problem=problem, cure=cure)
     difference = compare_identity(node, found)
     if difference is None:
@@ -90,7 +90,7 @@ def _probe(remote: RemoteNode, found: Identity | SdoError | BusError) -> Probe:
     return Probe(node, answers=True, identity=found, nmt_state=state, problem=problem, cure=CURES[reason])
 
 
-def _silence(remote: RemoteNode, error: SdoError) -> tuple[str, str]:
+def _no_answer(remote: RemoteNode, error: SdoError) -> tuple[str, str]:
     if remote.state is NmtState.STOPPED:
         return "it is in NMT state stopped, in which it answers nothing", "The daemon resets it when it starts"
     if remote.state is not None:

@@ -1,4 +1,4 @@
-"""What a network is to be, and what is known of it at this moment: plain data."""
+"""Settings, status and counters of a network: plain data."""
 
 from __future__ import annotations
 
@@ -17,33 +17,33 @@ if TYPE_CHECKING:
 
 
 class NodePhase(StrEnum):
-    """Where a node is in its life under this master."""
+    """Phase of a node, as its supervisor sees it."""
 
     BOOTING = "booting"
     OPERATIONAL = "operational"
-    LOST = "lost"  # was operational, and is so no more
+    LOST = "lost"  # was operational before
     FAILED = "failed"  # could not be booted
 
 
 @dataclass(frozen=True, slots=True)
 class NodeStatus:
-    """What is known of one node at this moment."""
+    """Present status of one node."""
 
     node: NodeDescription
     phase: NodePhase = NodePhase.BOOTING
-    nmt_state: NmtState | None = None  # as it last said
+    nmt_state: NmtState | None = None  # last reported
     heard_ns: int | None = None  # time of its last heartbeat or boot-up
     identity: Identity | None = None
     reason: BootReason | None = None  # of its last failed boot
     text: str = ""
     drive_state: DriveState | None = None  # motor controllers only
-    boots: int = 0  # how often it was booted with success
+    boots: int = 0  # number of successful boots
     emergencies: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class NetworkSettings:
-    """What the network is to be. Times in seconds, `gear_ratio` in motor turns per wheel turn."""
+    """Settings of a network. Times in seconds, `gear_ratio` in motor turns per wheel turn."""
 
     nodes: tuple[NodeDescription, ...]
     sync_rate_Hz: float = 2.0
@@ -55,13 +55,13 @@ class NetworkSettings:
     node_lost_after_s: float = 0.7
     sdo_timeout_s: float = 1.0
     boot_up_timeout_s: float = 3.0
-    retry_after_s: float = 5.0  # a node that could not be booted, and stays silent; doubles up to `retry_at_most_s`
+    retry_after_s: float = 5.0  # of a node that could not be booted and sends nothing; doubles up to `retry_at_most_s`
     retry_at_most_s: float = 30.0
 
 
 @dataclass(slots=True)
 class NetworkCounters:
-    """What the network counts of itself."""
+    """Counters of a network."""
 
     sync: SyncCounters = field(default_factory=SyncCounters)
     heartbeats_sent: int = 0

@@ -1,11 +1,11 @@
-"""One node's life under its master: boot it, watch it, and boot it again when it comes back.
+"""Supervision of one node: boot it, monitor it, and boot it again after it was lost.
 
     booting ──▶ operational ──▶ lost
-       │  ▲          ▲           │ heard again, or tried again after a while
+       │  ▲          ▲           │ sends again, or retry after a pause
        ▼  │          └── booting ◀
       failed
 
-Nothing else on the bus is touched when one node comes or goes.
+The other nodes are not affected when one is lost or returns.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
     from regolithd.drivers.master.remote_node import RemoteNode
 
 _SILENT = (BootReason.NO_BOOT_UP, BootReason.NO_SDO_ANSWER, BootReason.FELL_SILENT, BootReason.BUS_DOWN)
-_PAUSE_S = 0.1  # before a node that is heard again is booted: it may be restarting in a row
+_PAUSE_S = 0.1  # before a node that sends again is booted: it may restart several times
 
 
 class Supervisor:
-    """Runs one node's life; `status` is what is known of it."""
+    """Supervises one node."""
 
     def __init__(self, remote: RemoteNode, settings: NetworkSettings, emit: Callable[[NetworkEvent], None]) -> None:
         self.remote = remote
@@ -45,17 +45,17 @@ class Supervisor:
         )
         self._emit = emit
         self._status = NodeStatus(remote.node)
-        self._patience_s = settings.retry_after_s
-        self._away = False  # told as lost or failed, and not heard since
+        self._retry_s = settings.retry_after_s
+        self._reported_lost = False  # reported as lost or failed, and has sent nothing since
 
     @property
     def status(self) -> NodeStatus:
-        """What is known of the node at this moment."""
+        """Present status of the node."""
         return replace(self._status, nmt_state=self.remote.state, heard_ns=self.remote.heard_ns)
 
     @property
     def phase(self) -> NodePhase:
-        """Where the node is in its life."""
+        """Phase of the node."""
         return self._status.phase
 
     def count_emergency(self) -> None:
@@ -66,11 +66,11 @@ class Supervisor:
         """Boot the node and keep it operational, until cancelled."""
         while True:
             if await self._boot():
-                silent = await self._watch()
+                silent = await self._monitor()
             else:
                 silent = self._status.reason is not BootReason.RESTARTED
             if silent and not await self._heard_again():
-                continue  # tried once more in silence: still lost, or failed, until it says something
+                continue  # tried once more without an event: still lost, or failed, until it sends something
             await asyncio.sleep(_PAUSE_S)
             self._status = replace(self._status, phase=NodePhase.BOOTING)
 
@@ -82,8 +82,8 @@ class Supervisor:
             text = str(error)
             said_before = text == self._status.text
             self._status = replace(self._status, phase=NodePhase.FAILED, reason=error.reason, text=text)
-            self._away = True
-            if not said_before:  # once, however often it is tried
+            self._reported_lost = True
+            if not said_before:  # one event, however often it is tried
                 self._emit(NodeBootFailed(time.time_ns(), node_id, error.reason, text, error.cure))
         else:
             self._note_return()
@@ -97,35 +97,35 @@ class Supervisor:
         self.remote.changed.notify()
         return self.phase is NodePhase.OPERATIONAL
 
-    async def _watch(self) -> bool:
-        """Return, once the node is lost, whether it is silent."""
-        self._patience_s = self._settings.retry_after_s
+    async def _monitor(self) -> bool:
+        """Wait until the node is lost, and return whether its heartbeat stopped."""
+        self._retry_s = self._settings.retry_after_s
         loss = await until_lost(self.remote, self._settings.node_lost_after_s)
         node_id = self.remote.node.node_id
         text = f"node {node_id} ({self.remote.node.kind}) lost: {loss.text}"
         self._status = replace(self._status, phase=NodePhase.LOST, text=text)
         self._emit(NodeLost(time.time_ns(), node_id, text))
-        self._away = True
+        self._reported_lost = True
         return loss.silent
 
     def _note_return(self) -> None:
-        if self._away:
-            self._away = False
+        if self._reported_lost:
+            self._reported_lost = False
             node = self.remote.node
-            text = f"node {node.node_id} ({node.kind}) is heard again"
+            text = f"node {node.node_id} ({node.kind}) sends again"
             self._emit(NodeReturned(time.time_ns(), node.node_id, text))
 
     async def _heard_again(self) -> bool:
-        """Wait until the node is heard (where silence was the trouble) or boots up; False: some time has passed."""
+        """Wait until the node sends again (where it had stopped) or boots up; return False after the retry time."""
         remote = self.remote
         heard, boot_ups = remote.heard, remote.boot_ups
         any_sign = self.phase is NodePhase.LOST or self._status.reason in _SILENT
         returned = await remote.changed.until(
-            lambda: remote.boot_ups > boot_ups or (any_sign and remote.heard > heard), self._patience_s
+            lambda: remote.boot_ups > boot_ups or (any_sign and remote.heard > heard), self._retry_s
         )
         if returned:
-            self._patience_s = self._settings.retry_after_s
+            self._retry_s = self._settings.retry_after_s
             self._note_return()
         else:
-            self._patience_s = min(2.0 * self._patience_s, self._settings.retry_at_most_s)
+            self._retry_s = min(2.0 * self._retry_s, self._settings.retry_at_most_s)
         return returned

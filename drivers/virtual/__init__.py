@@ -1,12 +1,12 @@
-"""The virtual rover's nodes: real CANopen nodes, built from the EDS files that the drivers read.
+"""The virtual rover: CANopen nodes in software, with the EDS files that the master reads.
 
-    rover          all nodes behind one bus: the one task that does input and output
-    node           one node: network management, SDO, PDO, EMCY, heartbeats around a device
-    device, motor_controller, power_state      what the devices do
-    plant          the world, handed in
-    tell, faults   what can be made wrong, by command
+    rover                          all nodes on one bus: the one task that does input and output
+    node, sdo_server, pdo, emcy    one node: the CiA 301 services around a virtual device (`devices.virtual`)
+    object_dictionary              the values of a node's objects
+    plant                          interface to the physics, which is passed in
+    faults, fault_injection, fault_socket    faults of a node, and the commands that inject them
 
-Apart from `rover.run` everything is plain code without a clock, a bus or a thread.
+Apart from `rover.run` and `fault_socket` the code has no clock, bus or thread.
 """
 
 from regolithd.drivers.virtual.plant import Bench, Measurement, Plant

@@ -1,6 +1,6 @@
-"""EMCY (CiA 301, 7.2.7): the error register, the history, and the message.
+"""EMCY (CiA 301, 7.2.7): error register, error history and message.
 
-byte 0–1  error code      byte 2  error register (0x1001)      byte 3–7  the maker's own
+byte 0–1  error code      byte 2  error register (0x1001)      byte 3–7  manufacturer-specific
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ PDO_TOO_SHORT = 0x8210
 PDO_TOO_LONG = 0x8220
 
 _REGISTER_BITS = {0x2: 0x02, 0x3: 0x04, 0x4: 0x08, 0x8: 0x10, 0xFF: 0x80}
-"""Error code's class → error register: current, voltage, temperature, communication, the maker's own."""
+"""Error code's class → error register: current, voltage, temperature, communication, manufacturer-specific."""
 
 
 class EmergencyProducer:
@@ -35,7 +35,7 @@ class EmergencyProducer:
         self.active: list[int] = []
 
     def reset(self) -> None:
-        """Forget what was wrong before a reset; nothing is sent."""
+        """Clear all errors at a reset; nothing is sent."""
         self.active = []
 
     def set(self, code: int, detail: bytes = b"") -> None:
@@ -47,12 +47,12 @@ class EmergencyProducer:
         self._send(code, detail)
 
     def report(self, code: int, detail: bytes = b"") -> None:
-        """Report an error that is over at once."""
+        """Report an error that does not last."""
         self._remember(code)
         self._send(code, detail)
 
     def clear(self, code: int | None = None) -> None:
-        """End one error, or all (None), and say so by error code 0 (CiA 301: 'error reset or no error')."""
+        """End one error, or all (None), and send error code 0 (CiA 301: 'error reset or no error')."""
         before = list(self.active)
         self.active = [] if code is None else [other for other in before if other != code]
         if self.active != before:

@@ -1,4 +1,4 @@
-"""What can be wrong with a node; `drivers.virtual.fault_injection` makes it so by command."""
+"""The faults that a virtual node can have; `drivers.virtual.fault_injection` sets them by command."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from dataclasses import dataclass, field
 
 @dataclass(slots=True)
 class Faults:
-    """What is wrong with one node at present; as constructed, nothing."""
+    """The present faults of one node; none as constructed."""
 
     silent: bool = False  # sends no PDO, though its heartbeat says operational
-    frozen: bool = False  # repeats the last values for ever
-    deaf: bool = False  # ignores what PDOs tell it
+    frozen: bool = False  # repeats the last values
+    deaf: bool = False  # ignores RPDOs
     no_boot_up: bool = False
     no_heartbeat: bool = False
     no_sdo: bool = False
     refused: set[int] = field(default_factory=set)  # indices whose writing is aborted with 0x06060000
-    forgotten: set[int] = field(default_factory=set)  # indices whose writing is answered, and not done
-    identity: dict[int, int] = field(default_factory=dict)  # sub-index of 0x1018 → what it says instead
-    delay_ns: int = 0  # its PDOs come this late
-    missing_bytes: int = 0  # its PDOs are this much too short
-    status: int = 0  # bits of a load cell's 0x6150 that are set besides its own
+    forgotten: set[int] = field(default_factory=set)  # indices whose writing is acknowledged, and not done
+    identity: dict[int, int] = field(default_factory=dict)  # sub-index of 0x1018 → value that it reports instead
+    delay_ns: int = 0  # its TPDOs are this late
+    missing_bytes: int = 0  # its TPDOs are this many bytes too short
+    status: int = 0  # bits that are set in its status object (0x6150 of a load cell), besides its own

@@ -1,7 +1,7 @@
 """One CANopen node: the communication profile (CiA 301) around a device.
 
-A node does no input or output and knows no clock: frames come through `receive`, time through `tick`, and what it has
-to say goes through `emit` with the nanosecond at which it is due. Times are monotonic nanoseconds.
+A node does no input or output and has no clock: frames arrive through `receive`, time through `tick`, and frames leave
+through `emit` with the time at which they are due. Times are monotonic nanoseconds.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class State(IntEnum):
 class VirtualNode:
     """One node. `emit(due_ns, can_id, data)` takes a frame; due 0 is at once.
 
-    `counts` says what it has seen and sent, by name.
+    `counts` has the number of received and sent messages, by name.
     """
 
     def __init__(self, description: NodeDescription, emit: Callable[[int, int, bytes], None]) -> None:
@@ -79,7 +79,7 @@ class VirtualNode:
             self._reset(0x0000)
 
     def power_off(self) -> None:
-        """Switch off, without a word."""
+        """Switch off; nothing is sent."""
         self.state = State.OFF
         self._boot_due = self._heartbeat_due = self._master_due = None
         self._transmit, self._receive, self.sync_cob_id = [], {}, -1
@@ -104,7 +104,7 @@ class VirtualNode:
         self._configure()
 
     def _identify(self) -> None:
-        """Put the identity into 0x1018: the EDS's, with the node-ID as serial number, but for what it pretends."""
+        """Set 0x1018: the EDS's identity with the node-ID as serial number, overridden by the injected fault."""
         self.dictionary.reset(_IDENTITY, _IDENTITY)
         for sub, value in ({4: self.id} | self.faults.identity).items():
             self.dictionary.put(_IDENTITY, sub, value)
@@ -118,7 +118,7 @@ class VirtualNode:
         self._emit(0, cob_id.ERROR_CONTROL + self.id, b"\0")
 
     def _command(self, data: bytes) -> None:
-        """Obey a network management command (CiA 301, 7.2.8.2)."""
+        """Execute an NMT command (CiA 301, 7.2.8.2)."""
         if len(data) < 2 or data[1] not in {0, self.id}:
             return
         self.counts["nmt"] += 1
@@ -147,7 +147,7 @@ class VirtualNode:
     # Frames
 
     def receive(self, frame: Frame, now: int) -> None:
-        """Take a frame of somebody else's."""
+        """Take a frame of another node."""
         if self.state in {State.OFF, State.INITIALISING} or frame.extended or frame.remote or frame.error:
             return
         self._now = now
@@ -159,9 +159,9 @@ class VirtualNode:
         elif can_id == cob_id.SDO_REQUEST + self.id:
             self._request(frame.data)
         elif can_id in self._receive:
-            self._take(self._receive[can_id], frame.data)
+            self._receive_rpdo(self._receive[can_id], frame.data)
         elif can_id == cob_id.ERROR_CONTROL + self._master:
-            self._master_heard()
+            self._master_heartbeat()
 
     def _request(self, data: bytes) -> None:
         if self.state is State.STOPPED or self.faults.no_sdo:
@@ -188,7 +188,7 @@ class VirtualNode:
             elif each.syncs >= each.transmission_type:
                 self._send(each, each.content(self.dictionary))
 
-    def _take(self, each: pdo.Pdo, data: bytes) -> None:
+    def _receive_rpdo(self, each: pdo.Pdo, data: bytes) -> None:
         if self.state is not State.OPERATIONAL or self.faults.deaf:
             return
         self.counts["rpdo"] += 1
@@ -208,7 +208,7 @@ class VirtualNode:
             end = start + self.dictionary.entries[key].bits // 8
             try:
                 self.dictionary.write(key, data[start:end])
-            except AbortError:  # a value out of range: a PDO has nobody to tell, the old one stays
+            except AbortError:  # out of range: a PDO cannot be refused, the old value stays
                 self.counts["rpdo_refused"] += 1
             start = end
 
@@ -222,21 +222,21 @@ class VirtualNode:
         return min((moment for moment in moments if moment is not None), default=None)
 
     def tick(self, now: int) -> None:
-        """Do what is due: boot up, heartbeat, the master's silence, timed PDOs."""
+        """Do what is due: boot up, heartbeat, loss of the master's heartbeat, timed PDOs."""
         self._now = now
         if self._boot_due is not None and now >= self._boot_due:
             self._boot_up()
         if self._heartbeat_due is not None and now >= self._heartbeat_due:
             self._heartbeat()
         if self._master_due is not None and now >= self._master_due:
-            self._master_silent()
+            self._lose_master()
         if self.state is State.OPERATIONAL:
             for each in self._transmit:
                 if each.event_ns and now >= each.sent_ns + each.event_ns:
                     self._send(each, each.content(self.dictionary))
 
     def advance(self, elapsed_s: float) -> None:
-        """Let the device move on."""
+        """Advance the device's time."""
         if self.state is not State.OFF:
             self.device.advance(elapsed_s)
 
@@ -259,7 +259,7 @@ class VirtualNode:
     def _heartbeat(self) -> None:
         period = self.dictionary.get(_PRODUCER) * 1_000_000
         due = self._heartbeat_due or 0
-        # Keep the rhythm, but never catch up on what was missed.
+        # Keep the phase, but do not send what was missed.
         self._heartbeat_due = due + period if self._now < due + period else self._now + period
         if not self.faults.no_heartbeat and self.state is not State.INITIALISING:
             self.counts["heartbeat"] += 1
@@ -269,7 +269,7 @@ class VirtualNode:
     def _master(self) -> int:
         return self.dictionary.get(_CONSUMER, 1) >> 16 & 0x7F
 
-    def _master_heard(self) -> None:
+    def _master_heartbeat(self) -> None:
         period = self.dictionary.get(_CONSUMER, 1) & 0xFFFF
         if not period:
             return
@@ -279,8 +279,8 @@ class VirtualNode:
             if not self.device.latches_errors:
                 self._emergency.clear(emcy.HEARTBEAT_LOST)
 
-    def _master_silent(self) -> None:
-        """React to the master's heartbeat having stopped (0x1029, and the device's own 0x6007)."""
+    def _lose_master(self) -> None:
+        """React to the loss of the master's heartbeat (0x1029, and the device's own 0x6007)."""
         self._master_due = None
         self._master_lost = True
         self.counts["master_lost"] += 1
@@ -320,15 +320,15 @@ class VirtualNode:
         elif self.state is not State.OFF:
             self._emergency.set(code)
 
-    def pretend(self, sub: int, value: int) -> None:
-        """Say something else in 0x1018 from now on; sub-index 0 ends it."""
+    def override_identity(self, sub: int, value: int) -> None:
+        """Report another value in 0x1018 from now on; sub-index 0 ends it."""
         if sub:
             self.faults.identity[sub] = value
         else:
             self.faults.identity = {}
         self._identify()
 
-    # The object dictionary's rules
+    # Writing to the object dictionary
 
     def _check(self, key: Key, value: int) -> None:
         index, sub = key
@@ -339,7 +339,9 @@ class VirtualNode:
         if index == emcy.COB_ID_OBJECT and not pdo.usable(value):
             raise AbortError(Abort.INVALID_VALUE)
         if index == _SYNC_OBJECT and (value & 0x6000_0000 or not value & 0x7FF):
-            raise AbortError(Abort.INVALID_VALUE)  # these nodes neither produce a SYNC nor hear a 29-bit one
+            raise AbortError(
+                Abort.INVALID_VALUE
+            )  # these nodes neither produce a SYNC nor receive one with a 29-bit identifier
         if pdo.concerns_pdos(index):
             pdo.check(self.dictionary, key, value)
         self.device.check((index, sub), value)
@@ -361,7 +363,7 @@ class VirtualNode:
             self.device.written(key, value)
 
     def _configure(self) -> None:
-        """Compile what the communication objects say."""
+        """Compile SYNC and PDO configuration from the communication objects."""
         self.sync_cob_id = self.dictionary.get(_SYNC_OBJECT) & 0x7FF
         self._transmit = pdo.transmit_pdos(self.dictionary)
         self._receive = pdo.receive_pdos(self.dictionary)

@@ -1,7 +1,6 @@
-"""A node's object dictionary while it runs: the EDS gives types, rights, limits and defaults; values live here.
+"""A node's object dictionary while it runs: types, access rights, limits and defaults from the EDS, and its values.
 
-Reading and writing through `read` and `write` is what an SDO client does, and is refused as CiA 301 refuses it. The
-device itself uses `get` and `put`.
+SDO clients use `read` and `write`, which are refused as CiA 301 prescribes. The device itself uses `get` and `put`.
 """
 
 from __future__ import annotations
@@ -80,7 +79,7 @@ class Dictionary:
         return value
 
     def put(self, index: int, sub: int, value: int) -> None:
-        """Set a number, as the device does: no rights are asked, but what does not fit its type is cut to it."""
+        """Set a number, as the device does: access rights do not apply; a value outside its type's range is clipped."""
         entry = self.entries[index, sub]
         span = 1 << entry.bits
         lowest = -span // 2 if entry.format.islower() else 0

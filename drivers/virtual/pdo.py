@@ -1,4 +1,4 @@
-"""A node's PDOs: what they carry and when they go follows the configuration that the master wrote, and nothing else.
+"""A node's PDOs: mapping and transmission follow the configuration that the master wrote.
 
 Objects (CiA 301, 7.5.2): 0x1400 + k and 0x1600 + k describe RPDO k + 1, 0x1800 + k and 0x1A00 + k TPDO k + 1.
 `check` refuses what CiA 301 forbids; `transmit_pdos` and `receive_pdos` compile what is configured, once.
@@ -30,7 +30,7 @@ _RESERVED_COB_IDS = (
 
 @dataclass(slots=True)
 class Pdo:
-    """One PDO that is enabled and carries something."""
+    """One enabled PDO with at least one mapped object."""
 
     cob_id: int
     transmission_type: int
@@ -39,7 +39,7 @@ class Pdo:
     inhibit_ns: int = 0
     event_ns: int = 0
     syncs: int = 0  # SYNCs since it was last sent
-    sent: bytes | None = None  # what was sent last
+    sent: bytes | None = None  # data sent last
     sent_ns: int = 0
     received: bytes | None = None  # an RPDO that waits for the next SYNC
 
@@ -49,7 +49,7 @@ class Pdo:
         return self.transmission_type <= LAST_SYNCHRONOUS
 
     def content(self, dictionary: Dictionary) -> bytes:
-        """Return what it says now."""
+        """Return its data with the present values."""
         values = dictionary.values
         return self.layout.pack(*[values[key] for key in self.keys])
 
@@ -113,7 +113,7 @@ def _compile(dictionary: Dictionary, communication: int, mapping: int) -> list[P
 
 
 def _split(mapping: int) -> tuple[Key, int]:
-    """Return what a mapping entry names, and its length in bits."""
+    """Return the object of a mapping entry, and its length in bits."""
     return (mapping >> 16, mapping >> 8 & 0xFF), mapping & 0xFF
 
 

@@ -1,11 +1,11 @@
-"""The virtual rover: fourteen nodes and the world they measure, behind one bus.
+"""The virtual rover: all nodes, and the plant that they measure, on one bus.
 
     async with open_bus("virtual", "demo") as bus:
         await VirtualRover(plant).run(bus)
 
-One task reads, answers and sends for all nodes. At each SYNC the world is asked once, so that what the nodes report is
-of one instant. The bus is drained before any deadline is looked at: a process that slept does not take its own sleep
-for the master's silence.
+One task receives and sends for all nodes. At each SYNC the plant is measured once, so that all nodes report the same
+instant. All waiting frames are read before any deadline is checked: after a pause of the process itself, the master's
+heartbeat is not taken for lost.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from regolithd.drivers.devices.motor_controller import VirtualMotorController
 from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.devices.registry import DEVICES
 from regolithd.drivers.errors import BusError
-from regolithd.drivers.virtual.fault_injection import tell
+from regolithd.drivers.virtual.fault_injection import inject_fault
 from regolithd.drivers.virtual.node import VirtualNode
 from regolithd.drivers.virtual.plant import WHEELS
 
@@ -44,10 +44,10 @@ KAPVIK = tuple(
 """One device of each kind for the body, or six, with their default node-IDs."""
 
 MOVING_STEP_NS = 20_000_000
-"""How often the drives' ramps are followed where no SYNC does it."""
+"""Interval at which the drives' ramps are advanced between SYNCs."""
 IDLE_STEP_NS = 200_000_000
 LONGEST_STEP_S = 5.0
-"""A clock that jumps further than this, either way, moves the world no further."""
+"""A clock step is limited to this, in either direction."""
 
 
 class VirtualRover:
@@ -56,11 +56,11 @@ class VirtualRover:
     Parameters
     ----------
     plant
-        The world.
+        The simulated rover.
     nodes
-        Which nodes there are.
+        The nodes on the bus.
     monotonic_ns, wall_ns
-        The clocks: of deadlines, and of the frames' kernel times.
+        Clocks for deadlines, and for the frames' kernel times.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class VirtualRover:
         self._sync_ns: int | None = None
         self._bus_counts: Counter[str] = Counter()
 
-    # What happens, without any input or output
+    # Behaviour, without input or output
 
     def power_on(self, now: int) -> None:
         """Switch every node on."""
@@ -103,12 +103,12 @@ class VirtualRover:
             self._sync_ns = frame.time_ns
             self._step_due = now + max(IDLE_STEP_NS, 3 * interval_ns)
         elif frame.can_id < cob_id.ERROR_CONTROL:
-            self._advance(frame.time_ns)  # what a command changes begins now, not when somebody last looked
+            self._advance(frame.time_ns)  # what a command changes begins now, not at the last step
         for node in self.nodes.values():
             node.receive(frame, now)
 
     def tick(self, now: int) -> None:
-        """Do what is due by `now`."""
+        """Do what is due at `now`."""
         if now >= self._step_due:
             self._step(self._wall_ns(), now)
             self._step_due = now + (MOVING_STEP_NS if any(drive.busy for drive in self._drives) else IDLE_STEP_NS)
@@ -125,18 +125,22 @@ class VirtualRover:
         return min([self._step_due, *moments])
 
     def outgoing(self, now: int) -> list[Frame]:
-        """Return the frames that go out now, and forget them."""
+        """Return and remove the frames that are due."""
         frames, self._at_once = self._at_once, []
         while self._later and self._later[0][0] <= now:
             frames.append(heapq.heappop(self._later)[2])
         return frames
 
-    def tell(self, line: str) -> str:
-        """Obey a command of `virtual.fault_injection` and return its answer; `counts` asks for `counts`, as JSON."""
-        return json.dumps(self.counts()) if line.split() == ["counts"] else tell(self.nodes, line, self._monotonic_ns())
+    def inject_fault(self, line: str) -> str:
+        """Execute a command of `virtual.fault_injection` and return its answer; the command `counts` returns JSON."""
+        return (
+            json.dumps(self.counts())
+            if line.split() == ["counts"]
+            else inject_fault(self.nodes, line, self._monotonic_ns())
+        )
 
     def counts(self) -> dict[str, dict[str, int]]:
-        """Return what was seen and sent: `bus` for the whole, then each node by its ID."""
+        """Return the numbers of received and sent messages: `bus` for all nodes, then each node by its ID."""
         return {"bus": dict(self._bus_counts)} | {str(node.id): dict(node.counts) for node in self.nodes.values()}
 
     def _emit(self, due: int, can_id: int, data: bytes) -> None:
@@ -147,14 +151,14 @@ class VirtualRover:
             self._at_once.append(frame)
 
     def _step(self, wall_ns: int, now: int) -> None:
-        """Move the world on to `wall_ns` and let every node measure it."""
+        """Advance all nodes to `wall_ns` and let them measure the plant."""
         self._advance(wall_ns)
         measurement = self._plant.measure(self._time_s, self._motor_speeds())
         for node in self.nodes.values():
             node.measure(measurement, now)
 
     def _advance(self, wall_ns: int) -> None:
-        """Move the devices on to `wall_ns`."""
+        """Advance the devices to `wall_ns`."""
         elapsed_s = 0.0 if self._advanced_ns is None else (wall_ns - self._advanced_ns) / 1e9
         if self._advanced_ns is not None and -LONGEST_STEP_S < elapsed_s <= 0:
             return  # the frame came while the clock was being read
@@ -183,13 +187,13 @@ class VirtualRover:
             await self._send(bus, self.outgoing(self._monotonic_ns()))
 
     async def _receive(self, bus: Bus) -> list[Frame]:
-        """Return what has arrived, or nothing once something else is due."""
-        for patience_s in ((self.due() - self._monotonic_ns()) / 1e9, 0.0):
+        """Return the frames that have arrived; empty once something else is due."""
+        for timeout_s in ((self.due() - self._monotonic_ns()) / 1e9, 0.0):
             try:
-                async with asyncio.timeout(max(patience_s, 0.0)):
+                async with asyncio.timeout(max(timeout_s, 0.0)):
                     return await bus.receive()
             except TimeoutError:
-                continue  # once more, without waiting: frames may have come together with the deadline
+                continue  # once more, without waiting: frames may have arrived with the deadline
         return []
 
     async def _send(self, bus: Bus, frames: list[Frame]) -> None:

@@ -32,7 +32,7 @@ _SEGMENT = 7
 
 @dataclass(slots=True)
 class _Transfer:
-    """A segmented transfer under way: what is left to send, or what has come."""
+    """A segmented transfer under way: the data still to be sent, or received so far."""
 
     key: Key
     upload: bool
@@ -42,18 +42,18 @@ class _Transfer:
 
 
 class SdoServer:
-    """Answers requests on one dictionary."""
+    """Answers requests to one object dictionary."""
 
     def __init__(self, dictionary: Dictionary) -> None:
         self._dictionary = dictionary
         self._transfer: _Transfer | None = None
 
     def reset(self) -> None:
-        """Forget a transfer that is under way."""
+        """Abandon the transfer under way."""
         self._transfer = None
 
     def answer(self, request: bytes) -> bytes | None:
-        """Return the answer to one request, or None where CiA 301 wants none."""
+        """Return the answer to one request, or None where CiA 301 requires none."""
         if len(request) != 8:
             return None
         command, index, sub = _HEADER.unpack_from(request)

@@ -132,11 +132,11 @@ async def test_a_node_that_falls_silent_is_an_event_and_its_wheel_invalid_and_th
         await service.network.enable()
         await service.network.set_speed((0.29,) * 6)
         await listener.until(lambda: bool(listener.valid) and all(listener.valid[-1]))
-        rover.tell("off 13")
+        rover.inject_fault("off 13")
         await listener.until(lambda: "NodeLost" in listener.events)
         mcap = service.recorder.paths[0]
         service.recorder.flush()
-        rover.tell("on 13")
+        rover.inject_fault("on 13")
         await listener.until(lambda: all(listener.measured[-1]))
     assert [True, True, False, True, True, True] in listener.measured
     recorded = [message.content["event"] for message in read_messages(mcap) if message.topic == "event"]

@@ -28,17 +28,17 @@ if TYPE_CHECKING:
     from regolithd.drivers.virtual.plant import Plant
 
 _CHANNELS = itertools.count()
-PATIENCE_s = 20.0
+TIMEOUT_S = 20.0
 
 
-async def until(condition: Callable[[], object], what: str, patience_s: float = PATIENCE_s) -> None:
+async def until(condition: Callable[[], object], what: str, timeout_s: float = TIMEOUT_S) -> None:
     """Wait for a condition, and say what was waited for where it never holds."""
     try:
-        async with asyncio.timeout(patience_s):
+        async with asyncio.timeout(timeout_s):
             while not condition():  # noqa: ASYNC110  # what is waited for belongs to others, who notify nobody
                 await asyncio.sleep(0.01)
     except TimeoutError:
-        pytest.fail(f"waited {patience_s:g} s in vain: {what}")
+        pytest.fail(f"waited {timeout_s:g} s in vain: {what}")
 
 
 def settings(nodes: Sequence[NodeDescription], **changes: object) -> NetworkSettings:
@@ -72,7 +72,7 @@ class Rig:
         self.frames.extend(batch)
         self.signals.extend(filter(None, map(self.decoder.decode, batch)))
 
-    def told(self, kind: type, **fields: object) -> list[NetworkEvent]:
+    def events_of(self, kind: type, **fields: object) -> list[NetworkEvent]:
         """Return the events of a class whose fields are these."""
         return [
             event
@@ -84,10 +84,10 @@ class Rig:
         """Return what one node has measured so far."""
         return [signal for signal in self.signals if isinstance(signal, Reading) and signal.node_id == node_id]
 
-    async def until_told(self, kind: type, **fields: object) -> NetworkEvent:
+    async def wait_for_event(self, kind: type, **fields: object) -> NetworkEvent:
         """Wait for an event that has not been waited for before, and return it."""
-        await until(lambda: self.told(kind, **fields), f"{kind.__name__} {fields}; told: {self.events}")
-        event = self.told(kind, **fields)[0]
+        await until(lambda: self.events_of(kind, **fields), f"{kind.__name__} {fields}; told: {self.events}")
+        event = self.events_of(kind, **fields)[0]
         self.events.remove(event)
         return event
 
@@ -112,11 +112,11 @@ async def rig(
     nodes: Sequence[NodeDescription] = KAPVIK,
     *,
     plant: Plant | None = None,
-    tell: Sequence[str] = (),
+    faults: Sequence[str] = (),
     known: Sequence[NodeDescription] | None = None,
     **changes: object,
 ) -> AsyncIterator[Rig]:
-    """Run a virtual rover with these nodes, obeying `tell` from the start, and a network that knows `known`."""
+    """Run a virtual rover with these nodes, with `faults` from the start, and a network that knows `known`."""
     channel = f"test-{next(_CHANNELS)}"
     described = nodes if known is None else known
     async with AsyncExitStack() as stack:
@@ -126,8 +126,8 @@ async def rig(
         rover = VirtualRover(plant or Bench(), nodes)
         serving = tasks.create_task(rover.run(rover_bus))
         await asyncio.sleep(0)  # the nodes have their power now, and obey
-        for line in tell:
-            assert rover.tell(line) == "ok", line
+        for line in faults:
+            assert rover.inject_fault(line) == "ok", line
         running = Rig(rover, bus)
         running.start(tasks, settings(described, **changes))
         try:

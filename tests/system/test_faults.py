@@ -51,7 +51,7 @@ class Rig:
         """Inject faults; `since` and `until_received` consider messages from now on."""
         self.mark = len(self.received)
         for command in commands:
-            assert self.rover.tell(command) == "ok", command
+            assert self.rover.inject_fault(command) == "ok", command
 
     def since(self, topic: str, **fields: object) -> list[dict[str, Any]]:
         """Return the messages of a topic since the last injection that have these values."""

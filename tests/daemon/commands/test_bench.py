@@ -38,7 +38,7 @@ def bench(*options: str, channel: str = "bench") -> Iterator[subprocess.Popen[st
             process.kill()
 
 
-def tell(control: Path, *words: str) -> subprocess.CompletedProcess[str]:
+def fault(control: Path, *words: str) -> subprocess.CompletedProcess[str]:
     """Command the rover."""
     line = command("bench-fault", "--control", str(control), *words)
     return subprocess.run(line, capture_output=True, text=True, env=ENVIRONMENT, check=False, timeout=60)
@@ -50,11 +50,11 @@ def test_it_obeys_and_counts(tmp_path: Path, end: signal.Signals) -> None:
     control = tmp_path / "bench.sock"
     with bench("--control", str(control)) as process:
         assert control.stat().st_mode & 0o777 == 0o600
-        assert tell(control, "reset", "3").stdout == "ok\n"
-        refused = tell(control, "off", "99")
+        assert fault(control, "reset", "3").stdout == "ok\n"
+        refused = fault(control, "off", "99")
         assert refused.returncode == 1
         assert "there is no node 99" in refused.stdout
-        assert "silent N" in tell(control, "help").stdout
+        assert "silent N" in fault(control, "help").stdout
         process.send_signal(end)
         output, _ = process.communicate(timeout=60)
         assert process.returncode == 0
@@ -73,12 +73,12 @@ def test_two_do_not_share_a_socket(tmp_path: Path) -> None:
         assert "listens there already" in second.stderr
     assert control.exists()
     with bench("--control", str(control)):
-        assert tell(control, "counts").returncode == 0
+        assert fault(control, "counts").returncode == 0
 
 
 def test_nobody_listens(tmp_path: Path) -> None:
     """`bench-fault` says what to do."""
-    answer = tell(tmp_path / "nothing.sock", "off", "3")
+    answer = fault(tmp_path / "nothing.sock", "off", "3")
     assert answer.returncode == 1
     assert "Is `regolithd bench` running" in answer.stdout
 

@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 
 from regolithd.drivers.can.counters import BusCounters
 from regolithd.drivers.can.frame import Frame
-from regolithd.drivers.can.recvmmsg import BATCH, CAN_FRAME, SO_RXQ_OVFL, SO_TIMESTAMPNS, KernelBatch
+from regolithd.drivers.can.recvmmsg import BATCH, CAN_FRAME, SO_RXQ_OVFL, SO_TIMESTAMPNS, RecvmmsgBuffers
 
 CONFIRM = 0x800
 SOL_SOCKET = 1
 
 
 def put(
-    batch: KernelBatch, place: int, raw: bytes, *, flags: int = 0, drops: int | None = None, size: int = 16
+    batch: RecvmmsgBuffers, place: int, raw: bytes, *, flags: int = 0, drops: int | None = None, size: int = 16
 ) -> None:
     """Fill one message's place as the kernel does."""
     start = place * CAN_FRAME.size
@@ -31,7 +31,7 @@ def put(
 
 def test_flags_of_the_identifier_and_of_the_message_are_told_apart() -> None:
     """Standard, extended, remote, error, and our own."""
-    batch, counters = KernelBatch(), BusCounters()
+    batch, counters = RecvmmsgBuffers(), BusCounters()
     for place, (can_id, flags) in enumerate(
         [(0x181, 0), (0x80012345, 0), (0x40000181, 0), (0x20000040, 0), (0x080, CONFIRM)]
     ):
@@ -48,7 +48,7 @@ def test_flags_of_the_identifier_and_of_the_message_are_told_apart() -> None:
 
 def test_drops_are_counted_by_difference_and_over_the_counter_s_end() -> None:
     """The kernel says how many in all, modulo 2³², and only once there were some."""
-    batch, counters = KernelBatch(), BusCounters()
+    batch, counters = RecvmmsgBuffers(), BusCounters()
     for drops, total in ((None, 0), (3, 3), (3, 3), (None, 3), (10, 10), (2**32 - 1, 2**32 - 1), (4, 2**32 + 4)):
         put(batch, 0, struct.pack("=IB3x8s", 0x181, 8, bytes(8)), drops=drops)
         assert len(batch._parse(1, counters)) == 1
@@ -58,7 +58,7 @@ def test_drops_are_counted_by_difference_and_over_the_counter_s_end() -> None:
 @given(st.lists(st.tuples(st.binary(min_size=16, max_size=16), st.sampled_from([0, CONFIRM])), max_size=BATCH))
 def test_any_bytes_are_frames_or_counted(messages: list[tuple[bytes, int]]) -> None:
     """No exception; every message is a frame of at most 8 bytes, or counted as malformed."""
-    batch, counters = KernelBatch(), BusCounters()
+    batch, counters = RecvmmsgBuffers(), BusCounters()
     for place, (raw, flags) in enumerate(messages):
         put(batch, place, raw, flags=flags)
     frames = batch._parse(len(messages), counters)
@@ -68,7 +68,7 @@ def test_any_bytes_are_frames_or_counted(messages: list[tuple[bytes, int]]) -> N
 
 def test_what_is_no_classic_frame_is_counted() -> None:
     """A CAN FD frame, cut to the buffer's size."""
-    batch, counters = KernelBatch(), BusCounters()
+    batch, counters = RecvmmsgBuffers(), BusCounters()
     put(batch, 0, bytes(16), size=72)
     assert batch._parse(1, counters) == []
     assert counters.malformed == 1

@@ -216,10 +216,10 @@ async def test_the_network_over_a_real_kernel_loses_its_link_and_finds_all_again
         await until(lambda: sum(isinstance(signal, Sync) for signal in rig.signals) > 10, "ten SYNCs")
         assert all(frame.sent for frame in rig.frames if frame.can_id == 0x80)
         set_link("down")
-        await rig.until_told(BusStateChanged, state=BusState.DOWN)
+        await rig.wait_for_event(BusStateChanged, state=BusState.DOWN)
         await until(lambda: len(rig.told(NodeLost)) == 14, "all nodes lost", 60)
         set_link("up")
-        await rig.until_told(BusStateChanged, state=BusState.ACTIVE)
+        await rig.wait_for_event(BusStateChanged, state=BusState.ACTIVE)
         await until(lambda: len(rig.told(NodeBooted)) == 28, "all nodes booted again", 60)
         assert rig.network.counters.sync.failed > 0
         await rig.stop()

@@ -79,7 +79,7 @@ def node(request: pytest.FixtureRequest) -> NodeDescription:
 async def test_it_boots_says_who_it_is_and_beats(node: NodeDescription) -> None:
     """Operational, with the identity of its EDS, heard again and again."""
     async with rig([node]) as r:
-        booted = await r.until_told(NodeBooted)
+        booted = await r.wait_for_event(NodeBooted)
         assert booted.identity.vendor in (0xFB, 0xFFFF00)
         heard = r.network.status[node.node_id].heard_ns
         await until(lambda: r.network.status[node.node_id].heard_ns > heard, "the next heartbeat")
@@ -89,7 +89,7 @@ async def test_it_boots_says_who_it_is_and_beats(node: NodeDescription) -> None:
 async def test_its_configuration_is_in_the_node(node: NodeDescription) -> None:
     """Every object that was written holds what was written."""
     async with rig([node]) as r:
-        await r.until_told(NodeBooted)
+        await r.wait_for_event(NodeBooted)
         sdo = r.network._supervisors[node.node_id].remote.sdo
         wanted = {}
         for write in boot_writes(node, heartbeat_s=0.2, master_id=127, master_lost_after_s=2.0):
@@ -102,7 +102,7 @@ async def test_its_configuration_is_in_the_node(node: NodeDescription) -> None:
 async def test_what_it_measures_arrives_in_si(node: NodeDescription) -> None:
     """Every quantity of the layout arrives, with sign and scale, at every SYNC, and none that was not measured."""
     async with rig([node], plant=World()) as r:
-        await r.until_told(NodeBooted)
+        await r.wait_for_event(NodeBooted)
         pdos = tpdos(node.device, diagnostics=node.diagnostics)
         await until(lambda: len(r.readings(node.node_id)) >= 3 * len(pdos), "three readings of each PDO")
         last = r.readings(node.node_id)[-len(pdos) :]
@@ -115,35 +115,35 @@ async def test_what_it_measures_arrives_in_si(node: NodeDescription) -> None:
 async def test_its_emergency_is_told_in_words(node: NodeDescription) -> None:
     """An error arises and goes."""
     async with rig([node]) as r:
-        await r.until_told(NodeBooted)
-        r.rover.tell(f"emcy {node.node_id} 0x4210")
-        told = await r.until_told(NodeEmergency)
+        await r.wait_for_event(NodeBooted)
+        r.rover.inject_fault(f"emcy {node.node_id} 0x4210")
+        told = await r.wait_for_event(NodeEmergency)
         assert "temperature" in told.text
-        r.rover.tell(f"emcy {node.node_id} 0")
-        assert (await r.until_told(NodeEmergency)).emergency.cleared
+        r.rover.inject_fault(f"emcy {node.node_id} 0")
+        assert (await r.wait_for_event(NodeEmergency)).emergency.cleared
 
 
 async def test_it_is_lost_and_returns(node: NodeDescription) -> None:
     """Power off and on."""
     async with rig([node]) as r:
-        await r.until_told(NodeBooted)
-        r.rover.tell(f"off {node.node_id}")
-        await r.until_told(NodeLost)
-        r.rover.tell(f"on {node.node_id}")
-        await r.until_told(NodeBooted)
+        await r.wait_for_event(NodeBooted)
+        r.rover.inject_fault(f"off {node.node_id}")
+        await r.wait_for_event(NodeLost)
+        r.rover.inject_fault(f"on {node.node_id}")
+        await r.wait_for_event(NodeBooted)
 
 
 async def test_short_frames_are_counted_and_not_decoded(node: NodeDescription) -> None:
     """A PDO that is not as long as its mapping gives no value."""
     async with rig([node]) as r:
-        await r.until_told(NodeBooted)
-        r.rover.tell(f"short {node.node_id} 1")
+        await r.wait_for_event(NodeBooted)
+        r.rover.inject_fault(f"short {node.node_id} 1")
         await until(lambda: r.decoder.undecodable["wrong-length"] > 3, "wrong lengths counted")
 
 
 async def test_an_invalid_measurement_has_no_value() -> None:
     """A load cell that says `not valid` in 0x6150 is heard, and measures nothing."""
     async with rig([NODES[LOAD_CELL]]) as r:
-        await r.until_told(NodeBooted)
-        r.rover.tell("status 14 1")
+        await r.wait_for_event(NodeBooted)
+        r.rover.inject_fault("status 14 1")
         await until(lambda: r.readings(14) and r.readings(14)[-1].values == (), "a reading without value")

@@ -92,7 +92,7 @@ def test_a_fault_stops_it_tells_why_and_lasts() -> None:
     drive = DriveUnderTest()
     drive.run_at(3000)
     master = drive.master
-    master.rover.tell("fault 1 0x2310")
+    master.rover.inject_fault("fault 1 0x2310")
     frames = master.wait(0.02)
     assert [f.data for f in frames if f.can_id == 0x81] == [struct.pack("<HB5s", 0x2310, 0x03, b"")]
     assert drive.state == 0x0F

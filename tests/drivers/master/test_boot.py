@@ -33,23 +33,23 @@ FAULTS = {
 @pytest.mark.parametrize("reason", FAULTS)
 async def test_a_fault_has_its_reason_and_the_mended_node_boots(reason: BootReason) -> None:
     """The reason is told with a cure, a healthy neighbour is not disturbed, and the node boots once it is mended."""
-    async with rig([MOTOR, CELL], tell=[FAULTS[reason]]) as r:
-        failed = await r.until_told(NodeBootFailed)
+    async with rig([MOTOR, CELL], faults=[FAULTS[reason]]) as r:
+        failed = await r.wait_for_event(NodeBootFailed)
         assert (failed.node_id, failed.reason, failed.cure) == (4, reason, CURES[reason])
         assert "node 4" in failed.text
         assert failed.cure in failed.text
-        await r.until_told(NodeBooted, node_id=11)
+        await r.wait_for_event(NodeBooted, node_id=11)
         assert r.network.status[4].phase in (NodePhase.FAILED, NodePhase.BOOTING)
         for line in ("clear 4", "off 4", "on 4") if reason is BootReason.NO_BOOT_UP else ("clear 4",):
-            assert r.rover.tell(line) == "ok"
-        await r.until_told(NodeBooted, node_id=4)
+            assert r.rover.inject_fault(line) == "ok"
+        await r.wait_for_event(NodeBooted, node_id=4)
         assert r.network.status[11].boots == 1
 
 
 async def test_a_node_of_another_profile_is_refused() -> None:
     """A load cell where a motor controller should be."""
     async with rig([NodeDescription(4, LOAD_CELL, 3)], known=[MOTOR]) as r:
-        failed = await r.until_told(NodeBootFailed)
+        failed = await r.wait_for_event(NodeBootFailed)
         assert failed.reason is BootReason.WRONG_DEVICE_TYPE
         assert "0x00020194" in failed.text
         assert "0x00020192" in failed.text
@@ -59,36 +59,36 @@ async def test_an_exchanged_device_is_noticed_by_its_serial_number() -> None:
     """Where the serial number is configured, another one is refused."""
     known = NodeDescription(4, MOTOR_CONTROLLER, 3, serial=77)
     async with rig([MOTOR], known=[known]) as r:
-        assert (await r.until_told(NodeBootFailed)).reason is BootReason.WRONG_SERIAL
-        r.rover.tell("identity 4 serial 77")
-        assert (await r.until_told(NodeBooted)).identity.serial == 77
+        assert (await r.wait_for_event(NodeBootFailed)).reason is BootReason.WRONG_SERIAL
+        r.rover.inject_fault("identity 4 serial 77")
+        assert (await r.wait_for_event(NodeBooted)).identity.serial == 77
 
 
 async def test_a_node_that_restarts_while_it_is_configured_is_booted_again() -> None:
     """A boot-up in the middle ends the attempt, with its own reason, and starts the next."""
     async with rig([MOTOR]) as r:
         await r.until_transfers(4, 10)
-        r.rover.tell("reset 4")
-        failed = await r.until_told(NodeBootFailed)
+        r.rover.inject_fault("reset 4")
+        failed = await r.wait_for_event(NodeBootFailed)
         assert failed.reason in (BootReason.RESTARTED, BootReason.NO_HEARTBEAT)
-        await r.until_told(NodeBooted)
+        await r.wait_for_event(NodeBooted)
 
 
 async def test_a_missing_node_is_told_once_and_the_others_boot() -> None:
     """However often it is tried, the same failure is one event."""
     async with rig([CELL], known=[MOTOR, CELL], boot_up_timeout_s=0.2, retry_after_s=0.1) as r:
-        await r.until_told(NodeBooted, node_id=11)
+        await r.wait_for_event(NodeBooted, node_id=11)
         await r.until_attempts(4, 3)
-        assert [event.reason for event in r.told(NodeBootFailed)] == [BootReason.NO_BOOT_UP]
+        assert [event.reason for event in r.events_of(NodeBootFailed)] == [BootReason.NO_BOOT_UP]
 
 
 async def test_a_sensor_in_another_unit_is_refused_not_misread() -> None:
     """A load cell whose process value has three decimal digits would be read ten times too large."""
-    async with rig([CELL], tell=["off 11"]) as r:
+    async with rig([CELL], faults=["off 11"]) as r:
         objects = r.rover.nodes[11].dictionary
         objects.entries = {**objects.entries, (0x6132, 1): replace(objects.entries[0x6132, 1], default=3)}
-        r.rover.tell("on 11")
-        failed = await r.until_told(NodeBootFailed, reason=BootReason.CONFIGURATION_NOT_KEPT)
+        r.rover.inject_fault("on 11")
+        failed = await r.wait_for_event(NodeBootFailed, reason=BootReason.CONFIGURATION_NOT_KEPT)
         assert "object 0x6132:01: must be 0x2, and reads 0x3" in failed.text
 
 
@@ -100,7 +100,7 @@ async def test_an_eds_that_lacks_an_object_is_a_reason_and_no_crash(monkeypatch:
 
     monkeypatch.setattr("regolithd.drivers.master.boot.boot_writes", lacking)
     async with rig([MOTOR]) as r:
-        failed = await r.until_told(NodeBootFailed)
+        failed = await r.wait_for_event(NodeBootFailed)
         assert failed.reason is BootReason.UNUSABLE_EDS
         assert "0x1017" in failed.text
         assert not r.running.done()

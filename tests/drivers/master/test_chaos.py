@@ -48,11 +48,11 @@ async def test_whatever_happens_the_network_goes_on_and_mends(seed: int) -> None
         for _ in range(30):
             if chance.random() < 0.3:
                 await command(r, chance)
-            r.rover.tell(chance.choice(FAULTS).format(chance.choice(NODES).node_id))
+            r.rover.inject_fault(chance.choice(FAULTS).format(chance.choice(NODES).node_id))
             await asyncio.sleep(chance.random() * 0.15)
             assert not r.running.done()
         for line in ("clear all", "off all", "on all"):
-            assert r.rover.tell(line) == "ok"
+            assert r.rover.inject_fault(line) == "ok"
         await until(
             lambda: all(status.phase == "operational" for status in r.network.status.values()), "all operational", 40
         )

@@ -75,7 +75,7 @@ async def test_wheels_turn_at_the_speed_that_is_asked_and_stop() -> None:
         with pytest.raises(DriveError, match="a quick stop was commanded"):
             await r.network.set_speed(CREEP_rad_s)
         await r.network.disable()
-        assert not any(r.told(MotionStopped))
+        assert not any(r.events_of(MotionStopped))
 
 
 async def test_mirrored_motors_turn_the_other_way_and_read_as_forward() -> None:
@@ -127,10 +127,10 @@ async def test_a_mutilated_statusword_is_none() -> None:
         await r.network.settled()
         await r.network.enable()
         await r.network.set_speed(CREEP_rad_s)
-        r.rover.tell("short 2 7")
+        r.rover.inject_fault("short 2 7")
         await until(lambda: r.decoder.undecodable["wrong-length"] > 3, "short frames")
         assert r.network.status[2].drive_state is DriveState.ENABLED
-        assert not r.told(MotionStopped)
+        assert not r.events_of(MotionStopped)
 
 
 async def test_a_missing_drive_cannot_be_enabled_and_the_message_says_why() -> None:
@@ -147,10 +147,10 @@ async def test_a_lost_drive_stops_the_others_and_returns_without_a_restart() -> 
         await r.network.settled()
         await r.network.enable()
         await r.network.set_speed(CREEP_rad_s)
-        r.rover.tell("off 3")
-        lost = await r.until_told(NodeLost, node_id=3)
+        r.rover.inject_fault("off 3")
+        lost = await r.wait_for_event(NodeLost, node_id=3)
         assert "no heartbeat" in lost.text
-        stopped = await r.until_told(MotionStopped, node_id=3)
+        stopped = await r.wait_for_event(MotionStopped, node_id=3)
         assert "all others are stopped" in stopped.text
         await until(
             lambda: all(
@@ -158,8 +158,8 @@ async def test_a_lost_drive_stops_the_others_and_returns_without_a_restart() -> 
             ),
             "the others switched off",
         )
-        r.rover.tell("on 3")
-        await r.until_told(NodeReturned, node_id=3)
+        r.rover.inject_fault("on 3")
+        await r.wait_for_event(NodeReturned, node_id=3)
         await until(lambda: r.network.status[3].boots == 2, "node 3 booted a second time")
         assert [r.network.status[node].boots for node in range(1, 7)] == [1, 1, 2, 1, 1, 1]
         await r.network.enable()
@@ -173,10 +173,10 @@ async def test_a_lost_load_cell_that_is_not_required_does_not_stop_the_wheels() 
         await r.network.settled()
         await r.network.enable()
         await r.network.set_speed(CREEP_rad_s)
-        r.rover.tell("off 11")
-        await r.until_told(NodeLost, node_id=11)
+        r.rover.inject_fault("off 11")
+        await r.wait_for_event(NodeLost, node_id=11)
         await r.network.set_speed(CREEP_rad_s)
-        assert not r.told(MotionStopped)
+        assert not r.events_of(MotionStopped)
 
 
 async def test_a_drive_that_faults_stops_the_others_and_is_reset_by_enabling() -> None:
@@ -185,11 +185,11 @@ async def test_a_drive_that_faults_stops_the_others_and_is_reset_by_enabling() -
         await r.network.settled()
         await r.network.enable()
         await r.network.set_speed(CREEP_rad_s)
-        r.rover.tell("fault 2 0x2310")
-        emergency = (await r.until_told(NodeEmergency, node_id=2)).emergency
+        r.rover.inject_fault("fault 2 0x2310")
+        emergency = (await r.wait_for_event(NodeEmergency, node_id=2)).emergency
         assert (emergency.code, emergency.cleared) == (0x2310, False)
         assert "overcurrent" in emergency.text
-        await r.until_told(MotionStopped)
+        await r.wait_for_event(MotionStopped)
         await until(lambda: r.network.status[2].drive_state is DriveState.FAULT, "drive 2 in fault")
         await r.network.enable()
         assert r.network.status[2].drive_state is DriveState.ENABLED
@@ -199,20 +199,20 @@ async def test_a_drive_that_faults_stops_the_others_and_is_reset_by_enabling() -
 async def test_a_node_that_leaves_operational_or_restarts_is_booted_again() -> None:
     """Nobody has to notice: it is told, and mended."""
     async with rig([LOAD_CELLS[0]]) as r:
-        await r.until_told(NodeBooted)
-        r.rover.tell("leave 11")
-        assert "pre-operational" in (await r.until_told(NodeLost)).text
-        await r.until_told(NodeBooted)
-        r.rover.tell("reset 11")
-        assert "restarted" in (await r.until_told(NodeLost)).text
-        await r.until_told(NodeBooted)
+        await r.wait_for_event(NodeBooted)
+        r.rover.inject_fault("leave 11")
+        assert "pre-operational" in (await r.wait_for_event(NodeLost)).text
+        await r.wait_for_event(NodeBooted)
+        r.rover.inject_fault("reset 11")
+        assert "restarted" in (await r.wait_for_event(NodeLost)).text
+        await r.wait_for_event(NodeBooted)
 
 
 async def test_a_wrong_node_is_a_state_and_never_a_crash() -> None:
     """One wrong identity: eleven others measure."""
-    async with rig((*MOTORS, *LOAD_CELLS), tell=["identity 4 vendor 0x1"]) as r:
+    async with rig((*MOTORS, *LOAD_CELLS), faults=["identity 4 vendor 0x1"]) as r:
         await r.network.settled()
-        assert r.told(NodeBootFailed)[0].node_id == 4
+        assert r.events_of(NodeBootFailed)[0].node_id == 4
         assert [node for node, status in r.network.status.items() if status.phase != "operational"] == [4]
         await until(lambda: len(r.readings(5)) > 2, "node 5 measures")
 
@@ -223,7 +223,7 @@ async def test_stopping_leaves_the_bus_sane() -> None:
         await r.network.settled()
         await r.network.enable()
         await r.network.set_speed(CREEP_rad_s)
-        await until(lambda: r.told(DriveStateChanged, node_id=1, state=DriveState.ENABLED), "driving")
+        await until(lambda: r.events_of(DriveStateChanged, node_id=1, state=DriveState.ENABLED), "driving")
         await r.stop()
         await until(
             lambda: all(node.state == NmtState.PRE_OPERATIONAL for node in r.rover.nodes.values()), "pre-operational"
@@ -231,7 +231,7 @@ async def test_stopping_leaves_the_bus_sane() -> None:
         for node_id in range(1, 7):
             assert r.rover.nodes[node_id].device.speed_rad_s == 0.0
         await asyncio.sleep(2.5)  # longer than the drives would wait for a master
-        assert not r.told(NodeEmergency)
+        assert not r.events_of(NodeEmergency)
         assert sum(node.counts["emcy"] for node in r.rover.nodes.values()) == 0
 
 
@@ -254,7 +254,7 @@ async def forget(_frame: object) -> None:
 async def test_a_probe_finds_who_is_there_and_changes_nothing() -> None:
     """Identities and problems are told; no NMT command and no SDO write is on the bus."""
     nodes = (*MOTORS[:3], LOAD_CELLS[0])
-    async with rig(nodes, tell=["identity 2 product 0x999", "off 3"]) as r:
+    async with rig(nodes, faults=["identity 2 product 0x999", "off 3"]) as r:
         await r.network.settled()
         await r.stop()
         async with open_bus("virtual", r.bus.channel) as witness:

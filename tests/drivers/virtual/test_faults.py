@@ -37,9 +37,9 @@ class Running(Master):
             self.write(node, 0x1017, 0, 100, 2)
         self.nmt(1)
 
-    def tell(self, line: str) -> None:
+    def inject_fault(self, line: str) -> None:
         """Command, which must be understood."""
-        assert self.rover.tell(line) == "ok"
+        assert self.rover.inject_fault(line) == "ok"
 
     def heartbeats(self, node: int) -> list[int]:
         """Return what a node's heartbeat says in the next half second."""
@@ -68,12 +68,12 @@ def running() -> Running:
 
 def test_a_node_without_power_is_silent_and_comes_back_new(running: Running) -> None:
     """Off, it sends no frame; on again, it boots up, pre-operational and unconfigured."""
-    running.tell("off 11")
+    running.inject_fault("off 11")
     assert running.load(11) is None
     assert running.heartbeats(11) == []
     assert running.send(0x60B, bytes(8)) == []
     assert running.well(12)
-    running.tell("on 11")
+    running.inject_fault("on 11")
     assert [f.data for f in running.wait(0.1) if f.can_id == 0x70B] == [b"\0"]
     assert running.read(11, 0x1017) == 0
     running.nmt(1)
@@ -82,9 +82,9 @@ def test_a_node_without_power_is_silent_and_comes_back_new(running: Running) -> 
 
 def test_an_emergency_is_told_once_and_ends(running: Running) -> None:
     """EMCY with error register, and later error code 0."""
-    running.tell("emcy 12 0x5000")
-    running.tell("emcy 12 0x5000")
-    running.tell("emcy 12 0")
+    running.inject_fault("emcy 12 0x5000")
+    running.inject_fault("emcy 12 0x5000")
+    running.inject_fault("emcy 12 0")
     frames = [f.data for f in running.wait(0.1) if f.can_id == 0x8C]
     assert frames == [struct.pack("<HB5s", 0x5000, 0x01, b""), bytes(8)]
     assert running.well(11)
@@ -93,18 +93,18 @@ def test_an_emergency_is_told_once_and_ends(running: Running) -> None:
 def test_a_node_may_be_another_one(running: Running) -> None:
     """0x1018 says so until it is mended, through a reset as well."""
     was = running.read(4, 0x1018, 2)
-    running.tell("identity 4 product 0x999")
+    running.inject_fault("identity 4 product 0x999")
     assert running.read(4, 0x1018, 2) == 0x999
     running.nmt(0x81, 4)
     running.wait(0.1)
     assert running.read(4, 0x1018, 2) == 0x999
-    running.tell("clear 4")
+    running.inject_fault("clear 4")
     assert running.read(4, 0x1018, 2) == was
 
 
 def test_a_silent_node_lives(running: Running) -> None:
     """No PDO, but heartbeat and SDO."""
-    running.tell("silent 11")
+    running.inject_fault("silent 11")
     assert running.load(11) is None
     assert set(running.heartbeats(11)) == {5}
     assert running.read(11, 0x1000)
@@ -113,7 +113,7 @@ def test_a_silent_node_lives(running: Running) -> None:
 
 def test_a_frozen_node_repeats_itself(running: Running) -> None:
     """The same value for ever, though the world goes on."""
-    running.tell("frozen 11")
+    running.inject_fault("frozen 11")
     before = running.load(11)
     assert before is not None
     assert running.load(11) == before
@@ -124,14 +124,14 @@ def test_a_deaf_drive_obeys_no_pdo(running: Running) -> None:
     """Nor does it say that it does not."""
     running.configure(2, tpdo=MOTOR_TPDO, rpdo=(0x60400010, 0x60FF0020))
     running.nmt(1, 2)
-    running.tell("deaf 2")
+    running.inject_fault("deaf 2")
     running.send(0x202, struct.pack("<Hi", 0x06, 0))
     assert running.read(2, 0x6041) & 0x6F == 0x40
 
 
 def test_a_slow_node_answers_later(running: Running) -> None:
     """Its PDO comes, but not at its SYNC."""
-    running.tell("slow 11 30")
+    running.inject_fault("slow 11 30")
     assert running.load(11) is None
     assert [f for f in running.wait(0.02) if f.can_id == 0x18B] == []
     assert len([f for f in running.wait(0.02) if f.can_id == 0x18B]) == 1
@@ -139,19 +139,19 @@ def test_a_slow_node_answers_later(running: Running) -> None:
 
 def test_a_short_pdo_lacks_its_end(running: Running) -> None:
     """The frame is cut, as by another mapping."""
-    running.tell("short 11 2")
+    running.inject_fault("short 11 2")
     assert len(running.sync()[0x18B]) == 3
 
 
 def test_a_status_says_not_valid(running: Running) -> None:
     """Bits of 0x6150 by command."""
-    running.tell("status 11 1")
+    running.inject_fault("status 11 1")
     assert running.sync()[0x18B][4] == 1
 
 
 def test_no_boot_up(running: Running) -> None:
     """After a reset nothing more is heard."""
-    running.tell("no-boot-up 11")
+    running.inject_fault("no-boot-up 11")
     running.nmt(0x81, 11)
     assert running.heartbeats(11) == []
     assert running.send(0x60B, bytes(8)) == []
@@ -159,8 +159,8 @@ def test_no_boot_up(running: Running) -> None:
 
 def test_no_heartbeat_and_no_sdo(running: Running) -> None:
     """One each, and the PDOs go on."""
-    running.tell("no-heartbeat 11")
-    running.tell("no-sdo 12")
+    running.inject_fault("no-heartbeat 11")
+    running.inject_fault("no-sdo 12")
     assert running.heartbeats(11) == []
     assert running.send(0x60C, bytes(8)) == []
     assert running.load(11) is not None
@@ -169,24 +169,24 @@ def test_no_heartbeat_and_no_sdo(running: Running) -> None:
 
 def test_it_refuses_or_forgets_what_is_written(running: Running) -> None:
     """One object each: aborted by 'hardware error', or answered and not kept."""
-    running.tell("refuse 11 0x1017")
+    running.inject_fault("refuse 11 0x1017")
     with pytest.raises(AbortedError, match="0x06060000"):
         running.write(11, 0x1017, 0, 50, 2)
-    running.tell("forget 12 0x1017")
+    running.inject_fault("forget 12 0x1017")
     running.write(12, 0x1017, 0, 50, 2)
     assert running.read(12, 0x1017) == 0
 
 
 def test_a_reset_of_its_own(running: Running) -> None:
     """Boot-up without having been asked, and everything forgotten."""
-    running.tell("reset 11")
+    running.inject_fault("reset 11")
     assert [f.data for f in running.wait(0.1) if f.can_id == 0x70B] == [b"\0"]
     assert running.read(11, 0x1017) == 0
 
 
 def test_leaving_operational(running: Running) -> None:
     """The heartbeat says pre-operational, and no PDO comes."""
-    running.tell("leave 11")
+    running.inject_fault("leave 11")
     assert running.load(11) is None
     assert set(running.heartbeats(11)) == {0x7F}
 
@@ -211,8 +211,8 @@ def test_everything_can_be_mended(running: Running, name: str) -> None:
     """`clear` undoes a fault; what needs further words gets some."""
     words = {"identity": "vendor 1", "emcy": "0x1000", "slow": "500", "short": "1", "status": "1"}
     words |= {"refuse": "0x1017", "forget": "0x1017"}
-    running.tell(f"{name} 11 {words.get(name, '')}")
-    running.tell("clear all")
+    running.inject_fault(f"{name} 11 {words.get(name, '')}")
+    running.inject_fault("clear all")
     assert running.well(11)
     assert running.read(11, 0x1018, 1) == running.read(12, 0x1018, 1)
 
@@ -223,11 +223,11 @@ WRONG = ["bang 3", "off", "off 77", "off x", "identity 3", "identity 3 colour 1"
 @pytest.mark.parametrize("line", WRONG)
 def test_a_wrong_command_says_what_is_wrong(running: Running, line: str) -> None:
     """And changes nothing."""
-    assert running.rover.tell(line).startswith("error: ")
+    assert running.rover.inject_fault(line).startswith("error: ")
     assert running.well(11)
 
 
 def test_help_names_every_command(running: Running) -> None:
     """One line for each."""
-    lines = running.rover.tell("help").splitlines()
+    lines = running.rover.inject_fault("help").splitlines()
     assert [line.split()[0] for line in lines] == list(COMMANDS)

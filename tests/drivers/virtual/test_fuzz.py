@@ -63,6 +63,6 @@ def test_every_sdo_request_gets_at_most_one_answer(requests: list[bytes]) -> Non
         assert all(len(frame.data) == 8 for frame in answers)
     master.nmt(1)
     master.sync()
-    master.rover.tell("emcy 1 0x1000")
+    master.rover.inject_fault("emcy 1 0x1000")
     master.wait(0.3)
     assert all(0x80 < frame.can_id <= 0x7FF for frame in master.seen)

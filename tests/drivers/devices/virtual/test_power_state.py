@@ -103,7 +103,7 @@ def test_a_fault_is_reset_by_a_rising_edge_only() -> None:
     """Bit 7 that stands already, or falls, resets nothing; nor does any other command leave fault."""
     drive = DriveUnderTest()
     drive.say(0x80)
-    drive.master.rover.tell("fault 1 0x2310")
+    drive.master.rover.inject_fault("fault 1 0x2310")
     assert drive.state == 0x08
     assert drive.say(0x80) == 0x08  # no edge: it stood before the fault
     for controlword in (0x06, 0x07, 0x0F, 0x00):

@@ -1,6 +1,6 @@
-"""Faults by command from outside the process: a UNIX socket, one line in, one answer out.
+"""Fault injection from another process: a UNIX socket that takes one command a line.
 
-A line is one of `drivers.virtual.fault_injection`. Every answer ends with an empty line.
+The commands are those of `drivers.virtual.fault_injection`. Every answer ends with an empty line.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ if TYPE_CHECKING:
     from regolithd.drivers.virtual.rover import VirtualRover
 
 
-class ControlError(OSError):
-    """Nobody listens at the socket, or somebody else does already."""
+class FaultSocketError(OSError):
+    """No virtual rover listens at the socket, or another one already does."""
 
 
 @contextlib.asynccontextmanager
-async def control_socket(rover: VirtualRover, path: Path) -> AsyncIterator[None]:
-    """Obey the lines that come through `path`, which only this user may open, for the time of the context."""
+async def fault_socket(rover: VirtualRover, path: Path) -> AsyncIterator[None]:
+    """Execute commands that arrive at the socket `path`, which only this user may open, until the context ends."""
 
     async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with contextlib.suppress(ConnectionError):
             while line := await reader.readline():
-                writer.write(f"{rover.tell(line.decode(errors='replace'))}\n\n".encode())
+                writer.write(f"{rover.inject_fault(line.decode(errors='replace'))}\n\n".encode())
                 await writer.drain()
         writer.close()
 
-    _make_room(path)
+    _remove_stale(path)
     before = os.umask(0o177)
     try:
         server = await asyncio.start_unix_server(serve, path)
     except OSError as error:
-        raise ControlError(f"{path}: {error.strerror}") from error
+        raise FaultSocketError(f"{path}: {error.strerror}") from error
     finally:
         os.umask(before)
     try:
@@ -48,12 +48,12 @@ async def control_socket(rover: VirtualRover, path: Path) -> AsyncIterator[None]
         _remove(path)
 
 
-def ask(path: Path, line: str, timeout_s: float = 5.0) -> str:
+def send_command(path: Path, line: str, timeout_s: float = 5.0) -> str:
     """Send one command and return the answer.
 
     Raises
     ------
-    ControlError
+    FaultSocketError
         There is no virtual rover at this socket.
     """
     try:
@@ -68,14 +68,14 @@ def ask(path: Path, line: str, timeout_s: float = 5.0) -> str:
                     break
                 answer += part
     except OSError as error:
-        raise ControlError(f"{path}: {error}. Is `regolithd bench` running, with this --control?") from error
+        raise FaultSocketError(f"{path}: {error}. Is `regolithd bench` running, with this --control?") from error
     return answer.decode().strip("\n")
 
 
-def _make_room(path: Path) -> None:
-    """Remove the socket of a virtual rover that is no more."""
+def _remove_stale(path: Path) -> None:
+    """Remove the socket that a terminated virtual rover left behind."""
     if _answers(path):
-        raise ControlError(f"{path}: a virtual rover listens there already; give this one another --control")
+        raise FaultSocketError(f"{path}: a virtual rover listens there already; give this one another --control")
     _remove(path)
 
 
