@@ -1,1 +1,1 @@
-"""What `regolithd check` looks at, one file for each; nothing is changed, moved or published."""
+"""The checks of `regolithd check`, one module each; they change, move and publish nothing."""

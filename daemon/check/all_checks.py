@@ -1,4 +1,4 @@
-"""All checks, side by side, in the order in which a person mends things."""
+"""Runs all checks concurrently; the findings are in the order in which to correct them."""
 
 from __future__ import annotations
 

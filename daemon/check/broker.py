@@ -1,4 +1,4 @@
-"""The broker: whether it can be reached, and lets us in."""
+"""Checks the MQTT broker: whether it can be reached, and accepts the credentials."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TIMEOUT_S = 5.0
 
 
 async def check_broker(configuration: Configuration) -> list[Finding]:
-    """Connect and leave again; nothing is published, and a running daemon is not disturbed."""
+    """Connect with a separate client identifier, and disconnect; nothing is published."""
     mqtt = configuration.mqtt
     began = time.monotonic()
     try:
@@ -40,5 +40,5 @@ async def check_broker(configuration: Configuration) -> list[Finding]:
         text, _, cure = rest.partition(". ")
         return [wrong("broker", f"{place.removeprefix('MQTT broker ')}: {text}", cure)]
     secured = "TLS" if mqtt.tls else "no TLS"
-    who = mqtt.username or "nobody in particular"
-    return [good("broker", f"{mqtt.host}:{mqtt.port} lets in {who}, {secured}, after {1e3 * took:.0f} ms")]
+    who = mqtt.username or "anyone (no username)"
+    return [good("broker", f"{mqtt.host}:{mqtt.port} accepts {who}, {secured}, after {1e3 * took:.0f} ms")]

@@ -1,4 +1,4 @@
-"""The control socket: whether its group exists, you may command, and a daemon is running."""
+"""Checks the control socket: whether its group exists, the user may command, and a daemon is running."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 async def running_daemon(configuration: Configuration) -> Status | ControlError | None:
-    """Return what the running daemon says of itself, why it may not be asked, or None where none is running."""
+    """Return the status of the running daemon, the error if permission is missing, or None where none is running."""
     try:
         async with asyncio.timeout(5), control_connection(configuration.control.socket) as daemon:
             daemon.send(StatusRequest())
@@ -29,7 +29,7 @@ async def running_daemon(configuration: Configuration) -> Status | ControlError 
 
 
 def check_control(configuration: Configuration, running: Status | ControlError | None) -> list[Finding]:
-    """Return whether the rover can be commanded, and by you."""
+    """Return whether the rover can be commanded, and by this user."""
     control = configuration.control
     try:
         number = group_id(control.group)
@@ -41,7 +41,7 @@ def check_control(configuration: Configuration, running: Status | ControlError |
         return [warning("control", what, cure)]
     member = os.geteuid() == 0 or number in {*os.getgroups(), os.getegid()}
     if not member:
-        cure = f"`sudo usermod -aG {control.group} $USER`, and log in anew."
+        cure = f"`sudo usermod -aG {control.group} $USER`, and log in again."
         return [warning("control", f"you are not in the group {control.group!r} and may not command the rover", cure)]
     if running is None:
         return [unknown("control", f"you may command; no daemon is running at {control.socket}")]

@@ -1,4 +1,4 @@
-"""What a check found: where, how bad, and how to mend it."""
+"""The result of a check: subject, verdict, text, and what to do."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from enum import StrEnum
 
 
 class Verdict(StrEnum):
-    """How it is."""
+    """The verdict of a check."""
 
     GOOD = "good"
-    WARNING = "warning"  # it will run, but something is worth less
-    WRONG = "wrong"  # it will not run, or not do what it is for
+    WARNING = "warning"  # the daemon will run, with less accurate or less safe data
+    WRONG = "wrong"  # the daemon will not run, or not acquire
     UNKNOWN = "not checked"
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line of the report. `cure` is empty where there is nothing to mend."""
+    """One line of the report. `cure` is empty where there is nothing to do."""
 
     subject: str
     verdict: Verdict
@@ -26,20 +26,20 @@ class Finding:
 
 
 def good(subject: str, text: str) -> Finding:
-    """Return that all is well."""
+    """Return a finding without a problem."""
     return Finding(subject, Verdict.GOOD, text)
 
 
 def warning(subject: str, text: str, cure: str) -> Finding:
-    """Return that something is worth less than it could be."""
+    """Return a finding of something that reduces accuracy or safety."""
     return Finding(subject, Verdict.WARNING, text, cure)
 
 
 def wrong(subject: str, text: str, cure: str) -> Finding:
-    """Return that something does not work."""
+    """Return a finding of something that does not work."""
     return Finding(subject, Verdict.WRONG, text, cure)
 
 
 def unknown(subject: str, text: str, cure: str = "") -> Finding:
-    """Return that it could not be checked, and why."""
+    """Return that something could not be checked, and why."""
     return Finding(subject, Verdict.UNKNOWN, text, cure)

@@ -6,6 +6,7 @@ import asyncio
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.models.onnx_session import ModelError
+from regolithd.calibration.parameters import GRAVITY_M_S2
 from regolithd.daemon.check.finding import Finding, good, warning, wrong
 from regolithd.daemon.pipeline.onnx_models import load_posterior, load_terrain_network
 
@@ -28,22 +29,28 @@ async def check_models(configuration: Configuration) -> list[Finding]:
 
 
 def judge_posterior(configuration: Configuration, *, there: bool) -> Finding:
-    """Return whether there will be intervals, and alarms of a changed soil."""
+    """Return whether there will be a posterior, and soil-change alarms."""
     if there:
         return good("posterior", f"intervals from the last {configuration.posterior.window_s:g} s of all wheels")
     if not configuration.posterior.enabled:
-        return good("posterior", "switched off: no intervals, and no alarm when the soil changes")
-    text = "[drivetrain] no_load_current_A is not known: no intervals, and no alarm when the soil changes"
+        return good("posterior", "switched off: no posterior, and no soil-change alarm")
+    text = "[drivetrain] no_load_current_A is not calibrated: no posterior, and no soil-change alarm"
     return warning("posterior", text, "`regolithd calibrate wheels-up` measures it.")
 
 
 def judge_card(card: ModelCard, configuration: Configuration) -> Finding:
-    """Return whether the network suits this rover."""
+    """Return whether the terrain network was trained for loads like this rover's."""
     inputs = ", ".join(f"{each.name} {each.low:.4g} to {each.high:.4g} {each.unit}" for each in card.inputs)
-    share = configuration.rover.mass_kg * 9.81 / 6
+    share = configuration.rover.mass_kg * GRAVITY_M_S2 / 6
     for each in card.inputs:
         if each.name == "load_N" and not each.low <= share <= each.high:
             trained = f"{each.low:.3g} to {each.high:.3g} N"
-            text = f"{card.version}: a sixth of the rover weighs {share:.0f} N, it was trained for {trained}"
-            return warning("model", text, "Every estimate will be marked as outside: train one for this rover.")
+            text = (
+                f"{card.version}: a sixth of the rover's weight is {share:.0f} N, the network was trained for {trained}"
+            )
+            return warning(
+                "model",
+                text,
+                "Every estimate will be marked as outside the training range: train one for this rover.",
+            )
     return good("model", f"{card.version}; {inputs}")

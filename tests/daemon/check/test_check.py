@@ -14,7 +14,7 @@ from broker import Mosquitto, unused_port
 from regolithd.calibration.models.card import ModelCard, Variable
 from regolithd.daemon.check.broker import check_broker
 from regolithd.daemon.check.bus import check_bus, check_link, check_load, judge_link, judge_nodes, nodes_of_daemon
-from regolithd.daemon.check.clock import Discipline, check_clock, judge_clock, kernel_discipline
+from regolithd.daemon.check.clock import ClockState, check_clock, judge_clock, kernel_clock_state
 from regolithd.daemon.check.control import check_control, running_daemon
 from regolithd.daemon.check.disk import check_folder
 from regolithd.daemon.check.finding import Verdict
@@ -221,27 +221,25 @@ def test_a_running_daemon_is_asked_instead_of_the_bus() -> None:
 
 
 @pytest.mark.parametrize(
-    ("discipline", "jump_ns", "now_s", "verdict", "said"),
+    ("state", "jump_ns", "now_s", "verdict", "said"),
     [
-        (Discipline(synchronised=True, largest_error_s=0.004), 0, NOW_S, Verdict.GOOD, "4.0 ms"),
-        (Discipline(synchronised=False, largest_error_s=16.0), 0, NOW_S, Verdict.WARNING, "not synchronised"),
-        (Discipline(synchronised=True, largest_error_s=0.5), 0, NOW_S, Verdict.WARNING, "0.500 s"),
-        (Discipline(synchronised=True, largest_error_s=0.004), -80_000_000, NOW_S, Verdict.WRONG, "-0.080 s"),
+        (ClockState(synchronised=True, largest_error_s=0.004), 0, NOW_S, Verdict.GOOD, "4.0 ms"),
+        (ClockState(synchronised=False, largest_error_s=16.0), 0, NOW_S, Verdict.WARNING, "not synchronised"),
+        (ClockState(synchronised=True, largest_error_s=0.5), 0, NOW_S, Verdict.WARNING, "0.500 s"),
+        (ClockState(synchronised=True, largest_error_s=0.004), -80_000_000, NOW_S, Verdict.WRONG, "-0.080 s"),
         (None, 0, NOW_S, Verdict.UNKNOWN, "does not say"),
-        (Discipline(synchronised=True, largest_error_s=0.004), 0, 86_400.0, Verdict.WRONG, "1970-01-02"),
+        (ClockState(synchronised=True, largest_error_s=0.004), 0, 86_400.0, Verdict.WRONG, "1970-01-02"),
     ],
 )
-def test_the_clock_is_judged(
-    discipline: Discipline | None, jump_ns: int, now_s: float, verdict: Verdict, said: str
-) -> None:
+def test_the_clock_is_judged(state: ClockState | None, jump_ns: int, now_s: float, verdict: Verdict, said: str) -> None:
     """By the kernel's word, by what was watched, and by common sense."""
-    finding = judge_clock(discipline, jump_ns, now_s)
+    finding = judge_clock(state, jump_ns, now_s)
     assert (finding.verdict, said in finding.text) == (verdict, True)
 
 
 async def test_this_computers_clock_can_be_asked() -> None:
     """Linux always says; whether it is synchronised is this computer's affair."""
-    said = kernel_discipline()
+    said = kernel_clock_state()
     assert said is not None
     assert 0 <= said.largest_error_s < 1e4
     (finding,) = await check_clock()
@@ -251,7 +249,7 @@ async def test_this_computers_clock_can_be_asked() -> None:
 def test_a_folder_that_may_grow_beyond_its_disk_is_told(tmp_path: Path) -> None:
     """A warning as long as there is room for a while."""
     assert check_folder("store", tmp_path, 1.0, "[mqtt] spool_directory").verdict is Verdict.GOOD
-    assert check_folder("store", tmp_path / "new", 1.0, "[mqtt] spool_directory").text.count("to be made") == 1
+    assert check_folder("store", tmp_path / "new", 1.0, "[mqtt] spool_directory").text.count("will be created") == 1
     finding = check_folder("store", tmp_path, 1e12, "[mqtt] spool_directory")
     assert finding.verdict is Verdict.WARNING
     assert "the disk has" in finding.text
