@@ -1,0 +1,228 @@
+"""Every candidate's columns against its law, in closed form, on a problem of a few readings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch.candidates.candidate import growth_since, onset_grid
+from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.data.recording import Recording
+from regolithd.calibration.mismatch.problem.prior import Prior
+from regolithd.calibration.mismatch.problem.problem import Problem
+from regolithd.calibration.mismatch.simulation.simulation import Simulation
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+
+    Array = NDArray[np.float64]
+
+TIMES, WHEELS, STEP_S = 121, 4, 0.5
+CANDIDATES: dict[str, Candidate] = {candidate.name: candidate for candidate in library()}
+TIME_S = STEP_S * np.arange(TIMES)[:, None] * np.ones(WHEELS)
+SPEED = 0.3 * np.cos(TIME_S / 5) * np.array([1.0, 0.9, 1.1, 0.8]) + 0.01
+LOAD = 50.0 + 5 * np.sin(TIME_S / 7) + np.array([0.0, 2.0, -3.0, 1.0])
+
+
+class Linear(Simulation):
+    """current = (cohesion + friction angle × load) × strength of the soil's variants, against the motion."""
+
+    channel, unit = "current_A", "A"
+    parameters: ClassVar = {"cohesion_Pa": Prior(2.0, 0.1), "friction_angle_deg": Prior(0.05, 0.01)}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return a current that is linear in the parameters and in the load."""
+        soil = values["cohesion_Pa"] + values["friction_angle_deg"] * inputs["load_N"]
+        factor = values["stiffness_factor"] + 2 * values["shear_factor"] + 3 * values["slip_sinkage"]
+        return np.sign(inputs["speed"]) * soil * factor
+
+    def variants(self) -> Mapping[str, float]:
+        """Return a soil model's variants."""
+        return {"stiffness_factor": 1.0, "shear_factor": 0.0, "slip_sinkage": 0.0}
+
+
+def problem() -> Problem:
+    """Return a problem of a minute, four wheels in two rows, everything measured."""
+    recording = Recording(TIME_S[:, 0], np.zeros(TIMES, np.int64), (1, 2, 3, 4), {"load_N": LOAD, "speed": SPEED})
+    simulation = Linear()
+    values = {name: prior.value for name, prior in simulation.parameters.items()}
+    prediction = simulation.predict({"load_N": LOAD, "speed": SPEED}, {**simulation.variants(), **values})
+    covariates = {
+        "time": TIME_S,
+        "wheel_speed": SPEED,
+        "direction": np.sign(SPEED),
+        "wheel_acceleration": np.gradient(SPEED, STEP_S, axis=0),
+        "wheel_angle": np.cumsum(SPEED, axis=0) * STEP_S,
+        "torque": np.abs(prediction),
+        "temperature": -10 + TIME_S / 2 + np.arange(WHEELS),
+        "pitch": 0.1 * np.sin(TIME_S / 11),
+        "roll": 0.1 * np.cos(TIME_S / 13),
+        "yaw_rate": np.where(TIME_S > 30, 0.02, 0.0),
+        "slip": 0.1 + 0.05 * np.sin(TIME_S / 3),
+        "load": LOAD,
+        "place": 0.1 * TIME_S + np.array([0.3, 0.3, -0.3, -0.3]),
+    }
+    side, row = np.array([-1.0, 1.0, -1.0, 1.0]), np.array([0.0, 0.0, 1.0, 1.0])
+    mask = np.ones(SPEED.shape, np.bool_)
+    return Problem(recording, simulation, values, prediction, prediction, mask, covariates, side, row)
+
+
+P = problem()
+SIGN, PREDICTED = np.sign(SPEED), P.prediction
+RELATIVE = np.abs(PREDICTED) / np.mean(np.abs(PREDICTED))
+WARM = P.covariates["temperature"]
+COLDEST = float(np.quantile(WARM, 0.005))
+INF = float("inf")
+
+LAWS: list[tuple[str, Shape, Array]] = [
+    ("coulomb-friction", {}, SIGN),
+    ("viscous-friction", {"power": 1.0}, SPEED),
+    ("viscous-friction", {"power": 0.7}, SIGN * np.abs(SPEED) ** 0.7),
+    ("stribeck-friction", {"stribeck_speed_rad_s": 0.1, "fades": "exponent 1"}, SIGN * np.exp(-np.abs(SPEED) / 0.1)),
+    ("stribeck-friction", {"stribeck_speed_rad_s": 0.1, "fades": "exponent 2"}, SIGN * np.exp(-((SPEED / 0.1) ** 2))),
+    ("stribeck-friction", {"stribeck_speed_rad_s": 0.1, "fades": "quotient"}, SIGN / (1 + (SPEED / 0.1) ** 2)),
+    (
+        "cold-lubricant-friction",
+        {"power": 1.0, "no_drag_above_degC": 10.0},
+        SPEED * np.maximum(10 - WARM, 0) / (10 - COLDEST),
+    ),
+    (
+        "cold-lubricant-friction",
+        {"power": 0.0, "pole_degC": -95.0, "scale_K": 20.0},
+        SIGN * np.exp((COLDEST + 95) / 20 * ((COLDEST + 95) / (WARM + 95) - 1)),
+    ),
+    ("load-dependent-efficiency", {"power": 2.0}, PREDICTED * RELATIVE**2),
+    ("load-dependent-efficiency", {"light": 0.5}, PREDICTED * np.exp(-RELATIVE / 0.5)),
+    ("load-dependent-efficiency", {"bent": 0.2}, PREDICTED * (RELATIVE - 1) / (1 - 0.2 * (RELATIVE - 1))),
+    (
+        "torque-constant-temperature",
+        {"reference_degC": 20.0, "bent_per_K": 0.002},
+        PREDICTED * (WARM - 20) / (1 - 0.002 * (WARM - 20)),
+    ),
+    ("rotor-inertia", {"lag_s": 0.0}, P.covariates["wheel_acceleration"]),
+    ("grade-resistance", {"shared": "evenly"}, np.sin(P.covariates["pitch"])),
+    ("grade-resistance", {"shared": "by load"}, np.sin(P.covariates["pitch"]) * LOAD / np.mean(LOAD)),
+    ("slip-sinkage", {"power": 1.0}, PREDICTED * P.covariates["slip"]),
+    ("slip-sinkage", {"step": 0.3}, 3 * PREDICTED),
+    ("multi-pass-compaction", {"kept": 0.5, "leads": "front", "by": "current"}, PREDICTED * [0, 0, 1, 1]),
+    (
+        "multi-pass-compaction",
+        {"kept": 0.0, "leads": "travel", "by": "stiffness"},
+        PREDICTED * np.where(SIGN > 0, [0, 0, 1, 1], [1, 1, 0, 0]),
+    ),
+    (
+        "soil-transition",
+        {"onset_s": 20.0, "along": "time", "of": "strength"},
+        PREDICTED * (TIME_S >= 20),
+    ),
+    (
+        "soil-transition",
+        {"onset_s": 20.0, "along": "place", "within_m": 0.5, "of": "cohesion"},
+        2 * SIGN * np.clip(0.5 + (P.covariates["place"] - 2.0) / 0.5, 0, 1),
+    ),
+    ("current-sensor-bias", {}, np.ones(SPEED.shape)),
+    ("bearing-drag", {"onset_s": 20.0, "rise_s": 0.0}, SIGN * (TIME_S >= 20)),
+    ("bearing-drag", {"onset_s": 20.0, "rise_s": 8.0}, SIGN * (1 - np.exp(-np.maximum(TIME_S - 20, 0) / 8))),
+    ("bearing-drag", {"onset_s": 20.0, "rise_s": INF, "power": 0.5}, SIGN * np.sqrt(np.maximum(TIME_S - 20, 0) / 40)),
+]
+
+
+@pytest.mark.parametrize(("name", "shape", "law"), LAWS, ids=lambda value: value if isinstance(value, str) else "")
+def test_a_column_is_its_law(name: str, shape: Shape, law: Array) -> None:
+    """One column per law, with the coefficient 1."""
+    (column,) = CANDIDATES[name].columns(P, shape)
+    np.testing.assert_allclose(column, law, rtol=1e-9, atol=1e-12)
+
+
+def test_turning_has_a_drag_and_a_moment_relative_to_the_mean_turn() -> None:
+    """A constant turn has the size 1: the drag follows the rotation, the moment the side."""
+    drag, moment = CANDIDATES["turning-resistance"].columns(P, {"half_at": 1.0, "ends": 0.0, "by": "rate"})
+    turns = (TIME_S > 30).astype(float)
+    np.testing.assert_allclose(drag, turns * SIGN)
+    np.testing.assert_allclose(moment, turns * np.array([-1.0, 1.0, -1.0, 1.0]))
+
+
+def test_a_rut_that_changes_the_soil_has_a_column_for_each_property() -> None:
+    """Stiffness, shear modulus and cohesion, on the wheels behind."""
+    columns = CANDIDATES["multi-pass-compaction"].columns(P, {"kept": 0.0, "leads": "front", "by": "soil"})
+    behind = np.array([0, 0, 1, 1])
+    for column, law in zip(columns, (PREDICTED, 2 * PREDICTED, 2 * SIGN), strict=True):
+        np.testing.assert_allclose(column, law * behind, rtol=1e-9, atol=1e-12)
+
+
+def test_a_ripple_has_a_cosine_and_a_sine_for_each_wheel() -> None:
+    """Each wheel has a phase of its own; the overtone has twice the order."""
+    candidate = CANDIDATES["wheel-angle-ripple"]
+    columns = candidate.columns(P, {"order": 3.0, "kind": "torque", "lag": 0.0, "sines": 2.0})
+    assert columns.shape == (2 * WHEELS * 2, TIMES, WHEELS)
+    angle = P.covariates["wheel_angle"]
+    np.testing.assert_allclose(columns[2][:, 1], np.cos(3 * angle[:, 1]))
+    np.testing.assert_allclose(columns[3][:, 1], np.sin(3 * angle[:, 1]))
+    np.testing.assert_allclose(columns[2 * WHEELS + 2][:, 1], np.cos(6 * angle[:, 1]))
+    assert not columns[2][:, [0, 2, 3]].any()
+    found = candidate.parameters({"order": 3.0, "sines": 1.0}, [3.0, 4.0, 0.0, 5.0])
+    assert found == {"amplitude": pytest.approx(5.0), "order": 3.0}
+
+
+def test_a_load_cell_s_offset_takes_the_current_of_that_load_away() -> None:
+    """With a prediction linear in the load, an offset of d mean readings changes it by −slope × d × mean load."""
+    candidate = CANDIDATES["load-cell-drift"]
+    first, second = (candidate.columns(P, {"relative_offset": offset})[0] for offset in (0.15, 0.35))
+    np.testing.assert_allclose(second - first, -0.05 * SIGN * 0.2 * np.mean(LOAD, axis=0), rtol=1e-6)
+
+
+@pytest.mark.parametrize("candidate", library(), ids=lambda c: c.name)
+def test_shapes_lie_within_their_bounds_and_bounds_within_the_law(candidate: Candidate) -> None:
+    """A free parameter of the grid is inside the bounds of this recording, up to their step; both are ordered."""
+    for shape in candidate.shapes(P):
+        for name, (low, high) in candidate.bounds(P, shape).items():
+            assert low < high
+            if name in shape:
+                assert low - 1e-9 <= float(shape[name]) <= high + 1e-9
+                assert candidate.free[name][0] <= candidate.free[name][1]
+
+
+@pytest.mark.parametrize("candidate", library(), ids=lambda c: c.name)
+def test_a_candidate_needs_what_it_requires(candidate: Candidate) -> None:
+    """Without one of its covariates it is not looked for; with all of them it is."""
+    assert candidate.applies(P)
+    for name in candidate.requires:
+        less = {key: values for key, values in P.covariates.items() if key != name}
+        bare = Problem(P.recording, P.simulation, P.values, P.measured, PREDICTED, P.mask, less, P.side, P.row)
+        assert not candidate.applies(bare)
+
+
+@pytest.mark.parametrize("candidate", library(), ids=lambda c: c.name)
+def test_a_candidate_has_enough_shapes_to_choose_from_and_profiles_without_an_onset(candidate: Candidate) -> None:
+    """The penalty counts at least the grid; an onset's profile has no onset."""
+    assert candidate.shape_count(P) >= max(len(candidate.shapes(P)), 1)
+    assert all("onset_s" not in profile for profile in candidate.onset_profiles(P))
+    assert candidate.experiment_minutes[0] < candidate.experiment_minutes[1]
+    assert candidate.label
+
+
+def test_more_columns_than_coefficients_are_refused() -> None:
+    """A wrong count is no answer without a name."""
+    with pytest.raises(ValueError, match="zip"):
+        CANDIDATES["coulomb-friction"].parameters({}, [1.0, 2.0])
+
+
+def test_growth_is_a_step_a_rise_or_a_ramp() -> None:
+    """0 before the onset; 1 from it on, 1 − 1/e after the time constant, or 1 at the end."""
+    step, rise, ramp = (growth_since(P, 20.0, rise_s)[:, 0] for rise_s in (0.0, 10.0, INF))
+    at = {t: round(t / STEP_S) for t in (19.5, 20, 30, 40, 60)}
+    assert [step[at[t]] for t in (19.5, 20, 60)] == [0, 1, 1]
+    assert rise[at[30]] == pytest.approx(1 - np.exp(-1))
+    assert [ramp[at[t]] for t in (19.5, 20, 40, 60)] == pytest.approx([0, 0, 0.5, 1])
+
+
+def test_onsets_leave_both_ends_of_the_recording_out() -> None:
+    """From 3 to 95 % of its length."""
+    found = onset_grid(P, 5)
+    assert found == pytest.approx([1.8, 15.6, 29.4, 43.2, 57.0])
