@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from types import SimpleNamespace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -21,10 +22,13 @@ from regolithd.calibration.mismatch.answer import (
     Sensitivity,
     Unexplained,
 )
+from regolithd.calibration.mismatch.candidates.candidate import Candidate
+from regolithd.calibration.mismatch.candidates.coulomb_friction import CoulombFriction
 from regolithd.calibration.mismatch.report.axes import number, ticks
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.labels import Labels, verdict_sentence
-from regolithd.calibration.mismatch.report.page import Provenance, render_report
+from regolithd.calibration.mismatch.report.page import Provenance, equation, render_report
+from regolithd.calibration.mismatch.report.statements import plural, statement
 
 FROM = Provenance("drive.csv", "SIM.toml", "ab" * 32, "cd" * 32, "regolithd mismatch drive.csv --simulation SIM.toml")
 WORN = Effect(
@@ -176,8 +180,8 @@ def test_an_effect_s_curve_shows_its_own_wheels(evidence: Evidence) -> None:
     assert curve_of(replace(seen, problem=None), "time", (4,)) is None
 
 
-def test_names_are_spoken_as_people_speak() -> None:
-    """The last hyphen parts what it is from what it does; names of people are capital."""
+def test_labels_have_a_space_for_the_last_hyphen_and_capitals_for_persons() -> None:
+    """Derived from the name, or stated by the candidate."""
     assert Labels().effect("multi-pass-compaction") == "multi-pass compaction"
     assert Labels().effect("coulomb-friction") == "Coulomb friction"
 
@@ -195,3 +199,67 @@ def test_numbers_are_written_with_a_true_minus() -> None:
     assert number(-0.00012) == "−0.00012"
     assert number(float("nan")) == "–"
     assert number(61200.0) == "61200"
+
+
+class Axle(Candidate):
+    """Drag of a bearing."""
+
+    name = "axle-drag"
+    covariate = "wheel_speed"
+    label = "Axle drag"
+    parameter_labels: ClassVar = {"drag_N": "drag of the axle"}
+
+
+def test_another_machine_has_its_own_words(evidence: Evidence) -> None:
+    """A column is called what the recording calls it, a covariate what the simulation calls it; seconds where short."""
+    labels = Labels.of(
+        replace(
+            evidence,
+            time_s=np.arange(900) / 20,
+            wheel_column="axis",
+            covariate_labels={"wheel_speed": "carriage speed (m/s)"},
+            candidates=(Axle(),),
+        )
+    )
+    assert labels.wheels((1, 2), (1, 2)) == "all 2 axes"
+    assert labels.wheels((2,), (1, 2, 3)) == "axis 2"
+    assert labels.wheels((1, 3), (1, 2, 3)) == "axes 1, 3"
+    assert labels.wheels((1,), (1,)) == ""
+    assert labels.axis("wheel_speed") == "carriage speed (m/s)"
+    assert labels.covariate("wheel_speed") == "carriage speed"
+    assert labels.axis("time") == "time (s)"
+    assert labels.effect("axle-drag") == "Axle drag"
+    assert labels.parameter("axle-drag", "drag_N") == "drag of the axle"
+    assert labels.parameter("axle-drag", "rise_s") == "rise s"
+
+
+def test_a_page_about_another_machine_has_no_wheels(evidence: Evidence) -> None:
+    """Its map and its header speak of axes."""
+    page = render_report(answer(), replace(evidence, wheel_column="axis"), FROM)
+    assert "<b>6</b> axes" in page
+    assert "axis 4" in page
+    assert "wheel 4" not in page
+
+
+def test_an_equation_has_subscripts_and_superscripts_and_no_markup_of_its_own() -> None:
+    """What the candidate writes is escaped first."""
+    assert equation("ΔI = I_c |ω|^p <b>") == "ΔI = I<sub>c</sub> |ω|<sup>p</sup> &lt;b&gt;"
+
+
+@pytest.mark.parametrize(
+    ("noun", "expected"), [("wheel", "wheels"), ("axis", "axes"), ("body", "bodies"), ("side", "sides")]
+)
+def test_plurals_are_english(noun: str, expected: str) -> None:
+    """What a column is called is the user's own word."""
+    assert plural(noun) == expected
+
+
+def test_a_sentence_names_the_wheels_only_where_there_are_several() -> None:
+    """One axis needs no name."""
+    parameters = {"relative_size": Parameter(0.2, 0.1, 0.3, "1"), "onset_s": Parameter(60.0, 50.0, 70.0, "s")}
+    told = statement(CoulombFriction(), (1,), 1, parameters, (2.0, 1.0), "axis")
+    assert "axis" not in told
+    assert "from 60 s on (90 % sure: 50 to 70 s): 20 % of the mean reading (90 % sure: 10 to 30 %)" in told
+    assert "100.0 % larger" in told
+    several = statement(CoulombFriction(), (1, 3, 4), 6, parameters, (2.0, 1.0), "axis")
+    assert "on axes 1, 3 and 4 from 60 s on" in several
