@@ -1,87 +1,86 @@
-# Two commands: `make demo` shows it running, `make test` proves it. The others are for those who change it.
+# `make` lists the targets. They install into the virtual environment .venv what they need.
 # PYTHON=/path/to/python chooses the interpreter (3.11 or newer).
 VENV := .venv
 BIN := $(VENV)/bin
+DEMO := $(VENV)/demo.ready
+DEV := $(VENV)/dev.ready
 export PYTHON
 
 RECORDINGS ?= ../shared/recordings
 
-.PHONY: demo test check docs sizing reproduce evaluate loop pictures prove real scaling mutants picture frames install uninstall clean
+.PHONY: help demo test check docs clean install uninstall
+.PHONY: sizing reproduce evaluate loop prove real scaling mutants frames pictures picture
 
-demo: $(VENV)/demo.ready
+help:
+	@awk -F ':.*## ' '/^## / { print "\n" substr($$0, 4) } /^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+
+## Use and development
+
+demo: $(DEMO) ## virtual rover, daemon and broker for half a minute; no hardware, no root
 	$(BIN)/regolithd demo
 
-test: $(VENV)/dev.ready
+test: $(DEV) ## all tests and checks (installs Debian packages for some of them, where permitted)
 	.ci/test-packages
 	$(BIN)/python -m pytest
 
-check: $(VENV)/dev.ready
+check: $(DEV) ## lint, format, types and import rules alone
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# The documentation site in build/site: open build/site/index.html. A warning or a broken link is an error.
-docs: $(VENV)/dev.ready
+docs: $(DEV) ## documentation site in build/site; a warning or a broken link is an error
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
-# The paper's sizing study, all of it: minutes. Interrupted, it goes on where it was.
-sizing: $(VENV)/dev.ready
+clean: ## remove .venv and build
+	rm -rf $(VENV) build *.egg-info src/*.egg-info
+
+## On a rover or a bench, as root (docs/how-to/install.md)
+
+install: ## install or upgrade the systemd service
+	systemd/install
+
+uninstall: ## remove it; configuration and recordings are kept
+	systemd/uninstall
+
+## Results and figures of the documentation (minutes to hours; SEED=… where a seed is used)
+
+sizing: $(DEV) ## the paper's study of the number of hidden neurons; continues an interrupted run
 	$(BIN)/regolithd sizing
 
-# The paper's figures beside ours: docs/reproduction.md. Tells of the sizing study where that has been run.
-reproduce: $(VENV)/dev.ready
+reproduce: $(DEV) ## docs/reproduction.md: the paper's figures beside ours
 	$(BIN)/regolithd reproduce
 
-# Posterior, paper's network, least squares and alarm on rovers that none of them has seen.
-evaluate: $(VENV)/dev.ready
+evaluate: $(DEV) ## errors and coverage of the soil estimators, delays of the soil-change alarm
 	$(BIN)/regolithd evaluate
 
-# A rover conceals a drivetrain effect, the comparison finds it, the daemon is corrected. SEED=… conceals another size.
-loop: $(VENV)/dev.ready
+loop: $(DEV) ## closed-loop study: hidden drivetrain effect, comparison, corrected configuration
 	$(BIN)/regolithd loop $(if $(SEED),--seed $(SEED))
 
-# docs/*.svg, from what `make sizing`, `make reproduce`, `make evaluate` and `make loop` found.
-pictures: reproduce
+prove: $(DEV) ## blind trials of `regolithd mismatch` on 200 recordings; continues an interrupted run
+	$(BIN)/regolithd prove $(if $(SEED),--seed $(SEED)) --figures build/figures/prove.json
+
+real: $(DEV) ## worked examples on recordings that are not part of this project (RECORDINGS=…)
+	$(BIN)/python docs/examples/run.py $(RECORDINGS) build/figures/real.json build/real
+
+scaling: $(DEV) ## time and memory of a comparison against rows and candidates
+	$(BIN)/python -m regolithd.calibration.validation.blind_trials.figures.cost_scaling build/figures/scaling.json docs/mismatch-scaling.svg
+
+mutants: $(DEV) ## mutation testing on a random sample (SEED=… COUNT=… ONLY=drivers/can)
+	$(BIN)/python tests/mutation/sample.py --seed $(or $(SEED),1) --count $(or $(COUNT),200) $(if $(ONLY),--only $(ONLY))
+
+frames: $(DEV) ## time per frame beside python-can and canopen, on vcan; docs/bus.md
+	tests/bench/with-vcan $(BIN)/python -m regolithd.drivers.benchmark
+	$(BIN)/python -m regolithd.drivers.reference > docs/bus.md
+
+pictures: reproduce ## docs/*.svg from the results of sizing, reproduce, evaluate and loop
 	test ! -f build/loop/loop.svg || cp build/loop/loop.svg docs/loop.svg
 	$(BIN)/regolithd pictures
 	$(BIN)/python -m regolithd.daemon.demo.screenshot docs/demo.svg
 
-# The proof of `regolithd mismatch`: 200 recordings with an effect concealed. SEED=… repeats one; interrupted, it goes on.
-prove: $(VENV)/dev.ready
-	$(BIN)/regolithd prove $(if $(SEED),--seed $(SEED)) --figures build/figures/prove.json
-
-# The worked examples on recordings of others, which are not part of this project (docs/examples).
-real: $(VENV)/dev.ready
-	$(BIN)/python docs/examples/run.py $(RECORDINGS) build/figures/real.json build/real
-
-# How time and memory of a comparison grow with rows and candidates.
-scaling: $(VENV)/dev.ready
-	$(BIN)/python -m regolithd.calibration.validation.blind_trials.figures.cost_scaling build/figures/scaling.json docs/mismatch-scaling.svg
-
-# Mutation testing on a random sample; hours. SEED=… COUNT=… ONLY=drivers/can narrows it.
-mutants: $(VENV)/dev.ready
-	$(BIN)/python tests/mutation/sample.py --seed $(or $(SEED),1) --count $(or $(COUNT),200) $(if $(ONLY),--only $(ONLY))
-
-# Time per frame, compared with python-can and canopen, on vcan; and docs/bus.md, generated from the device registry.
-frames: $(VENV)/dev.ready
-	tests/bench/with-vcan $(BIN)/python -m regolithd.drivers.benchmark
-	$(BIN)/python -m regolithd.drivers.reference > docs/bus.md
-
-# The README's first figure: the head of a real report. Needs chromium.
-picture: $(VENV)/dev.ready
+picture: $(DEV) ## the README's first figure: the head of a report (needs chromium)
 	$(BIN)/python -m regolithd.calibration.validation.blind_trials.figures.report_screenshot docs/mismatch-report.png build/picture
-
-# On a rover or a bench, as root: docs/install.md.
-install:
-	systemd/install
-
-uninstall:
-	systemd/uninstall
 
 $(VENV)/%.ready: pyproject.toml
 	.ci/virtual-environment $(VENV) $*
 	touch $@
-
-clean:
-	rm -rf $(VENV) build *.egg-info

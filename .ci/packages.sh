@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# Sourced: install_packages NAME…: installs Debian packages where this user may, and says so; fails quietly where not.
+# Sourced: install_packages NAME…: installs Debian packages if this user may (root or sudo without password), else returns 1.
 install_packages() {
   local root=()
   command -v apt-get >/dev/null || return 1
@@ -8,7 +8,7 @@ install_packages() {
     root=(sudo -n)
   fi
   echo "Installing Debian packages: $* …"
-  # Lists first: a fresh machine has none. What apt says matters only if it fails.
+  # Package lists first: a fresh machine has none. apt's output is shown only if it fails.
   local log status=0
   log=$(mktemp)
   {

@@ -1,10 +1,10 @@
 # shellcheck shell=bash
-# Sourced: finds a Python that is new enough, and sees that it can make virtual environments.
+# Sourced: finds Python 3.11 or newer that can make virtual environments.
 . .ci/packages.sh
 
 new_enough() { command -v "$1" >/dev/null && "$1" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; }
 
-# find_python: prints $PYTHON, or the first of python3, python3.14 … python3.11, if it is new enough; else says what is wrong.
+# find_python: prints $PYTHON, or the first of python3, python3.14 … python3.11 that is new enough; else an error and its cure.
 find_python() {
   local candidate found
   [ -n "${PYTHON:-}" ] || command -v python3 >/dev/null || install_packages python3 python3-venv >&2 || true
@@ -21,7 +21,7 @@ find_python() {
   return 1
 }
 
-# need_venv PYTHON: Debian keeps ensurepip in a package of its own, named after Python's version.
+# need_venv PYTHON: Debian has ensurepip in a separate package, named after Python's version.
 need_venv() {
   local package
   "$1" -c 'import ensurepip, venv' 2>/dev/null && return

@@ -75,7 +75,7 @@ def set_line(key: str, value: str) -> None:
 
 @pytest.fixture(scope="module", autouse=True)
 def _machine() -> Iterator[None]:
-    """A machine set up by docs/how-to/install.md: broker, daemon, and a virtual rover where the real one would be."""
+    """A machine set up by docs/how-to/install.md, with broker, daemon and virtual rover."""
     run("systemd/install")
     for name, folder in (("conf", "/etc/mosquitto/conf.d"), ("acl", "/etc/mosquitto")):
         shutil.copy(ROOT / f"systemd/mosquitto/regolith.{name}", folder)

@@ -1,35 +1,31 @@
-"""`regolithd bench` runs the virtual rover, obeys `regolithd bench-fault`, and says at its end what it did."""
+"""`regolithd bench` and `regolithd bench-fault` as processes, on an in-process bus."""
 
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-ROOT = Path(__file__).resolve().parents[3]
-ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
+    from pathlib import Path
 
 
-def command(*words: str) -> list[str]:
+def command(*arguments: str) -> list[str]:
     """Return a command line of regolithd."""
-    return [sys.executable, "-m", "regolithd", *words]
+    return [sys.executable, "-m", "regolithd", *arguments]
 
 
 @contextmanager
 def bench(*options: str, channel: str = "bench") -> Iterator[subprocess.Popen[str]]:
-    """Run the rover on a bus of its own process, until it is ready."""
+    """Run the virtual rover on an in-process bus; yield its process once it is ready."""
     line = command("bench", "--interface", "virtual", "--channel", channel, *options)
-    with subprocess.Popen(line, stdout=subprocess.PIPE, text=True, env=ENVIRONMENT) as process:
+    with subprocess.Popen(line, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None
             assert process.stdout.readline().startswith("ready: 14 nodes on virtual")
@@ -38,23 +34,23 @@ def bench(*options: str, channel: str = "bench") -> Iterator[subprocess.Popen[st
             process.kill()
 
 
-def fault(control: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    """Command the rover."""
-    line = command("bench-fault", "--control", str(control), *words)
-    return subprocess.run(line, capture_output=True, text=True, env=ENVIRONMENT, check=False, timeout=60)
+def inject(control: Path, *fault: str) -> subprocess.CompletedProcess[str]:
+    """Run `regolithd bench-fault`."""
+    line = command("bench-fault", "--control", str(control), *fault)
+    return subprocess.run(line, capture_output=True, text=True, check=False, timeout=60)
 
 
 @pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT])
-def test_it_obeys_and_counts(tmp_path: Path, end: signal.Signals) -> None:
-    """Commands come through a socket of this user alone; either signal ends it cleanly, with its counts."""
+def test_faults_are_injected_and_counters_printed(tmp_path: Path, end: signal.Signals) -> None:
+    """The control socket is this user's alone, and SIGTERM or SIGINT ends the bench cleanly with its counters."""
     control = tmp_path / "bench.sock"
     with bench("--control", str(control)) as process:
         assert control.stat().st_mode & 0o777 == 0o600
-        assert fault(control, "reset", "3").stdout == "ok\n"
-        refused = fault(control, "off", "99")
+        assert inject(control, "reset", "3").stdout == "ok\n"
+        refused = inject(control, "off", "99")
         assert refused.returncode == 1
         assert "there is no node 99" in refused.stdout
-        assert "silent N" in fault(control, "help").stdout
+        assert "silent N" in inject(control, "help").stdout
         process.send_signal(end)
         output, _ = process.communicate(timeout=60)
         assert process.returncode == 0
@@ -63,54 +59,54 @@ def test_it_obeys_and_counts(tmp_path: Path, end: signal.Signals) -> None:
     assert not control.exists()
 
 
-def test_two_do_not_share_a_socket(tmp_path: Path) -> None:
-    """The second one says so; what a killed one leaves behind is in nobody's way."""
+def test_a_control_socket_has_one_owner(tmp_path: Path) -> None:
+    """A second bench is refused while the first runs, and replaces the socket of a killed one."""
     control = tmp_path / "bench.sock"
     with bench("--control", str(control)):
         line = command("bench", "--interface", "virtual", "--channel", "x", "--control", str(control))
-        second = subprocess.run(line, capture_output=True, text=True, env=ENVIRONMENT, check=False, timeout=60)
+        second = subprocess.run(line, capture_output=True, text=True, check=False, timeout=60)
         assert second.returncode == 1
         assert "listens there already" in second.stderr
     assert control.exists()
     with bench("--control", str(control)):
-        assert fault(control, "counts").returncode == 0
+        assert inject(control, "counts").returncode == 0
 
 
-def test_nobody_listens(tmp_path: Path) -> None:
-    """`bench-fault` says what to do."""
-    answer = fault(tmp_path / "nothing.sock", "off", "3")
+def test_without_a_running_bench_the_cure_is_printed(tmp_path: Path) -> None:
+    """`bench-fault` fails and asks whether `regolithd bench` is running."""
+    answer = inject(tmp_path / "nothing.sock", "off", "3")
     assert answer.returncode == 1
     assert "Is `regolithd bench` running" in answer.stdout
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         (["--soil", "cheese"], "no soil is called 'cheese'"),
         (["--scenario", "no-such-file.toml"], "No such file"),
     ],
 )
-def test_a_wrong_scenario_is_told(options: list[str], said: str) -> None:
-    """Exit 78, as for any configuration."""
+def test_an_invalid_scenario_is_refused(options: list[str], message: str) -> None:
+    """The exit status is 78, and the error names the problem."""
     line = command("bench", "--interface", "virtual", *options)
-    ended = subprocess.run(line, capture_output=True, text=True, env=ENVIRONMENT, check=False, timeout=60)
+    ended = subprocess.run(line, capture_output=True, text=True, check=False, timeout=60)
     assert ended.returncode == 78
-    assert said in ended.stderr
+    assert message in ended.stderr
 
 
-def test_it_may_have_other_nodes(tmp_path: Path) -> None:
-    """Those of a rover.toml."""
+def test_the_nodes_may_be_those_of_a_rover_toml(tmp_path: Path) -> None:
+    """With `--config` the bench simulates the nodes of that file."""
     config = tmp_path / "rover.toml"
     config.write_text("[nodes]\nmotors = [31, 32, 33, 34, 35, 36]\n")
     line = command("bench", "--interface", "virtual", "--config", str(config), "--seconds", "0.2")
     line += ["--control", str(tmp_path / "bench.sock")]
-    ended = subprocess.run(line, capture_output=True, text=True, env=ENVIRONMENT, check=False, timeout=60)
+    ended = subprocess.run(line, capture_output=True, text=True, check=False, timeout=60)
     assert ended.stdout.startswith("ready: 12 nodes")
     assert json.loads(ended.stdout.splitlines()[-1])["31"] == {"boot_up": 1}
 
 
-def test_it_ends_by_itself(tmp_path: Path) -> None:
-    """With `--seconds`, on the soils that it was given."""
+def test_the_duration_may_be_limited(tmp_path: Path) -> None:
+    """With `--seconds` the bench ends by itself, also with options for soil, seed and noise."""
     options = ["--soil", "lete-sand", "--soil", "clayey-soil", "--seed", "5", "--no-noise", "--seconds", "0.2"]
     with bench(*options, "--control", str(tmp_path / "bench.sock")) as process:
         output, _ = process.communicate(timeout=60)
