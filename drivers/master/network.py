@@ -105,7 +105,7 @@ class Network:
         self._supervisors: dict[int, Supervisor] = {}
         self._drives: dict[int, Drive] = {}
         self._bus_state = bus.state
-        self._stop_cause: NetworkEvent | None = None
+        self._stop_cause: NodeLost | DriveStateChanged | None = None
         self._stop_requested = asyncio.Event()
         for node in settings.nodes:
             self._add(node)
@@ -256,19 +256,15 @@ class Network:
     def _emit(self, event: NetworkEvent) -> None:
         if isinstance(event, NodeLost) and event.node_id in self._drives:
             self._drives[event.node_id].forget()
-        if self._motion.moving and self._ends_motion(event):
+        if self._motion.moving and isinstance(event, NodeLost | DriveStateChanged) and self._ends_motion(event):
             self._stop_cause = event
             self._stop_requested.set()
         self._on_event(event)
 
-    def _ends_motion(self, event: NetworkEvent) -> bool:
-        match event:
-            case NodeLost(node_id=node_id):
-                return self._supervisors[node_id].remote.node.required
-            case DriveStateChanged(state=state):
-                return state is not DriveState.ENABLED
-            case _:
-                return False
+    def _ends_motion(self, event: NodeLost | DriveStateChanged) -> bool:
+        if isinstance(event, NodeLost):
+            return self._supervisors[event.node_id].remote.node.required
+        return event.state is not DriveState.ENABLED
 
     async def _stop_when_requested(self) -> None:
         """Stop all wheels when one is lost: a rover that drags an unpowered wheel digs itself in."""
@@ -283,8 +279,7 @@ class Network:
                 await self._motion.quick_stop(event.text)
             except DriverError as error:
                 outcome = str(error)
-            node_id = getattr(event, "node_id", 0)
-            self._on_event(MotionStopped(time.time_ns(), node_id, f"motion stopped: {event.text}; {outcome}"))
+            self._on_event(MotionStopped(time.time_ns(), event.node_id, f"motion stopped: {event.text}; {outcome}"))
 
     async def _leave(self) -> None:
         """Stop and disable the drives, end their heartbeat consumers, and set every node to pre-operational."""

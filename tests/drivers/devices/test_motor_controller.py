@@ -158,3 +158,46 @@ def test_it_refuses_any_other_mode() -> None:
         drive.master.write(1, 0x6060, 0, 1, 1)
     drive.master.write(1, 0x6060, 0, 3, 1)
     assert drive.master.read(1, 0x6061) == 3
+
+
+@pytest.mark.parametrize(
+    ("option", "state", "ramp"),
+    [(0, 0x27, 0), (1, 0x0F, 4000), (2, 0x40, 50_000), (3, 0x07, 4000)],
+    ids=["no action", "fault", "disable voltage", "quick stop"],
+)
+def test_the_loss_of_the_connection_selects_state_and_ramp(option: int, state: int, ramp: int) -> None:
+    """Option code 0x6007 determines the state in the statusword, at once, and the deceleration [rpm/s]."""
+    drive = DriveUnderTest()
+    drive.master.write(1, 0x6085, 0, 4000, 4)
+    drive.master.write(1, 0x6007, 0, option, 2)
+    drive.run_at(3000)
+    device = drive.master.node(1).device
+    device.connection_lost()
+    assert drive.state == state
+    device.advance(0.05)
+    assert drive.speed_rpm == 3000 - 0.05 * ramp
+
+
+def test_a_disabled_drive_stays_disabled_when_the_connection_is_lost() -> None:
+    """Neither disable voltage nor quick stop applies to a drive in switch-on disabled."""
+    for option in (2, 3):
+        drive = DriveUnderTest()
+        drive.master.write(1, 0x6007, 0, option, 2)
+        drive.master.node(1).device.connection_lost()
+        assert drive.state == 0x40
+
+
+def test_averaged_current_and_velocity_follow_the_measured_ones() -> None:
+    """Objects 0x2027 (current) and 0x2028 (velocity) converge with a time constant of 50 ms."""
+    drive = DriveUnderTest()
+    drive.master.write(1, 0x6083, 0, 10_000, 4)
+    drive.run_at(1000)
+    drive.master.wait(1)
+    assert drive.master.read(1, 0x2027) == 40
+    assert drive.master.read(1, 0x2028) == 1000
+    drive.say(0x0F, 2000)
+    drive.master.wait(0.11)
+    assert drive.speed_rpm == 2000
+    assert 1500 < drive.master.read(1, 0x2028) < 1900
+    drive.master.wait(1)
+    assert drive.master.read(1, 0x2028) == 2000

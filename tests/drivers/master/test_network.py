@@ -189,7 +189,7 @@ async def test_a_drive_that_faults_stops_the_others_and_is_reset_by_enabling() -
         emergency = (await r.wait_for_event(NodeEmergency, node_id=2)).emergency
         assert (emergency.code, emergency.cleared) == (0x2310, False)
         assert "overcurrent" in emergency.text
-        await r.wait_for_event(MotionStopped)
+        await r.wait_for_event(MotionStopped, node_id=2)
         await until(lambda: r.network.status[2].drive_state is DriveState.FAULT, "drive 2 in fault")
         await r.network.enable()
         assert r.network.status[2].drive_state is DriveState.ENABLED

@@ -11,6 +11,7 @@ import pytest
 from virtual_master import LOAD_CELL_TPDO, MOTOR_TPDO, DriveUnderTest, Master
 
 from regolithd.drivers.virtual import Bench, Measurement
+from regolithd.drivers.virtual.pdo import Pdo
 
 
 class Tilted(Bench):
@@ -145,3 +146,9 @@ def test_a_load_cell_says_when_it_cannot_measure(load: float, status: int) -> No
     master.configure(11, tpdo=LOAD_CELL_TPDO)
     master.nmt(1)
     assert master.sync()[0x18B][4] == status
+
+
+def test_transmission_types_up_to_240_are_synchronous() -> None:
+    """CiA 301, 7.5.2.35: 0 to 240 are synchronous, 254 and 255 event-driven."""
+    synchronous = [kind for kind in (0, 1, 240, 254, 255) if Pdo(0x181, kind, (), struct.Struct("<")).synchronous]
+    assert synchronous == [0, 1, 240]
