@@ -1,4 +1,4 @@
-"""The answer, as data; `to_json` writes it exactly as the contract has it."""
+"""The answer of a comparison as frozen data (`Answer.to_json` gives the JSON object), and the evidence to draw it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Verdict = Literal["consistent", "missing-physics", "unexplained"]
 
 @dataclass(frozen=True)
 class Parameter:
-    """A value and the bounds that hold it nine times in ten."""
+    """A value with its 90 % interval."""
 
     value: float
     low: float
@@ -30,7 +30,15 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect:
-    """Physics that the simulation leaves out."""
+    """An effect that the simulation leaves out.
+
+    Attributes
+    ----------
+    channel: the faulty channel
+    wheels: their names in the recording
+    onset_s: when it begins, None where it was there from the start
+    rmse_before, rmse_after: held-out root mean squares on its wheels, without and with the effect
+    """
 
     name: str
     channel: str
@@ -46,7 +54,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """Structure that nothing in the library explains, where it lives, and how much of the residual it is."""
+    """A structure in the residual that no candidate explains: its covariate, wheels, time and share of the power."""
 
     channel: str
     wheels: tuple[int, ...]
@@ -58,7 +66,7 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class Indistinguishable:
-    """Effects that this recording cannot tell apart, and the drive that would."""
+    """Effects that this recording cannot tell apart, and the experiment that tells them apart."""
 
     effects: tuple[str, ...]
     experiment: str
@@ -66,7 +74,7 @@ class Indistinguishable:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """The smallest effect that this recording would have shown nine times in ten; infinite: none, however large."""
+    """The smallest effect that the recording shows with a probability of 90 %; infinite where it shows none."""
 
     name: str
     smallest_detectable: float
@@ -75,7 +83,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class FitImprovement:
-    """Errors on data that neither chose the effects nor fitted them."""
+    """Root-mean-square errors on blocks of time that were used neither to select the effects nor to fit them."""
 
     channel: str
     held_out_rmse_before: float
@@ -85,7 +93,7 @@ class FitImprovement:
 
 @dataclass(frozen=True)
 class Answer:
-    """What `regolithd mismatch` says."""
+    """The result of `regolithd mismatch`."""
 
     verdict: Verdict
     effects: tuple[Effect, ...]
@@ -94,11 +102,11 @@ class Answer:
     sensitivity: tuple[Sensitivity, ...]
     fit: FitImprovement
     notes: tuple[str, ...] = ()
-    """Beyond the contract: what was wrong with the recording, and what could not be looked for."""
+    """What was wrong with the recording, and which candidates could not be looked for."""
     version: int = 1
 
     def to_json(self) -> dict[str, Any]:
-        """Return the contract's object: numbers that JSON can hold, tuples as lists."""
+        """Return the JSON object: tuples as lists, and null for numbers that are not finite."""
         plain: dict[str, Any] = _plain(asdict(self))
         order = ("version", "verdict", "effects", "unexplained", "indistinguishable", "sensitivity", "fit", "notes")
         return {name: plain[name] for name in order}
@@ -135,7 +143,7 @@ class Contribution:
 
 @dataclass(frozen=True)
 class Curve:
-    """A residual against a covariate, before and after the effects, in bins that share the data evenly.
+    """A residual against a covariate, before and after the effects, in bins with equal numbers of values.
 
     Attributes
     ----------
@@ -143,7 +151,7 @@ class Curve:
     coupling: "drag" for residual × sign of the speed, "gain" for residual × sign of the prediction, "offset" for the
         residual as it is
     at, before, after: bin centres and mean residuals, shape (bin,)
-    standard_error: of a bin's mean, with the noise's memory counted in, shape (bin,)
+    standard_error: of a bin's mean, autocorrelation of the noise included, shape (bin,)
     wheels: the wheels that went into it
     """
 
@@ -158,17 +166,17 @@ class Curve:
 
 @dataclass(frozen=True)
 class Evidence:
-    """The arrays that a picture of the answer needs.
+    """The arrays that the report draws.
 
     Attributes
     ----------
     time_s: shape (time,); wheels: names of the columns
-    measured, before, after: the channel, the calibrated simulation, and it with the effects in, shape (time, wheel);
-        NaN where the simulation says nothing
-    map_time_s, map_before, map_after: block means of the residual along the direction of rotation in units of their
-        standard error, shape (block,), (block, wheel): what is above 3 or so is not noise
-    curves: the residual against every covariate, the most telling first
-    values: the simulation's parameters where the recording put them
+    measured, before, after: the channel, the calibrated simulation, and it with the effects added, shape (time, wheel);
+        NaN where there is no prediction
+    map_time_s, map_before, map_after: centres of blocks of time, and block means of residual × sign of the speed in units
+        of their standard error, shape (block,), (block, wheel)
+    curves: the residual against every covariate, the one with the largest dependence first
+    values: the simulation's parameters as calibrated by the recording
     contributions: the terms of `--corrected`
     problem: what the candidates' columns are computed from; None draws no curve of an effect's own wheels
     candidates: those that were looked for, for their labels

@@ -1,19 +1,19 @@
-"""What can be wrong with what the tool is given.
+"""Errors of the mismatch tool's input.
 
 MismatchError
 ├── RecordingError      the recording cannot be read as one (also a ValueError)
 └── SimulationError     SIM.toml or the user's class is not a simulation (also a ValueError)
 
-Everything that can be worked around is not an error but a note in the answer.
+What the comparison can do without is no error but a note in the answer.
 """
 
 
 class MismatchError(Exception):
-    """Whatever keeps the tool from comparing at all."""
+    """The comparison is impossible."""
 
 
 class RecordingError(MismatchError, ValueError):
-    """The recording lacks what the simulation predicts, or is no table of instants and wheels."""
+    """The recording lacks what the simulation predicts, or is no table of times and wheels."""
 
 
 class SimulationError(MismatchError, ValueError):
