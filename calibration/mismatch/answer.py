@@ -173,8 +173,8 @@ class Evidence:
     time_s: shape (time,); wheels: names of the columns
     measured, before, after: the channel, the calibrated simulation, and it with the effects added, shape (time, wheel);
         NaN where there is no prediction
-    map_time_s, map_before, map_after: centres of blocks of time, and block means of residual × sign of the speed in units
-        of their standard error, shape (block,), (block, wheel)
+    map_time_s, map_before, map_after: centres of blocks of time, and block means of residual × sign of the speed in
+        units of their standard error, shape (block,), (block, wheel)
     curves: the residual against every covariate, the one with the largest dependence first
     values: the simulation's parameters as calibrated by the recording
     contributions: the terms of `--corrected`

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.report.axes import Panel, axes, box, line, number, svg, text
-from regolithd.calibration.mismatch.report.labels import scaled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -110,7 +109,7 @@ def curve_figure(
     curve: Curve, unit: str, labels: Labels, *, corrected: bool = True, width: float = WIDTH, height: float = 270.0
 ) -> str:
     """Draw the residual against a covariate: before with its error bars, and after, if it was corrected."""
-    factor, shown = scaled(unit)
+    factor, shown = labels.scaled(unit)
     small = width < 500
     centre = curve.at * labels.time_factor if curve.covariate == "time" else curve.at
     across = labels.axis(curve.covariate)
@@ -143,9 +142,9 @@ def curve_figure(
     return svg(width, height, parts, f"Residual against {across}, before and after")
 
 
-def fit_figure(answer: Answer, unit: str) -> str:
+def fit_figure(answer: Answer, unit: str, labels: Labels) -> str:
     """Draw the held-out error before and after, over the noise floor."""
-    factor, shown = scaled(unit)
+    factor, shown = labels.scaled(unit)
     fit = answer.fit
     before, after, floor = (
         factor * value for value in (fit.held_out_rmse_before, fit.held_out_rmse_after, fit.noise_floor_rmse)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.report.statements import listed, plural
 
@@ -29,6 +31,8 @@ PARAMETERS = {"onset_s": "onset", "relative_size": "share of the mean reading"}
 """Parameters that the engine adds to those of a candidate."""
 UNITS = {"degC": "°C", "1": ""}
 """Units whose spelling in the answer is not the usual one."""
+WITH_MILLI = frozenset({"A"})
+"""Units of a channel that are shown in thousandths where the mean reading is below 1."""
 LONGEST_IN_SECONDS = 180.0
 """Recordings up to this long have their times in seconds, longer ones in minutes [s] (a choice)."""
 
@@ -43,19 +47,22 @@ class Labels:
     covariates: axis labels with units, as the simulation gives them
     candidates: by name
     in_minutes: whether times are in minutes, or in seconds
+    in_milli: whether values of the channel are in thousandths of its unit
     """
 
     wheel: str = "wheel"
     covariates: Mapping[str, str] = field(default_factory=dict)
     candidates: Mapping[str, Candidate] = field(default_factory=lambda: {c.name: c for c in library()})
     in_minutes: bool = True
+    in_milli: bool = False
 
     @classmethod
     def of(cls, evidence: Evidence) -> Labels:
         """Return the labels of the simulation that the evidence is about."""
         in_minutes = float(evidence.time_s[-1] - evidence.time_s[0]) > LONGEST_IN_SECONDS
         candidates = {candidate.name: candidate for candidate in evidence.candidates or library()}
-        return cls(evidence.wheel_column, evidence.covariate_labels, candidates, in_minutes)
+        in_milli = evidence.unit in WITH_MILLI and float(np.nanmean(np.abs(evidence.measured))) < 1
+        return cls(evidence.wheel_column, evidence.covariate_labels, candidates, in_minutes, in_milli)
 
     @property
     def time_unit(self) -> str:
@@ -66,6 +73,12 @@ class Labels:
     def time_factor(self) -> float:
         """Factor from seconds to `time_unit`."""
         return 1 / 60 if self.in_minutes else 1.0
+
+    def scaled(self, unit: str) -> tuple[float, str]:
+        """Return factor and unit in which a value is shown: small currents in milliampere, others as they are."""
+        if self.in_milli and unit.split(" ", maxsplit=1)[0] in WITH_MILLI:
+            return 1000.0, "m" + unit
+        return 1.0, UNITS.get(unit, unit)
 
     def effect(self, name: str) -> str:
         """Return an effect's label; of a parameter's effect the name with spaces."""
@@ -99,11 +112,6 @@ class Labels:
 def capital(sentence: str) -> str:
     """Return the sentence with its first letter as a capital."""
     return sentence[:1].upper() + sentence[1:]
-
-
-def scaled(unit: str) -> tuple[float, str]:
-    """Return factor and unit in which a value is shown: currents in milliampere, the others as they are."""
-    return (1000.0, "m" + unit) if unit.split(" ", maxsplit=1)[0] == "A" else (1.0, UNITS.get(unit, unit))
 
 
 def verdict_sentence(answer: Answer, labels: Labels | None = None) -> str:

@@ -63,7 +63,7 @@ def render_report(answer: Answer, evidence: Evidence, provenance: Provenance) ->
             curves=sections.curves(answer, evidence, labels),
             effects=[sections.effect(effect, evidence, labels) for effect in answer.effects],
             unexplained=[sections.unexplained(place, evidence, labels) for place in answer.unexplained],
-            fit=sections.fit(answer, evidence),
+            fit=sections.fit(answer, evidence, labels),
             confusions=sections.confusions(answer, labels),
             sensitivity=sections.sensitivity(answer, evidence, labels),
             other_curves=sections.other_curves(answer, evidence, labels),

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from regolithd.calibration.mismatch.report.axes import number
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.figures import curve_figure, fit_figure, interval_figure, map_figure
-from regolithd.calibration.mismatch.report.labels import capital, scaled
+from regolithd.calibration.mismatch.report.labels import capital
 from regolithd.calibration.mismatch.report.statements import listed
 
 if TYPE_CHECKING:
@@ -139,14 +139,14 @@ def _curve(curve: Curve, answer: Answer, evidence: Evidence, labels: Labels) -> 
 
 def effect(found: Effect, evidence: Evidence, labels: Labels) -> EffectSection:
     """Return one named effect: sentence, equation, facts and table."""
-    factor, unit = scaled(_unit_of(found))
+    factor, unit = labels.scaled(_unit_of(found))
     before, after = factor * found.rmse_before, factor * found.rmse_after
-    fewer = 100 * (1 - after / before) if before else 0.0
+    change = f"{100 * (after / before - 1) if before else 0.0:+.1f}".replace("-", "−")
     facts = (
         labels.wheels(found.wheels, evidence.wheels),
         "constant" if found.covariate == "none" else f"depends on {labels.covariate(found.covariate)}",
         "" if found.onset_s is None else f"from {number(found.onset_s * labels.time_factor)} {labels.time_unit} on",
-        f"held-out error {number(before)} → {number(after)} {unit} (−{fewer:.1f} %)",
+        f"held-out error {number(before)} → {number(after)} {unit} ({change} %)",
     )
     return EffectSection(
         capital(labels.effect(found.name)),
@@ -161,7 +161,7 @@ def _parameter_rows(found: Effect, labels: Labels) -> tuple[ParameterRow, ...]:
     rows = []
     for name, parameter in found.parameters.items():
         # Shares are read in percent.
-        factor, unit = (100.0, "%") if name == "relative_size" else scaled(parameter.unit)
+        factor, unit = (100.0, "%") if name == "relative_size" else labels.scaled(parameter.unit)
         value, low, high = (factor * each for each in (parameter.value, parameter.low, parameter.high))
         if np.isfinite(value):
             drawing = _safe(interval_figure(value, low, high))
@@ -187,16 +187,16 @@ def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> Unexp
     return UnexplainedSection(labels.covariate(place.covariate), tuple(fact for fact in facts if fact))
 
 
-def fit(answer: Answer, evidence: Evidence) -> FitSection:
+def fit(answer: Answer, evidence: Evidence, labels: Labels) -> FitSection:
     """Return the held-out errors before and after, and the noise floor."""
     found = answer.fit
-    factor, unit = scaled(evidence.unit)
+    factor, unit = labels.scaled(evidence.unit)
     before, after, floor = (
         factor * value for value in (found.held_out_rmse_before, found.held_out_rmse_after, found.noise_floor_rmse)
     )
     reducible = before**2 - floor**2
     removed = f"{min(100 * (before**2 - after**2) / reducible, 100):.0f}" if reducible > 0 else ""
-    svg = _safe(fit_figure(answer, evidence.unit))
+    svg = _safe(fit_figure(answer, evidence.unit, labels))
     return FitSection(number(before), number(after), number(floor), unit, removed, svg)
 
 
@@ -215,7 +215,7 @@ def sensitivity(answer: Answer, evidence: Evidence, labels: Labels) -> tuple[Sen
     rows = []
     for one in answer.sensitivity:
         if one.name not in found:
-            size = number(scaled(one.unit)[0] * one.smallest_detectable, 2)
+            size = number(labels.scaled(one.unit)[0] * one.smallest_detectable, 2)
             share = f"{100 * one.smallest_detectable / mean:.1f} %" if mean > 0 else "–"
             known = np.isfinite(one.smallest_detectable)
             label = capital(labels.effect(one.name))

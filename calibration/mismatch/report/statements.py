@@ -53,9 +53,10 @@ def statement(
     onset = parameters.get("onset_s")
     begins = f" from {onset.value:.0f} s on (90 % sure: {onset.low:.0f} to {onset.high:.0f} s)" if onset else ""
     costs = 100 * (errors[0] / errors[1] - 1) if errors[1] > 0 else 0.0
+    costs_in_words = f"{abs(costs):.1f} % {'larger' if costs >= 0 else 'smaller'}"
     words = candidate.words[:1].upper() + candidate.words[1:]
     return (
         f"{words}{where}{begins}: {100 * size.value:.0f} % of the mean reading "
         f"(90 % sure: {100 * size.low:.0f} to {100 * size.high:.0f} %); "
-        f"left out, it makes the held-out error there {costs:.1f} % larger."
+        f"left out, it makes the held-out error there {costs_in_words}."
     )

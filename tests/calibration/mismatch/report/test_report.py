@@ -261,5 +261,22 @@ def test_a_sentence_names_the_wheels_only_where_there_are_several() -> None:
     assert "axis" not in told
     assert "from 60 s on (90 % sure: 50 to 70 s): 20 % of the mean reading (90 % sure: 10 to 30 %)" in told
     assert "100.0 % larger" in told
+    assert "50.0 % smaller" in statement(CoulombFriction(), (1,), 1, parameters, (1.0, 2.0), "axis")
     several = statement(CoulombFriction(), (1, 3, 4), 6, parameters, (2.0, 1.0), "axis")
     assert "on axes 1, 3 and 4 from 60 s on" in several
+
+
+def test_currents_of_amperes_are_in_amperes(evidence: Evidence) -> None:
+    """Milliampere only where the mean reading is below one ampere; other units as they are."""
+    small, large = Labels.of(evidence), Labels.of(replace(evidence, measured=10 * evidence.measured))
+    assert small.scaled("A s²/rad") == (1000.0, "mA s²/rad")
+    assert large.scaled("A") == (1.0, "A")
+    assert small.scaled("degC") == (1.0, "°C")
+
+
+def test_an_effect_that_makes_held_out_data_worse_says_so(evidence: Evidence) -> None:
+    """The change has one sign."""
+    worse = replace(WORN, rmse_before=0.0048, rmse_after=0.0049)
+    page = render_report(answer(verdict="missing-physics", effects=(worse,)), evidence, FROM)
+    assert "4.8 → 4.9 mA (+2.1 %)" in page
+    assert "6.9 → 4.8 mA (−30.4 %)" in render_report(ANSWERS["missing-physics"], evidence, FROM)
