@@ -28,7 +28,7 @@ Figures = dict[str, float | int | str]
 
 
 def mismatch(recording: Path, simulation: Path, report: Path) -> dict[str, Any]:
-    """Let the command line answer."""
+    """Run the command and return its answer."""
     answer = report.with_suffix(".json")
     command = [sys.executable, "-m", "regolithd", "mismatch", str(recording), "--simulation", str(simulation)]
     subprocess.run(  # noqa: S603  # our own command
@@ -46,7 +46,7 @@ def r_squared(recording: Path, simulation: Path, answer: dict[str, Any]) -> dict
 
 
 def named(answer: dict[str, Any]) -> str:
-    """Return what was named, and where."""
+    """Return the effects and their wheels."""
     return "; ".join(f"{e['name']} on {','.join(map(str, e['wheels']))}" for e in answer["effects"])
 
 
@@ -109,7 +109,7 @@ def cmu_wheel(recordings: Path, reports: Path) -> Figures:
 
 
 def main(recordings: Path, figures: Path, reports: Path) -> None:
-    """Run all three."""
+    """Run the three examples."""
     reports.mkdir(parents=True, exist_ok=True)
     found = emps(recordings, reports) | husky(recordings, reports) | cmu_wheel(recordings, reports)
     figures.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""What a slip angle may do to a wheel in sand: four physical candidates, each a few lines."""
+"""Lateral forces on a wheel in sand at a slip angle: four candidates."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ if TYPE_CHECKING:
 
 
 def sideways(travel_mm_s: Array, rim_mm_s: Array, slip_angle_rad: Array) -> Array:
-    """Return how much of the contact's sliding goes across the wheel: the lateral part of its unit vector."""
+    """Return the lateral component of the unit vector of sliding in the contact."""
     across = travel_mm_s * np.sin(slip_angle_rad)
     return across / np.maximum(np.hypot(rim_mm_s - travel_mm_s * np.cos(slip_angle_rad), across), 1e-9)
 
 
 class SideForce(Candidate):
-    """A force of the slip angle."""
+    """A force that depends on the slip angle."""
 
     covariate = "slip_angle"
+    along_motion = False
     experiment = "tow the wheel at one slip through slip angles from 0 to 90 degrees, at two loads"
     requires = ("slip_angle", "sinkage", "load", "sideways")
     sharing: ClassVar = ("one",)
-    signature = "a force that is not there straight ahead and grows with the slip angle"
+    signature = "a force that is zero straight ahead and grows with the slip angle"
 
 
 class SideShear(SideForce):
-    """Sand sheared across the wheel, over a contact that grows with sinkage."""
+    """Lateral shear of the sand over a contact area that grows with sinkage."""
 
     name = "side-shear"
     equation = "ΔF = k z v_y/|v|"
@@ -43,7 +44,7 @@ class SideShear(SideForce):
 
 
 class Bulldozing(SideForce):
-    """Sand pushed aside by the wheel's flank: passive earth pressure, with the square of sinkage."""
+    """Passive earth pressure on the wheel's flank, with the square of sinkage."""
 
     name = "bulldozing"
     equation = "ΔF = b z² sin β"
@@ -57,12 +58,12 @@ class Bulldozing(SideForce):
 
 
 class SideFriction(SideForce):
-    """Coulomb friction of the load, across."""
+    """Lateral Coulomb friction of the load."""
 
     name = "side-friction"
     equation = "ΔF = μ W sin β"
     words = "friction of the load across the wheel"
-    source = "a tyre on a road; sand has no such surface"
+    source = "Coulomb friction of a tyre on a road"
     coefficients: ClassVar = (Coefficient("friction_coefficient", "1"),)
 
     def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002  # it has no shape
@@ -71,7 +72,7 @@ class SideFriction(SideForce):
 
 
 class TurnedTraction(SideForce):
-    """Traction that turns with the slip angle: of what straight driving has, only the part along the wheel is left."""
+    """Traction reduced by the slip angle: the part of the straight-ahead force that is not along the wheel is lost."""
 
     name = "turned-traction"
     equation = "ΔF = −a F_straight (1 − cos β)"
@@ -80,9 +81,9 @@ class TurnedTraction(SideForce):
     coefficients: ClassVar = (Coefficient("share_lost", "1"),)
 
     def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002  # it has no shape
-        """Return what a cosine takes from the straight-ahead force."""
+        """Return −F (1 − cos β) with the straight-ahead force F."""
         return (-problem.filled * (1 - np.cos(problem.covariates["slip_angle"])))[None]
 
 
 CANDIDATES = (SideShear(), Bulldozing(), SideFriction(), TurnedTraction())
-"""The four."""
+"""All four."""

@@ -1,4 +1,4 @@
-"""A single wheel in a sand bin: the first simulation anybody writes, traction from slip as measured straight ahead."""
+"""A single wheel in a sand bin: traction from slip, as measured without a slip angle."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TRACTION = np.array([-2.0, -1.13, -0.74, -0.31, -0.055, 0.028, 0.04, 0.035, 0.05
 
 
 class SingleWheel(Simulation):
-    """Forces along (axis 1) and across (axis 2) the wheel; a wheel that runs straight has none across."""
+    """Longitudinal (axis 1) and lateral (axis 2) force; without a slip angle there is no lateral force."""
 
     channel, unit = "force_N", "N"
     wheel_column = "axis"
@@ -35,22 +35,22 @@ class SingleWheel(Simulation):
     parameters: Mapping[str, Prior] = {"scale": Prior(1.0, 0.1)}
 
     def prepare(self, recording: Recording) -> Recording:
-        """Say which axis a value belongs to."""
+        """Add the number of the axis that a value belongs to."""
         axis = np.broadcast_to(np.asarray(recording.wheels, np.float64), recording.shape)
         return recording.with_channels(axis_number=axis)
 
     def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
-        """Return load × traction(slip) along the wheel, and nothing across it [N]."""
+        """Return load × traction(slip) along the wheel, and 0 across it [N]."""
         along = values["scale"] * inputs["load_N"] * np.interp(inputs["slip"], SLIP, TRACTION)
         return np.where(inputs["axis_number"] == LONGITUDINAL, along, 0.0)
 
     def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
-        """Return what the residual may be ordered by."""
+        """Return what the residual may depend on."""
         angle = np.radians(inputs["slip_angle_deg"])
         names = {"load": "load_N", "sinkage": "sinkage_mm", "slip": "slip"}
         side = sideways(inputs["travel_mm_s"], inputs["rim_mm_s"], angle)
         return {**{name: inputs[column] for name, column in names.items()}, "slip_angle": angle, "sideways": side}
 
     def candidates(self, library: Sequence[Candidate]) -> Sequence[Candidate]:  # noqa: ARG002  # a rover's
-        """Return this domain's own: none of a rover's drivetrain is here."""
+        """Return the four lateral effects: a measured force has no drivetrain."""
         return CANDIDATES

@@ -1,4 +1,4 @@
-"""Viscous friction as the literature on this axis has it: strictly proportional to speed."""
+"""Viscous friction as in the literature on this axis: proportional to speed."""
 
 from __future__ import annotations
 

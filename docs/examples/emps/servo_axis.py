@@ -1,4 +1,4 @@
-"""A servo axis on a ball screw (EMPS): the first simulation anybody writes, force = mass × acceleration."""
+"""A servo axis on a ball screw (EMPS): force = mass × acceleration, without friction."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 FORCE_PER_VOLT = 35.15
 CUTOFF_HZ = 20.0
 EDGE_S = 0.15
-"""What a zero-phase filter spoils at either end."""
+"""Length at either end that the zero-phase filter distorts [s]: three periods of its cutoff."""
 
 
 class ServoAxis(Simulation):
@@ -31,7 +31,7 @@ class ServoAxis(Simulation):
     parameters: Mapping[str, Prior] = {"mass_kg": Prior(95.0, 5.0, "kg")}
 
     def prepare(self, recording: Recording) -> Recording:
-        """Low-pass (20 Hz, zero phase) position and voltage, then differentiate; drop the filter's ends."""
+        """Low-pass position and voltage with zero phase, differentiate, and drop the ends."""
         step = recording.step_s
         low = butter(4, CUTOFF_HZ, fs=1 / step, output="sos")
         position = sosfiltfilt(low, recording.channel("position_m"), axis=0)
@@ -50,13 +50,13 @@ class ServoAxis(Simulation):
         return values["mass_kg"] * inputs["acceleration_m_s2"]
 
     def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
-        """Return what the residual may be ordered by."""
+        """Return what the residual may depend on."""
         return {"time": inputs["t_s"], "wheel_speed": inputs["speed_m_s"], "position": inputs["position_m"]}
 
     def candidates(self, library: Sequence[Candidate]) -> Sequence[Candidate]:
         """Return the library without what this machine cannot have, and two effects as its literature has them.
 
-        A slide has no wheel angle, and the voltage is the controller's own command: no sensor reads it with an offset.
+        A slide has no wheel angle. The voltage is the controller's command: no sensor with an offset measures it.
         """
         foreign = {"wheel-angle-ripple", "current-sensor-bias", "viscous-friction"}
         return (*(c for c in library if c.name not in foreign), LinearFriction(), AsymmetricFriction())

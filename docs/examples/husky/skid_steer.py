@@ -1,4 +1,4 @@
-"""A skid-steer Husky: the first simulation anybody writes, each side's current depends on its own speed alone."""
+"""A skid-steer Husky: each side's current depends on its own speed alone."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ if TYPE_CHECKING:
 
 GRAVITY_M_S2 = 9.81
 CREEPING_M_S = 0.02
+"""Rim speed below which a side counts as standing [m/s]."""
 
 
 class SkidSteer(Simulation):
-    """Current of the left (1) and right (2) motors; the controller reports its size, not its sign."""
+    """Current of the left (1) and right (2) motors; the controller reports its magnitude, without a sign."""
 
     channel, unit = "motor_current_A", "A"
     wheel_column = "wheel"
