@@ -72,7 +72,7 @@ def parse_configuration(text: str, path: Path) -> Configuration:
     try:
         configuration = Configuration.model_validate(tables)
     except ValidationError as error:
-        found = [_problem(details, text, path) for details in error.errors()]
+        found = [_problem(details, text, path) for details in _without_consequences(error.errors())]
         # Tables that are valid alone may still contradict each other: report that in the same run.
         raise ConfigurationError(found + _problems_together(_valid_tables(tables), text, path)) from error
     if problems := _problems_together(configuration, text, path):
@@ -101,6 +101,15 @@ def _valid_tables(tables: Mapping[str, Any]) -> Configuration:
             except ValidationError:
                 continue  # its own problems are already in the list
     return Configuration.model_validate(valid)
+
+
+def _without_consequences(errors: list[ErrorDetails]) -> list[ErrorDetails]:
+    """Return the errors except those of lists that are long enough: pydantic does not count an invalid element."""
+    return [
+        details
+        for details in errors
+        if details["type"] != "too_short" or len(details["input"]) < details["ctx"]["min_length"]
+    ]
 
 
 def _problem(details: ErrorDetails, text: str, path: Path) -> Problem:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import re
-import textwrap
 from typing import TYPE_CHECKING, Any
 
 from pydantic.json_schema import models_json_schema
@@ -19,6 +18,9 @@ from regolithd.daemon.messages.header import SCHEMA_VERSION
 
 if TYPE_CHECKING:
     from regolithd.daemon.messages.channels import Channel
+
+WIDTH = 118
+"""Of the examples' lines; a string that is longer stays whole."""
 
 _PARAMETERS = {
     "wheel": {
@@ -163,9 +165,18 @@ def _example_lines() -> str:
     parts = []
     for channel in CHANNELS:
         text = json.dumps(example(channel), ensure_ascii=False)
-        wrapped = textwrap.fill(text, 118, break_long_words=False, break_on_hyphens=False)
-        parts.append(f"### {channel.name}\n\n```json\n{wrapped}\n```")
+        parts.append(f"### {channel.name}\n\n```json\n{_wrapped(text)}\n```")
     return "\n\n".join(parts)
+
+
+def _wrapped(text: str) -> str:
+    """Return JSON text in lines of at most `WIDTH` characters, broken after commas outside of strings."""
+    lines = [""]
+    for part in re.findall(r'(?:"(?:[^"\\]|\\.)*"|[^",])+,?', text):
+        if lines[-1] and len(lines[-1]) + len(part) > WIDTH:
+            lines.append("")
+        lines[-1] += part if lines[-1] else part.lstrip()
+    return "\n".join(lines)
 
 
 def documents() -> dict[str, str]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.drivers.devices.ground_speed import GROUND_SPEED
 from regolithd.drivers.devices.load_cell import LOAD
 from regolithd.drivers.devices.motor_controller import MOTOR_CURRENT, MOTOR_SPEED
 from regolithd.drivers.devices.registry import QUANTITIES
@@ -31,6 +32,8 @@ WHEEL_QUANTITIES = tuple(quantity for quantity in QUANTITIES if quantity.per_whe
 BODY_QUANTITIES = tuple(quantity for quantity in QUANTITIES if not quantity.per_wheel)
 NEEDED = (MOTOR_CURRENT, MOTOR_SPEED, LOAD)
 """The quantities that an estimate of a wheel needs."""
+
+_NEEDED_ROWS = [ROW[quantity] for quantity in NEEDED]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,57 +62,27 @@ class Snapshot:
     @property
     def motor_current_A(self) -> Array:
         """Motor current, signed [A]."""
-        return self.values[0]
+        return self[MOTOR_CURRENT]
 
     @property
     def motor_speed_rad_s(self) -> Array:
         """Motor speed before the gears, signed [rad/s]."""
-        return self.values[1]
+        return self[MOTOR_SPEED]
 
     @property
     def load_N(self) -> Array:
         """Load on the wheel [N]."""
-        return self.values[2]
+        return self[LOAD]
 
     @property
     def ground_speed_m_s(self) -> Array:
         """Speed of the hub over ground [m/s]."""
-        return self.values[3]
-
-    @property
-    def pitch_rad(self) -> Array:
-        """Pitch of the body, positive nose up [rad]."""
-        return self.values[4]
-
-    @property
-    def roll_rad(self) -> Array:
-        """Roll of the body, positive right side down [rad]."""
-        return self.values[5]
-
-    @property
-    def yaw_rate_rad_s(self) -> Array:
-        """Yaw rate of the body, positive to the left [rad/s]."""
-        return self.values[6]
-
-    @property
-    def motor_temperature_degC(self) -> Array:
-        """Temperature of the motor [°C]."""
-        return self.values[7]
-
-    @property
-    def bus_voltage_V(self) -> Array:
-        """Supply voltage at the motor controller [V]."""
-        return self.values[8]
-
-    @property
-    def statusword(self) -> Array:
-        """Statusword of the motor controller (0x6041), as a number."""
-        return self.values[9]
+        return self[GROUND_SPEED]
 
     @property
     def valid(self) -> Mask:
         """Where current, speed and load all arrived in this SYNC's window."""
-        needed: Mask = np.isfinite(self.values[: len(NEEDED)])
+        needed: Mask = np.isfinite(self.values[_NEEDED_ROWS])
         return np.logical_and.reduce(needed, axis=0)
 
 

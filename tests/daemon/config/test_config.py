@@ -121,3 +121,24 @@ def test_an_absolute_path_is_not_changed(name: str) -> None:
     text = f'[{table}]\n{key} = "/some/where"\n' + ('username = "x"\n' if key == "password_file" else "")
     read = parse_configuration(text, Path("/etc/regolithd/rover.toml"))
     assert getattr(getattr(read, table), key) == Path("/some/where")
+
+
+def test_only_the_motors_of_the_mirrored_wheels_are_mirrored() -> None:
+    """`mirrored_wheels` counts wheels from 1; load cells and body sensors have no direction."""
+    nodes = parse_configuration("[nodes]\nmirrored_wheels = [2, 6]\ninclinometer = 21\n", Path("rover.toml")).nodes
+    described = nodes.described()
+    assert [node.node_id for node in described if node.mirrored] == [2, 6]
+    assert [node.wheel for node in described if node.mirrored] == [1, 5]
+
+
+def test_motor_diagnostics_are_of_the_motors_alone() -> None:
+    """The other nodes have no supply voltage and motor temperature."""
+    nodes = parse_configuration("[nodes]\nmotor_diagnostics = true\n", Path("rover.toml")).nodes
+    assert [node.node_id for node in nodes.described() if node.diagnostics] == [1, 2, 3, 4, 5, 6]
+
+
+def test_a_wrong_element_of_a_list_is_reported_with_its_place() -> None:
+    """The first wheel is element 0 of the list."""
+    assert set(problems_of("[nodes]\nmotors = [1, 2, 3, 4, 5, 300]\n")) == {"nodes.motors[5]"}
+    assert set(problems_of("[nodes]\nmotors = [1, 300]\n")) == {"nodes.motors[1]", "nodes.motors"}
+    assert set(problems_of("[nodes]\nload_cells = [1, 12, 13, 14, 15, 16]\n")) == {"nodes.load_cells[0]"}

@@ -1,6 +1,7 @@
 """What is published is what the models and the documents say."""
 
 import json
+import re
 from pathlib import Path
 
 import jsonschema
@@ -11,6 +12,7 @@ from pydantic import ValidationError
 
 from regolithd.daemon.messages.channels import CHANNELS
 from regolithd.daemon.messages.documents import documents
+from regolithd.daemon.messages.examples import example
 from regolithd.daemon.messages.header import iso_time
 from regolithd.daemon.messages.measurements import SnapshotMessage, WheelMessage
 from regolithd.daemon.messages.state import StateMessage
@@ -144,3 +146,18 @@ def test_no_message_is_taken_with_a_field_too_many() -> None:
     snapshot, _ = encode(estimate(), SESSION)
     with pytest.raises(ValidationError):
         SnapshotMessage.model_validate(json.loads(snapshot) | {"extra": 1})
+
+
+def test_the_readme_of_the_messages_shows_the_example_of_each() -> None:
+    """Each block is JSON, in the order of the channels, and text is not escaped."""
+    shown = [
+        json.loads(block) for block in re.findall(r"```json\n(.*?)\n```", documents()["README.md"], flags=re.DOTALL)
+    ]
+    assert shown == [example(channel) for channel in CHANNELS]
+
+
+def test_text_in_an_example_is_written_as_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A reader sees `Ω`, not its escape."""
+    monkeypatch.setattr("regolithd.daemon.messages.documents.example", lambda _: {"cure": "120 Ω"})
+    assert documents()["README.md"].count('"120 Ω"') == len(CHANNELS)
+    assert '"120 Ω"' in documents()["asyncapi.json"]

@@ -1,5 +1,6 @@
 """What was recorded reads back the same to the last bit, whole or cut off anywhere."""
 
+import json
 import math
 import shutil
 import subprocess
@@ -16,9 +17,10 @@ from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.pipeline.pipeline import Chain
 from regolithd.daemon.recording.candump import frame_line, parse_line, read_log
 from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, snapshot_from_json
-from regolithd.daemon.recording.digest import Digest
-from regolithd.daemon.recording.mcap_file import read_messages, read_metadata
+from regolithd.daemon.recording.digest import Digest, _flattened
+from regolithd.daemon.recording.mcap_file import McapFile, read_messages, read_metadata
 from regolithd.daemon.recording.recorder import Recorder
+from regolithd.daemon.recording.replay import replay_logs
 from regolithd.drivers.can.frame import Frame
 
 FRAMES = st.builds(
@@ -215,3 +217,45 @@ def test_numbers_that_are_not_are_null(drive: Callable, configuration: Configura
             if isinstance(row, list)
             for value in row
         )
+
+
+def test_a_recording_of_version_0_1_is_compared_under_todays_names(
+    tmp_path: Path, drive: Callable, configuration: Configuration
+) -> None:
+    """Its estimates have `belief` where they now have `posterior`; a number that differs is still found."""
+    calibrated = {"no_load_current_A": 0.037, "no_load_current_std_A": 0.001, "gain_relative_std": 0.03}
+    configuration = Configuration.model_validate(configuration.model_dump() | {"drivetrain": calibrated})
+    mcap, log, digest = recorded(tmp_path, list(drive(rate_Hz=2.0).frames(20)), configuration)
+    messages = list(read_messages(mcap))
+    models = load_models(configuration)
+    for factor in (1.0, 1.0 + 2**-52):
+        old = McapFile(mcap.open("wb"), {})
+        posteriors = 0
+        for message in messages:
+            content = dict(message.content)
+            if posterior := content.pop("posterior", None):
+                posteriors += 1
+                interval = posterior["cohesion_Pa"] | {"mean": factor * posterior["cohesion_Pa"]["mean"]}
+                content["belief"] = posterior | {"cohesion_Pa": interval}
+            old.write(message.topic, message.time_ns, json.dumps(content).encode())
+        old.close()
+        result = replay_logs([log], configuration, models)
+        assert posteriors > 10
+        assert result.compared == 2 * digest.count == 40
+        assert len(result.different) == (0 if factor == 1.0 else posteriors)
+        assert str(result.digest) == str(digest)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"), [(1.0, 1), ("1", 1), (None, ""), (0.0, -0.0), (("a", "b"), ("ab", "")), (1.0, 1.0 + 2**-52)]
+)
+def test_the_digest_differs_for_values_that_differ_in_type_sign_or_last_bit(one: object, other: object) -> None:
+    """Otherwise equal digests could hide a difference."""
+    assert b"".join(_flattened((one,))) == b"".join(_flattened((one,)))
+    assert b"".join(_flattened((one,))) != b"".join(_flattened((other,)))
+
+
+def test_the_digest_refuses_a_value_that_it_cannot_encode() -> None:
+    """A new field of an unknown type must not be left out silently."""
+    with pytest.raises(TypeError, match="no encoding"):
+        list(_flattened(([1.0],)))
