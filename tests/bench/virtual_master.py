@@ -125,7 +125,7 @@ class DriveUnderTest:
         self.master.configure(1, tpdo=MOTOR_TPDO, rpdo=MOTOR_RPDO)
         self.master.nmt(1)
 
-    def say(self, controlword: int, target_rpm: int = 0) -> int:
+    def send_controlword(self, controlword: int, target_rpm: int = 0) -> int:
         """Send controlword and target, and return the state bits (mask 0x6F) that follow."""
         self.master.send(0x201, struct.pack("<Hi", controlword, target_rpm))
         return self.state
@@ -148,12 +148,12 @@ class DriveUnderTest:
     def enable(self) -> None:
         """Go through the states of CiA 402 to operation enabled."""
         for controlword in (0x06, 0x07, 0x0F):
-            self.say(controlword)
+            self.send_controlword(controlword)
         assert self.state == 0x27
 
     def run_at(self, rpm: int) -> None:
         """Enable, and wait until it turns at this speed."""
         self.enable()
-        self.say(0x0F, rpm)
+        self.send_controlword(0x0F, rpm)
         self.master.wait(2)
         assert self.speed_rpm == rpm

@@ -83,7 +83,7 @@ def test_the_wheel_has_one_import_name(wheel: Path) -> None:
     sources = [
         path.relative_to(ROOT)
         for room in ("daemon", "drivers", "calibration")
-        for pattern in ("*.py", "*.eds", "*.onnx", "*.html", "*.toml")
+        for pattern in ("*.py", "*.eds", "*.onnx", "*.html", "*.css", "*.toml")
         for path in (ROOT / room).rglob(pattern)
     ]
     assert {f"regolithd/{path}" for path in sources} <= set(names)

@@ -98,7 +98,7 @@ def test_uphill_costs_current() -> None:
 
 
 def test_the_front_wheels_reach_new_soil_first() -> None:
-    """Truth says wheel by wheel what it stands on, and when that changed."""
+    """The ground truth lists the soil under each wheel, and each change."""
     stretches = [{"soil": "sandy-loam", "until_m": 1.0}, {"soil": "clayey-soil"}]
     world = even(ground={"stretches": stretches})
     records = drive(world, 140)

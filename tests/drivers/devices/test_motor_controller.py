@@ -14,17 +14,17 @@ def test_it_follows_its_ramps() -> None:
     drive.master.write(1, 0x6083, 0, 1000, 4)
     drive.master.write(1, 0x6084, 0, 2000, 4)
     drive.enable()
-    drive.say(0x0F, 1500)
+    drive.send_controlword(0x0F, 1500)
     drive.master.wait(1)
     assert drive.speed_rpm == pytest.approx(1000, abs=25)
     assert not drive.statusword & 0x0400
     drive.master.wait(1)
     assert drive.speed_rpm == 1500
     assert drive.statusword & 0x0400  # target reached
-    drive.say(0x0F, 500)
+    drive.send_controlword(0x0F, 500)
     drive.master.wait(0.25)
     assert drive.speed_rpm == pytest.approx(1000, abs=45)
-    drive.say(0x0F, -500)
+    drive.send_controlword(0x0F, -500)
     drive.master.wait(2)
     assert drive.speed_rpm == -500
 
@@ -32,18 +32,18 @@ def test_it_follows_its_ramps() -> None:
 def test_it_turns_only_in_operation_enabled() -> None:
     """A target alone moves nothing; halt stops without leaving the state; disabling stops."""
     drive = DriveUnderTest()
-    drive.say(0x06, 1000)
+    drive.send_controlword(0x06, 1000)
     drive.master.wait(1)
     assert drive.speed_rpm == 0
     drive.run_at(1000)
-    assert drive.say(0x10F, 1000) == 0x27
+    assert drive.send_controlword(0x10F, 1000) == 0x27
     drive.master.wait(1)
     assert drive.speed_rpm == 0
     assert drive.statusword & 0x1000
-    drive.say(0x0F, 1000)
+    drive.send_controlword(0x0F, 1000)
     drive.master.wait(1)
     assert drive.speed_rpm == 1000
-    assert drive.say(0x07, 1000) == 0x23
+    assert drive.send_controlword(0x07, 1000) == 0x23
     drive.master.wait(1)
     assert drive.speed_rpm == 0
 
@@ -53,7 +53,7 @@ def test_the_speed_is_limited() -> None:
     drive = DriveUnderTest()
     drive.master.write(1, 0x607F, 0, 600, 4)
     drive.enable()
-    drive.say(0x0F, 5000)
+    drive.send_controlword(0x0F, 5000)
     drive.master.wait(2)
     assert drive.speed_rpm == 600
 
@@ -69,7 +69,7 @@ def test_quick_stop_brakes_as_its_option_says(option: int, ramp: int, after: int
     drive.master.write(1, 0x6085, 0, 4000, 4)
     drive.master.write(1, 0x605A, 0, option, 2)
     drive.run_at(3000)
-    assert drive.say(0x02, 3000) == 0x07
+    assert drive.send_controlword(0x02, 3000) == 0x07
     drive.master.wait(2900 / ramp)
     assert 0 < drive.speed_rpm <= 3000 or ramp == 50_000
     drive.master.wait(0.5)
@@ -82,9 +82,9 @@ def test_from_a_holding_quick_stop_it_may_go_on() -> None:
     drive = DriveUnderTest()
     drive.master.write(1, 0x605A, 0, 6, 2)
     drive.run_at(1000)
-    drive.say(0x02)
+    drive.send_controlword(0x02)
     drive.master.wait(1)
-    assert drive.say(0x0F, 1000) == 0x27
+    assert drive.send_controlword(0x0F, 1000) == 0x27
 
 
 def test_a_fault_stops_it_tells_why_and_lasts() -> None:
@@ -102,7 +102,7 @@ def test_a_fault_stops_it_tells_why_and_lasts() -> None:
     assert (master.read(1, 0x603F), master.read(1, 0x1001)) == (0x2310, 0x03)
     assert (master.read(1, 0x1003), master.read(1, 0x1003, 1)) == (1, 0x2310)
     before = len(master.seen)
-    assert drive.say(0x80) == 0x40
+    assert drive.send_controlword(0x80) == 0x40
     assert [f.data for f in master.seen[before:] if f.can_id == 0x81] == [bytes(8)]
     assert (master.read(1, 0x603F), master.read(1, 0x1001)) == (0, 0)
 
@@ -135,8 +135,8 @@ def test_a_master_that_is_heard_again_does_not_start_it() -> None:
     drive.master.wait(1)
     drive.master.heartbeat()
     drive.master.nmt(1)
-    assert drive.say(0x0F, 1000) == 0x08
-    assert drive.say(0x8F) == 0x40
+    assert drive.send_controlword(0x0F, 1000) == 0x08
+    assert drive.send_controlword(0x8F) == 0x40
     drive.enable()
 
 
@@ -195,7 +195,7 @@ def test_averaged_current_and_velocity_follow_the_measured_ones() -> None:
     drive.master.wait(1)
     assert drive.master.read(1, 0x2027) == 40
     assert drive.master.read(1, 0x2028) == 1000
-    drive.say(0x0F, 2000)
+    drive.send_controlword(0x0F, 2000)
     drive.master.wait(0.11)
     assert drive.speed_rpm == 2000
     assert 1500 < drive.master.read(1, 0x2028) < 1900

@@ -118,9 +118,9 @@ def test_every_sensor_says_what_the_plant_says() -> None:
 def test_a_synchronous_rpdo_waits_for_the_sync() -> None:
     """Type 1: what came is done at the next SYNC; type 255: at once."""
     drive = DriveUnderTest()
-    assert drive.say(0x06) == 0x21
+    assert drive.send_controlword(0x06) == 0x21
     drive.master.write(1, 0x1400, 2, 1, 1)
-    assert drive.say(0x07) == 0x21
+    assert drive.send_controlword(0x07) == 0x21
     drive.master.sync()
     assert drive.state == 0x23
 

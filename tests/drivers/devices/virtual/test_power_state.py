@@ -89,23 +89,23 @@ def test_the_ladder_up_and_down_over_the_bus() -> None:
     """By controlword in a PDO, each rung shows in the statusword; what skips a rung is ignored."""
     drive = DriveUnderTest()
     assert drive.state == 0x40
-    assert drive.say(0x0F) == 0x40  # enable operation: illegal from here
-    assert drive.say(0x07) == 0x40
-    assert drive.say(0x06) == 0x21
-    assert drive.say(0x07) == 0x23
-    assert drive.say(0x0F) == 0x27
-    assert drive.say(0x07) == 0x23
-    assert drive.say(0x06) == 0x21
-    assert drive.say(0x00) == 0x40
+    assert drive.send_controlword(0x0F) == 0x40  # enable operation: illegal from here
+    assert drive.send_controlword(0x07) == 0x40
+    assert drive.send_controlword(0x06) == 0x21
+    assert drive.send_controlword(0x07) == 0x23
+    assert drive.send_controlword(0x0F) == 0x27
+    assert drive.send_controlword(0x07) == 0x23
+    assert drive.send_controlword(0x06) == 0x21
+    assert drive.send_controlword(0x00) == 0x40
 
 
 def test_a_fault_is_reset_by_a_rising_edge_only() -> None:
     """Bit 7 that stands already, or falls, resets nothing; nor does any other command leave fault."""
     drive = DriveUnderTest()
-    drive.say(0x80)
+    drive.send_controlword(0x80)
     drive.master.rover.inject_fault("fault 1 0x2310")
     assert drive.state == 0x08
-    assert drive.say(0x80) == 0x08  # no edge: it stood before the fault
+    assert drive.send_controlword(0x80) == 0x08  # no edge: it stood before the fault
     for controlword in (0x06, 0x07, 0x0F, 0x00):
-        assert drive.say(controlword) == 0x08
-    assert drive.say(0x80) == 0x40
+        assert drive.send_controlword(controlword) == 0x08
+    assert drive.send_controlword(0x80) == 0x40
