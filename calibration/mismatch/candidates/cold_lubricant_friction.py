@@ -26,10 +26,14 @@ SCALES_K = (6.0, 11.0, 20.0, 45.0)
 """Temperature changes for a factor e near the coldest reading, as searched [K] (a choice: in steps of about two)."""
 STEEPEST_K = 5.0
 """Least temperature change for a factor e, or for the whole drag to vanish [K] (a choice: greases have 10 to 40 K)."""
+ABOVE_POLE_K = 5.0
+"""Least distance from the pole, where the law has no limit [K] (a choice: no reading is that cold)."""
 COLDEST_QUANTILE = 0.005
 """Quantile of the temperature that counts as the coldest, so that single readings do not."""
 END_QUANTILES = (0.35, 0.6, 0.85)
 """Quantiles of the temperature at which a linear drag may end (a choice)."""
+LOWEST_END_QUANTILE, FURTHEST_END_K = 0.2, 40.0
+"""Range of the end of a linear drag: from this quantile to so far above the warmest reading [K] (a choice)."""
 BEYOND_K = 20.0
 """A linear drag may end this far above the warmest reading too [K] (a choice)."""
 
@@ -81,7 +85,7 @@ class ColdLubricantFriction(Candidate):
         if "scale_K" in shape:
             # Vogel: ln η = A + B/(T − T_0); near the coldest reading the viscosity falls by a factor e over the scale.
             pole = float(shape["pole_degC"])
-            above, coldest_above = np.maximum(temperature - pole, 5.0), max(coldest - pole, 5.0)
+            above, coldest_above = (np.maximum(each - pole, ABOVE_POLE_K) for each in (temperature, coldest))
             return np.asarray(np.exp(coldest_above / float(shape["scale_K"]) * (coldest_above / above - 1)))
         end = float(shape["no_drag_above_degC"])
         return np.maximum(end - temperature, 0.0) / max(end - coldest, STEEPEST_K)
@@ -89,8 +93,8 @@ class ColdLubricantFriction(Candidate):
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
         """Return the range of the one parameter that this shape has."""
         temperature = problem.covariates["temperature"][problem.mask]
-        soonest = max(float(np.nanquantile(temperature, 0.2)), _coldest(problem) + STEEPEST_K)
-        ends = (soonest, max(float(np.nanmax(temperature)), soonest) + 40)
+        soonest = max(float(np.nanquantile(temperature, LOWEST_END_QUANTILE)), _coldest(problem) + STEEPEST_K)
+        ends = (soonest, max(float(np.nanmax(temperature)), soonest) + FURTHEST_END_K)
         return {"scale_K": self.free["scale_K"]} if "scale_K" in shape else {"no_drag_above_degC": ends}
 
 

@@ -23,6 +23,11 @@ OFFSETS = (-3.0, -2.2, -1.6, -1.1, -0.8, -0.55, -0.4, -0.2, 0.0, 0.15, 0.3, 0.4,
 """Offsets of the drift in mean readings, at which the simulation runs; a parabola interpolates between them (a choice:
 dense where the current depends on the load most)."""
 
+LEAST_SHARE = 0.1
+"""Share of the reading that is left of the load at least: the contact model needs a positive load (a choice)."""
+LEAST_READINGS = 10
+"""Readings below which no posture is fitted: as many as the regression has columns."""
+
 
 class LoadCellDrift(Candidate):
     """A load reading that drifts while the current does not follow it.
@@ -82,7 +87,9 @@ class LoadCellDrift(Candidate):
         if key not in problem.made:
             load = problem.covariates["load"]
             wrong = known_mean(load) * (self._drift(problem) + offset)
-            problem.made[key] = problem.with_input("load_N", np.maximum(load - wrong, 0.1 * load)) - problem.filled
+            problem.made[key] = (
+                problem.with_input("load_N", np.maximum(load - wrong, LEAST_SHARE * load)) - problem.filled
+            )
         return problem.made[key]
 
     def _drift(self, problem: Problem) -> Array:
@@ -112,7 +119,7 @@ def _without_posture(problem: Problem, values: Array) -> Array:
         pitch, roll = (np.nan_to_num(problem.covariates[name][:, k]) for name in ("pitch", "roll"))
         posture = np.column_stack((pitch, roll, pitch**2, roll**2, pitch * roll))
         known = np.isfinite(values[:, k])
-        if known.sum() > 10:
+        if known.sum() > LEAST_READINGS:
             line = broken_lines(problem.time_s[:, 0], known, POSTURE_KNOTS) or [np.ones(len(pitch))]
             beside = np.column_stack((posture, *line))
             fitted = np.linalg.lstsq(beside[known], values[known, k], rcond=None)[0][: posture.shape[1]]

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch import Prior, Simulation
+from regolithd.calibration.parameters import GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch import Array
 
-GRAVITY_M_S2 = 9.81
 CREEPING_M_S = 0.02
 """Rim speed below which a side counts as standing [m/s]."""
 

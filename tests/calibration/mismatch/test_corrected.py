@@ -6,12 +6,14 @@ from typing import Any
 import numpy as np
 import pytest
 from drives import TABLES, columns, simulation
+from servo import ServoAxis
 
+from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.comparison import Comparison, compare
 from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel
-from regolithd.calibration.toml_document import to_toml
+from regolithd.calibration.toml_document import to_toml, with_tables
 
 CONCEALED_A = 0.037
 
@@ -62,3 +64,49 @@ def test_parameters_that_lean_over_stay_where_they_can_be(found: Comparison) -> 
     tables = corrected_tables(TABLES, simulation(), moved, ())
     assert tables["drivetrain"]["gain_factor"] == pytest.approx([1 - 3 * 0.02] * 6)
     assert tables["soil"]["friction_angle_deg"] == pytest.approx(30.3 * (1 + 3 * 0.02))
+
+
+def test_the_user_s_comments_and_order_stay(found: Comparison) -> None:
+    """SIM.toml is edited, not written anew."""
+    text = to_toml(TABLES).replace("[soil]", "[soil]  # from the bin").replace("k_phi_kN", "# stiff\nk_phi_kN")
+    evidence = found.evidence
+    tables = corrected_tables(TABLES, simulation(), evidence.values, evidence.contributions, found.answer.effects)
+    edited = with_tables(text, tables)
+    assert tomllib.loads(edited) == tomllib.loads(to_toml(tables))
+    assert "[soil]  # from the bin" in edited
+    assert "# stiff\nk_phi_kN" in edited
+
+
+def test_a_simulation_without_keys_for_an_effect_leaves_it_to_the_list() -> None:
+    """Only the rover's simulation has friction in its own tables."""
+    term = Contribution("coulomb-friction", {}, (0.5,), (1,), 0.1)
+    tables = corrected_tables({"simulation": {"model": "servo:ServoAxis"}}, ServoAxis(), {"mass_kg": 96.0}, (term,))
+    assert tables["parameters"]["mass_kg"] == {"value": 96.0, "std": 2.0}
+    (effect,) = tables["effects"]
+    assert effect == {
+        "name": "coulomb-friction",
+        "shape": {},
+        "coefficients": [0.5],
+        "wheels": [1],
+        "relative_std": 0.1,
+    }
+    assert stated_effects(tables) == (term,)
+
+
+def test_viscous_friction_is_told_per_motor_speed_and_its_wheels_alone_have_it() -> None:
+    """The effect is per wheel speed; another power stays in the list; standard deviations add in quadrature."""
+    rover = simulation()
+    values = {name: prior.value for name, prior in rover.parameters.items()}
+    terms = [
+        Contribution("viscous-friction", {"power": 1.0}, (0.14,), (2, 5), 0.1),
+        Contribution("viscous-friction", {"power": 0.8}, (0.14,), (2,), 0.1),
+        Contribution("coulomb-friction", {}, (0.03,), (1,), 0.2),
+        Contribution("coulomb-friction", {}, (0.04,), (1,), 0.2),
+    ]
+    tables = corrected_tables(TABLES, rover, values, terms)
+    drivetrain = tables["drivetrain"]
+    assert drivetrain["viscous_current_A_s_per_rad"] == pytest.approx([0, 1e-4, 0, 0, 1e-4, 0])
+    assert drivetrain["viscous_current_std_A_s_per_rad"] == pytest.approx([0, 1e-5, 0, 0, 1e-5, 0])
+    assert drivetrain["no_load_current_A"] == pytest.approx([0.07, 0, 0, 0, 0, 0])
+    assert drivetrain["no_load_current_std_A"] == pytest.approx([0.01, 0, 0, 0, 0, 0])
+    assert [effect["shape"]["power"] for effect in tables["effects"]] == [0.8]
