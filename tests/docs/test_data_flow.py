@@ -1,0 +1,72 @@
+"""The page that walks the data through the code names files that exist, in an order that imports connect."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs/explanation/data-flow.md").read_text(encoding="utf-8")
+STEP = re.compile(r"^(\d+)\. `([^`]+)`", flags=re.MULTILINE)
+COUNT = re.compile(r"^(\d+) files; (\d+) in version 0\.1\.0", flags=re.MULTILINE)
+WALKS = {section.splitlines()[0]: section for section in PAGE.split("\n## ")[1:]}
+IN_0_1_0 = {
+    "A CAN frame becomes an MQTT message": """
+        drivers/socketcan drivers/kernel_batch drivers/bus drivers/network drivers/decode daemon/service daemon/replay
+        daemon/acquire daemon/pipeline calibration/drivetrain daemon/slip daemon/smooth daemon/estimate
+        daemon/publish/outlet daemon/publish/publisher daemon/publish/encode daemon/publish/outbox daemon/publish/spool
+        daemon/publish/segment daemon/publish/link
+    """,
+    "A CSV row becomes an answer": """
+        daemon/commands/mismatch
+    """,
+    "A key in rover.toml becomes a behaviour": """
+        daemon/commands/run daemon/start_up daemon/config_reader daemon/config daemon/service daemon/replay
+        daemon/pipeline daemon/smooth
+    """,
+}
+"""The same walks by the same rule in version 0.1.0 (commit c69d7bb)."""
+
+
+def imported(path: str) -> set[str]:
+    """Files of the project that a file imports, wherever in it."""
+    found = set()
+    for node in ast.walk(ast.parse((ROOT / path).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("regolithd."):
+            place = node.module.removeprefix("regolithd.").replace(".", "/")
+            found |= {f"{place}.py", *(f"{place}/{name.name}.py" for name in node.names)}
+    return found
+
+
+@pytest.mark.parametrize("walk", IN_0_1_0)
+def test_every_step_is_a_file(walk: str) -> None:
+    """The steps of a walk are numbered, and each is a file."""
+    steps = STEP.findall(WALKS[walk])
+    assert [int(number) for number, _ in steps] == list(range(1, len(steps) + 1))
+    assert [path for _, path in steps if not (ROOT / path).is_file()] == []
+
+
+@pytest.mark.parametrize("walk", IN_0_1_0)
+def test_imports_connect_each_step_to_those_before_it(walk: str) -> None:
+    """Each file imports, or is imported by, a file that comes before it in the walk."""
+    paths = [path for _, path in STEP.findall(WALKS[walk])]
+    imports = {path: imported(path) for path in paths}
+    loose = [
+        path
+        for place, path in enumerate(paths)
+        if place and not any(path in imports[earlier] or earlier in imports[path] for earlier in paths[:place])
+    ]
+    assert loose == []
+
+
+@pytest.mark.parametrize("walk", IN_0_1_0)
+def test_the_counts_are_those_of_the_lists(walk: str) -> None:
+    """The page tells how many files the walk has and had, and it has not become longer."""
+    told = COUNT.search(WALKS[walk])
+    assert told
+    assert int(told[1]) == len(STEP.findall(WALKS[walk]))
+    assert int(told[2]) == len(IN_0_1_0[walk].split())
+    assert int(told[1]) < int(told[2])
