@@ -23,9 +23,10 @@ IN_0_1_0 = {
     "A CSV row becomes an answer": """
         daemon/commands/mismatch calibration/mismatch/simulation calibration/mismatch/recording
         calibration/mismatch/compare calibration/mismatch/scene calibration/mismatch/noise
-        calibration/mismatch/dictionary calibration/mismatch/fill calibration/mismatch/search calibration/mismatch/decide
-        calibration/mismatch/held_out calibration/mismatch/intervals calibration/mismatch/statements calibration/mismatch/rivals
-        calibration/mismatch/sensitivity calibration/mismatch/answer
+        calibration/mismatch/dictionary calibration/mismatch/fill calibration/mismatch/search
+        calibration/mismatch/decide calibration/mismatch/held_out calibration/mismatch/intervals
+        calibration/mismatch/statements calibration/mismatch/rivals calibration/mismatch/sensitivity
+        calibration/mismatch/answer
     """,
     "A key in rover.toml becomes a behaviour": """
         daemon/commands/run daemon/start_up daemon/config_reader daemon/config daemon/service daemon/replay
