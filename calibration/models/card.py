@@ -1,12 +1,12 @@
-"""What a terrain network says about itself in its ONNX metadata: the contract between training and the rover.
+"""Model card of a terrain network, in its ONNX metadata: version, inputs, outputs, gain.
 
 Four keys in the model's `metadata_props`:
 
-- `regolithd.version`: text, changes with every training.
+- `regolithd.version`: text, different for each training.
 - `regolithd.inputs`, `regolithd.outputs`: JSON, a list of `{"name", "unit", "low", "high"}` in the order of the
-  columns. `low` and `high` bound the training set; an input outside them is marked so in what is published.
-- `regolithd.gain_Nm_per_A`: number, the drivetrain's gain (Eq. 11) that the training set was made with. A network that
-  takes `motor_current_A` is given the torque divided by this, so that it is not tied to one rover's gears.
+  columns. `low` and `high` are the range of the training set; inputs outside it are listed in the published messages.
+- `regolithd.gain_Nm_per_A`: number, the drivetrain's gain (Eq. 11) that the training set was made with. A network with
+  the input `motor_current_A` is given the torque divided by this gain, so that it works with other gears.
 
 The model has one input of shape (N, inputs) and one output of shape (N, outputs), float32, N free. Scaling is inside
 the model: it takes and returns the units that it names.
@@ -28,14 +28,14 @@ INPUTS = {
     "wheel_torque_Nm": "N.m",
     "wheel_speed_rad_s": "rad/s",
 }
-"""What the daemon can give a network, with the unit of each."""
+"""Inputs that the daemon can provide, with their units."""
 
 OUTPUTS = {"cohesion_Pa": "Pa", "tan_friction_angle": "1"}
-"""What the daemon takes from a network, in this order."""
+"""Outputs that a network must have, in this order, with their units."""
 
 
 class ModelCardError(ValueError):
-    """A network's metadata do not fit; `problems` says each thing that is wrong."""
+    """The metadata are not a valid model card; `problems` lists everything that is wrong."""
 
     def __init__(self, problems: list[str]) -> None:
         super().__init__("; ".join(problems))
@@ -44,7 +44,7 @@ class ModelCardError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """One column of a network's input or output: [low, high] bounds the training set."""
+    """One column of the input or output; [low, high] is its range in the training set."""
 
     name: str
     unit: str
@@ -54,7 +54,7 @@ class Variable:
 
 @dataclass(frozen=True, slots=True)
 class ModelCard:
-    """What a network takes and returns, and which one it is."""
+    """Version, inputs, outputs and gain of a terrain network."""
 
     version: str
     inputs: tuple[Variable, ...]
@@ -72,7 +72,7 @@ class ModelCard:
 
 
 def read_card(metadata: Mapping[str, str]) -> ModelCard:
-    """Return the card that the metadata hold; raise `ModelCardError` with everything that does not fit."""
+    """Return the card in the metadata; raise `ModelCardError` with everything that is wrong."""
     problems: list[str] = []
     inputs = _variables(metadata, "regolithd.inputs", INPUTS, problems)
     outputs = _variables(metadata, "regolithd.outputs", OUTPUTS, problems)
@@ -102,7 +102,7 @@ def _variables(
         problems.append(f'{key} is missing or not a JSON list of {{"name", "unit", "low", "high"}}')
         return ()
     if not variables:
-        problems.append(f"{key} names nothing")
+        problems.append(f"{key} is empty")
     for variable in variables:
         if variable.name not in known:
             problems.append(f"{key}: {variable.name!r} is unknown; known are {', '.join(known)}")

@@ -1,4 +1,4 @@
-"""How the rover opens and runs its networks: one thread that does not spin, since one call of six wheels is quick."""
+"""Opens an ONNX model with onnxruntime: one thread without spinning, since one call takes less than a millisecond."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ if TYPE_CHECKING:
 
 
 class ModelError(Exception):
-    """A network cannot be used; the message says which file, what is wrong with it, and the cure."""
+    """A model cannot be used; the message has the file, the problem, and the remedy."""
 
 
-def open_session(path: Path, cure: str) -> onnxruntime.InferenceSession:
-    """Return the network of a file, ready to run.
+def open_session(path: Path, remedy: str) -> onnxruntime.InferenceSession:
+    """Return an onnxruntime session of a model file.
 
     Raises
     ------
     ModelError
-        There is no such file, or it is damaged or no network; the message ends with `cure`.
+        There is no such file, or it is not an ONNX model; the message ends with `remedy`.
     """
     if not path.is_file():
-        raise ModelError(f"{path}: no such file. {cure}")
+        raise ModelError(f"{path}: no such file. {remedy}")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
@@ -31,5 +31,5 @@ def open_session(path: Path, cure: str) -> onnxruntime.InferenceSession:
     options.log_severity_level = 3
     try:
         return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
-    except Exception as error:  # onnxruntime's errors have no common class
-        raise ModelError(f"{path}: damaged, or not an ONNX model ({error}). {cure}") from error
+    except Exception as error:  # onnxruntime's errors have no common base class
+        raise ModelError(f"{path}: damaged, or not an ONNX model ({error}). {remedy}") from error

@@ -1,10 +1,10 @@
-"""The posterior on the rover: the last seconds of six wheels in, intervals of cohesion, friction angle and margin out.
+"""Posterior of cohesion, friction angle and drawbar margin from a window of measurements, on the rover.
 
-NumPy and onnxruntime only. A `Buffer` collects measurements and hands out the window; a `PosteriorEstimator` runs the
-network on it. Neither reads a clock: time comes with the measurements, so that a replay gives the same numbers.
+NumPy and onnxruntime only. A `Buffer` collects measurements into a window; a `PosteriorEstimator` runs the posterior
+network on it. Neither reads a clock: the time comes with the measurements, so that a replay gives the same numbers.
 
-What comes out is the posterior under the prior of `soils`: as wide as the data leave it. One instant of one wheel says
-little more than the prior, and the intervals show it.
+The result is the posterior under the prior of `terrain.soils`. Its intervals widen with less data: one instant of one
+wheel adds little to the prior.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from regolithd.calibration.posterior.mixture import TARGETS, Mixture, unpack
 from regolithd.calibration.posterior.window import (
     INTERVAL_S,
     KNOWN,
-    LONGEST,
+    MAX_INSTANTS,
     CalibrationUncertainty,
     Windows,
     reduce_windows,
@@ -35,26 +35,24 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-"""The posterior network that comes with regolithd."""
-
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""The quantiles that are told: of the 90 % interval, of the 50 % interval, and the median."""
+"""Quantiles that are published: limits of the 90 % and 50 % intervals, and the median."""
 
 WHEELS = 6
 _SAMPLES = 4000
 _SEED = 20
 
 
-CURE = "Train one (`regolithd train-posterior`), or mend [posterior] model."
+REMEDY = "Train one (`regolithd train-posterior`), or correct [posterior] model."
 
 
 class PosteriorModelError(ModelError):
-    """A file's network is not a posterior as the daemon needs it."""
+    """A file is not a posterior network with the inputs, targets and metadata that the daemon needs."""
 
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """One quantity's posterior: mean, and the quantiles of `LEVELS`. SI units."""
+    """Posterior of one quantity: mean, and the quantiles of `LEVELS`; SI units."""
 
     mean: float
     low_90: float
@@ -66,7 +64,7 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Posterior:
-    """The posterior of the soil under the rover, given one window of measurements."""
+    """Posterior of the soil under the rover given one window; numbers of wheels and instants with measurements."""
 
     cohesion_Pa: Interval
     friction_angle_rad: Interval
@@ -77,7 +75,7 @@ class Posterior:
 
 @dataclass(frozen=True, slots=True)
 class FallProbability:
-    """How likely it is that each quantity fell between two windows: the evidence of an alarm."""
+    """Probability that each quantity decreased from one window to another [1]; part of an alarm."""
 
     cohesion: float
     friction_angle: float
@@ -86,66 +84,69 @@ class FallProbability:
 
 @dataclass(slots=True)
 class Buffer:
-    """The last `length_s` seconds of measurements, in half-second means; the state is all here.
-
-    Faster samples are averaged over each half second; a wheel that turned round or stood still is NaN there.
-    """
+    """The last `length_s` seconds of measurements as half-second means; NaN where a wheel has no measurement."""
 
     length_s: float = 10.0
-    _closed: deque[Array] = field(default_factory=deque)
-    _open: list[Array] = field(default_factory=list)
+    _completed: deque[Array] = field(default_factory=deque)
+    _current: list[Array] = field(default_factory=list)
     _slot: int | None = None
 
     def add(self, time_ns: int, load_N: Array, slip: Array, torque_Nm: Array) -> bool:
-        """Take one snapshot's load, slip and driving torque, each of shape (6,); say whether a half second closed."""
+        """Add one snapshot's load [N], slip [1], torque [N·m], each (6,); return whether a half second is complete."""
         slot = time_ns // int(INTERVAL_S * 1e9)
-        closed = self._slot is not None and slot != self._slot
-        if closed:
-            self._close()
+        completed = self._slot is not None and slot != self._slot
+        if completed:
+            self._complete()
         if self._slot is not None and not 0 <= slot - self._slot <= self.instants:
-            self._closed.clear()  # a gap as long as the window, or a clock that was set back: begin anew
+            self._completed.clear()  # a gap as long as the window, or time going backwards: start again
         self._slot = slot
-        self._open.append(np.stack([load_N, slip, torque_Nm]).astype(np.float64))
-        return closed
+        self._current.append(np.stack([load_N, slip, torque_Nm]).astype(np.float64))
+        return completed
 
     @property
     def instants(self) -> int:
-        """Return how many half seconds a full window has."""
-        return max(1, min(LONGEST, round(self.length_s / INTERVAL_S)))
+        """Number of half seconds in a full window."""
+        return max(1, min(MAX_INSTANTS, round(self.length_s / INTERVAL_S)))
 
     def window(self) -> Array:
-        """Return load, slip and torque of the closed half seconds, shape (3, instants, 6); may be empty."""
-        return np.stack(self._closed, axis=1) if self._closed else np.empty((3, 0, WHEELS))
+        """Return load, slip and torque of the completed half seconds, shape (3, instants, 6); may be empty."""
+        return np.stack(self._completed, axis=1) if self._completed else np.empty((3, 0, WHEELS))
 
-    def _close(self) -> None:
-        values = np.stack(self._open)
+    def _complete(self) -> None:
+        values = np.stack(self._current)
         known = np.isfinite(values)
         count = known.sum(axis=0)
         total = np.where(known, values, 0.0).sum(axis=0)
-        self._closed.append(np.where(count > 0, total / np.maximum(count, 1), np.nan))
-        self._open.clear()
-        while len(self._closed) > self.instants:
-            self._closed.popleft()
+        self._completed.append(np.where(count > 0, total / np.maximum(count, 1), np.nan))
+        self._current.clear()
+        while len(self._completed) > self.instants:
+            self._completed.popleft()
 
 
 class PosteriorEstimator:
-    """The posterior network, ready to run."""
+    """A posterior network, loaded from an ONNX file.
+
+    Raises
+    ------
+    ModelError
+        The file is absent or damaged (`open_session`), or not a posterior network (`PosteriorModelError`).
+    """
 
     def __init__(self, path: Path = POSTERIOR_MODEL) -> None:
-        self._session = open_session(path, CURE)
+        self._session = open_session(path, REMEDY)
         if {each.name: each.shape[-1] for each in self._session.get_inputs()}.get("known") != KNOWN:
-            raise PosteriorModelError(f"{path}: was trained with other inputs. {CURE}")
+            raise PosteriorModelError(f"{path}: was trained with other inputs. {REMEDY}")
         metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
         try:
             targets = json.loads(metadata["regolithd.targets"])
             self.version = metadata["regolithd.version"]
             self.radius_m = float(metadata["regolithd.radius_m"])
             if tuple(target["name"] for target in targets) != TARGETS:
-                raise PosteriorModelError(f"{path}: its targets are not {', '.join(TARGETS)}, in this order. {CURE}")
+                raise PosteriorModelError(f"{path}: its targets are not {', '.join(TARGETS)}, in this order. {REMEDY}")
             self._centre = np.array([float(target["centre"]) for target in targets])
             self._unit = np.array([float(target["unit"]) for target in targets])
         except (KeyError, ValueError, TypeError) as error:
-            raise PosteriorModelError(f"{path}: its metadata are not a posterior's: {error}. {CURE}") from error
+            raise PosteriorModelError(f"{path}: its metadata are not a posterior's: {error}. {REMEDY}") from error
 
     def mixtures(self, windows: Windows) -> Mixture:
         """Return the posterior of each window."""
@@ -156,10 +157,10 @@ class PosteriorEstimator:
     def fall_probability(
         self, before: Array, after: Array, uncertainty: CalibrationUncertainty
     ) -> FallProbability | None:
-        """Return how likely each quantity fell from one window, (3, instants, 6), to another; None if either is empty.
+        """Return the probability that each quantity decreased from one window to another; None if either is empty.
 
-        The two windows share the errors of gain and no-load current, which are counted in each as if they were not
-        shared: the probabilities err towards one half.
+        Windows have shape (3, instants, 6). The errors of gain and no-load current, which both windows share, are taken
+        as independent: this biases the probabilities towards one half.
         """
         if not (_usable(before).any() and _usable(after).any()):
             return None
@@ -184,7 +185,7 @@ class PosteriorEstimator:
 
     def _reduce(self, window: Array, uncertainty: CalibrationUncertainty) -> Windows:
         load, slip, torque = window[:, None]
-        return reduce_windows(load, slip, torque, uncertainty.deviations(), self.radius_m, uncertainty.told())
+        return reduce_windows(load, slip, torque, uncertainty.deviations(), self.radius_m, uncertainty.soil_index())
 
 
 def _usable(window: Array) -> NDArray[np.bool_]:

@@ -1,7 +1,7 @@
-"""A mixture of Gaussians over (cohesion, friction angle, drawbar margin): what the posterior network says, read out.
+"""Mixture of Gaussians over cohesion, friction angle and drawbar margin: the output of the posterior network.
 
-NumPy only, for the rover. The network works with standardised log c, φ and margin; what is read out is in pascals,
-radians and shares of the load.
+NumPy only. The mixture is over the standardised ln c, φ and margin; means, quantiles and samples are in pascals,
+radians, and as a share of the load.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 TARGETS = ("cohesion_Pa", "friction_angle_rad", "drawbar_margin")
-"""What there is a posterior of. Cohesion is worked with as its logarithm."""
+"""Quantities of the posterior, in order; the mixture is over the logarithm of the cohesion."""
 
 PARAMETERS = 10
-"""For each component: log weight, three means, three log scales and the lower triangle of a whitening matrix."""
+"""Outputs for each component: log weight, three means, lower triangle of a whitening matrix (diagonal as log)."""
 
 _GRID = 401
-_REACH = 4.5
+_HALF_WIDTH = 4.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +36,7 @@ class Mixture:
     whitening
         Shape (N, K, 3, 3): lower triangular A with A (u − mean) of unit covariance.
     centre, unit
-        Shape (3,): what zero and one of the standardised targets mean.
+        Shape (3,): mean and standard deviation that standardise the targets.
     """
 
     weight: Array
@@ -47,7 +47,7 @@ class Mixture:
     unit: Array
 
     def means(self) -> Array:
-        """Return the posterior means, shape (N, 3); of cohesion itself, not of its logarithm."""
+        """Return the posterior means, shape (N, 3), of the cohesion and not of its logarithm."""
         means = np.sum(self.weight[..., None] * (self.centre + self.unit * self.mean), axis=1)
         spread = (self.unit[0] * self.std[..., 0]) ** 2
         log_mean = self.centre[0] + self.unit[0] * self.mean[..., 0]
@@ -64,8 +64,8 @@ class Mixture:
         return self._physical(answer)
 
     def ranks(self, truth: Array) -> Array:
-        """Return the posterior's probability of less than the truth, shape (N, 3): uniform where it is calibrated."""
-        inner = (self._worked(truth) - self.centre) / self.unit
+        """Return the posterior distribution function at the truth, shape (N, 3): uniform for a calibrated posterior."""
+        inner = (self._with_log_cohesion(truth) - self.centre) / self.unit
         answer = np.empty(truth.shape)
         for target in range(3):
             grid, below = self._distribution(target)
@@ -87,9 +87,9 @@ class Mixture:
     def _distribution(self, target: int) -> tuple[Array, Array]:
         """Return a grid and the distribution function on it, each of shape (N, grid), standardised."""
         mean, std = self.mean[..., target], self.std[..., target]
-        real = self.weight > 1e-4
-        low = np.where(real, mean - _REACH * std, np.inf).min(axis=1, keepdims=True)
-        high = np.where(real, mean + _REACH * std, -np.inf).max(axis=1, keepdims=True)
+        relevant = self.weight > 1e-4
+        low = np.where(relevant, mean - _HALF_WIDTH * std, np.inf).min(axis=1, keepdims=True)
+        high = np.where(relevant, mean + _HALF_WIDTH * std, -np.inf).max(axis=1, keepdims=True)
         grid = low + (high - low) * np.linspace(0, 1, _GRID)
         density = np.zeros_like(grid)
         for k in range(mean.shape[1]):
@@ -105,14 +105,14 @@ class Mixture:
         return answer
 
     @staticmethod
-    def _worked(truth: Array) -> Array:
-        worked = np.array(truth, np.float64)
-        worked[:, 0] = np.log(worked[:, 0])
-        return worked
+    def _with_log_cohesion(truth: Array) -> Array:
+        converted = np.array(truth, np.float64)
+        converted[:, 0] = np.log(converted[:, 0])
+        return converted
 
 
 def unpack(raw: Array, centre: Array, unit: Array) -> Mixture:
-    """Return the mixtures that the network's raw output of shape (N, 10 K) stands for."""
+    """Return the mixtures of the network's raw output of shape (N, 10 K)."""
     parts = np.asarray(raw, np.float64).reshape(len(raw), -1, PARAMETERS)
     logit = parts[..., 0] - parts[..., 0].max(axis=1, keepdims=True)
     weight = np.exp(logit) / np.exp(logit).sum(axis=1, keepdims=True)

@@ -52,28 +52,28 @@ def evaluate(
     from rich.progress import Progress
 
     from regolithd.calibration.posterior.estimator import PosteriorEstimator
-    from regolithd.calibration.validation.estimators import bias, drivetrain
-    from regolithd.calibration.validation.estimators import change_detector as detector
-    from regolithd.calibration.validation.estimators import errors_and_coverage as estimators
+    from regolithd.calibration.validation.estimators import bias, change_detector, drivetrain, errors_and_coverage
 
     found: dict[str, float | None] = json.loads(out.read_text(encoding="utf-8")) if out.is_file() else {}
     kept: dict[str, Array] = dict(np.load(details)) if details.is_file() else {}
     with Progress() as progress:
         if part != Part.ALARM:
             estimator = PosteriorEstimator()
-            task = progress.add_task("estimators", total=len(estimators.CASES) + 1)
-            for name, case in estimators.CASES.items():
-                answers = estimators.answers(rovers, case, seed, estimator)
-                found |= estimators.figures(answers, f"{name}_")
-                kept |= {f"{name}_ranks": answers.ranks}
+            task = progress.add_task("estimators", total=len(errors_and_coverage.CASES) + 1)
+            for name, case in errors_and_coverage.CASES.items():
+                estimates = errors_and_coverage.estimate_all(rovers, case, seed, estimator)
+                found |= errors_and_coverage.figures(estimates, f"{name}_")
+                kept |= {f"{name}_ranks": estimates.ranks}
                 progress.advance(task)
             found["rovers"] = rovers
             found |= drivetrain.figures(min(rovers, 4000), seed + 1, estimator)
             found |= bias.figures(2000, seed + 3, estimator)
             progress.advance(task)
         if part != Part.ESTIMATORS:
-            task = progress.add_task("alarm", total=len(detector.CASES) * round(hours * 7200) * drives)
-            figures, delays = detector.figures(drives, hours, seed + 2, lambda done: progress.advance(task, done))
+            task = progress.add_task("alarm", total=len(change_detector.CASES) * round(hours * 7200) * drives)
+            figures, delays = change_detector.figures(
+                drives, hours, seed + 2, lambda done: progress.advance(task, done)
+            )
             found |= {f"alarm_{name}": value for name, value in figures.items()}
             kept |= {f"alarm_{name}": value for name, value in delays.items()}
     out.parent.mkdir(parents=True, exist_ok=True)

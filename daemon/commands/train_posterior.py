@@ -27,17 +27,21 @@ def train_posterior(
     from rich.progress import Progress
 
     from regolithd.calibration.parameters import Wheel
-    from regolithd.calibration.posterior.training import fit, freeze, simulate
+    from regolithd.calibration.posterior.onnx_export import export_onnx
+    from regolithd.calibration.posterior.training import fit
+    from regolithd.calibration.posterior.training_examples import simulate_examples
 
     with Progress() as progress:
         simulating = progress.add_task("simulating rovers", total=rovers)
-        examples = simulate(rovers, np.random.default_rng(seed), lambda done: progress.advance(simulating, done))
+        examples = simulate_examples(
+            rovers, np.random.default_rng(seed), lambda done: progress.advance(simulating, done)
+        )
         fitting = progress.add_task("fitting", total=steps)
 
         def show(loss: float) -> None:
             progress.update(fitting, advance=50, description=f"fitting, loss {loss:.3f}")
 
-        parameters, by = fit(examples, seed, steps, progress=show)
+        parameters, standardisation = fit(examples, seed, steps, progress=show)
     out.parent.mkdir(parents=True, exist_ok=True)
-    onnx.save(freeze(parameters, by, Wheel().radius_m), out)
+    onnx.save(export_onnx(parameters, standardisation, Wheel().radius_m), out)
     typer.echo(f"Wrote {out}.")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.posterior.estimator import Buffer, Posterior, PosteriorEstimator
-from regolithd.calibration.posterior.window import INTERVAL_S, LONGEST, CalibrationUncertainty, USUAL_TORQUE_Nm
+from regolithd.calibration.posterior.window import INTERVAL_S, MAX_INSTANTS, CalibrationUncertainty, REFERENCE_TORQUE_Nm
 from regolithd.daemon.pipeline.snapshot import SlipSource, SoilChange
 from regolithd.daemon.pipeline.soil_change import SoilChangeDetector
 
@@ -68,7 +68,7 @@ class PosteriorStage:
             return None
         past = np.stack(self._history, axis=1)
         since = max(1, round((alarm.time_ns - alarm.onset_ns) / (INTERVAL_S * 1e9)))
-        before, after = past[:, :-since][:, -LONGEST:], past[:, -since:][:, -LONGEST:]
+        before, after = past[:, :-since][:, -MAX_INSTANTS:], past[:, -since:][:, -MAX_INSTANTS:]
         fall = self._estimator.fall_probability(before, after, uncertainty) if before.size else None
         return SoilChange(alarm, fall)
 
@@ -89,5 +89,5 @@ def gain_relative_std(drivetrain: Drivetrain) -> float:
     A brake test measures the whole gain: for its wheels, its standard deviation replaces that of Eq. 11's constants.
     """
     factor, std = np.array(drivetrain.gain_factor), np.array(drivetrain.gain_factor_std)
-    braked = np.hypot(std / factor, USUAL_TORQUE_Nm * np.array(drivetrain.load_loss_std_per_Nm))
+    braked = np.hypot(std / factor, REFERENCE_TORQUE_Nm * np.array(drivetrain.load_loss_std_per_Nm))
     return float(np.mean(np.where(braked > 0, braked, drivetrain.gain_relative_std)))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.posterior.estimator import PosteriorEstimator
-from regolithd.calibration.validation.estimators.errors_and_coverage import Case, answers
+from regolithd.calibration.validation.estimators.errors_and_coverage import Case, estimate_all
 
 
 @pytest.mark.timeout(600)
@@ -28,6 +28,6 @@ def test_a_brief_training_already_beats_the_prior(tmp_path: Path) -> None:
         str(out),
     ]
     subprocess.run(command, check=True, cwd=Path(__file__).parents[2])
-    found = answers(1000, Case(), 5, PosteriorEstimator(out))
+    found = estimate_all(1000, Case(), 5, PosteriorEstimator(out))
     error = np.sqrt(np.mean((found.methods["posterior"][:, 0] - found.truth[:, 0]) ** 2))
     assert error < 0.9 * found.truth[:, 0].std()

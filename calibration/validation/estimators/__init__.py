@@ -1,4 +1,11 @@
-"""How good the estimators and the alarm are, on rovers and soils that none of them has seen: `regolithd evaluate`.
+"""Evaluation of the soil estimators and of the soil-change alarm on held-out simulated rovers (`regolithd evaluate`).
 
-Each module answers one question and returns one flat dictionary of figures.
+| module | question |
+|---|---|
+| `errors_and_coverage` | errors, coverage and ranks of posterior, paper's network and least squares |
+| `bias` | bias of the friction angle by the noise of the current |
+| `drivetrain` | error of the cohesion by an uncalibrated no-load current |
+| `change_detector` | delay of the soil-change alarm at one false alarm in 8 h |
+| `simulated_drives` | long drives for the alarm |
+| `pictures` | figures for the documentation |
 """

@@ -1,13 +1,13 @@
-"""The posterior against the paper's network and least squares: errors, coverage, ranks, and the bias of φ under noise.
+"""Errors, coverage and ranks of the posterior, compared with the paper's network and least squares.
 
-The rovers are new ones from `rovers`; noise is that of the paper's Table 4. Each method gets what it asks for, and the
-classical ones more than a rover has:
+Held-out rovers from `posterior.simulated_rovers` with the noise of the paper's Table 4. The inputs of each method:
 
-- the paper's network: load, slip and recorded current at each instant and wheel; its answers are averaged. As the paper
-  does it, the no-load current stays in; `…_corrected` takes it out. The better of the two is what the posterior must
-  beat.
-- least squares: the true sinkage of each wheel at each instant and the true shear modulus.
-- the posterior: load, slip and torque, and how well the rover is known.
+- the paper's network: load, slip and recorded current of each instant and wheel; its estimates are averaged. As in the
+  paper the current includes the no-load current; `paper_corrected` has it subtracted. The posterior is compared with
+  the better of the two.
+- least squares: in addition the true sinkage of each wheel at each instant and the true shear modulus, which a rover
+  does not measure.
+- the posterior: load, slip and torque, and the uncertainty of the calibration.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.calibration.paper.least_squares import least_squares
 from regolithd.calibration.parameters import SOILS, Drivetrain, Wheel
-from regolithd.calibration.posterior import simulated_rovers as simulation
+from regolithd.calibration.posterior import simulated_rovers
 from regolithd.calibration.posterior.window import CalibrationUncertainty, reduce_windows
 from regolithd.calibration.terrain.soils import ANGLE_STD_DEG, LOG_STD
 from regolithd.calibration.terrain.wheel_soil import contact_angle, shear_displacement
@@ -38,8 +38,22 @@ CHUNK = 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Answers:
-    """What each method says of N windows: cohesion [Pa], φ [rad] and, of the posterior, the margin; and the truth."""
+class MethodEstimates:
+    """Estimates of each method for N windows, and the truth.
+
+    Attributes
+    ----------
+    truth
+        Cohesion [Pa], friction angle [rad] and drawbar margin [1], shape (N, 3).
+    nearest, slip
+        Index in `SOILS` of the nearest class, and mean slip, shape (N,).
+    methods
+        Cohesion [Pa], friction angle [rad] and, of the posterior, drawbar margin [1], shape (N, 2 or 3).
+    ranks
+        Posterior distribution function at the truth, shape (N, 3).
+    intervals
+        Quantiles 0.05, 0.25, 0.5, 0.75, 0.95 of the posterior, shape (N, 3, 5).
+    """
 
     truth: Array
     nearest: NDArray[np.intp]
@@ -51,28 +65,28 @@ class Answers:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """What the estimators get: half seconds, wheels, the noise of Table 4 or none, and whether the class of soil."""
+    """Input of the estimators: number of half seconds and of wheels, with noise or not, soil class known or not."""
 
     instants: int = 20
     wheels: int = 6
     noise: bool = True
-    told: bool = False
+    soil_known: bool = False
 
 
 CASES = {
     "window": Case(),
     "instant": Case(instants=1, wheels=1),
     "noiseless_window": Case(noise=False),
-    "told_window": Case(told=True),
+    "told_window": Case(soil_known=True),
 }
-"""The cases of the evaluation: ten seconds of six wheels, one instant of one, and what becomes of the first."""
+"""Cases of the evaluation: ten seconds of six wheels (also without noise, and with known class), one instant of one."""
 
 
-def answers(count: int, case: Case, seed: int, estimator: PosteriorEstimator) -> Answers:
-    """Ask all methods about `count` rovers."""
+def estimate_all(count: int, case: Case, seed: int, estimator: PosteriorEstimator) -> MethodEstimates:
+    """Return the estimates of all methods for `count` rovers."""
     rng = np.random.default_rng(seed)
     parts = [_chunk(min(CHUNK, count - start), case, rng, estimator) for start in range(0, count, CHUNK)]
-    return Answers(
+    return MethodEstimates(
         truth=np.concatenate([part.truth for part in parts]),
         nearest=np.concatenate([part.nearest for part in parts]),
         slip=np.concatenate([part.slip for part in parts]),
@@ -82,24 +96,24 @@ def answers(count: int, case: Case, seed: int, estimator: PosteriorEstimator) ->
     )
 
 
-def _chunk(count: int, case: Case, rng: np.random.Generator, estimator: PosteriorEstimator) -> Answers:
+def _chunk(count: int, case: Case, rng: np.random.Generator, estimator: PosteriorEstimator) -> MethodEstimates:
     wheel, drivetrain = Wheel(), Drivetrain()
     uncertainty = CalibrationUncertainty() if case.noise else CalibrationUncertainty(torque_noise_Nm=0.0)
     known = np.tile(uncertainty.deviations(), (count, 1))
-    rovers = simulation.draw_rovers(count, rng, known, no_load_A=NO_LOAD_A)
-    noise = simulation.table_4_noise(count) if case.noise else simulation.no_noise(count)
-    measured = simulation.drive(rovers, noise, case.instants, rng, drivetrain, wheel)
+    rovers = simulated_rovers.draw_rovers(count, rng, known, no_load_A=NO_LOAD_A)
+    noise = simulated_rovers.table_4_noise(count) if case.noise else simulated_rovers.no_noise(count)
+    measured = simulated_rovers.simulate_measurements(rovers, noise, case.instants, rng, drivetrain, wheel)
     truth = np.column_stack(
         [
             rovers.soils.cohesion_Pa,
             np.radians(rovers.soils.friction_angle_deg),
-            simulation.margins(rovers, wheel),
+            simulated_rovers.drawbar_margins(rovers, wheel),
         ]
     )
     load, slip, torque = (x.copy() for x in (measured.load_N, measured.slip, measured.torque_Nm))
     load[:, :, case.wheels :] = np.nan
-    told = rovers.nearest if case.told else None
-    mixture = estimator.mixtures(reduce_windows(load, slip, torque, known, wheel.radius_m, told))
+    soil_index = rovers.nearest_class if case.soil_known else None
+    mixture = estimator.mixtures(reduce_windows(load, slip, torque, known, wheel.radius_m, soil_index))
     chosen = np.s_[:, :, : case.wheels]
     methods = {
         "paper": _paper(measured.load_N[chosen], slip[chosen], measured.current_A[chosen]),
@@ -109,8 +123,8 @@ def _chunk(count: int, case: Case, rng: np.random.Generator, estimator: Posterio
     if case.instants * case.wheels > 2:
         methods["least_squares"] = _least_squares(rovers, measured, case.wheels, wheel)
     levels = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
-    return Answers(
-        truth, rovers.nearest, rovers.slip.mean(axis=1), methods, mixture.ranks(truth), mixture.quantiles(levels)
+    return MethodEstimates(
+        truth, rovers.nearest_class, rovers.slip.mean(axis=1), methods, mixture.ranks(truth), mixture.quantiles(levels)
     )
 
 
@@ -122,7 +136,9 @@ def _paper(load_N: Array, slip: Array, current_A: Array) -> Array:
     return np.column_stack([cohesion.mean(axis=(1, 2)), np.arctan(tangent).mean(axis=(1, 2))])
 
 
-def _least_squares(rovers: simulation.Rovers, measured: simulation.Measured, wheels: int, wheel: Wheel) -> Array:
+def _least_squares(
+    rovers: simulated_rovers.SimulatedRovers, measured: simulated_rovers.Measurements, wheels: int, wheel: Wheel
+) -> Array:
     soils = rovers.soils.per_wheel()
     angle = contact_angle(rovers.load_N, rovers.slip, wheel, soils)
     displacement = shear_displacement(angle, rovers.slip, wheel)
@@ -139,8 +155,8 @@ def _least_squares(rovers: simulation.Rovers, measured: simulation.Measured, whe
     return np.column_stack([cohesion, np.arctan(tangent)])
 
 
-def figures(found: Answers, prefix: str) -> dict[str, float]:
-    """Return root-mean-square errors, biases and coverage, overall and in each soil class."""
+def figures(found: MethodEstimates, prefix: str) -> dict[str, float]:
+    """Return root-mean-square errors, biases and coverage, over all rovers and for each class of soil."""
     out: dict[str, float] = {}
     truth = found.truth
     methods = found.methods | {"prior_mean": np.broadcast_to(truth[:, :2].mean(axis=0), (len(truth), 2))}
@@ -160,18 +176,19 @@ def figures(found: Answers, prefix: str) -> dict[str, float]:
     return out | coverage(found, prefix)
 
 
-def coverage(found: Answers, prefix: str) -> dict[str, float]:
-    """Return how often the 50 % and 90 % intervals hold the truth: overall, and in each class of soil.
+def coverage(found: MethodEstimates, prefix: str) -> dict[str, float]:
+    """Return the coverage of the 50 % and 90 % intervals over all rovers and for each class, and χ² of the ranks.
 
-    Classes are told apart in two ways: by the truth, and by what the posterior believes. A posterior covers as it says
-    on average over soils that look alike to it – so overall, and in each class that it believes in, and in each true
-    class once it is told the class. In a true class that the data cannot tell from others it need not, and does not.
+    Classes are defined in two ways: by the truth, and by the posterior mean (keys `_believed_…`). A calibrated
+    posterior has its nominal coverage on average over soils that give the same data: over all rovers, for each class by
+    posterior mean, and for each true class if the class is known. For a true class that the data do not determine, it
+    does not.
     """
     out: dict[str, float] = {}
     groups = {"": np.full(len(found.truth), True)}
     groups |= {f"_{name}": found.nearest == index for index, name in enumerate(SOILS)}
-    believed = _believed_class(found)
-    groups |= {f"_believed_{name}": believed == index for index, name in enumerate(SOILS)}
+    estimated = _class_by_posterior_mean(found)
+    groups |= {f"_believed_{name}": estimated == index for index, name in enumerate(SOILS)}
     for column, target in enumerate(("cohesion", "friction_angle", "margin")):
         value, quantile = found.truth[:, column], found.intervals[:, column]
         for level, (low, high) in {50: (1, 3), 90: (0, 4)}.items():
@@ -181,13 +198,13 @@ def coverage(found: Answers, prefix: str) -> dict[str, float]:
                     out[f"{prefix}coverage_{level}_{target}{group}"] = float(inside[rows].mean())
         counts, _ = np.histogram(found.ranks[:, column], BINS, (0, 1))
         expected = len(value) / BINS
-        # Under calibration this is χ² with BINS − 1 degrees of freedom: 19 ± 6.
+        # For a calibrated posterior this is distributed as χ² with BINS − 1 degrees of freedom: 19 ± 6.
         out[f"{prefix}rank_chi_squared_{target}"] = float(np.sum((counts - expected) ** 2 / expected))
     return out
 
 
-def _believed_class(found: Answers) -> NDArray[np.intp]:
-    """Return the class of Table 1 that the posterior's mean is nearest to, in its classes' own spread."""
+def _class_by_posterior_mean(found: MethodEstimates) -> NDArray[np.intp]:
+    """Return the class of Table 1 nearest to the posterior mean, in units of the prior's spread around a class."""
     soils = list(SOILS.values())
     cohesion = np.log(found.methods["posterior"][:, :1] / [soil.cohesion_Pa for soil in soils]) / LOG_STD
     angle = np.degrees(found.methods["posterior"][:, 1:2]) - [soil.friction_angle_deg for soil in soils]

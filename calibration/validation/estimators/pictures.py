@@ -1,4 +1,4 @@
-"""Pictures of the evaluation for `docs/`: errors, coverage, one sample and ten seconds, the alarm, the drivetrain."""
+"""Figures of the evaluation for `docs/`: errors, coverage, one window, alarm delays, drivetrain calibration."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 
 from regolithd.calibration.parameters import SOILS, Drivetrain, Wheel
-from regolithd.calibration.posterior import simulated_rovers as simulation
+from regolithd.calibration.posterior import simulated_rovers
 from regolithd.calibration.posterior.window import CalibrationUncertainty, reduce_windows
 from regolithd.calibration.terrain.soils import draw_soils, soils_from
 from regolithd.calibration.validation.estimators.errors_and_coverage import NO_LOAD_A
@@ -25,18 +25,18 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-CLASSICAL, SINGLE, TOLD = "#b08d57", "#e59866", "#922b21"
+CLASSICAL, SINGLE, SOIL_KNOWN = "#b08d57", "#e59866", "#922b21"
 
 
 def errors(found: Mapping[str, float], path: Path) -> None:
     """Draw the root-mean-square errors of c and φ, method by method."""
     bars = [
-        ("the prior's mean, no data", "window_prior_mean", "#d5d8dc"),
+        ("prior mean, without data", "window_prior_mean", "#d5d8dc"),
         ("paper's network, 10 s × 6 wheels", "window_paper", PAPER),
-        ("least squares, z and K given, 10 s × 6", "window_least_squares", CLASSICAL),
+        ("least squares, z and K given, 10 s × 6 wheels", "window_least_squares", CLASSICAL),
         ("posterior, one instant of one wheel", "instant_posterior", SINGLE),
         ("posterior, 10 s × 6 wheels", "window_posterior", OURS),
-        ("the same, told the class of soil", "told_window_posterior", TOLD),
+        ("the same, soil class known", "told_window_posterior", SOIL_KNOWN),
     ]
     with mpl.rc_context(STYLE):
         made = figure(11, 3.6)
@@ -57,7 +57,7 @@ def errors(found: Mapping[str, float], path: Path) -> None:
 
 
 def calibration(found: Mapping[str, float], ranks: Array, path: Path) -> None:
-    """Draw the rank histograms, and coverage in the classes that the posterior believes in and those that are true."""
+    """Draw the rank histograms, and the coverage over all rovers and in each true class, known and not."""
     targets = ("cohesion", "friction_angle", "margin")
     with mpl.rc_context(STYLE):
         made = figure(11, 6)
@@ -66,7 +66,7 @@ def calibration(found: Mapping[str, float], ranks: Array, path: Path) -> None:
             _ranks(panels[0, column], ranks[:, column], label)
             _coverage(panels[1, column], found, target)
         panels[0, 0].set_ylabel("rovers")
-        panels[1, 0].set_ylabel("truth inside (%)")
+        panels[1, 0].set_ylabel("coverage (%)")
         panels[1, 2].legend(fontsize=8, loc="lower right")
         save(made, path)
 
@@ -80,11 +80,11 @@ def _ranks(panel: Axes, ranks: Array, label: str) -> None:
 
 def _coverage(panel: Axes, found: Mapping[str, float], target: str) -> None:
     names = ["", *SOILS]
-    for name, colour, label in (("window", PAPER, "true class"), ("told_window", OURS, "true class, told")):
+    for name, colour, label in (("window", PAPER, "true class"), ("told_window", OURS, "true class, known")):
         for level, marker in ((50, "o"), (90, "s")):
             values = [100 * found[f"{name}_coverage_{level}_{target}{'_' + each if each else ''}"] for each in names]
-            told = f"{label}, {level} %"
-            panel.plot(range(len(names)), values, marker, color=colour, label=told, markersize=6)
+            legend = f"{label}, {level} %"
+            panel.plot(range(len(names)), values, marker, color=colour, label=legend, markersize=6)
     for level in (50, 90):
         panel.axhspan(level - 2, level + 2, color="black", alpha=0.15)
     panel.set_xticks(range(len(names)), ["all", *(each.replace("-", "\n") for each in SOILS)], fontsize=8)
@@ -92,24 +92,26 @@ def _coverage(panel: Axes, found: Mapping[str, float], target: str) -> None:
 
 
 def one_sample(estimator: PosteriorEstimator, path: Path, seed: int = 3) -> None:
-    """Draw what one instant of one wheel says of sandy loam, and what ten seconds of six wheels say."""
+    """Draw the posterior of sandy loam from one instant of one wheel, and from ten seconds of six wheels."""
     rng = np.random.default_rng(seed)
     wheel, drivetrain = Wheel(), Drivetrain()
     known = CalibrationUncertainty().deviations()
-    rovers = simulation.draw_rovers(1, rng, known, no_load_A=NO_LOAD_A)
+    rovers = simulated_rovers.draw_rovers(1, rng, known, no_load_A=NO_LOAD_A)
     soils = soils_from([SOILS["sandy-loam"]], wheel.width_m)
-    rovers = simulation.Rovers(
+    rovers = simulated_rovers.SimulatedRovers(
         soils=soils,
-        nearest=np.array([1]),
+        nearest_class=np.array([1]),
         load_N=np.array([[47.0, 52, 49, 46, 51, 48]]),
         slip=np.full((1, 6), 0.025),
         no_load_A=rovers.no_load_A,
         gain_error=rovers.gain_error,
         no_load_error_A=rovers.no_load_error_A,
         slip_error=0 * rovers.slip_error,
-        known=known,
+        uncertainty=known,
     )
-    measured = simulation.drive(rovers, simulation.table_4_noise(1), 20, rng, drivetrain, wheel)
+    measured = simulated_rovers.simulate_measurements(
+        rovers, simulated_rovers.table_4_noise(1), 20, rng, drivetrain, wheel
+    )
     single = measured.load_N[:, :1].copy()
     single[..., [0, 1, 2, 3, 5]] = np.nan
     one = reduce_windows(single, measured.slip[:, :1], measured.torque_Nm[:, :1], known, wheel.radius_m)
@@ -119,7 +121,7 @@ def one_sample(estimator: PosteriorEstimator, path: Path, seed: int = 3) -> None
         made = figure(11, 4.4)
         panels = made.subplots(1, 2, sharex=True, sharey=True)
         for panel, windows, colour, title in (
-            (panels[0], one, SINGLE, "one instant of one wheel: hardly more than the prior"),
+            (panels[0], one, SINGLE, "one instant of one wheel"),
             (panels[1], many, OURS, "ten seconds of six wheels"),
         ):
             samples = estimator.mixtures(windows).sample(3000, rng)[0]
@@ -144,7 +146,7 @@ def one_sample(estimator: PosteriorEstimator, path: Path, seed: int = 3) -> None
                     markeredgecolor="white",
                     label=name,
                 )
-            panel.plot(3.15, 30.0, "*", color="black", markersize=16, label="the truth")
+            panel.plot(3.15, 30.0, "*", color="black", markersize=16, label="truth")
             panel.set(title=title, xlabel="c (kPa)", xlim=(0, 11), ylim=(4, 43))
         panels[0].set_ylabel("φ (°)")
         panels[1].legend(loc="upper left", bbox_to_anchor=(1, 1))
@@ -152,14 +154,14 @@ def one_sample(estimator: PosteriorEstimator, path: Path, seed: int = 3) -> None
 
 
 def alarm(delays: Mapping[str, Array], path: Path) -> None:
-    """Draw how many rovers have been warned after how long."""
+    """Draw the share of rovers with an alarm against the delay."""
     lines: list[tuple[str, str, dict[str, Any]]] = [
         ("cusum_delay", "CUSUM, white noise", {"color": OURS}),
-        ("cusum_delay_correlated", "CUSUM, noise with 0.5 s memory", {"color": OURS, "linestyle": "--"}),
+        ("cusum_delay_correlated", "CUSUM, noise correlated over 0.5 s", {"color": OURS, "linestyle": "--"}),
         ("paper_instant_delay", "paper's network: fall of c", {"color": "#bdc3c7"}),
         ("paper_10_s_delay", "paper's network: fall of 10 s mean", {"color": PAPER}),
         ("paper_shift_delay", "paper's network: shift of 10 s mean", {"color": PAPER, "linestyle": "--"}),
-        ("paper_shift_delay_flat", "the same, on flat ground", {"color": "#2c3e50", "linestyle": "--"}),
+        ("paper_shift_delay_flat", "the same, level ground", {"color": "#2c3e50", "linestyle": "--"}),
     ]
     with mpl.rc_context(STYLE):
         made = figure(11, 4.2)
@@ -182,25 +184,25 @@ def alarm(delays: Mapping[str, Array], path: Path) -> None:
                 )
             panel.axvline(15, color="black", linewidth=0.8, linestyle=":")
             panel.set(title=title, xlabel="seconds since the front axle met LETE sand", xlim=(0, 90), ylim=(0, 102))
-        panels[0].set_ylabel("rovers warned (%)")
+        panels[0].set_ylabel("rovers with an alarm (%)")
         panels[1].legend(loc="lower right", fontsize=9)
         made.suptitle("Sandy loam to LETE sand, 35 % current noise, 2 Hz, one false alarm in 8 h", x=0.01, ha="left")
         save(made, path)
 
 
 def drivetrain(found: Mapping[str, float], path: Path) -> None:
-    """Draw the error of c with 37 mA of no-load current, calibrated and not."""
+    """Draw error and coverage of c with a no-load current of 37 mA, calibrated and not."""
     names = {
         "calibrated": "wheels-up calibration",
-        "uncalibrated": "none: Eq. 11 reads it as soil",
-        "uncalibrated_and_doubted": "none, and told to doubt it",
+        "uncalibrated": "none: no-load current attributed to the soil",
+        "uncalibrated_and_doubted": "none, stated uncertainty 10 mA",
     }
     with mpl.rc_context(STYLE):
         made = figure(9, 2.6)
         panels = made.subplots(1, 2, sharey=True)
         for panel, key, label, scale in (
             (panels[0], "rmse_cohesion_Pa", "error of c (kPa, r.m.s.)", 1e-3),
-            (panels[1], "coverage_90", "truth inside the 90 % interval (%)", 100.0),
+            (panels[1], "coverage_90", "coverage of the 90 % interval (%)", 100.0),
         ):
             values = [scale * found[f"drivetrain_{name}_{key}"] for name in names]
             drawn = panel.barh(list(names.values()), values, color=[OURS, PAPER, CLASSICAL])

@@ -1,8 +1,8 @@
-"""Long drives over a soil and, at some time, another: what the alarm is tested on.
+"""Long simulated drives over one soil, or from one soil to another: measurements that the alarm is evaluated with.
 
-Torque is a polynomial in log load and slip, fitted once to the wheel–soil model of each soil (to 1 part in 1000), so
-that hundreds of hours take minutes. Slopes come and go (±5°, about two minutes), and with them the loads of the axles
-and the slip, which grows uphill as if each part in ten of slope cost one part in twenty of slip.
+For speed the torque is a polynomial in ln load and slip, fitted once to the wheel–soil model of each soil (relative
+error about 0.001). Pitch and roll are sinusoids of ±5° with periods of about two minutes; they change the loads of the
+wheels, and the slip, which is 0.025 + 0.5 sin(pitch), at least 0.01.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ _DEGREE = 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TorqueCurve:
-    """Torque of one soil, quickly: log T as a polynomial of log load and slip."""
+    """Torque on one soil: ln T as a polynomial of ln load and slip."""
 
     coefficients: Array
 
     def __call__(self, load_N: Array, slip: Array) -> Array:
-        """Return the torque [N·m] for loads of 5–150 N and slips of −0.02–0.25."""
+        """Return the torque [N·m]; loads are clipped to 5–150 N, slips to −0.02–0.25."""
         return np.exp(np.polynomial.polynomial.polyval2d(_x(load_N), _y(slip), self.coefficients))
 
 
@@ -49,7 +49,7 @@ def _y(slip: Array) -> Array:
 
 
 def torque_curve(soil: Soil, wheel: Wheel) -> TorqueCurve:
-    """Return the fitted curve of a soil."""
+    """Return the curve that is fitted to the wheel–soil model of a soil."""
     load, slip = np.meshgrid(np.geomspace(5, 150, 40), np.linspace(-0.02, 0.25, 30))
     torque = wheel_torque(contact_angle(load, slip, wheel, soil), slip, wheel, soil)
     basis = np.polynomial.polynomial.polyvander2d(_x(load).ravel(), _y(slip).ravel(), [_DEGREE, _DEGREE])
@@ -58,11 +58,29 @@ def torque_curve(soil: Soil, wheel: Wheel) -> TorqueCurve:
 
 
 @dataclass(frozen=True, slots=True)
-class Drive:
-    """How the drives go.
+class SimulatedDrive:
+    """Settings of simultaneous drives of several rovers.
 
-    `change_at` is the half second at which the front axle meets the second soil; None where it never does. Axles follow
-    each other at half a wheelbase, unless `at_once`. `noise` is relative to the whole recorded current.
+    Attributes
+    ----------
+    rovers
+        Number of rovers.
+    change_at
+        Half second at which the front axle meets the second soil; None for a drive over the first soil only.
+    at_once
+        Whether all axles meet the second soil at once, instead of half a wheelbase after each other.
+    first, second
+        Soils, keys of `SOILS`.
+    noise
+        Relative standard deviation of the recorded current [1].
+    correlation_time_s
+        Correlation time of that noise [s]; 0 is white noise.
+    drop_rate
+        Share of the half seconds with a momentary drop of current [1].
+    no_load_A
+        No-load current [A].
+    slope_deg
+        Amplitude of pitch and roll [°].
     """
 
     rovers: int
@@ -71,7 +89,7 @@ class Drive:
     first: str = "sandy-loam"
     second: str = "lete-sand"
     noise: float = 0.35
-    memory_s: float = 0.0
+    correlation_time_s: float = 0.0
     drop_rate: float = 0.03
     no_load_A: float = NO_LOAD_A
     slope_deg: float = 5.0
@@ -79,7 +97,7 @@ class Drive:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Instant:
-    """One half second of all drives, shape (rovers, 6): as measured."""
+    """Measurements of one half second of all drives, shape (rovers, 6)."""
 
     load_N: Array
     slip: Array
@@ -87,14 +105,14 @@ class Instant:
     torque_Nm: Array
 
 
-def instants(drive: Drive, length: int, rng: np.random.Generator) -> Iterator[Instant]:
-    """Yield `length` half seconds."""
+def instants(drive: SimulatedDrive, length: int, rng: np.random.Generator) -> Iterator[Instant]:
+    """Yield the measurements of `length` half seconds."""
     wheel, gain = Wheel(), Drivetrain().gain_Nm_per_A
     first, second = (torque_curve(SOILS[name], wheel) for name in (drive.first, drive.second))
     shape = (drive.rovers, 6)
     period = rng.uniform(160, 320, (2, drive.rovers))
     phase = rng.uniform(0, 2 * np.pi, (2, drive.rovers))
-    keep = np.exp(-INTERVAL_S / drive.memory_s) if drive.memory_s > 0 else 0.0
+    keep = np.exp(-INTERVAL_S / drive.correlation_time_s) if drive.correlation_time_s > 0 else 0.0
     rest, ground = rng.standard_normal(shape), rng.standard_normal(shape)
     between = 0 if drive.at_once else Rover().wheelbase_m / 2 / SPEED_M_S / INTERVAL_S
     meets = np.repeat([0, between, 2 * between], 2) + (length if drive.change_at is None else drive.change_at)
