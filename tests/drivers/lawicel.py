@@ -1,7 +1,7 @@
-"""An emulated LAWICEL adapter: a pty behind the kernel's slcan driver, which makes of it a real CAN link with states.
+"""An emulated LAWICEL adapter: a pty for the kernel's slcan driver, which makes it a CAN link with controller states.
 
-The kernel's side is a link that `ip` lists (`slcan0`, …); this side says what the wire would: frames, error counters,
-bus-off. The lines are those of the LAWICEL protocol, as linux/drivers/net/can/slcan reads them.
+The kernel's side is a link that `ip` lists (`slcan0`, …); this side sends what an adapter reports of the bus: frames,
+error counters, bus-off. The lines are those of the LAWICEL protocol, as linux/drivers/net/can/slcan reads them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _SIOCGIFNAME = 0x8910
 
 
 class Adapter:
-    """A link with an emulated adapter behind it; `with Adapter() as adapter: … adapter.link`."""
+    """A link with an emulated adapter; `with Adapter() as adapter: … adapter.link`."""
 
     def __enter__(self) -> Self:
         self._ours, self._kernels = pty.openpty()
@@ -42,7 +42,7 @@ class Adapter:
         self.unplug()
 
     def unplug(self) -> None:
-        """Take the adapter away: the kernel's link vanishes."""
+        """Close the adapter: the kernel's link vanishes."""
         if self._kernels >= 0:
             os.close(self._kernels)
             self._kernels = -1
@@ -53,20 +53,20 @@ class Adapter:
         """Run `ip`."""
         subprocess.run(["ip", *words], check=True)
 
-    def say(self, line: str) -> None:
-        """Let the adapter say a line."""
+    def send_line(self, line: str) -> None:
+        """Send a line to the kernel."""
         os.write(self._ours, line.encode() + b"\r")
 
     def frame(self, can_id: int, data: bytes) -> None:
-        """Let a frame arrive from the wire."""
-        self.say(f"t{can_id:03X}{len(data)}{data.hex()}")
+        """Send a received frame to the kernel."""
+        self.send_line(f"t{can_id:03X}{len(data)}{data.hex()}")
 
     def block(self) -> None:
-        """Take nothing more from the kernel: nobody acknowledges on the wire."""
+        """Stop reading from the kernel, as if no node acknowledged."""
         self._may_take.clear()
 
     def unblock(self) -> None:
-        """Take again."""
+        """Read again."""
         self._may_take.set()
 
     def _take(self) -> None:

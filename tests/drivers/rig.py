@@ -1,4 +1,4 @@
-"""A bus in this process, with the virtual rover on it."""
+"""A network and a virtual rover on a bus in this process."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ TIMEOUT_S = 20.0
 
 
 async def until(condition: Callable[[], object], what: str, timeout_s: float = TIMEOUT_S) -> None:
-    """Wait for a condition, and say what was waited for where it never holds."""
+    """Wait until a condition holds; fail with `what` after the timeout."""
     try:
         async with asyncio.timeout(timeout_s):
-            while not condition():  # noqa: ASYNC110  # what is waited for belongs to others, who notify nobody
+            while not condition():  # noqa: ASYNC110  # the condition has no event
                 await asyncio.sleep(0.01)
     except TimeoutError:
-        pytest.fail(f"waited {timeout_s:g} s in vain: {what}")
+        pytest.fail(f"not within {timeout_s:g} s: {what}")
 
 
 def settings(nodes: Sequence[NodeDescription], **changes: object) -> NetworkSettings:
-    """Return settings for a bus in a test: quick where nothing depends on it, patient where a loaded machine does."""
+    """Return settings for a test: short intervals, and long timeouts for a loaded machine."""
     quick = {"sync_rate_Hz": 20.0, "boot_up_timeout_s": 1.0, "sdo_timeout_s": 0.5, "retry_after_s": 0.5}
     slow = {"node_lost_after_s": 1.0, "master_lost_after_s": 2.0}
     return NetworkSettings(nodes=tuple(nodes), **(quick | slow | changes))
@@ -62,7 +62,7 @@ class Rig:
     signals: list[Signal] = field(default_factory=list)
 
     def start(self, tasks: asyncio.TaskGroup, wanted: NetworkSettings) -> None:
-        """Run a network, and keep what it says."""
+        """Run a network, and keep its events."""
         self.decoder = Decoder(wanted.nodes)
         self.network = Network(self.bus, wanted, on_frames=self.take, on_event=self.events.append)
         self.running = tasks.create_task(self.network.run())
@@ -125,7 +125,7 @@ async def rig(
         tasks = await stack.enter_async_context(asyncio.TaskGroup())
         rover = VirtualRover(plant or Bench(), nodes)
         serving = tasks.create_task(rover.run(rover_bus))
-        await asyncio.sleep(0)  # the nodes have their power now, and obey
+        await asyncio.sleep(0)  # the nodes are powered now, and take commands
         for line in faults:
             assert rover.inject_fault(line) == "ok", line
         running = Rig(rover, bus)

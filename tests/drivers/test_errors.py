@@ -9,15 +9,15 @@ from regolithd.drivers import errors
 from regolithd.drivers.errors import BusDownError, DriverError, SdoTimeoutError
 
 
-def test_a_message_says_where_what_and_the_cure() -> None:
-    """In that order, and only what is known."""
+def test_a_message_has_place_problem_and_remedy() -> None:
+    """An error message consists of node and object, what happened, and the remedy, as far as they are known."""
     error = SdoTimeoutError("no answer within 0.5 s", node_id=3, index=0x1018, subindex=1, cure="Is it powered?")
     assert str(error) == "node 3, object 0x1018:01: no answer within 0.5 s. Is it powered?"
     assert str(BusDownError("vcan0: cannot send")) == "vcan0: cannot send"
 
 
-def test_the_tree_that_is_drawn_is_the_tree_that_is() -> None:
-    """Each error of the module stands in its docstring, is a `DriverError`, and the standard error drawn beside it."""
+def test_the_documented_error_tree_is_complete() -> None:
+    """Each error is in the docstring of the module, and derives from the standard error named there."""
     for name, error in vars(errors).items():
         if not (isinstance(error, type) and issubclass(error, DriverError)):
             continue

@@ -1,4 +1,4 @@
-"""One contract for every kind of bus: the in-process one of python-can, and SocketCAN."""
+"""One contract for every kind of bus: python-can's virtual bus, and SocketCAN."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ async def take(bus: Bus, count: int) -> list[Frame]:
 
 
 @BOTH
-async def test_what_is_sent_arrives_in_order_and_comes_back_marked(interface: str, channel: str) -> None:
-    """Everything but time and mark is as it was sent; both ends count alike."""
+async def test_frames_arrive_in_order_and_echoes_are_marked(interface: str, channel: str) -> None:
+    """Received frames and echoes equal the sent ones, apart from time and `sent`, and both buses count the same."""
     async with open_bus(interface, channel) as one, open_bus(interface, channel) as two:
         before_ns = time.time_ns()
         for frame in FRAMES:
@@ -55,7 +55,7 @@ async def test_what_is_sent_arrives_in_order_and_comes_back_marked(interface: st
 
 @BOTH
 async def test_cancelling_a_wait_loses_nothing(interface: str, channel: str) -> None:
-    """A reader that gives up again and again gets every frame in the end."""
+    """A reader that is cancelled repeatedly receives every frame in the end."""
     async with open_bus(interface, channel) as one, open_bus(interface, channel) as two:
         got: list[Frame] = []
         for number in range(200):
@@ -73,7 +73,7 @@ async def test_cancelling_a_wait_loses_nothing(interface: str, channel: str) -> 
 async def test_a_slow_reader_pauses_the_reading_and_loses_nothing(
     interface: str, channel: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Frames wait where they are until they are asked for."""
+    """While the consumer is too slow, frames wait and none is lost."""
     monkeypatch.setattr("regolithd.drivers.can.bus._MOST_PENDING", 10)
     async with open_bus(interface, channel) as one, open_bus(interface, channel) as two:
         for number in range(100):
@@ -84,18 +84,18 @@ async def test_a_slow_reader_pauses_the_reading_and_loses_nothing(
         assert [int.from_bytes(frame.data, "big") for frame in got] == list(range(100))
 
 
-async def test_an_interface_that_there_is_not_is_refused() -> None:
-    """The message names those that there are."""
+async def test_an_unknown_interface_is_refused() -> None:
+    """The error message lists the interfaces that exist."""
     with pytest.raises(BusOpenError, match=r"'telepathy'.*socketcan.*virtual"):
         async with open_bus("telepathy", "x"):
             pass
 
 
-async def test_an_adapter_that_fails_is_a_state_and_is_opened_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Reading fails: down; opened again: active, and frames flow."""
+async def test_a_failed_adapter_is_reported_as_down_and_reopened(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a read error the state is down, and after the adapter is opened again it is active and frames arrive."""
     monkeypatch.setattr("regolithd.drivers.can.python_can_bus._REOPEN_S", 0.05)
     async with open_bus("virtual", "flaky") as bus, open_bus("virtual", "flaky") as other:
-        bus._bus.shutdown()  # as if it were pulled out
+        bus._bus.shutdown()  # as if it were unplugged
         async with asyncio.timeout(20):
             while bus.state is not BusState.DOWN:
                 await bus.receive()
@@ -106,8 +106,8 @@ async def test_an_adapter_that_fails_is_a_state_and_is_opened_again(monkeypatch:
         assert bus.counters.link_down == 1
 
 
-async def test_an_adapter_that_cannot_send_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    """python-can's errors become ours, with the cause kept."""
+async def test_a_send_error_of_python_can_becomes_a_bus_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A python-can exception in `send` becomes a `BusDownError` with the exception as its cause."""
     async with open_bus("virtual", "mute") as bus:
 
         def refuse(*_: object, **__: object) -> None:

@@ -23,10 +23,8 @@ from regolithd.drivers.can.frame import Frame
         (0x004, b"", ["controller"], None),
     ],
 )
-def test_an_error_frame_is_counted_and_says_the_state(
-    can_id: int, data: bytes, classes: list[str], state: BusState | None
-) -> None:
-    """By the bits of linux/can/error.h."""
+def test_an_error_frame_is_classified(can_id: int, data: bytes, classes: list[str], state: BusState | None) -> None:
+    """Error classes and controller state follow from the bits of linux/can/error.h."""
     frame = Frame(0, can_id, data, error=True)
     assert error_classes(frame) == classes
     assert reported_state(frame) is state

@@ -1,4 +1,4 @@
-"""Whatever the kernel hands over is parsed: the batch's buffers are filled by hand, so no SocketCAN is needed."""
+"""Parsing of the buffers that `recvmmsg` fills; the test fills them itself, so no SocketCAN is needed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SOL_SOCKET = 1
 def put(
     batch: RecvmmsgBuffers, place: int, raw: bytes, *, flags: int = 0, drops: int | None = None, size: int = 16
 ) -> None:
-    """Fill one message's place as the kernel does."""
+    """Fill the buffers of one message as the kernel does."""
     start = place * CAN_FRAME.size
     batch._frames[start : start + CAN_FRAME.size] = raw.ljust(16, b"\0")[:16]
     control = struct.pack("@Niill", struct.calcsize("@Niill"), SOL_SOCKET, SO_TIMESTAMPNS, 1_700_000_000, 123 + place)
@@ -29,8 +29,8 @@ def put(
     header.header.control_length, header.header.flags, header.length = len(control), flags, size
 
 
-def test_flags_of_the_identifier_and_of_the_message_are_told_apart() -> None:
-    """Standard, extended, remote, error, and our own."""
+def test_flags_of_identifier_and_message_are_distinguished() -> None:
+    """Standard, extended, remote and error frames, and echoes, are parsed as such."""
     batch, counters = RecvmmsgBuffers(), BusCounters()
     for place, (can_id, flags) in enumerate(
         [(0x181, 0), (0x80012345, 0), (0x40000181, 0), (0x20000040, 0), (0x080, CONFIRM)]
@@ -46,8 +46,8 @@ def test_flags_of_the_identifier_and_of_the_message_are_told_apart() -> None:
     ]
 
 
-def test_drops_are_counted_by_difference_and_over_the_counter_s_end() -> None:
-    """The kernel says how many in all, modulo 2³², and only once there were some."""
+def test_drops_are_counted_by_difference_and_across_the_overflow() -> None:
+    """The kernel reports the total modulo 2³², and only after the first drop."""
     batch, counters = RecvmmsgBuffers(), BusCounters()
     for drops, total in ((None, 0), (3, 3), (3, 3), (None, 3), (10, 10), (2**32 - 1, 2**32 - 1), (4, 2**32 + 4)):
         put(batch, 0, struct.pack("=IB3x8s", 0x181, 8, bytes(8)), drops=drops)
@@ -56,8 +56,8 @@ def test_drops_are_counted_by_difference_and_over_the_counter_s_end() -> None:
 
 
 @given(st.lists(st.tuples(st.binary(min_size=16, max_size=16), st.sampled_from([0, CONFIRM])), max_size=BATCH))
-def test_any_bytes_are_frames_or_counted(messages: list[tuple[bytes, int]]) -> None:
-    """No exception; every message is a frame of at most 8 bytes, or counted as malformed."""
+def test_any_bytes_are_parsed_or_counted(messages: list[tuple[bytes, int]]) -> None:
+    """Every message is a frame of at most 8 bytes or counted as malformed, without an exception."""
     batch, counters = RecvmmsgBuffers(), BusCounters()
     for place, (raw, flags) in enumerate(messages):
         put(batch, place, raw, flags=flags)
@@ -66,8 +66,8 @@ def test_any_bytes_are_frames_or_counted(messages: list[tuple[bytes, int]]) -> N
     assert all(len(frame.data) <= 8 and 0 <= frame.can_id < 1 << 29 for frame in frames)
 
 
-def test_what_is_no_classic_frame_is_counted() -> None:
-    """A CAN FD frame, cut to the buffer's size."""
+def test_a_can_fd_frame_is_counted_as_malformed() -> None:
+    """A CAN FD frame, truncated to the size of the buffer, is not returned."""
     batch, counters = RecvmmsgBuffers(), BusCounters()
     put(batch, 0, bytes(16), size=72)
     assert batch._parse(1, counters) == []

@@ -32,7 +32,7 @@ SYNC = Frame(0, 0x80, b"")
 
 @pytest.fixture(autouse=True)
 def links_come_back() -> Iterator[None]:
-    """Leave vcan0 as it was found."""
+    """Set vcan0 up again afterwards."""
     yield
     set_link("up")
 
@@ -59,20 +59,20 @@ def set_link(state: str) -> None:
 
 
 async def flood(bus: Bus) -> None:
-    """Send more than any queue holds."""
+    """Send more frames than the receive queue holds."""
     for _ in range(5000):
         await bus.send(Frame(0, 0x201, bytes(8)))
 
 
 def raw_sender(channel: str = "vcan0") -> socket.socket:
-    """Return a socket of nobody's, to send without an event loop."""
+    """Return a socket to send without an event loop."""
     sender = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
     sender.bind((channel,))
     return sender
 
 
-async def test_frames_have_kernel_times_and_our_own_come_back_marked() -> None:
-    """Times lie between before and after, rise, and are the same for both readers; only the sender's are `sent`."""
+async def test_frames_have_kernel_times_and_echoes_are_marked() -> None:
+    """Times increase and are equal for both readers, and `sent` is set for the sender only."""
     async with open_bus("socketcan", "vcan0") as ours, open_bus("socketcan", "vcan0") as theirs:
         before = time.time_ns()
         sent = [SYNC, Frame(0, 0x181, bytes(range(8))), Frame(0, 0x12345, b"abc", extended=True)]
@@ -89,8 +89,8 @@ async def test_frames_have_kernel_times_and_our_own_come_back_marked() -> None:
         assert (theirs.counters.echoed, theirs.counters.received) == (0, 3)
 
 
-async def test_a_burst_is_drained_in_batches_and_nothing_is_lost() -> None:
-    """Five hundred frames while the loop is busy elsewhere: all arrive, in order, many to a wake-up."""
+async def test_a_burst_is_read_in_batches_without_loss() -> None:
+    """Five hundred frames that arrive while the event loop is busy are received in order, many in one batch."""
     async with open_bus("socketcan", "vcan0") as bus:
         with raw_sender() as sender:
             for number in range(500):
@@ -101,29 +101,29 @@ async def test_a_burst_is_drained_in_batches_and_nothing_is_lost() -> None:
         assert bus.counters.kernel_drops == 0
 
 
-async def test_what_the_kernel_drops_is_counted_to_the_last_frame() -> None:
-    """With a tiny receive buffer: what arrived and what was dropped make what was sent."""
+async def test_every_frame_that_the_kernel_drops_is_counted() -> None:
+    """With a tiny receive buffer, received and dropped frames add up to the sent ones."""
     async with open_bus("socketcan", "vcan0") as bus:
         bus._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         with raw_sender() as sender:
             for _ in range(300):
                 sender.send(struct.pack("=IB3x8s", 0x181, 8, bytes(8)))
             await take(bus, 1)
-            sender.send(struct.pack("=IB3x8s", 0x182, 8, bytes(8)))  # brings the counter along
+            sender.send(struct.pack("=IB3x8s", 0x182, 8, bytes(8)))  # carries the drop counter
             await until_received(bus, 0x182)
         assert bus.counters.kernel_drops > 0
         assert bus.counters.received + bus.counters.kernel_drops == 301
 
 
 async def until_received(bus: Bus, can_id: int) -> None:
-    """Read until a frame with this identifier has come."""
+    """Read until a frame with this identifier has arrived."""
     async with asyncio.timeout(20):
         while all(frame.can_id != can_id for frame in await bus.receive()):
             pass
 
 
-async def test_the_socket_survives_its_link() -> None:
-    """Down: a state, and sending says so; up: the same socket goes on."""
+async def test_the_socket_stays_open_while_the_link_is_down() -> None:
+    """A link that is down is a state and an error in `send`; when it is up again the same socket continues."""
     async with open_bus("socketcan", "vcan0") as bus:
         set_link("down")
         await until_state(bus, BusState.DOWN)
@@ -136,24 +136,24 @@ async def test_the_socket_survives_its_link() -> None:
         assert bus.state is BusState.ACTIVE
 
 
-async def test_a_link_that_is_not_there_is_refused_with_the_cure() -> None:
-    """The message holds the command that makes one."""
+async def test_a_missing_link_is_refused_with_a_remedy() -> None:
+    """The error message has the command that creates the link."""
     with pytest.raises(BusOpenError, match=r"cannot open vcan7: No such device.*ip link add dev vcan7 type vcan"):
         async with open_bus("socketcan", "vcan7"):
             pass
 
 
-async def test_the_controller_s_errors_are_states_and_counts() -> None:
-    """Warning, passive, bus-off and a bus error from a real can-dev link; link down and up recovers it."""
+async def test_controller_errors_are_states_and_counters() -> None:
+    """Warning, passive, bus-off and a bus error of a can-dev link are reported, and link down and up recovers it."""
     with Adapter() as adapter:
         async with open_bus("socketcan", adapter.link) as bus:
-            adapter.say("sw100100")
+            adapter.send_line("sw100100")
             await until_state(bus, BusState.WARNING)
-            adapter.say("sp130140")
+            adapter.send_line("sp130140")
             await until_state(bus, BusState.PASSIVE)
-            adapter.say("e2ab")
+            adapter.send_line("e2ab")
             await until(lambda: bus.counters.errors["bus-error"] > 0, "a bus error")
-            adapter.say("sb256000")
+            adapter.send_line("sb256000")
             await until_state(bus, BusState.OFF)
             assert bus.counters.bus_off == 1
             assert bus.counters.errors["bus-off"] == 1
@@ -167,8 +167,8 @@ async def test_the_controller_s_errors_are_states_and_counts() -> None:
             assert bus.state is BusState.ACTIVE
 
 
-async def test_a_full_queue_is_retried_counted_and_then_told() -> None:
-    """Nobody takes the frames: retries, then an error; once somebody does, sending goes on."""
+async def test_a_full_transmit_queue_is_retried_counted_and_reported() -> None:
+    """While no node acknowledges, `send` retries and then fails; afterwards it works again."""
     with Adapter() as adapter:
         async with open_bus("socketcan", adapter.link) as bus:
             adapter.block()
@@ -186,8 +186,8 @@ async def test_a_full_queue_is_retried_counted_and_then_told() -> None:
                         await asyncio.sleep(0.05)
 
 
-async def test_an_adapter_that_is_unplugged_is_a_state() -> None:
-    """The link vanishes: down, not an exception; sending says what is wrong."""
+async def test_an_unplugged_adapter_is_reported_as_down() -> None:
+    """A link that vanishes is the state down, not an exception, and `send` reports it."""
     with Adapter() as adapter:
         async with open_bus("socketcan", adapter.link) as bus:
             adapter.ip("link", "set", adapter.link, "down")
@@ -202,8 +202,8 @@ async def test_an_adapter_that_is_unplugged_is_a_state() -> None:
                     await asyncio.sleep(0.1)
 
 
-async def test_the_network_over_a_real_kernel_loses_its_link_and_finds_all_again() -> None:
-    """Fourteen nodes boot; link down: all lost; link up: all boot again, and SYNCs have kernel times throughout."""
+async def test_the_network_recovers_from_link_down() -> None:
+    """Fourteen nodes boot, are lost while the link is down, and boot again afterwards, with kernel times throughout."""
     async with (
         open_bus("socketcan", "vcan0") as rover_bus,
         open_bus("socketcan", "vcan0") as bus,
@@ -212,15 +212,15 @@ async def test_the_network_over_a_real_kernel_loses_its_link_and_finds_all_again
         serving = tasks.create_task(VirtualRover(Bench()).run(rover_bus))
         rig = Rig(None, bus)
         rig.start(tasks, settings(KAPVIK, sync_rate_Hz=10.0, sdo_timeout_s=2.0, boot_up_timeout_s=5.0))
-        await until(lambda: len(rig.told(NodeBooted)) == 14, "all nodes booted", 60)
+        await until(lambda: len(rig.events_of(NodeBooted)) == 14, "all nodes booted", 60)
         await until(lambda: sum(isinstance(signal, Sync) for signal in rig.signals) > 10, "ten SYNCs")
         assert all(frame.sent for frame in rig.frames if frame.can_id == 0x80)
         set_link("down")
         await rig.wait_for_event(BusStateChanged, state=BusState.DOWN)
-        await until(lambda: len(rig.told(NodeLost)) == 14, "all nodes lost", 60)
+        await until(lambda: len(rig.events_of(NodeLost)) == 14, "all nodes lost", 60)
         set_link("up")
         await rig.wait_for_event(BusStateChanged, state=BusState.ACTIVE)
-        await until(lambda: len(rig.told(NodeBooted)) == 28, "all nodes booted again", 60)
+        await until(lambda: len(rig.events_of(NodeBooted)) == 28, "all nodes booted again", 60)
         assert rig.network.counters.sync.failed > 0
         await rig.stop()
         serving.cancel()

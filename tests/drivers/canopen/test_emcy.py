@@ -9,8 +9,8 @@ from regolithd.drivers.canopen.emcy import error_text
 from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
 
 
-def test_error_codes_are_words() -> None:
-    """The maker's words for its own device, else CiA 301's, else the class's."""
+def test_an_error_code_has_the_most_specific_text() -> None:
+    """The manufacturer's text of a code is preferred to CiA 301's, and that to the text of its class."""
     assert "undervoltage" in error_text(0x3220, MOTOR_CONTROLLER.error_texts)
     assert error_text(0x3220) == "voltage inside the device"
     assert "heartbeat" in error_text(0x8130)
@@ -20,7 +20,7 @@ def test_error_codes_are_words() -> None:
 
 
 @given(st.integers(0, 0xFFFF))
-def test_every_code_has_words(code: int) -> None:
-    """All of them."""
+def test_every_error_code_has_a_text(code: int) -> None:
+    """There is a text for each of the 65 536 codes."""
     assert error_text(code)
     assert error_text(code, MOTOR_CONTROLLER.error_texts)

@@ -1,4 +1,4 @@
-"""Any frame, to every node's identifiers, into the running network: nothing escapes, and the counters tell."""
+"""Random frames with every node's identifiers into a running network: no exception, and every reason is counted."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def random_frame(chance: random.Random) -> Frame:
 
 
 @pytest.mark.parametrize("seed", range(3))
-async def test_a_babbling_node_harms_nobody(seed: int) -> None:
-    """While nodes boot and while they measure, 3000 random frames: the network runs on and settles again."""
+async def test_random_frames_do_not_harm_the_network(seed: int) -> None:
+    """During boot and operation 3000 random frames are sent, and the network continues and settles again."""
     chance = random.Random(seed)
     async with rig(sync_rate_Hz=50.0) as r, open_bus("virtual", r.bus.channel) as babbler:
         for _ in range(3):

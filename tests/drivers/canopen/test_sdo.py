@@ -1,4 +1,4 @@
-"""The SDO protocol: the standard's bytes, a round trip through the virtual server, and answers of any kind."""
+"""The SDO protocol: the bytes of the standard, a round trip through the virtual server, and arbitrary answers."""
 
 from __future__ import annotations
 
@@ -33,22 +33,22 @@ def run(transfer: Transfer, *answers: str) -> tuple[list[str], bytes | None]:
     return [request.hex(" ") for request in requests if request], None
 
 
-def test_expedited_reading() -> None:
-    """Four bytes, two bytes, and an answer that gives no size."""
+def test_expedited_upload() -> None:
+    """Four bytes, two bytes, and an answer without size are read."""
     assert run(upload(0x1018, 1), "43 18 10 01 fb 00 00 00") == (["40 18 10 01 00 00 00 00"], b"\xfb\0\0\0")
     assert run(upload(0x6041, 0), "4b 41 60 00 37 06 00 00")[1] == b"\x37\x06"
     assert run(upload(0x6041, 0), "42 41 60 00 37 06 00 00")[1] == b"\x37\x06\0\0"
 
 
-def test_expedited_writing() -> None:
-    """One, two and four bytes."""
+def test_expedited_download() -> None:
+    """One, two and four bytes are written."""
     for data, request in (("01", "2f 60 60 00 01 00 00 00"), ("0f00", "2b 60 60 00 0f 00 00 00")):
         assert run(download(0x6060, 0, bytes.fromhex(data)), "60 60 60 00 00 00 00 00") == ([request], b"")
     assert run(download(0x1016, 1, bytes(4)))[0] == ["23 16 10 01 00 00 00 00"]
 
 
-def test_segmented_reading() -> None:
-    """Nine characters in two segments, the toggle bit alternating."""
+def test_segmented_upload() -> None:
+    """Nine characters are read in two segments with an alternating toggle bit."""
     requests, data = run(
         upload(0x1008, 0), "41 08 10 00 09 00 00 00", "00 45 50 4f 53 20 32 34", "1b 2f 31 00 00 00 00 00"
     )
@@ -56,8 +56,8 @@ def test_segmented_reading() -> None:
     assert requests[1:] == ["60 00 00 00 00 00 00 00", "70 00 00 00 00 00 00 00"]
 
 
-def test_segmented_writing() -> None:
-    """The size first, then seven bytes at a time; the last segment says so."""
+def test_segmented_download() -> None:
+    """The size is sent first, then seven bytes at a time, and the last segment is marked."""
     requests, _ = run(
         download(0x1008, 0, b"EPOS 24/1"),
         "60 08 10 00 00 00 00 00",
@@ -67,14 +67,14 @@ def test_segmented_writing() -> None:
     assert requests == ["21 08 10 00 09 00 00 00", "00 45 50 4f 53 20 32 34", "1b 2f 31 00 00 00 00 00"]
 
 
-def test_a_late_answer_for_another_object_is_passed_over() -> None:
-    """It belongs to a transfer that was given up before."""
+def test_a_late_answer_for_another_object_is_ignored() -> None:
+    """It belongs to a transfer that has timed out before."""
     requests, data = run(upload(0x6041, 0), "4b 78 60 00 01 00 00 00", "4b 41 60 00 37 06 00 00")
     assert (len(requests), data) == (1, b"\x37\x06")
 
 
-def test_an_abort_is_told_in_words() -> None:
-    """Code, object, and what it means."""
+def test_an_abort_has_code_object_and_text() -> None:
+    """The error of an aborted transfer names the code, the object and the meaning."""
     with pytest.raises(SdoAbortError, match=r"object 0x1A00:01: aborted with 0x06040041: object cannot be mapped"):
         run(download(0x1A00, 1, bytes(4)), "80 00 1a 01 41 00 04 06")
     assert "not define" in abort_text(0x12345678)
@@ -90,15 +90,15 @@ def test_an_abort_is_told_in_words() -> None:
         ("41 18 10 01 09 00 00 00", "60 00 00 00 00 00 00 00"),  # not a segment
     ],
 )
-def test_what_the_standard_does_not_allow_is_refused(answers: tuple[str, ...]) -> None:
-    """Each way to break the protocol has an error that says so."""
+def test_a_protocol_violation_is_an_error(answers: tuple[str, ...]) -> None:
+    """Each violation of the protocol raises an `SdoProtocolError` that describes it."""
     with pytest.raises(SdoProtocolError):
         run(upload(0x1018, 1), *answers)
 
 
 @given(st.sampled_from(["read", "write"]), st.lists(st.binary(max_size=8), max_size=20), st.binary(max_size=30))
 def test_any_answer_ends_in_a_value_or_an_sdo_error(way: str, answers: list[bytes], data: bytes) -> None:
-    """A node may say what it wants."""
+    """Arbitrary answers of a node raise no other exception."""
     transfer = upload(0x1018, 1) if way == "read" else download(0x1018, 1, data)
     next(transfer)
     try:
@@ -122,8 +122,8 @@ class Wire:
         self.sent.append(frame)
 
 
-async def test_silence_is_told_and_the_transfer_aborted() -> None:
-    """The node is told too that nobody waits any more."""
+async def test_a_timeout_aborts_the_transfer() -> None:
+    """Without an answer an `SdoTimeoutError` is raised, and the abort is sent to the node."""
     wire = Wire()
     client = SdoClient(wire, 5, timeout_s=0.05)
     with pytest.raises(SdoTimeoutError, match=r"node 5, object 0x6041:00: no answer within 0.05 s\. Is the node"):
@@ -132,8 +132,8 @@ async def test_silence_is_told_and_the_transfer_aborted() -> None:
     assert (client.transfers, client.failures) == (1, 1)
 
 
-async def test_transfers_wait_for_one_another() -> None:
-    """Two at once are two, one after the other."""
+async def test_transfers_are_sequential() -> None:
+    """Two concurrent reads are two transfers, one after the other."""
     wire = Wire()
     client = SdoClient(wire, 5, timeout_s=5.0)
     first, second = asyncio.ensure_future(client.read_number(0x6041)), asyncio.ensure_future(client.read(0x6078))
@@ -148,7 +148,7 @@ async def test_transfers_wait_for_one_another() -> None:
 
 
 async def test_a_restart_ends_a_transfer_at_once() -> None:
-    """There is no need to wait for the time limit."""
+    """A node's boot-up ends the transfer before its timeout."""
     client = SdoClient(Wire(), 5, timeout_s=60.0)
     reading = asyncio.ensure_future(client.read(0x6041))
     await asyncio.sleep(0)
@@ -157,7 +157,7 @@ async def test_a_restart_ends_a_transfer_at_once() -> None:
         await reading
 
 
-async def test_a_dead_link_is_the_bus_s_error() -> None:
-    """Not the node's silence."""
+async def test_a_link_that_is_down_is_a_bus_error() -> None:
+    """It is not reported as a timeout of the node."""
     with pytest.raises(BusDownError):
         await SdoClient(Wire(down=True), 5, timeout_s=0.05).read(0x6041)

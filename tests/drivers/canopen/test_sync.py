@@ -7,8 +7,8 @@ import pytest
 from regolithd.drivers.canopen.sync import SyncCounters
 
 
-def test_jitter_is_the_spread_of_the_lateness() -> None:
-    """Mean, worst and standard deviation of three."""
+def test_jitter_is_the_standard_deviation_of_the_lateness() -> None:
+    """Mean, maximum and standard deviation of three values are exact."""
     counters = SyncCounters()
     for late in (100, 200, 600):
         counters.count(late)

@@ -1,4 +1,4 @@
-"""The SYNC's clock: it neither drifts nor bursts, whoever keeps it."""
+"""The periodic timers: no drift and no bursts, with timerfd and with asyncio."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ PERIOD_NS = 5_000_000
 
 @given(st.integers(5_000_000, 1_000_000_000), st.lists(st.integers(0, 3_000_000_000), max_size=60))
 def test_a_schedule_neither_drifts_nor_bursts(period_ns: int, delays_ns: list[int]) -> None:
-    """Every due time is start + n·period; late by whole periods, they are left out and counted."""
+    """Every due time is start + n·period, and periods that have passed are skipped and counted."""
     schedule, now, counted = Schedule(START_NS, period_ns), START_NS, 0
     for delay in delays_ns:
         due, missed = schedule.following(now)
@@ -27,14 +27,14 @@ def test_a_schedule_neither_drifts_nor_bursts(period_ns: int, delays_ns: list[in
 
 
 @pytest.mark.parametrize("kind", [LoopTimer, KernelTimer])
-async def test_no_tick_is_early_and_those_missed_are_counted(kind: type[Timer]) -> None:
-    """Ticks and missed ones add up to the time that has passed; after a stall there is one tick, not a burst."""
+async def test_no_tick_is_early_and_missed_ones_are_counted(kind: type[Timer]) -> None:
+    """Ticks and missed ticks add up to the time that has passed, and after a stall there is one tick, not a burst."""
     before_ns = time.monotonic_ns()
     timer = kind(PERIOD_NS)
     counted = 0
     for number in range(40):
         if number in (10, 20):
-            time.sleep(0.042)  # noqa: ASYNC251  # the loop hangs, on purpose
+            time.sleep(0.042)  # noqa: ASYNC251  # blocks the event loop on purpose
         tick = await timer.tick()
         now_ns = time.monotonic_ns()
         counted += 1 + tick.missed
@@ -46,8 +46,8 @@ async def test_no_tick_is_early_and_those_missed_are_counted(kind: type[Timer]) 
         timer.close()
 
 
-async def test_a_timer_gives_its_descriptor_back() -> None:
-    """A hundred timers leave nothing open."""
+async def test_a_timer_closes_its_descriptor() -> None:
+    """A hundred timers leave no open file descriptor."""
     for _ in range(100):
         with periodic(PERIOD_NS):
             pass

@@ -1,4 +1,4 @@
-"""One contract that every node driver passes against its virtual twin."""
+"""One contract that every registered device passes against its virtual node."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ NODES = {
 
 
 class World:
-    """A plant whose every value is another, negative ones among them."""
+    """A plant with different values for all sensors, negative ones among them."""
 
     def measure(self, time_s: float, motor_speed_rad_s: np.ndarray) -> Measurement:
-        """Return the same always."""
+        """Return constant values."""
         del time_s, motor_speed_rad_s
         return Measurement(
             motor_current_A=np.array([0.01, 0.02, -0.081, 0.04, 0.05, 0.06]),
@@ -76,8 +76,8 @@ def node(request: pytest.FixtureRequest) -> NodeDescription:
     return NODES[request.param]
 
 
-async def test_it_boots_says_who_it_is_and_beats(node: NodeDescription) -> None:
-    """Operational, with the identity of its EDS, heard again and again."""
+async def test_it_boots_reports_its_identity_and_sends_heartbeats(node: NodeDescription) -> None:
+    """The node becomes operational with the identity of its EDS, and its heartbeat continues."""
     async with rig([node]) as r:
         booted = await r.wait_for_event(NodeBooted)
         assert booted.identity.vendor in (0xFB, 0xFFFF00)
@@ -87,7 +87,7 @@ async def test_it_boots_says_who_it_is_and_beats(node: NodeDescription) -> None:
 
 
 async def test_its_configuration_is_in_the_node(node: NodeDescription) -> None:
-    """Every object that was written holds what was written."""
+    """Every object that was written during boot holds the written value."""
     async with rig([node]) as r:
         await r.wait_for_event(NodeBooted)
         sdo = r.network._supervisors[node.node_id].remote.sdo
@@ -99,8 +99,8 @@ async def test_its_configuration_is_in_the_node(node: NodeDescription) -> None:
             assert value & write.mask == write.value, hex(write.index)
 
 
-async def test_what_it_measures_arrives_in_si(node: NodeDescription) -> None:
-    """Every quantity of the layout arrives, with sign and scale, at every SYNC, and none that was not measured."""
+async def test_its_measurements_arrive_in_si_units(node: NodeDescription) -> None:
+    """Every quantity of the layout arrives with sign and scale, and no other."""
     async with rig([node], plant=World()) as r:
         await r.wait_for_event(NodeBooted)
         pdos = tpdos(node.device, diagnostics=node.diagnostics)
@@ -112,8 +112,8 @@ async def test_what_it_measures_arrives_in_si(node: NodeDescription) -> None:
         assert measured == pytest.approx(EXPECTED[node.device], abs=1e-9)
 
 
-async def test_its_emergency_is_told_in_words(node: NodeDescription) -> None:
-    """An error arises and goes."""
+async def test_its_emergency_is_reported_with_a_text(node: NodeDescription) -> None:
+    """An emergency and its end are events."""
     async with rig([node]) as r:
         await r.wait_for_event(NodeBooted)
         r.rover.inject_fault(f"emcy {node.node_id} 0x4210")
@@ -124,7 +124,7 @@ async def test_its_emergency_is_told_in_words(node: NodeDescription) -> None:
 
 
 async def test_it_is_lost_and_returns(node: NodeDescription) -> None:
-    """Power off and on."""
+    """A node that loses power is lost, and boots again after power-on."""
     async with rig([node]) as r:
         await r.wait_for_event(NodeBooted)
         r.rover.inject_fault(f"off {node.node_id}")
@@ -134,7 +134,7 @@ async def test_it_is_lost_and_returns(node: NodeDescription) -> None:
 
 
 async def test_short_frames_are_counted_and_not_decoded(node: NodeDescription) -> None:
-    """A PDO that is not as long as its mapping gives no value."""
+    """A PDO that is shorter than its mapping gives no value."""
     async with rig([node]) as r:
         await r.wait_for_event(NodeBooted)
         r.rover.inject_fault(f"short {node.node_id} 1")
@@ -142,7 +142,7 @@ async def test_short_frames_are_counted_and_not_decoded(node: NodeDescription) -
 
 
 async def test_an_invalid_measurement_has_no_value() -> None:
-    """A load cell that says `not valid` in 0x6150 is heard, and measures nothing."""
+    """A load cell that reports `not valid` in 0x6150 gives a reading without value."""
     async with rig([NODES[LOAD_CELL]]) as r:
         await r.wait_for_event(NodeBooted)
         r.rover.inject_fault("status 14 1")

@@ -1,4 +1,4 @@
-"""The data sheets load cleanly and say what the bus needs them to say."""
+"""The EDS files load without warnings and have the necessary objects."""
 
 from __future__ import annotations
 
@@ -38,23 +38,23 @@ TPDO = {
 
 
 def load(device: Device) -> ObjectDictionary:
-    """Read a sheet for node 9, with every complaint an error."""
+    """Read an EDS file for node 9, with every warning an error."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         return canopen.import_od(str(device.eds), node_id=9)
 
 
 @pytest.mark.parametrize("device", DEVICES, ids=lambda device: device.kind)
-def test_every_sheet_loads_without_a_complaint(device: Device, caplog: pytest.LogCaptureFixture) -> None:
-    """Canopen reads the sheet silently and finds every object that either side uses."""
+def test_every_eds_file_loads_without_a_warning(device: Device, caplog: pytest.LogCaptureFixture) -> None:
+    """The canopen package reads the file without a warning and finds every object that master and virtual node use."""
     od = load(device)
     assert not caplog.records
     assert [hex(index) for index in (*COMMUNICATION, *APPLICATION[device]) if index not in od] == []
 
 
 @pytest.mark.parametrize("device", DEVICES, ids=lambda device: device.kind)
-def test_what_a_pdo_carries_may_be_mapped(device: Device) -> None:
-    """Every object of the fixed PDO layout is mappable and as long as the layout says; SDO-only objects are not."""
+def test_pdo_objects_may_be_mapped(device: Device) -> None:
+    """Every object of the PDO layout is mappable and has the expected size, and identity and heartbeat are not."""
     od = load(device)
     for index, sub, bits in TPDO[device]:
         entry = od.get_variable(index, sub)
@@ -66,7 +66,7 @@ def test_what_a_pdo_carries_may_be_mapped(device: Device) -> None:
 
 @pytest.mark.parametrize("device", DEVICES, ids=lambda device: device.kind)
 def test_an_unconfigured_node_has_every_pdo_disabled(device: Device) -> None:
-    """COB-ID bit 31 is set in each default, so that a node speaks only once it is configured."""
+    """COB-ID bit 31 is set in each default, so that a node sends PDOs only after configuration."""
     od = load(device)
     communication = [index for index in od if 0x1400 <= index < 0x1600 or 0x1800 <= index < 0x1A00]
     assert communication
@@ -76,8 +76,8 @@ def test_an_unconfigured_node_has_every_pdo_disabled(device: Device) -> None:
 
 
 @pytest.mark.parametrize("device", DEVICES, ids=lambda device: device.kind)
-def test_the_list_of_objects_names_what_the_sheet_holds(device: Device) -> None:
-    """The sections `MandatoryObjects` … agree with the objects that follow (CiA 306)."""
+def test_the_object_lists_are_complete(device: Device) -> None:
+    """The sections `MandatoryObjects` etc. list exactly the objects of the file (CiA 306)."""
     listed = set()
     for line in device.eds.read_text().splitlines():
         number, _, value = line.partition("=")

@@ -1,4 +1,4 @@
-"""The virtual drive moves, stops and faults as its object dictionary says."""
+"""The virtual drive turns, stops and faults as its object dictionary says."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from virtual_master import MASTER_ID, DriveUnderTest
 
 
 def test_it_follows_its_ramps() -> None:
-    """Speed rises by 0x6083 and falls by 0x6084, rpm per second, to the target and no further."""
+    """Speed rises by 0x6083 and falls by 0x6084 [rpm/s], to the target and no further."""
     drive = DriveUnderTest()
     drive.master.write(1, 0x6083, 0, 1000, 4)
     drive.master.write(1, 0x6084, 0, 2000, 4)
@@ -30,7 +30,7 @@ def test_it_follows_its_ramps() -> None:
 
 
 def test_it_turns_only_in_operation_enabled() -> None:
-    """A target alone moves nothing; halt stops without leaving the state; disabling stops."""
+    """A target alone has no effect, halt stops the motor without leaving the state, and disabling stops it."""
     drive = DriveUnderTest()
     drive.send_controlword(0x06, 1000)
     drive.master.wait(1)
@@ -49,7 +49,7 @@ def test_it_turns_only_in_operation_enabled() -> None:
 
 
 def test_the_speed_is_limited() -> None:
-    """No faster than 0x607F."""
+    """The speed does not exceed 0x607F."""
     drive = DriveUnderTest()
     drive.master.write(1, 0x607F, 0, 600, 4)
     drive.enable()
@@ -62,8 +62,8 @@ def test_the_speed_is_limited() -> None:
     ("option", "ramp", "after"),
     [(1, 1000, 0x40), (2, 4000, 0x40), (5, 1000, 0x07), (6, 4000, 0x07), (0, 50_000, 0x40)],
 )
-def test_quick_stop_brakes_as_its_option_says(option: int, ramp: int, after: int) -> None:
-    """0x605A chooses the ramp, and whether the drive then leaves quick stop active by itself (transition 12)."""
+def test_quick_stop_follows_its_option_code(option: int, ramp: int, after: int) -> None:
+    """Option code 0x605A selects the ramp, and whether transition 12 follows by itself."""
     drive = DriveUnderTest()
     drive.master.write(1, 0x6084, 0, 1000, 4)
     drive.master.write(1, 0x6085, 0, 4000, 4)
@@ -77,8 +77,8 @@ def test_quick_stop_brakes_as_its_option_says(option: int, ramp: int, after: int
     assert drive.state == after
 
 
-def test_from_a_holding_quick_stop_it_may_go_on() -> None:
-    """Transition 16, with option 6 only."""
+def test_transition_16_leaves_a_holding_quick_stop() -> None:
+    """It exists for option codes 5 and 6."""
     drive = DriveUnderTest()
     drive.master.write(1, 0x605A, 0, 6, 2)
     drive.run_at(1000)
@@ -87,8 +87,8 @@ def test_from_a_holding_quick_stop_it_may_go_on() -> None:
     assert drive.send_controlword(0x0F, 1000) == 0x27
 
 
-def test_a_fault_stops_it_tells_why_and_lasts() -> None:
-    """EMCY, 0x603F, 0x1001 and 0x1003 name it; fault reaction while it brakes, then fault; reset clears and says so."""
+def test_a_fault_stops_the_drive_and_lasts() -> None:
+    """EMCY, 0x603F, 0x1001 and 0x1003 report it; fault follows the fault reaction, and a fault reset clears it."""
     drive = DriveUnderTest()
     drive.run_at(3000)
     master = drive.master
@@ -108,13 +108,13 @@ def test_a_fault_stops_it_tells_why_and_lasts() -> None:
 
 
 @pytest.mark.parametrize(("option", "state"), [(0, 0x27), (1, 0x08), (2, 0x40), (3, 0x40)])
-def test_the_masters_silence_stops_it(option: int, state: int) -> None:
-    """Heartbeat consumer (0x1016): EMCY 0x8130, and 0x6007's reaction; only after the master was heard once."""
+def test_the_loss_of_the_masters_heartbeat_stops_it(option: int, state: int) -> None:
+    """Heartbeat consumer (0x1016): EMCY 0x8130 and the reaction of 0x6007, only after the first heartbeat."""
     drive = DriveUnderTest()
     master = drive.master
     master.write(1, 0x6007, 0, option, 2)
     master.write(1, 0x1016, 1, MASTER_ID << 16 | 500, 4)
-    drive.run_at(3000)  # two seconds, in which nobody was heard: monitoring has not begun
+    drive.run_at(3000)  # two seconds without a first heartbeat: monitoring has not begun
     master.heartbeat()
     master.wait(0.49)
     assert drive.speed_rpm == 3000
@@ -126,8 +126,8 @@ def test_the_masters_silence_stops_it(option: int, state: int) -> None:
     assert drive.speed_rpm == (3000 if option == 0 else 0)
 
 
-def test_a_master_that_is_heard_again_does_not_start_it() -> None:
-    """After the loss it takes a fault reset and the whole ladder."""
+def test_a_returning_master_does_not_restart_the_drive() -> None:
+    """After the loss, a fault reset and all transitions to operation enabled are necessary."""
     drive = DriveUnderTest()
     drive.master.write(1, 0x1016, 1, MASTER_ID << 16 | 100, 4)
     drive.run_at(1000)
@@ -141,7 +141,7 @@ def test_a_master_that_is_heard_again_does_not_start_it() -> None:
 
 
 def test_stopping_the_node_stops_the_motor() -> None:
-    """NMT stop is a lost connection as well (CiA 402-2, 0x6007)."""
+    """The NMT command `stop` is a loss of the connection as well (CiA 402-2, 0x6007)."""
     drive = DriveUnderTest()
     drive.run_at(1000)
     drive.master.nmt(2)
@@ -151,8 +151,8 @@ def test_stopping_the_node_stops_the_motor() -> None:
     assert drive.state == 0x08
 
 
-def test_it_refuses_any_other_mode() -> None:
-    """Only profile velocity (3) is supported; 0x6061 goes on saying so."""
+def test_it_refuses_every_other_mode() -> None:
+    """Only profile velocity (3) is supported, and 0x6061 keeps reporting it."""
     drive = DriveUnderTest()
     with pytest.raises(Exception, match="0x06090030"):
         drive.master.write(1, 0x6060, 0, 1, 1)

@@ -1,4 +1,4 @@
-"""Booting: each way to fail has its own reason, its words and its cure, and is mended without a restart."""
+"""Boot failures: each has its own reason, text and remedy, and needs no restart of the master."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("reason", FAULTS)
-async def test_a_fault_has_its_reason_and_the_mended_node_boots(reason: BootReason) -> None:
-    """The reason is told with a cure, a healthy neighbour is not disturbed, and the node boots once it is mended."""
+async def test_a_boot_failure_has_its_reason_and_the_repaired_node_boots(reason: BootReason) -> None:
+    """The reason has a remedy, a second node is not affected, and the node boots once the fault is cleared."""
     async with rig([MOTOR, CELL], faults=[FAULTS[reason]]) as r:
         failed = await r.wait_for_event(NodeBootFailed)
         assert (failed.node_id, failed.reason, failed.cure) == (4, reason, CURES[reason])
@@ -47,7 +47,7 @@ async def test_a_fault_has_its_reason_and_the_mended_node_boots(reason: BootReas
 
 
 async def test_a_node_of_another_profile_is_refused() -> None:
-    """A load cell where a motor controller should be."""
+    """A load cell with the node-ID of a motor controller is not booted."""
     async with rig([NodeDescription(4, LOAD_CELL, 3)], known=[MOTOR]) as r:
         failed = await r.wait_for_event(NodeBootFailed)
         assert failed.reason is BootReason.WRONG_DEVICE_TYPE
@@ -55,8 +55,8 @@ async def test_a_node_of_another_profile_is_refused() -> None:
         assert "0x00020192" in failed.text
 
 
-async def test_an_exchanged_device_is_noticed_by_its_serial_number() -> None:
-    """Where the serial number is configured, another one is refused."""
+async def test_another_serial_number_is_refused() -> None:
+    """Where the serial number is configured, a device with another one is not booted."""
     known = NodeDescription(4, MOTOR_CONTROLLER, 3, serial=77)
     async with rig([MOTOR], known=[known]) as r:
         assert (await r.wait_for_event(NodeBootFailed)).reason is BootReason.WRONG_SERIAL
@@ -65,7 +65,7 @@ async def test_an_exchanged_device_is_noticed_by_its_serial_number() -> None:
 
 
 async def test_a_node_that_restarts_while_it_is_configured_is_booted_again() -> None:
-    """A boot-up in the middle ends the attempt, with its own reason, and starts the next."""
+    """A boot-up message during the configuration ends the attempt, with its own reason, and starts the next."""
     async with rig([MOTOR]) as r:
         await r.until_transfers(4, 10)
         r.rover.inject_fault("reset 4")
@@ -74,15 +74,15 @@ async def test_a_node_that_restarts_while_it_is_configured_is_booted_again() -> 
         await r.wait_for_event(NodeBooted)
 
 
-async def test_a_missing_node_is_told_once_and_the_others_boot() -> None:
-    """However often it is tried, the same failure is one event."""
+async def test_a_missing_node_is_reported_once_and_the_others_boot() -> None:
+    """However often the boot is tried, the same failure is one event."""
     async with rig([CELL], known=[MOTOR, CELL], boot_up_timeout_s=0.2, retry_after_s=0.1) as r:
         await r.wait_for_event(NodeBooted, node_id=11)
         await r.until_attempts(4, 3)
         assert [event.reason for event in r.events_of(NodeBootFailed)] == [BootReason.NO_BOOT_UP]
 
 
-async def test_a_sensor_in_another_unit_is_refused_not_misread() -> None:
+async def test_a_sensor_with_another_unit_is_refused() -> None:
     """A load cell whose process value has three decimal digits would be read ten times too large."""
     async with rig([CELL], faults=["off 11"]) as r:
         objects = r.rover.nodes[11].dictionary
@@ -92,8 +92,8 @@ async def test_a_sensor_in_another_unit_is_refused_not_misread() -> None:
         assert "object 0x6132:01: must be 0x2, and reads 0x3" in failed.text
 
 
-async def test_an_eds_that_lacks_an_object_is_a_reason_and_no_crash(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The daemon goes on with the others."""
+async def test_an_unusable_eds_is_a_boot_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A missing object in an EDS file does not end the network."""
 
     def lacking(*_: object, **__: object) -> None:
         raise DictionaryError("the EDS of motor nodes has no such object", index=0x1017)
@@ -106,6 +106,6 @@ async def test_an_eds_that_lacks_an_object_is_a_reason_and_no_crash(monkeypatch:
         assert not r.running.done()
 
 
-def test_every_reason_has_a_cure() -> None:
-    """The table of cures is complete."""
+def test_every_boot_reason_has_a_remedy() -> None:
+    """The table of remedies is complete."""
     assert set(CURES) == set(BootReason)

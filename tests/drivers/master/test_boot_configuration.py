@@ -10,8 +10,8 @@ from regolithd.drivers.devices.registry import DEVICES
 from regolithd.drivers.master.boot_configuration import boot_writes
 
 
-def test_a_pdo_is_set_up_in_the_standard_s_order() -> None:
-    """Off, type, count 0, entries, count, on – and what is not used is off."""
+def test_a_pdo_is_configured_in_the_order_of_cia_301() -> None:
+    """A PDO is disabled, mapped and enabled in this order, and unused PDOs are disabled."""
     writes = boot_writes(
         NodeDescription(3, MOTOR_CONTROLLER, 2), heartbeat_s=0.2, master_id=127, master_lost_after_s=0.5
     )
@@ -32,7 +32,7 @@ def test_a_pdo_is_set_up_in_the_standard_s_order() -> None:
 
 
 def test_units_are_set_or_compared() -> None:
-    """A sensor that measures in another unit is refused, not misread."""
+    """A unit is written where the EDS allows it, and compared otherwise."""
     of = {
         device: boot_writes(NodeDescription(9, device, 0), heartbeat_s=0.2, master_id=127, master_lost_after_s=0.5)
         for device in DEVICES
@@ -43,7 +43,7 @@ def test_units_are_set_or_compared() -> None:
     assert (digits.value, digits.read_only) == (2, True)
 
 
-def test_a_valid_pdo_keeps_its_identifier_while_it_is_switched_off() -> None:
-    """CiA 301 forbids to change it and bit 31 at once."""
+def test_disabling_a_pdo_keeps_its_identifier() -> None:
+    """CiA 301 forbids to change identifier and bit 31 at once."""
     off = boot_writes(NodeDescription(3, LOAD_CELL, 2), heartbeat_s=0.2, master_id=127, master_lost_after_s=0.5)[2]
     assert off.data(present=0x40000183) == (0xC0000183).to_bytes(4, "little")

@@ -1,4 +1,4 @@
-"""Faults in any order: the network never ends, and once all is well again, all nodes are operational."""
+"""Random faults: the network continues, and once they are cleared, all nodes are operational."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ FAULTS = (
 
 
 @pytest.mark.parametrize("seed", range(4))
-async def test_whatever_happens_the_network_goes_on_and_mends(seed: int) -> None:
-    """Thirty faults and commands at random moments; then all is cleared and switched off and on."""
+async def test_the_network_recovers_from_random_faults(seed: int) -> None:
+    """After thirty faults and commands at random moments, all nodes become operational once the faults are cleared."""
     chance = random.Random(seed)
     async with rig(NODES, retry_after_s=0.3, retry_at_most_s=0.6, sdo_timeout_s=0.2, node_lost_after_s=0.6) as r:
         for _ in range(30):
@@ -60,7 +60,7 @@ async def test_whatever_happens_the_network_goes_on_and_mends(seed: int) -> None
 
 
 async def drive(r: Rig) -> None:
-    """Drive and stop, as if nothing had been."""
+    """Drive and stop."""
     await r.network.enable()
     await r.network.set_speed((0.1, 0.1, 0, 0, 0, 0))
     await until(lambda: r.rover.nodes[1].device.speed_rad_s > 0, "wheel 1 turning")
@@ -69,7 +69,7 @@ async def drive(r: Rig) -> None:
 
 
 async def command(r: Rig, chance: random.Random) -> None:
-    """Give a command; it may fail with the tree's own errors alone."""
+    """Give a command; it may fail with a `DriverError` only."""
     what = chance.choice(["enable", "set_speed", "quick_stop", "disable"])
     try:
         async with asyncio.timeout(1.0):

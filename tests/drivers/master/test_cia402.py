@@ -1,4 +1,4 @@
-"""The drive's state machine, held against the standard's table and against the virtual drive."""
+"""The drive's state machine in the master, compared with the table of the standard and with a simulated drive."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 
 from regolithd.drivers.master.cia402 import Controlword, DriveState, enabling_step, state_of
 
-# CiA 402-2, table 30, written out as the standard prints it: bits 6 5 3 2 1 0, x for any.
+# CiA 402-2, table 30, as printed: bits 6 5 3 2 1 0, x for any.
 PRINTED = {
     DriveState.NOT_READY: "0x0000",
     DriveState.SWITCH_ON_DISABLED: "1x0000",
@@ -33,8 +33,8 @@ def printed_state(statusword: int) -> DriveState:
     return found[0] if found else DriveState.UNKNOWN
 
 
-def test_every_statusword_is_the_state_that_the_standard_prints() -> None:
-    """All 65 536."""
+def test_every_statusword_gives_the_state_of_the_standard() -> None:
+    """All 65 536 statuswords agree with CiA 402-2, table 30."""
     assert [word for word in range(1 << 16) if state_of(word) is not printed_state(word)] == []
 
 
@@ -85,8 +85,8 @@ class StandardDrive:
         DriveState.FAULT,
     ],
 )
-def test_enabling_gets_there_from_every_state(state: DriveState) -> None:
-    """In at most six words, whatever the controlword was before."""
+def test_enabling_reaches_operation_enabled_from_every_state(state: DriveState) -> None:
+    """At most six controlwords are necessary, whatever the previous one was."""
     drive, last, words = StandardDrive(state), Controlword.FAULT_RESET, []
     for _ in range(6):
         word = enabling_step(drive.state, last)
@@ -98,8 +98,8 @@ def test_enabling_gets_there_from_every_state(state: DriveState) -> None:
     assert drive.state is DriveState.ENABLED, words
 
 
-def test_a_fault_reset_that_does_not_take_is_tried_with_a_new_rising_edge() -> None:
-    """Bit 7 goes 1, 0, 1, 0, … while the fault stays."""
+def test_a_fault_reset_is_repeated_with_a_rising_edge() -> None:
+    """Bit 7 alternates while the fault remains."""
     last = Controlword.DISABLE_VOLTAGE
     words = [last]
     for _ in range(6):
@@ -108,7 +108,7 @@ def test_a_fault_reset_that_does_not_take_is_tried_with_a_new_rising_edge() -> N
     assert all((one & 0x80) != (two & 0x80) for one, two in pairwise(words))
 
 
-def test_a_drive_that_reacts_to_a_fault_is_left_alone() -> None:
-    """There is nothing to be said to it."""
+def test_no_command_is_sent_during_the_fault_reaction() -> None:
+    """The transition from fault reaction active is automatic."""
     for state in (DriveState.NOT_READY, DriveState.FAULT_REACTION, DriveState.ENABLED, DriveState.UNKNOWN):
         assert enabling_step(state, Controlword.SHUTDOWN) is None

@@ -7,8 +7,8 @@ import asyncio
 from regolithd.drivers.master.condition import Condition
 
 
-async def test_a_wait_that_is_given_up_leaves_nothing_behind() -> None:
-    """Months of waiting for a silent node fill no list; a wait that is fulfilled ends."""
+async def test_a_timed_out_wait_is_removed() -> None:
+    """Timed-out waits do not accumulate, and a wait whose condition holds ends."""
     watch, seen = Condition(), []
     for _ in range(50):
         assert not await watch.until(lambda: bool(seen), 0.001)

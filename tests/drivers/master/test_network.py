@@ -1,4 +1,4 @@
-"""The network over a bus in this process: supervision, commands, and what is left behind."""
+"""The network on a bus in this process: supervision, commands, and the state after its end."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ CREEP_rad_s = (0.29,) * 6
 
 
 def values(readings: list, quantity: Quantity) -> list[float]:
-    """Return what readings say of one quantity."""
+    """Return the values of one quantity."""
     return [value for reading in readings for name, value in reading.values if name is quantity]
 
 
 async def test_every_node_boots_and_measures() -> None:
-    """All fourteen become operational, and each SYNC is answered by each."""
+    """All fourteen nodes become operational and answer each SYNC."""
     async with rig() as r:
         await r.network.settled()
         assert {status.phase for status in r.network.status.values()} == {"operational"}
@@ -54,8 +54,8 @@ async def test_every_node_boots_and_measures() -> None:
         assert r.network.counters.sdo_failures == 0
 
 
-async def test_wheels_turn_at_the_speed_that_is_asked_and_stop() -> None:
-    """Enable, turn, quick stop, disable: the motors' own speeds say so."""
+async def test_wheels_turn_at_the_commanded_speed_and_stop() -> None:
+    """The measured motor speeds follow enable, speed, quick stop and disable."""
     async with rig(MOTORS) as r:
         await r.network.settled()
         await r.network.enable()
@@ -79,7 +79,7 @@ async def test_wheels_turn_at_the_speed_that_is_asked_and_stop() -> None:
 
 
 async def test_mirrored_motors_turn_the_other_way_and_read_as_forward() -> None:
-    """Both sides drive forward; the right side's motors turn backwards for it."""
+    """For driving forward the mirrored motors turn backwards, and their speed is read as forward."""
     known = [replace(motor, mirrored=motor.node_id % 2 == 0) for motor in MOTORS]
     async with rig(MOTORS, known=known) as r:
         await r.network.settled()
@@ -94,8 +94,8 @@ async def test_mirrored_motors_turn_the_other_way_and_read_as_forward() -> None:
         assert r.rover.nodes[2].device.speed_rad_s < 0.0
 
 
-async def test_nothing_turns_before_it_is_enabled() -> None:
-    """A speed for a drive that is not enabled is refused, and no frame is sent."""
+async def test_a_speed_is_refused_before_enabling() -> None:
+    """No frame is sent."""
     async with rig(MOTORS) as r:
         await r.network.settled()
         await until(lambda: len(r.frames), "frames")
@@ -104,8 +104,8 @@ async def test_nothing_turns_before_it_is_enabled() -> None:
         assert not [frame for frame in r.frames if frame.can_id & 0x780 == 0x200]
 
 
-async def test_a_stop_while_the_drives_are_being_enabled_wins() -> None:
-    """Enabling that was under way fails and leaves no drive enabled."""
+async def test_a_stop_cancels_enabling() -> None:
+    """Enabling that is under way fails and leaves no drive enabled."""
     async with rig(MOTORS) as r:
         await r.network.settled()
         enabling = asyncio.ensure_future(r.network.enable())
@@ -121,8 +121,8 @@ async def test_a_stop_while_the_drives_are_being_enabled_wins() -> None:
             await r.network.set_speed(CREEP_rad_s)
 
 
-async def test_a_mutilated_statusword_is_none() -> None:
-    """A TPDO that is too short does not say that a drive has left its state."""
+async def test_a_truncated_statusword_is_ignored() -> None:
+    """A TPDO that is too short does not change the state of the drive."""
     async with rig(MOTORS) as r:
         await r.network.settled()
         await r.network.enable()
@@ -134,7 +134,7 @@ async def test_a_mutilated_statusword_is_none() -> None:
 
 
 async def test_a_missing_drive_cannot_be_enabled_and_the_message_says_why() -> None:
-    """The message names the node, and why it is not on the bus."""
+    """The message has the node-ID and the reason of the failed boot."""
     async with rig(MOTORS[:5], known=MOTORS) as r:
         await r.network.settled()
         with pytest.raises(DriveError, match=r"node 6: the drive is not operational .*no boot-up message"):
@@ -142,7 +142,7 @@ async def test_a_missing_drive_cannot_be_enabled_and_the_message_says_why() -> N
 
 
 async def test_a_lost_drive_stops_the_others_and_returns_without_a_restart() -> None:
-    """Power off while driving: lost, all others stopped; power on: booted again, and it drives again."""
+    """A drive that loses power while driving stops all others, and after power-on it is booted and drives again."""
     async with rig(MOTORS) as r:
         await r.network.settled()
         await r.network.enable()
@@ -167,7 +167,7 @@ async def test_a_lost_drive_stops_the_others_and_returns_without_a_restart() -> 
 
 
 async def test_a_lost_load_cell_that_is_not_required_does_not_stop_the_wheels() -> None:
-    """What the rover can drive without, it drives without."""
+    """Losing a node that is not required does not stop the motion."""
     optional = NodeDescription(11, LOAD_CELL, 0, required=False)
     async with rig((*MOTORS, optional)) as r:
         await r.network.settled()
@@ -180,7 +180,7 @@ async def test_a_lost_load_cell_that_is_not_required_does_not_stop_the_wheels() 
 
 
 async def test_a_drive_that_faults_stops_the_others_and_is_reset_by_enabling() -> None:
-    """EMCY and state are told; enabling resets the fault with a rising edge."""
+    """Emergency and state are events, and enabling resets the fault with a rising edge."""
     async with rig(MOTORS) as r:
         await r.network.settled()
         await r.network.enable()
@@ -197,7 +197,7 @@ async def test_a_drive_that_faults_stops_the_others_and_is_reset_by_enabling() -
 
 
 async def test_a_node_that_leaves_operational_or_restarts_is_booted_again() -> None:
-    """Nobody has to notice: it is told, and mended."""
+    """Both are reported as a loss, and the node becomes operational again."""
     async with rig([LOAD_CELLS[0]]) as r:
         await r.wait_for_event(NodeBooted)
         r.rover.inject_fault("leave 11")
@@ -208,8 +208,8 @@ async def test_a_node_that_leaves_operational_or_restarts_is_booted_again() -> N
         await r.wait_for_event(NodeBooted)
 
 
-async def test_a_wrong_node_is_a_state_and_never_a_crash() -> None:
-    """One wrong identity: eleven others measure."""
+async def test_a_wrong_node_does_not_affect_the_others() -> None:
+    """With one wrong identity, eleven other nodes measure."""
     async with rig((*MOTORS, *LOAD_CELLS), faults=["identity 4 vendor 0x1"]) as r:
         await r.network.settled()
         assert r.events_of(NodeBootFailed)[0].node_id == 4
@@ -217,8 +217,8 @@ async def test_a_wrong_node_is_a_state_and_never_a_crash() -> None:
         await until(lambda: len(r.readings(5)) > 2, "node 5 measures")
 
 
-async def test_stopping_leaves_the_bus_sane() -> None:
-    """Cancelled while driving: wheels stopped, voltage off, every node pre-operational and free of its master."""
+async def test_stopping_disables_drives_and_nodes() -> None:
+    """Cancelled while driving, the network stops and disables the drives and sets every node to pre-operational."""
     async with rig((*MOTORS, LOAD_CELLS[0])) as r:
         await r.network.settled()
         await r.network.enable()
@@ -230,13 +230,13 @@ async def test_stopping_leaves_the_bus_sane() -> None:
         )
         for node_id in range(1, 7):
             assert r.rover.nodes[node_id].device.speed_rad_s == 0.0
-        await asyncio.sleep(2.5)  # longer than the drives would wait for a master
+        await asyncio.sleep(2.5)  # longer than the heartbeat consumer time of the drives
         assert not r.events_of(NodeEmergency)
         assert sum(node.counts["emcy"] for node in r.rover.nodes.values()) == 0
 
 
 async def test_a_drive_stops_by_itself_when_its_master_hangs() -> None:
-    """No heartbeat, no motion: the drive's own consumer (0x1016) acts, not we."""
+    """Without the master's heartbeat the drive's own consumer (0x1016) stops it."""
     async with rig([MOTORS[0]]) as r:
         await r.network.settled()
         await r.network.enable()
@@ -248,11 +248,11 @@ async def test_a_drive_stops_by_itself_when_its_master_hangs() -> None:
 
 
 async def forget(_frame: object) -> None:
-    """Send nothing, and say nothing of it."""
+    """Send nothing, without an error."""
 
 
-async def test_a_probe_finds_who_is_there_and_changes_nothing() -> None:
-    """Identities and problems are told; no NMT command and no SDO write is on the bus."""
+async def test_a_scan_reads_identities_and_changes_nothing() -> None:
+    """Identities and problems are returned, and neither an NMT command nor an SDO download is on the bus."""
     nodes = (*MOTORS[:3], LOAD_CELLS[0])
     async with rig(nodes, faults=["identity 2 product 0x999", "off 3"]) as r:
         await r.network.settled()

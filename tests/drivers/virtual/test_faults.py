@@ -1,4 +1,4 @@
-"""Each thing that can be made wrong with a virtual node is wrong on the bus, there alone, and can be mended."""
+"""Each injected fault has its effect on the bus, for its node only, and can be cleared."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Ticking(Bench):
-    """Loads that never stay the same."""
+    """A plant whose loads change continuously."""
 
     def measure(self, time_s: float, motor_speed_rad_s: np.ndarray) -> Measurement:
         """Return loads that grow."""
@@ -38,11 +38,11 @@ class Running(Master):
         self.nmt(1)
 
     def inject_fault(self, line: str) -> None:
-        """Command, which must be understood."""
+        """Inject a fault; the command must be accepted."""
         assert self.rover.inject_fault(line) == "ok"
 
     def heartbeats(self, node: int) -> list[int]:
-        """Return what a node's heartbeat says in the next half second."""
+        """Return the states in a node's heartbeats of the next half second."""
         return [frame.data[0] for frame in self.wait(0.5) if frame.can_id == 0x700 + node]
 
     def load(self, node: int) -> int | None:
@@ -52,7 +52,7 @@ class Running(Master):
         return None if data is None else struct.unpack_from("<i", data)[0]
 
     def well(self, node: int) -> bool:
-        """Whether a load cell does everything that it should."""
+        """Whether a load cell works without a fault."""
         first, second = self.load(node), self.load(node)
         grows = first is not None and second is not None and second > first
         return grows and self.heartbeats(node).count(5) in {4, 5, 6}
@@ -60,14 +60,14 @@ class Running(Master):
 
 @pytest.fixture
 def running() -> Running:
-    """A part of the rover, running."""
+    """Two load cells and a drive, operational."""
     master = Running()
     assert master.well(11)
     return master
 
 
-def test_a_node_without_power_is_silent_and_comes_back_new(running: Running) -> None:
-    """Off, it sends no frame; on again, it boots up, pre-operational and unconfigured."""
+def test_a_node_without_power_sends_nothing(running: Running) -> None:
+    """After power-on it boots up, pre-operational and unconfigured."""
     running.inject_fault("off 11")
     assert running.load(11) is None
     assert running.heartbeats(11) == []
@@ -80,8 +80,8 @@ def test_a_node_without_power_is_silent_and_comes_back_new(running: Running) -> 
     assert running.load(11) is None
 
 
-def test_an_emergency_is_told_once_and_ends(running: Running) -> None:
-    """EMCY with error register, and later error code 0."""
+def test_an_emergency_is_sent_once_and_ends(running: Running) -> None:
+    """EMCY has the error register, and error code 0 follows at its end."""
     running.inject_fault("emcy 12 0x5000")
     running.inject_fault("emcy 12 0x5000")
     running.inject_fault("emcy 12 0")
@@ -90,8 +90,8 @@ def test_an_emergency_is_told_once_and_ends(running: Running) -> None:
     assert running.well(11)
 
 
-def test_a_node_may_be_another_one(running: Running) -> None:
-    """0x1018 says so until it is mended, through a reset as well."""
+def test_a_node_may_report_another_identity(running: Running) -> None:
+    """Object 0x1018 has the injected value until it is cleared, after a reset as well."""
     was = running.read(4, 0x1018, 2)
     running.inject_fault("identity 4 product 0x999")
     assert running.read(4, 0x1018, 2) == 0x999
@@ -102,8 +102,8 @@ def test_a_node_may_be_another_one(running: Running) -> None:
     assert running.read(4, 0x1018, 2) == was
 
 
-def test_a_silent_node_lives(running: Running) -> None:
-    """No PDO, but heartbeat and SDO."""
+def test_a_silent_node_answers_sdo_and_sends_heartbeats(running: Running) -> None:
+    """It sends no PDO."""
     running.inject_fault("silent 11")
     assert running.load(11) is None
     assert set(running.heartbeats(11)) == {5}
@@ -111,8 +111,8 @@ def test_a_silent_node_lives(running: Running) -> None:
     assert running.well(12)
 
 
-def test_a_frozen_node_repeats_itself(running: Running) -> None:
-    """The same value for ever, though the world goes on."""
+def test_a_frozen_node_repeats_its_values(running: Running) -> None:
+    """Its value stays constant while the plant changes."""
     running.inject_fault("frozen 11")
     before = running.load(11)
     assert before is not None
@@ -120,8 +120,8 @@ def test_a_frozen_node_repeats_itself(running: Running) -> None:
     assert running.well(12)
 
 
-def test_a_deaf_drive_obeys_no_pdo(running: Running) -> None:
-    """Nor does it say that it does not."""
+def test_a_deaf_drive_ignores_rpdos(running: Running) -> None:
+    """It reports no error either."""
     running.configure(2, tpdo=MOTOR_TPDO, rpdo=(0x60400010, 0x60FF0020))
     running.nmt(1, 2)
     running.inject_fault("deaf 2")
@@ -130,27 +130,27 @@ def test_a_deaf_drive_obeys_no_pdo(running: Running) -> None:
 
 
 def test_a_slow_node_answers_later(running: Running) -> None:
-    """Its PDO comes, but not at its SYNC."""
+    """Its PDO arrives after the given delay."""
     running.inject_fault("slow 11 30")
     assert running.load(11) is None
     assert [f for f in running.wait(0.02) if f.can_id == 0x18B] == []
     assert len([f for f in running.wait(0.02) if f.can_id == 0x18B]) == 1
 
 
-def test_a_short_pdo_lacks_its_end(running: Running) -> None:
-    """The frame is cut, as by another mapping."""
+def test_a_short_pdo_is_truncated(running: Running) -> None:
+    """The last bytes are missing."""
     running.inject_fault("short 11 2")
     assert len(running.sync()[0x18B]) == 3
 
 
-def test_a_status_says_not_valid(running: Running) -> None:
-    """Bits of 0x6150 by command."""
+def test_status_bits_are_set(running: Running) -> None:
+    """Bits of 0x6150 are set by command."""
     running.inject_fault("status 11 1")
     assert running.sync()[0x18B][4] == 1
 
 
 def test_no_boot_up(running: Running) -> None:
-    """After a reset nothing more is heard."""
+    """After a reset the node sends nothing."""
     running.inject_fault("no-boot-up 11")
     running.nmt(0x81, 11)
     assert running.heartbeats(11) == []
@@ -158,7 +158,7 @@ def test_no_boot_up(running: Running) -> None:
 
 
 def test_no_heartbeat_and_no_sdo(running: Running) -> None:
-    """One each, and the PDOs go on."""
+    """One node sends no heartbeat and another answers no SDO, and their PDOs continue."""
     running.inject_fault("no-heartbeat 11")
     running.inject_fault("no-sdo 12")
     assert running.heartbeats(11) == []
@@ -167,8 +167,8 @@ def test_no_heartbeat_and_no_sdo(running: Running) -> None:
     assert running.load(12) is not None
 
 
-def test_it_refuses_or_forgets_what_is_written(running: Running) -> None:
-    """One object each: aborted by 'hardware error', or answered and not kept."""
+def test_writing_is_refused_or_has_no_effect(running: Running) -> None:
+    """One object is aborted with a hardware error, another is acknowledged and keeps its value."""
     running.inject_fault("refuse 11 0x1017")
     with pytest.raises(AbortedError, match="0x06060000"):
         running.write(11, 0x1017, 0, 50, 2)
@@ -177,22 +177,22 @@ def test_it_refuses_or_forgets_what_is_written(running: Running) -> None:
     assert running.read(12, 0x1017) == 0
 
 
-def test_a_reset_of_its_own(running: Running) -> None:
-    """Boot-up without having been asked, and everything forgotten."""
+def test_a_spontaneous_reset(running: Running) -> None:
+    """The node sends a boot-up message and has lost its configuration."""
     running.inject_fault("reset 11")
     assert [f.data for f in running.wait(0.1) if f.can_id == 0x70B] == [b"\0"]
     assert running.read(11, 0x1017) == 0
 
 
 def test_leaving_operational(running: Running) -> None:
-    """The heartbeat says pre-operational, and no PDO comes."""
+    """The heartbeat has the state pre-operational, and no PDO is sent."""
     running.inject_fault("leave 11")
     assert running.load(11) is None
     assert set(running.heartbeats(11)) == {0x7F}
 
 
-def test_the_masters_silence_is_told_by_every_node(running: Running) -> None:
-    """EMCY 0x8130 and pre-operational (0x1029); what is heard again ends the error."""
+def test_every_node_reports_the_loss_of_the_master(running: Running) -> None:
+    """EMCY 0x8130 and pre-operational (0x1029) follow, and the error ends with the next heartbeat."""
     running.write(11, 0x1016, 1, MASTER_ID << 16 | 200, 4)
     running.heartbeat()
     frames = running.wait(0.3)
@@ -207,8 +207,8 @@ FOR_A_MASTER_TO_MEND = {"off", "on", "reset", "leave", "no-boot-up", "fault"}
 
 
 @pytest.mark.parametrize("name", [name for name in COMMANDS if name not in FOR_A_MASTER_TO_MEND])
-def test_everything_can_be_mended(running: Running, name: str) -> None:
-    """`clear` undoes a fault; what needs further words gets some."""
+def test_every_fault_can_be_cleared(running: Running, name: str) -> None:
+    """The command `clear` ends each fault."""
     words = {"identity": "vendor 1", "emcy": "0x1000", "slow": "500", "short": "1", "status": "1"}
     words |= {"refuse": "0x1017", "forget": "0x1017"}
     running.inject_fault(f"{name} 11 {words.get(name, '')}")
@@ -221,13 +221,13 @@ WRONG = ["bang 3", "off", "off 77", "off x", "identity 3", "identity 3 colour 1"
 
 
 @pytest.mark.parametrize("line", WRONG)
-def test_a_wrong_command_says_what_is_wrong(running: Running, line: str) -> None:
-    """And changes nothing."""
+def test_a_wrong_command_is_refused_with_its_reason(running: Running, line: str) -> None:
+    """It changes nothing."""
     assert running.rover.inject_fault(line).startswith("error: ")
     assert running.well(11)
 
 
 def test_help_names_every_command(running: Running) -> None:
-    """One line for each."""
+    """There is one line for each command."""
     lines = running.rover.inject_fault("help").splitlines()
     assert [line.split()[0] for line in lines] == list(COMMANDS)

@@ -1,4 +1,4 @@
-"""What a virtual node sends is what it was configured to send, when it was configured to."""
+"""The virtual nodes' PDOs: content and transmission follow the configuration."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from regolithd.drivers.virtual.pdo import Pdo
 
 
 class Tilted(Bench):
-    """A plant with a slope, and a load that tells the time."""
+    """A plant with a slope, and loads that depend on time."""
 
     def measure(self, time_s: float, motor_speed_rad_s: np.ndarray) -> Measurement:
         """Return the bench's values on a slope."""
@@ -32,7 +32,7 @@ class Tilted(Bench):
 
 
 def test_an_unconfigured_node_sends_nothing() -> None:
-    """Operational or not: SYNC brings no PDO before somebody configured one."""
+    """Operational or not, it answers no SYNC before a PDO is configured."""
     master = Master()
     assert master.sync() == {}
     master.nmt(1)
@@ -48,7 +48,7 @@ def test_an_unconfigured_node_sends_nothing() -> None:
     ],
 )
 def test_a_wrongly_configured_node_sends_nothing(what: str, index: int, sub: int, value: int, size: int) -> None:
-    """One wrong object is enough."""
+    """One wrong object of the configuration is enough."""
     master = Master()
     master.configure(1, tpdo=MOTOR_TPDO)
     master.nmt(1)
@@ -59,7 +59,7 @@ def test_a_wrongly_configured_node_sends_nothing(what: str, index: int, sub: int
 
 
 def test_only_an_operational_node_sends() -> None:
-    """Neither before start, nor after stop, nor after enter pre-operational."""
+    """No PDO is sent before the NMT command start, after stop, or in pre-operational."""
     master = Master()
     master.configure(1, tpdo=MOTOR_TPDO)
     assert master.sync() == {}
@@ -68,8 +68,8 @@ def test_only_an_operational_node_sends() -> None:
         assert bool(master.sync()) is talks
 
 
-def test_a_pdo_carries_what_is_mapped_in_its_order() -> None:
-    """Two mappings of the same node, byte by byte, and another COB-ID."""
+def test_a_pdo_has_the_mapped_objects_in_their_order() -> None:
+    """Two mappings of the same node, with another COB-ID, are exact to the byte."""
     master = Master()
     master.configure(3, tpdo=MOTOR_TPDO)
     master.nmt(1)
@@ -80,7 +80,7 @@ def test_a_pdo_carries_what_is_mapped_in_its_order() -> None:
 
 
 def test_transmission_types() -> None:
-    """1: every SYNC; 3: every third; 0: at SYNC when something changed."""
+    """Type 1 sends at every SYNC, type 3 at every third, type 0 at a SYNC after a change."""
     for kind, expected in ((1, 6), (3, 2), (0, 1)):
         master = Master()
         master.configure(11, tpdo=LOAD_CELL_TPDO, kind=kind)
@@ -89,7 +89,7 @@ def test_transmission_types() -> None:
 
 
 def test_an_event_timer_sends_without_sync() -> None:
-    """Type 255 with 0x1800:05 = 100 ms: ten a second."""
+    """With type 255 and 0x1800:05 = 100 ms, ten PDOs a second are sent."""
     master = Master()
     master.configure(11, tpdo=LOAD_CELL_TPDO, kind=255)
     master.write(11, 0x1800, 5, 100, 2)
@@ -97,8 +97,8 @@ def test_an_event_timer_sends_without_sync() -> None:
     assert sum(frame.can_id == 0x18B for frame in master.wait(1.001)) in {10, 11}
 
 
-def test_every_sensor_says_what_the_plant_says() -> None:
-    """Each in its own units and at its own place; all of the SYNC's instant."""
+def test_every_sensor_reports_the_plants_values() -> None:
+    """Each value has the device's unit and position, and all are of the SYNC's instant."""
     master = Master(plant=Tilted())
     for wheel in range(6):
         master.configure(11 + wheel, tpdo=LOAD_CELL_TPDO)
@@ -116,7 +116,7 @@ def test_every_sensor_says_what_the_plant_says() -> None:
 
 
 def test_a_synchronous_rpdo_waits_for_the_sync() -> None:
-    """Type 1: what came is done at the next SYNC; type 255: at once."""
+    """Type 1 takes effect at the next SYNC, type 255 at once."""
     drive = DriveUnderTest()
     assert drive.send_controlword(0x06) == 0x21
     drive.master.write(1, 0x1400, 2, 1, 1)
@@ -127,7 +127,7 @@ def test_a_synchronous_rpdo_waits_for_the_sync() -> None:
 
 @pytest.mark.parametrize(("length", "code", "obeyed"), [(5, 0x8210, False), (7, 0x8220, True)])
 def test_an_rpdo_of_the_wrong_length_is_reported(length: int, code: int, *, obeyed: bool) -> None:
-    """Too short brings EMCY 0x8210 and does nothing; too long brings 0x8220, and what is mapped is done."""
+    """Too short: EMCY 0x8210 and no effect; too long: EMCY 0x8220, and the mapped objects are written."""
     drive = DriveUnderTest()
     frames = drive.master.send(0x201, struct.pack("<Hi", 0x06, 0).ljust(8, b"\0")[:length])
     assert [struct.unpack_from("<H", f.data)[0] for f in frames if f.can_id == 0x81] == [code]
@@ -135,8 +135,8 @@ def test_an_rpdo_of_the_wrong_length_is_reported(length: int, code: int, *, obey
 
 
 @pytest.mark.parametrize(("load", "status"), [(50.0, 0), (250.0, 2), (-1.0, 4), (math.nan, 1)])
-def test_a_load_cell_says_when_it_cannot_measure(load: float, status: int) -> None:
-    """0x6150: not valid, positive and negative overload (CiA 404)."""
+def test_a_load_cell_reports_overload_and_invalid_values(load: float, status: int) -> None:
+    """Object 0x6150 has not valid, positive and negative overload (CiA 404)."""
 
     class Overloaded(Bench):
         def measure(self, time_s: float, motor_speed_rad_s: np.ndarray) -> Measurement:

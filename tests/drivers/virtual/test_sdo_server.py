@@ -1,4 +1,4 @@
-"""The virtual nodes' SDO server: CiA 301's transfers, and its reasons to refuse."""
+"""The virtual nodes' SDO server: transfers and abort codes of CiA 301."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def master() -> Master:
 
 
 @pytest.mark.parametrize("description", KAPVIK, ids=lambda each: f"node {each.node_id}")
-def test_every_object_of_the_sheet_is_there(master: Master, description: canopen.ObjectDictionary) -> None:
-    """Each number in the EDS reads back its default, but for what the device measures and its serial number."""
+def test_every_object_of_the_eds_can_be_read(master: Master, description: canopen.ObjectDictionary) -> None:
+    """Each number of the EDS has its default value, measurements and serial number apart."""
     node = description.node_id
     od = canopen.import_od(str(description.device.eds), node)
     live = {0x1018, 0x2F00, 0x6041, 0x6079, 0x9130}
@@ -34,16 +34,16 @@ def test_every_object_of_the_sheet_is_there(master: Master, description: canopen
                 assert value == variable.default % (1 << len(variable)), variable.name
 
 
-def test_a_name_comes_in_segments(master: Master) -> None:
-    """0x1008 is longer than four bytes: initiate says the size, segments alternate their toggle bit."""
+def test_a_string_is_read_in_segments(master: Master) -> None:
+    """Object 0x1008 is longer than four bytes: the size comes first, then segments with alternating toggle bit."""
     first = master.request(1, struct.pack("<BHBI", 0x40, 0x1008, 0, 0))
     assert first == struct.pack("<BHBI", 0x41, 0x1008, 0, 9)
     assert master.request(1, b"\x60" + bytes(7)) == b"\x00EPOS 24"
     assert master.request(1, b"\x70" + bytes(7)) == b"\x1b/1" + bytes(5)
 
 
-def test_a_number_may_come_in_segments(master: Master) -> None:
-    """A download that is not expedited ends in the same value."""
+def test_a_number_may_be_written_in_segments(master: Master) -> None:
+    """A segmented download has the same effect as an expedited one."""
     master.request(1, struct.pack("<BHBI", 0x21, 0x6083, 0, 4))
     assert master.request(1, b"\x07" + struct.pack("<I", 1234) + bytes(3)) == b"\x20" + bytes(7)
     assert master.read(1, 0x6083) == 1234
@@ -70,8 +70,8 @@ REFUSED = [
 
 
 @pytest.mark.parametrize("case", [case[1:] for case in REFUSED], ids=[case[0] for case in REFUSED])
-def test_what_must_be_refused_is_refused(master: Master, case: tuple[int, int, int, int, int]) -> None:
-    """Each for the reason that CiA 301 gives."""
+def test_invalid_requests_are_aborted(master: Master, case: tuple[int, int, int, int, int]) -> None:
+    """Each is aborted with the code of CiA 301."""
     index, sub, value, size, code = case
     with pytest.raises(AbortedError, match=f"0x{code:08X}"):
         master.write(1, index, sub, value, size)
@@ -87,7 +87,7 @@ MAPPINGS = [
 
 @pytest.mark.parametrize(("entries", "code"), [m[1:] for m in MAPPINGS], ids=[m[0] for m in MAPPINGS])
 def test_a_wrong_mapping_is_refused(master: Master, entries: list[int], code: int) -> None:
-    """At the entry, or at the count that would put it into force."""
+    """It is refused at the entry, or at the number of entries that would enable it."""
 
     def configure() -> None:
         master.write(1, 0x1A00, 0, 0, 1)
@@ -100,7 +100,7 @@ def test_a_wrong_mapping_is_refused(master: Master, entries: list[int], code: in
 
 
 def test_an_enabled_pdo_is_not_remapped(master: Master) -> None:
-    """First disable it (COB-ID bit 31), says CiA 301; moving it to another COB-ID needs the same."""
+    """It must be disabled first (COB-ID bit 31), also for another COB-ID (CiA 301)."""
     master.configure(1, tpdo=MOTOR_TPDO)
     with pytest.raises(AbortedError, match="0x06010000"):
         master.write(1, 0x1A00, 0, 0, 1)
@@ -113,19 +113,19 @@ def test_an_enabled_pdo_is_not_remapped(master: Master) -> None:
     [
         (b"\xa0\x08\x10\x00\x00\x00\x00\x00", 0x05040001),  # block upload, which is optional
         (b"\xc2\x17\x10\x00\x02\x00\x00\x00", 0x05040001),  # block download
-        (b"\x60" + bytes(7), 0x05040001),  # a segment of nothing
+        (b"\x60" + bytes(7), 0x05040001),  # a segment without a transfer
         (b"\x00" + bytes(7), 0x05040001),
         (b"\xff" * 8, 0x05040001),
     ],
 )
-def test_what_is_no_request_is_aborted(master: Master, request_: bytes, code: int) -> None:
-    """Anything of eight bytes gets an answer."""
+def test_an_unknown_command_is_aborted(master: Master, request_: bytes, code: int) -> None:
+    """Every request of eight bytes is answered."""
     with pytest.raises(AbortedError, match=f"0x{code:08X}"):
         master.request(1, request_)
 
 
 def test_a_toggle_bit_must_alternate(master: Master) -> None:
-    """A segment asked for twice is a lost frame somewhere: the transfer ends."""
+    """A repeated segment request means a lost frame and ends the transfer."""
     master.request(1, struct.pack("<BHBI", 0x40, 0x1008, 0, 0))
     master.request(1, b"\x60" + bytes(7))
     with pytest.raises(AbortedError, match="0x05030000"):
@@ -133,12 +133,12 @@ def test_a_toggle_bit_must_alternate(master: Master) -> None:
 
 
 def test_a_frame_that_is_too_short_gets_no_answer(master: Master) -> None:
-    """An SDO has eight bytes."""
+    """An SDO frame has eight bytes."""
     assert master.send(0x601, b"\x40\x00\x10") == []
 
 
-async def test_another_implementations_client_is_served() -> None:
-    """Canopen's own client reads and writes over python-can, in segments too."""
+async def test_the_client_of_python_canopen_is_served() -> None:
+    """It reads and writes over python-can, segmented as well."""
     import asyncio  # noqa: PLC0415  # only here
 
     rover = VirtualRover(Bench())

@@ -1,4 +1,4 @@
-"""Decoding: exact values for known frames, and no exception for any frame."""
+"""Decoding: exact values for known frames, and no exception for arbitrary frames."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ FRAMES = st.builds(
 )
 
 
-def test_a_motor_speaks_in_si() -> None:
-    """−80 mA and 3922 rpm, as the bytes that a drive sends."""
+def test_a_motors_tpdo_is_decoded_to_si_units() -> None:
+    """The bytes of −80 mA and 3922 rpm give the exact values."""
     frame = Frame(5, 0x181, struct.pack("<Hhi", 0x0637, -80, 3922))
     reading = Decoder(NODES).decode(frame)
     assert reading == Reading(
@@ -60,8 +60,8 @@ def test_a_motor_speaks_in_si() -> None:
     )
 
 
-def test_a_mirrored_motor_has_the_signs_of_the_rover() -> None:
-    """Current and speed change their sign; the statusword does not, and nothing is minus zero."""
+def test_a_mirrored_motors_signs_are_inverted() -> None:
+    """Current and speed are inverted, the statusword is not, and no value is minus zero."""
     mirrored = Decoder([NodeDescription(2, MOTOR_CONTROLLER, 1, mirrored=True)])
     values = dict(mirrored.decode(Frame(5, 0x182, struct.pack("<Hhi", 0x0637, -80, 0))).values)
     assert values[STATUSWORD] == 0x0637
@@ -69,8 +69,8 @@ def test_a_mirrored_motor_has_the_signs_of_the_rover() -> None:
     assert math.copysign(1.0, values[MOTOR_SPEED]) == 1.0
 
 
-def test_diagnostics_and_sensors_speak_in_si() -> None:
-    """Supply voltage and temperature, load, slopes and yaw rate, ground speed."""
+def test_diagnostics_and_sensors_are_decoded_to_si_units() -> None:
+    """Supply voltage and temperature, load, slopes and yaw rate, and ground speed are exact."""
     decoder = Decoder(NODES)
     sent = {
         0x281: (struct.pack("<Ih", 23456, -35), {BUS_VOLTAGE: 23.456, MOTOR_TEMPERATURE: -3.5}),
@@ -90,13 +90,13 @@ def test_diagnostics_and_sensors_speak_in_si() -> None:
 
 
 @pytest.mark.parametrize("status", range(1, 8))
-def test_a_load_cell_that_is_not_valid_gives_no_value(status: int) -> None:
-    """Not valid, or overloaded either way: the frame has arrived, and says nothing."""
+def test_an_invalid_load_gives_no_value(status: int) -> None:
+    """With not valid or overload in the status, the reading has no value."""
     assert Decoder(NODES).decode(Frame(3, 0x18B, struct.pack("<iB", 3160, status))) == Reading(3, 11, 0x18B, ())
 
 
-def test_services_are_told_apart() -> None:
-    """SYNC, heartbeat, boot-up, emergency; what is of no use is None and no error."""
+def test_services_are_distinguished() -> None:
+    """SYNC, heartbeat, boot-up and emergency are signals, and other services give None and no error."""
     decoder = Decoder(NODES)
     assert decoder.decode(Frame(7, 0x80, b"")) == Sync(7)
     assert decoder.decode(state_frame(NmtState.OPERATIONAL, 3)) == NodeState(0, 3, NmtState.OPERATIONAL)
@@ -112,7 +112,7 @@ def test_services_are_told_apart() -> None:
 
 
 def test_what_cannot_be_decoded_is_counted_by_its_reason() -> None:
-    """Each reason has its own count."""
+    """Each reason has its own counter."""
     decoder = Decoder(NODES)
     for frame in (
         Frame(0, 0x19E, bytes(8)),
@@ -133,15 +133,15 @@ def test_what_cannot_be_decoded_is_counted_by_its_reason() -> None:
     }
 
 
-def test_the_frames_of_a_full_answer_are_known() -> None:
-    """Fourteen nodes, and one of them with a second PDO."""
+def test_expected_lists_every_configured_tpdo() -> None:
+    """Fourteen nodes, one of them with a second TPDO, have fifteen COB-IDs."""
     assert len(Decoder(NODES).expected) == 15
     assert {0x181, 0x281, 0x18B, 0x195, 0x196} <= Decoder(NODES).expected
 
 
 @given(st.lists(FRAMES, max_size=50))
-def test_no_frame_raises_and_none_vanishes(frames: list[Frame]) -> None:
-    """Every frame is a signal, of no use by design, or counted; the same frames give the same signals again."""
+def test_every_frame_is_decoded_ignored_or_counted(frames: list[Frame]) -> None:
+    """Every frame is a signal, without signal by design, or counted; equal frames give equal signals."""
     decoder, again = Decoder(NODES), Decoder(NODES)
     silent = 0
     for frame in frames:

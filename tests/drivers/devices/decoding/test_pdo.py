@@ -12,7 +12,7 @@ from regolithd.drivers.errors import DictionaryError
 
 
 def test_a_layout_is_checked_against_the_eds() -> None:
-    """What the EDS lacks, what it does not allow, and what does not fit are refused, with the object named."""
+    """Missing and unmappable objects and more than 8 bytes are refused, with the object in the message."""
     for entries, what in (
         (((0x6123, 0),), "no such object"),
         (((0x1017, 0),), "may not be mapped"),

@@ -1,4 +1,4 @@
-"""The virtual drive's state machine against CiA 402-2, as a table written from the standard and not from the code."""
+"""The virtual drive's state machine, compared with tables written from CiA 402-2 independently of the code."""
 
 from __future__ import annotations
 
@@ -59,8 +59,8 @@ def expected(state: PowerState, controlword: int, before: int, option: int) -> P
 
 
 @pytest.mark.parametrize("state", PowerState)
-def test_every_controlword_does_what_the_standard_says_and_nothing_else(state: PowerState) -> None:
-    """All controlwords' low bytes, after each state of bit 7, with each kind of quick-stop option."""
+def test_every_controlword_has_the_effect_of_the_standard(state: PowerState) -> None:
+    """All low bytes of the controlword, after each state of bit 7, with each quick stop option."""
     for controlword, before, option in itertools.product(range(256), (0x00, 0x80), (2, 6)):
         reached = next_state(state, controlword, before, quick_stop_option=option)
         assert reached is expected(state, controlword, before, option), (hex(controlword), hex(before), option)
@@ -80,13 +80,13 @@ def test_every_controlword_does_what_the_standard_says_and_nothing_else(state: P
     ],
 )
 def test_each_state_has_its_bits_in_the_statusword(state: PowerState, mask: int, bits: int) -> None:
-    """State coding, CiA 402-2 table 31; and the bits of no other state."""
+    """State coding of CiA 402-2, table 31, is unique."""
     assert state.value & mask == bits
     assert sum(other.value & mask == bits for other in PowerState) == 1
 
 
-def test_the_ladder_up_and_down_over_the_bus() -> None:
-    """By controlword in a PDO, each rung shows in the statusword; what skips a rung is ignored."""
+def test_the_states_up_and_down_over_the_bus() -> None:
+    """Each controlword in a PDO gives the next state in the statusword, and one that skips a state is ignored."""
     drive = DriveUnderTest()
     assert drive.state == 0x40
     assert drive.send_controlword(0x0F) == 0x40  # enable operation: illegal from here
@@ -100,12 +100,12 @@ def test_the_ladder_up_and_down_over_the_bus() -> None:
 
 
 def test_a_fault_is_reset_by_a_rising_edge_only() -> None:
-    """Bit 7 that stands already, or falls, resets nothing; nor does any other command leave fault."""
+    """Bit 7 that is constant or falls has no effect, and no other command leaves fault."""
     drive = DriveUnderTest()
     drive.send_controlword(0x80)
     drive.master.rover.inject_fault("fault 1 0x2310")
     assert drive.state == 0x08
-    assert drive.send_controlword(0x80) == 0x08  # no edge: it stood before the fault
+    assert drive.send_controlword(0x80) == 0x08  # no edge: it was set before the fault
     for controlword in (0x06, 0x07, 0x0F, 0x00):
         assert drive.send_controlword(controlword) == 0x08
     assert drive.send_controlword(0x80) == 0x40
