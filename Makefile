@@ -9,10 +9,10 @@ export PYTHON
 RECORDINGS ?= ../shared/recordings
 
 .PHONY: help demo test check docs clean install uninstall
-.PHONY: sizing reproduce evaluate loop prove real scaling mutants frames pictures picture
+.PHONY: sizing reproduce evaluate loop prove prove-machines real scaling mutants frames pictures picture
 
 help:
-	@awk -F ':.*## ' '/^## / { print "\n" substr($$0, 4) } /^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^## / { print "\n" substr($$0, 4) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
 
 ## Use and development
 
@@ -59,6 +59,9 @@ loop: $(DEV) ## closed-loop study: hidden drivetrain effect, comparison, correct
 
 prove: $(DEV) ## blind trials of `regolithd mismatch` on 200 recordings; continues an interrupted run
 	$(BIN)/regolithd prove $(if $(SEED),--seed $(SEED)) --figures build/figures/prove.json
+
+prove-machines: $(DEV) ## the same on five other machines, one of them an FMU (needs a C compiler; CASES=…)
+	$(BIN)/python -m regolithd.calibration.validation.machine_trials --cases $(or $(CASES),300) $(if $(SEED),--seed $(SEED))
 
 real: $(DEV) ## worked examples on recordings that are not part of this project (RECORDINGS=…)
 	$(BIN)/python docs/examples/run.py $(RECORDINGS) build/figures/real.json build/real

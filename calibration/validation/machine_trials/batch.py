@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from regolithd.calibration.validation.blind_trials.commitment import Envelope, Truth, file_digest, read_opened
+from regolithd.calibration.validation.blind_trials.commitment import Commitment, Truth, file_digest, read_opened
 from regolithd.calibration.validation.blind_trials.errors import OtherBatchError, SolverError
-from regolithd.calibration.validation.blind_trials.isolation import run_alone
+from regolithd.calibration.validation.blind_trials.isolation import run_isolated
 from regolithd.calibration.validation.machine_trials.files import write_recording, write_simulation
 from regolithd.calibration.validation.machine_trials.generator import GROWN, Case, Recorded, make_case
 from regolithd.calibration.validation.machine_trials.strength import readings
@@ -144,7 +144,7 @@ def ask(batch: Batch, folder: Path, recording: str, simulation: str, extra: str 
     said.unlink(missing_ok=True)
     command = batch.solver.format(recording=recording, simulation=simulation, answer=said.name) + extra
     try:
-        run_alone(shlex.split(command), folder, threads=1, timeout_s=batch.timeout_s)
+        run_isolated(shlex.split(command), folder, threads=1, timeout_s=batch.timeout_s)
         return json.loads(said.read_text())
     except (SolverError, OSError, json.JSONDecodeError) as error:
         return {"failed": str(error)}
@@ -167,8 +167,8 @@ def run_case(batch: Batch, plan: Plan) -> Outcome:
     if opened.exists():
         return reopened(batch, plan)
     case = make_case(plan)
-    envelope = Envelope(truth_of(case, write_case(case, folder)))
-    committed = envelope.digest
+    sealed = Commitment(truth_of(case, write_case(case, folder)))
+    committed = sealed.digest
     with (batch.folder / "commitments.csv").open("a") as lines:
         lines.write(f"{plan.number},{committed}\n")
     units, later = len(case.units), case.later is not None
@@ -183,7 +183,7 @@ def run_case(batch: Batch, plan: Plan) -> Outcome:
     path = batch.path("answers", plan.number)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(told, indent=1) + "\n")
-    envelope.open_into(opened, committed)
+    sealed.open_into(opened, committed)
     if not batch.keep:
         shutil.rmtree(folder)
     return outcome(batch, plan.number)
