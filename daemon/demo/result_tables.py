@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def wheel_table(wheels: list[WheelOnSoil]) -> Table:
     """Return the table of each wheel's means on each soil, true values in brackets."""
-    table = _titled("Each wheel alone, the paper's network: mean over each soil (true value)")
+    table = _titled("Each wheel alone, the paper's network: mean over each soil (true)")
     table.add_column("\nwheel", justify="right")
     table.add_column("\nsoil")
     for name in ("torque\nN·m", "c\nkPa", "φ\n°"):
@@ -36,7 +36,7 @@ def wheel_table(wheels: list[WheelOnSoil]) -> Table:
 
 def posterior_table(posteriors: list[PosteriorOnSoil]) -> Table:
     """Return the table of the posterior on each soil: median and 90 % interval, true values in brackets."""
-    table = _titled("Posterior of all six wheels: median, 90 % interval (true value)")
+    table = _titled("Posterior of all six wheels: median, 90 % interval (true)")
     table.add_column("\nsoil")
     table.add_column("c\nkPa", justify="right", no_wrap=True)
     table.add_column("φ\n°", justify="right", no_wrap=True)
