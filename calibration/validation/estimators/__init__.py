@@ -7,5 +7,6 @@
 | `drivetrain` | error of the cohesion by an uncalibrated no-load current |
 | `change_detector` | delay of the soil-change alarm at one false alarm in 8 h |
 | `simulated_drives` | long drives for the alarm |
+| `paper_network` | the paper's network, loaded once |
 | `pictures` | figures for the documentation |
 """

@@ -10,14 +10,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
-from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.calibration.parameters import SOILS, Drivetrain, Wheel
 from regolithd.calibration.posterior import simulated_rovers
 from regolithd.calibration.posterior.window import CalibrationUncertainty, reduce_windows
 from regolithd.calibration.terrain.soils import soils_from
+from regolithd.calibration.validation.estimators import paper_network
 from regolithd.calibration.validation.estimators.errors_and_coverage import NO_LOAD_A
 from regolithd.calibration.validation.reproduction import published
 
@@ -70,11 +69,9 @@ def _paper(rng: np.random.Generator) -> tuple[float, float]:
     # Divided by its mean: the drops lower the mean current, and only the scatter is of interest here.
     current = np.clip(record["motor_current_A"] * noise / noise.mean(), 0, None)
     slip = np.full_like(load, record["slip"])
-    session = onnxruntime.InferenceSession(TERRAIN_MODEL)
 
-    def angle(inputs: Array) -> float:
-        (raw,) = session.run(None, {"inputs": inputs.reshape(-1, 3).astype(np.float32)})
-        return float(np.degrees(np.arctan(raw[:, 1])).mean())
+    def angle(*inputs: Array) -> float:
+        return float(np.degrees(np.arctan(paper_network.estimate(*inputs)[..., 1].ravel())).mean())
 
-    usual = np.array([record["load_N"], record["slip"], record["motor_current_A"]])
-    return angle(usual), angle(np.stack([load, slip, current], axis=-1))
+    usual = (np.array([record[name]]) for name in ("load_N", "slip", "motor_current_A"))
+    return angle(*usual), angle(load, slip, current)

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
-from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.calibration.parameters import SOILS, Wheel
 from regolithd.calibration.posterior import change_detection as change
 from regolithd.calibration.posterior.window import INTERVAL_S
+from regolithd.calibration.validation.estimators import paper_network
 from regolithd.calibration.validation.estimators.simulated_drives import Instant, SimulatedDrive, instants, torque_curve
 
 if TYPE_CHECKING:
@@ -49,14 +48,13 @@ class SingleSoilDrives:
 
 def statistics(drive: SimulatedDrive, length: int, rng: np.random.Generator) -> Iterator[dict[str, Array]]:
     """Yield each method's statistic, shape (rovers,), for each half second; high values raise the alarm."""
-    session = onnxruntime.InferenceSession(TERRAIN_MODEL)
     expected = torque_curve(SOILS[drive.first], Wheel())
     state = change.start((drive.rovers,))
     recent: deque[Array] = deque(maxlen=20)
     reference: deque[Array] = deque(maxlen=220)
     for instant in instants(drive, length, rng):
         state, cusum = change.step(state, instant.torque_Nm, expected(instant.load_N, instant.slip))
-        recent.append(-_paper_cohesion(session, instant))
+        recent.append(-_paper_cohesion(instant))
         reference.append(recent[0])
         mean_10_s = np.mean(recent, axis=0)
         yield {
@@ -67,10 +65,9 @@ def statistics(drive: SimulatedDrive, length: int, rng: np.random.Generator) -> 
         }
 
 
-def _paper_cohesion(session: onnxruntime.InferenceSession, instant: Instant) -> Array:
-    inputs = np.stack([instant.load_N, instant.slip, instant.current_A], axis=-1)
-    (answer,) = session.run(None, {"inputs": inputs.reshape(-1, 3).astype(np.float32)})
-    return answer[:, 0].reshape(instant.load_N.shape).mean(axis=1).astype(np.float64)
+def _paper_cohesion(instant: Instant) -> Array:
+    estimates = paper_network.estimate(instant.load_N, instant.slip, instant.current_A)
+    return np.ascontiguousarray(estimates[..., 0]).mean(axis=1).astype(np.float64)
 
 
 def single_soil_drives(

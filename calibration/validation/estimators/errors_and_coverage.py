@@ -16,16 +16,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import onnxruntime
 from numpy.typing import NDArray
 
-from regolithd.calibration.models import TERRAIN_MODEL
 from regolithd.calibration.paper.least_squares import least_squares
 from regolithd.calibration.parameters import SOILS, Drivetrain, Wheel
 from regolithd.calibration.posterior import simulated_rovers
 from regolithd.calibration.posterior.window import CalibrationUncertainty, reduce_windows
 from regolithd.calibration.terrain.soils import ANGLE_STD_DEG, LOG_STD
 from regolithd.calibration.terrain.wheel_soil import contact_angle, shear_displacement
+from regolithd.calibration.validation.estimators import paper_network
 
 if TYPE_CHECKING:
     from regolithd.calibration.posterior.estimator import PosteriorEstimator
@@ -129,10 +128,7 @@ def _chunk(count: int, case: Case, rng: np.random.Generator, estimator: Posterio
 
 
 def _paper(load_N: Array, slip: Array, current_A: Array) -> Array:
-    session = onnxruntime.InferenceSession(TERRAIN_MODEL)
-    inputs = np.stack([load_N, slip, current_A], axis=-1).reshape(-1, 3).astype(np.float32)
-    (raw,) = session.run(None, {"inputs": inputs})
-    cohesion, tangent = raw.reshape(*load_N.shape, 2).astype(np.float64).transpose(3, 0, 1, 2)
+    cohesion, tangent = np.moveaxis(paper_network.estimate(load_N, slip, current_A).astype(np.float64), -1, 0)
     return np.column_stack([cohesion.mean(axis=(1, 2)), np.arctan(tangent).mean(axis=(1, 2))])
 
 
