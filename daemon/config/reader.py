@@ -88,7 +88,7 @@ def _syntax_problem(path: Path, error: tomllib.TOMLDecodeError) -> Problem:
     place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
     line = int(place[1]) if place else None
     what = re.sub(r"\s*\(at .*\)$", "", str(error))
-    return Problem(str(path), line, "syntax", "valid TOML", f'"{what}"', "Mend this line; the rest was not read.")
+    return Problem(str(path), line, "syntax", "valid TOML", f'"{what}"', "Correct this line; the rest was not read.")
 
 
 def _valid_tables(tables: Mapping[str, Any]) -> Configuration:

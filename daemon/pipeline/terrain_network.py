@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     import onnxruntime
 
-CURE = "Train one (`regolithd train`), or mend [estimator] model."
+CURE = "Train one (`regolithd train`), or correct [estimator] model."
 
 
 class TerrainModelError(ModelError):

@@ -1,4 +1,4 @@
-"""What the daemon's tests share: a tiny network with a card, and the frames of a rover that needs no bus."""
+"""Fixtures of the daemon's tests: a small network with a model card, and the frames of a rover without a bus."""
 
 import struct
 from collections.abc import Callable, Iterator
@@ -19,7 +19,7 @@ START_NS = 1_700_000_000_123_456_000
 
 @pytest.fixture
 def card() -> ModelCard:
-    """The paper's inputs and outputs."""
+    """A model card with the paper's inputs and outputs."""
     return ModelCard(
         version="test-1",
         inputs=(
@@ -83,7 +83,7 @@ class Drive:
 
 @pytest.fixture
 def drive() -> type[Drive]:
-    """Return the maker of frames."""
+    """Return the class that makes the frames."""
     return Drive
 
 

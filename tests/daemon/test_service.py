@@ -1,4 +1,4 @@
-"""The whole path in one process: virtual nodes, bus, service, recording – and the same numbers from the log."""
+"""The whole path in one process: virtual nodes, bus, service, recording, and the same numbers from the log."""
 
 import asyncio
 import csv
@@ -28,33 +28,33 @@ from regolithd.drivers.virtual import Bench, VirtualRover
 
 @dataclass
 class Listener:
-    """A sink that remembers."""
+    """A sink that keeps what it gets."""
 
     digest: Digest = field(default_factory=Digest)
     valid: list[list[bool]] = field(default_factory=list)
     measured: list[list[bool]] = field(default_factory=list)
     events: list[str] = field(default_factory=list)
-    said_goodbye: bool = False
+    cancelled: bool = False
 
     def estimate(self, estimate: Estimate) -> None:
-        """Remember it."""
+        """Keep what is compared."""
         self.digest.add(estimate)
         self.valid.append(estimate.valid.tolist())
         self.measured.append(estimate.snapshot.valid.tolist())
 
     def event(self, event: NetworkEvent) -> None:
-        """Remember its name."""
+        """Keep its name."""
         self.events.append(type(event).__name__)
 
     async def run(self) -> None:
-        """Wait for the end."""
+        """Wait for cancellation."""
         try:
             await asyncio.Event().wait()
         finally:
-            self.said_goodbye = True
+            self.cancelled = True
 
     async def until(self, condition: Callable[[], bool]) -> None:
-        """Wait for something to be true; the test's time limit ends it otherwise."""
+        """Wait for a condition; the test's time limit ends it otherwise."""
         while not condition():  # noqa: ASYNC110  # whatever is waited for, it has no event of its own
             await asyncio.sleep(0.02)
 
@@ -93,13 +93,13 @@ def running(tmp_path: Path, configuration: Configuration) -> Callable:
 
 
 async def test_a_rover_drives_is_recorded_replayed_and_exported(running: Callable, tmp_path: Path) -> None:
-    """From the virtual wheels to the last bit of the replay."""
+    """The replay of the log equals the live run to the last bit, and the export has every snapshot."""
     async with running() as (service, listener, rover):
         await service.network.enable()
         await service.network.set_speed((0.29,) * 6)
         await listener.until(lambda: sum(all(valid) for valid in listener.valid) >= 20)
         mcap, log = service.recorder.paths
-    assert listener.said_goodbye
+    assert listener.cancelled
     assert listener.events.count("NodeBooted") >= 14
     assert all(node.device.speed_rad_s == 0 for node in rover.nodes.values() if hasattr(node.device, "speed_rad_s"))
 
@@ -127,7 +127,7 @@ async def test_a_rover_drives_is_recorded_replayed_and_exported(running: Callabl
 async def test_a_node_that_falls_silent_is_an_event_and_its_wheel_invalid_and_the_rest_goes_on(
     running: Callable,
 ) -> None:
-    """Load cell 13 loses its power, and gets it back."""
+    """Load cell 13 loses its power and gets it back."""
     async with running() as (service, listener, rover):
         await service.network.enable()
         await service.network.set_speed((0.29,) * 6)
@@ -144,7 +144,7 @@ async def test_a_node_that_falls_silent_is_an_event_and_its_wheel_invalid_and_th
 
 
 async def test_a_log_that_was_changed_is_found_out(running: Callable) -> None:
-    """One bit of one current."""
+    """One changed bit of one current makes the replay fail, and names the quantity."""
     async with running() as (service, listener, _):
         await listener.until(lambda: listener.digest.count >= 5)
         log = service.recorder.paths[1]
@@ -159,7 +159,7 @@ async def test_a_log_that_was_changed_is_found_out(running: Callable) -> None:
 
 
 async def test_a_slow_task_starves_the_watchdog(running: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The service manager is told who does not answer, and is not fed."""
+    """While a task is overdue, the watchdog is not fed and STATUS names the task."""
     told: list[str] = []
     monkeypatch.setattr("regolithd.daemon.service.notify", told.append)
     monkeypatch.setenv("WATCHDOG_USEC", "200000")
@@ -176,6 +176,6 @@ async def test_a_slow_task_starves_the_watchdog(running: Callable, monkeypatch: 
 
 
 def test_events_are_json() -> None:
-    """Whatever they hold."""
+    """An event with bytes and nested objects is encoded."""
     event = NodeEmergency(1, 3, Emergency(1, 3, 0x8130, 0x11, b"\x00\x01\x02\x03\x04", "heartbeat"), "node 3: …")
     assert json.loads(event_json(event))["emergency"]["vendor"] == "0001020304"

@@ -26,7 +26,7 @@ def test_faulty_nodes_are_found_and_named(stack: Stack) -> None:
     status, found = check(stack)
     assert status == 0, found
     assert "vcan0 is up" in found["bus"]["text"]
-    assert found["nodes"]["text"].startswith("12 of 12 answer and are who they should be")
+    assert found["nodes"]["text"].startswith("12 of 12 answer with the expected identity")
     assert found["broker"]["verdict"] == found["model"]["verdict"] == "good"
 
     stack.inject_fault("off 13")

@@ -1,4 +1,4 @@
-"""`regolithd check` says what is wrong, all of it, and how to mend it – also where hardly anything is there."""
+"""`regolithd check` reports every problem with what to do, also on a computer without bus, broker and models."""
 
 import asyncio
 import grp
@@ -34,14 +34,14 @@ GROUP = grp.getgrgid(os.getgid()).gr_name
 
 
 def check(*options: str) -> subprocess.CompletedProcess[str]:
-    """Run the command as a person does."""
+    """Run `regolithd check` as a command."""
     environment = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "200"}
     command = [sys.executable, "-m", "regolithd", "check", *options]
     return subprocess.run(command, capture_output=True, text=True, env=environment, check=False, timeout=60)
 
 
 def test_five_mistakes_are_five_lines_and_status_78(tmp_path: Path) -> None:
-    """Each with file, line, key, what was expected, what was found and what to do."""
+    """Each line has file, line, key, the expected and the found value, and what to do."""
     config = tmp_path / "rover.toml"
     config.write_text(
         """\
@@ -70,14 +70,14 @@ host = ""
 
 
 def test_syntax_alone_touches_nothing(tmp_path: Path) -> None:
-    """For the installer, before anything is there."""
+    """`--syntax` reads the file and checks nothing else, for use during installation."""
     run = check("--syntax", "--config", str(ROOT / "rover.toml"))
     assert (run.returncode, run.stdout) == (0, f"{ROOT / 'rover.toml'}: good\n")
     assert check("--syntax", "--config", str(tmp_path / "absent.toml")).returncode == 78
 
 
-def test_where_hardly_anything_is_there_everything_is_told_at_once(tmp_path: Path) -> None:
-    """No link, no broker, no model, no group, no folder: five things wrong, and status 1."""
+def test_where_hardly_anything_is_there_everything_is_reported_at_once(tmp_path: Path) -> None:
+    """Without link, broker, model, group and folder there are five wrong findings, and the status is 1."""
     config = tmp_path / "rover.toml"
     (tmp_path / "file").touch()
     config.write_text(
@@ -111,8 +111,8 @@ socket = "{tmp_path}/control.sock"
     assert "groupadd --system no-such-group" in shown
 
 
-async def test_a_broker_that_lets_us_in_and_one_that_does_not(mosquitto: Mosquitto, tmp_path: Path) -> None:
-    """With the keys to mend."""
+async def test_a_broker_that_accepts_us_and_one_that_does_not(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """A broker that accepts the credentials is good, one that refuses is wrong and the cure names the keys."""
     settings = Mqtt(host="127.0.0.1", port=mosquitto.port)
     (finding,) = await check_broker(Configuration(mqtt=settings))
     assert finding.verdict is Verdict.GOOD
@@ -147,14 +147,14 @@ async def test_a_broker_that_lets_us_in_and_one_that_does_not(mosquitto: Mosquit
     ],
 )
 def test_a_link_is_judged_by_what_iproute2_says(details: dict, verdict: Verdict, said: str) -> None:
-    """And where that is not installed, by being up."""
+    """Bit rate and error state decide; without iproute2, that the link is up."""
     finding = judge_link(Bus(), details)
     assert (finding.verdict, said in finding.text) == (verdict, True)
     assert bool(finding.cure) == (verdict is not Verdict.GOOD)
 
 
-def test_a_link_that_is_no_can_link_is_told() -> None:
-    """The loopback interface is there everywhere."""
+def test_a_link_that_is_no_can_link_is_reported() -> None:
+    """The loopback interface is reported as no CAN link."""
     (finding,) = check_link(Bus(channel="lo"), {})
     assert (finding.verdict, "no CAN link" in finding.text) == (Verdict.WRONG, True)
 
@@ -169,20 +169,20 @@ def test_a_link_that_is_no_can_link_is_told() -> None:
         (150, 250_000, ["warning"]),
     ],
 )
-def test_a_bus_that_will_be_too_full_is_told(rate_Hz: int, bitrate: int, verdicts: list[str]) -> None:
-    """By the worst case of every frame that the configured nodes send."""
+def test_a_bus_that_will_be_too_full_is_reported(rate_Hz: int, bitrate: int, verdicts: list[str]) -> None:
+    """The bus load counts the longest form of every frame that the configured nodes send."""
     configuration = Configuration(sync={"rate_Hz": rate_Hz}, bus={"bitrate": bitrate})
     assert [finding.verdict for finding in check_load(configuration)] == verdicts
 
 
-async def test_an_in_process_bus_has_nobody_to_ask() -> None:
-    """The demo's configuration is not wrong for it."""
+async def test_an_in_process_bus_is_not_probed() -> None:
+    """A bus inside one process, as in the demo, is not checked and not wrong."""
     (finding,) = await check_bus(Configuration(bus=Bus(interface="virtual")), None)
     assert finding.verdict is Verdict.UNKNOWN
 
 
 def test_each_node_that_is_not_right_has_its_line() -> None:
-    """One that may be absent is a warning."""
+    """A node that is not required gives a warning, any other an error."""
     motor = NodeDescription(1, MOTOR_CONTROLLER, 0)
     cell = NodeDescription(11, LOAD_CELL, 0)
     speed = NodeDescription(22, GROUND_SPEED_SENSOR, None, required=False)
@@ -202,7 +202,7 @@ def test_each_node_that_is_not_right_has_its_line() -> None:
 
 
 def status(*phases: str) -> Status:
-    """Return what a running daemon says."""
+    """Return the status of a running daemon."""
     nodes = tuple(
         NodeLine(node_id=n, kind="motor", wheel=n, phase=phase, drive_state=None, text="")
         for n, phase in enumerate(phases, start=1)
@@ -211,7 +211,7 @@ def status(*phases: str) -> Status:
 
 
 def test_a_running_daemon_is_asked_instead_of_the_bus() -> None:
-    """Two masters would disturb each other."""
+    """The states of the nodes come from the running daemon, since two masters would disturb each other."""
     found = nodes_of_daemon(status("operational", "lost"))
     assert [(finding.subject, finding.verdict) for finding in found] == [
         ("nodes", Verdict.GOOD),
@@ -232,13 +232,13 @@ def test_a_running_daemon_is_asked_instead_of_the_bus() -> None:
     ],
 )
 def test_the_clock_is_judged(state: ClockState | None, jump_ns: int, now_s: float, verdict: Verdict, said: str) -> None:
-    """By the kernel's word, by what was watched, and by common sense."""
+    """The kernel's state, a jump during the observation, and an implausible date each decide."""
     finding = judge_clock(state, jump_ns, now_s)
     assert (finding.verdict, said in finding.text) == (verdict, True)
 
 
 async def test_this_computers_clock_can_be_asked() -> None:
-    """Linux always says; whether it is synchronised is this computer's affair."""
+    """Linux always reports the state of its clock, synchronised or not."""
     said = kernel_clock_state()
     assert said is not None
     assert 0 <= said.largest_error_s < 1e4
@@ -246,8 +246,8 @@ async def test_this_computers_clock_can_be_asked() -> None:
     assert finding.verdict in {Verdict.GOOD, Verdict.WARNING}
 
 
-def test_a_folder_that_may_grow_beyond_its_disk_is_told(tmp_path: Path) -> None:
-    """A warning as long as there is room for a while."""
+def test_a_folder_that_may_grow_beyond_its_disk_is_reported(tmp_path: Path) -> None:
+    """A folder that may grow beyond its disk is a warning while at least 100 MB are free, then wrong."""
     assert check_folder("store", tmp_path, 1.0, "[mqtt] spool_directory").verdict is Verdict.GOOD
     assert check_folder("store", tmp_path / "new", 1.0, "[mqtt] spool_directory").text.count("will be created") == 1
     finding = check_folder("store", tmp_path, 1e12, "[mqtt] spool_directory")
@@ -257,8 +257,8 @@ def test_a_folder_that_may_grow_beyond_its_disk_is_told(tmp_path: Path) -> None:
     assert check_folder("store", tmp_path / "file", 1.0, "[mqtt] spool_directory").verdict is Verdict.WRONG
 
 
-async def test_a_network_that_does_not_suit_the_rover_is_told(tmp_path: Path) -> None:
-    """Or is no network at all."""
+async def test_a_network_that_does_not_suit_the_rover_is_reported(tmp_path: Path) -> None:
+    """A network for other loads is a warning, a file that is no network is wrong."""
     card = ModelCard("small-1", (Variable("load_N", "N", 1.0, 10.0),), (), 1.0)
     assert judge_card(card, Configuration()).verdict is Verdict.WARNING
     (tmp_path / "broken.onnx").write_bytes(b"no network")
@@ -268,8 +268,8 @@ async def test_a_network_that_does_not_suit_the_rover_is_told(tmp_path: Path) ->
     assert finding.verdict is Verdict.GOOD
 
 
-async def test_who_may_command_is_told(tmp_path: Path) -> None:
-    """And whether there is anything to command."""
+async def test_who_may_command_is_reported(tmp_path: Path) -> None:
+    """The finding tells whether the user is in the group, and whether a daemon runs."""
     configuration = Configuration(control=Control(group=GROUP, socket=tmp_path / "control.sock"))
     assert await running_daemon(configuration) is None
     (finding,) = check_control(configuration, None)
@@ -284,7 +284,7 @@ async def test_who_may_command_is_told(tmp_path: Path) -> None:
 
 
 async def test_a_drivetrain_that_nobody_calibrated_means_no_intervals_and_a_known_one_does() -> None:
-    """And a posterior that was trained for another wheel is wrong."""
+    """Without calibration there is a warning, with it none, and a posterior for another wheel is wrong."""
     known = {"no_load_current_A": 0.037}
     cases = {
         Verdict.WARNING: Configuration(),

@@ -1,4 +1,4 @@
-"""A configuration is either right, or every mistake in it is told at once."""
+"""A configuration is either valid, or every mistake in it is reported at once."""
 
 from pathlib import Path
 
@@ -11,14 +11,14 @@ ROVER = Path(__file__).resolve().parents[3] / "rover.toml"
 
 
 def problems_of(text: str) -> dict[str, str]:
-    """Return key → message of everything that is wrong."""
+    """Return key → message of every problem."""
     with pytest.raises(ConfigurationError) as caught:
         parse_configuration(text, Path("rover.toml"))
     return {problem.key: str(problem) for problem in caught.value.problems}
 
 
 def test_the_shipped_file_is_the_defaults_with_both_body_sensors() -> None:
-    """`rover.toml` promises that its values are the defaults."""
+    """`rover.toml` has the default of every key, and both body sensors."""
     shipped = read_configuration(ROVER)
     sensors = shipped.nodes.model_copy(update={"inclinometer": None, "ground_speed": None})
     assert shipped.model_copy(update={"nodes": sensors}) == Configuration()
@@ -26,7 +26,7 @@ def test_the_shipped_file_is_the_defaults_with_both_body_sensors() -> None:
 
 
 def test_every_key_of_the_model_is_shown_in_the_shipped_file() -> None:
-    """A key that nobody can see does not exist."""
+    """Each table and each key of the model is in `rover.toml`."""
     text = ROVER.read_text()
     for name, field in Configuration.model_fields.items():
         assert f"[{name}]" in text
@@ -35,7 +35,7 @@ def test_every_key_of_the_model_is_shown_in_the_shipped_file() -> None:
 
 
 def test_five_mistakes_are_five_problems_with_file_line_key_and_cure() -> None:
-    """Among them one that only shows when two keys are looked at together."""
+    """Each problem has its file, line, key and cure, those between two keys included."""
     text = """\
 [sync]
 rate_Hz = 500
@@ -58,21 +58,21 @@ port = "1883a"
     assert found["mqtt.port"].endswith("Change it, or leave it out for 1883.")
 
 
-def test_a_toml_mistake_is_told_with_its_line() -> None:
-    """Nothing can be said about the rest then."""
+def test_a_toml_mistake_is_reported_with_its_line() -> None:
+    """A file that does not parse gives one problem with the line."""
     found = problems_of("[sync]\nrate_Hz = \n")
     assert found["syntax"].startswith("rover.toml:2: ")
 
 
-def test_an_unknown_table_and_a_table_that_is_a_number_are_told() -> None:
-    """The shape of the file is checked like its values."""
+def test_an_unknown_table_and_a_table_that_is_a_number_are_reported() -> None:
+    """An unknown table and a table that is a number are problems too."""
     found = problems_of("sync = 3\n[recordings]\n")
     assert "Did you mean recording?" in found["recordings"]
     assert "sync" in found
 
 
 def test_a_missing_file_is_a_problem_like_any_other(tmp_path: Path) -> None:
-    """`--config` mistyped is told, not traced."""
+    """A missing file gives a problem, not a traceback."""
     with pytest.raises(ConfigurationError, match=r"absent.toml: file: expected a readable TOML file"):
         read_configuration(tmp_path / "absent.toml")
 
@@ -89,7 +89,7 @@ PATH_KEYS = (
 
 
 def test_every_path_of_the_model_is_in_the_list_of_path_keys() -> None:
-    """A new key whose value is a path is tested below like the others."""
+    """Every key of the model whose value is a path is tested below."""
     found = {
         f"{name}.{key}"
         for name, table in Configuration.model_fields.items()
@@ -103,7 +103,7 @@ def test_every_path_of_the_model_is_in_the_list_of_path_keys() -> None:
 def test_a_relative_path_is_relative_to_the_folder_of_the_file(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A configuration and the files it names may be moved together, and it is read from any working directory."""
+    """The working directory does not matter, whichever key the path is under."""
     table, key = name.split(".")
     username = 'username = "somebody"\n' if key == "password_file" else ""
     file = tmp_path / "rover" / "rover.toml"
@@ -116,7 +116,7 @@ def test_a_relative_path_is_relative_to_the_folder_of_the_file(
 
 @pytest.mark.parametrize("name", PATH_KEYS)
 def test_an_absolute_path_is_not_changed(name: str) -> None:
-    """The folder of the file does not matter then."""
+    """The folder of the file does not matter for an absolute path."""
     table, key = name.split(".")
     text = f'[{table}]\n{key} = "/some/where"\n' + ('username = "x"\n' if key == "password_file" else "")
     read = parse_configuration(text, Path("/etc/regolithd/rover.toml"))
@@ -124,7 +124,7 @@ def test_an_absolute_path_is_not_changed(name: str) -> None:
 
 
 def test_only_the_motors_of_the_mirrored_wheels_are_mirrored() -> None:
-    """`mirrored_wheels` counts wheels from 1; load cells and body sensors have no direction."""
+    """`mirrored_wheels` counts wheels from 1, and applies to motors only."""
     nodes = parse_configuration("[nodes]\nmirrored_wheels = [2, 6]\ninclinometer = 21\n", Path("rover.toml")).nodes
     described = nodes.described()
     assert [node.node_id for node in described if node.mirrored] == [2, 6]
@@ -132,13 +132,13 @@ def test_only_the_motors_of_the_mirrored_wheels_are_mirrored() -> None:
 
 
 def test_motor_diagnostics_are_of_the_motors_alone() -> None:
-    """The other nodes have no supply voltage and motor temperature."""
+    """`motor_diagnostics` applies to motors only."""
     nodes = parse_configuration("[nodes]\nmotor_diagnostics = true\n", Path("rover.toml")).nodes
     assert [node.node_id for node in nodes.described() if node.diagnostics] == [1, 2, 3, 4, 5, 6]
 
 
 def test_a_wrong_element_of_a_list_is_reported_with_its_place() -> None:
-    """The first wheel is element 0 of the list."""
+    """The key of the problem has the element's index, from 0, and the list itself is not reported as too short."""
     assert set(problems_of("[nodes]\nmotors = [1, 2, 3, 4, 5, 300]\n")) == {"nodes.motors[5]"}
     assert set(problems_of("[nodes]\nmotors = [1, 300]\n")) == {"nodes.motors[1]", "nodes.motors"}
     assert set(problems_of("[nodes]\nload_cells = [1, 12, 13, 14, 15, 16]\n")) == {"nodes.load_cells[0]"}

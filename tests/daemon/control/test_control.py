@@ -1,4 +1,4 @@
-"""The control socket: who may open it, what it understands, and what happens when somebody disappears."""
+"""The control socket: its permissions, its protocol, and what happens when a client disconnects."""
 
 import asyncio
 import grp
@@ -38,7 +38,7 @@ GROUP = grp.getgrgid(os.getgid()).gr_name
 
 @dataclass
 class Rover:
-    """Six drives that do what they are told, and remember it."""
+    """Six drives that carry out each command and keep a list of them."""
 
     told: list[str] = field(default_factory=list)
     phase: NodePhase = NodePhase.OPERATIONAL
@@ -46,7 +46,7 @@ class Rover:
 
     @property
     def status(self) -> Mapping[int, NodeStatus]:
-        """Its nodes; the third is in `phase`."""
+        """State of each node; the third is in `phase`."""
         return {
             n: NodeStatus(
                 NodeDescription(n, MOTOR_CONTROLLER, n - 1),
@@ -57,19 +57,19 @@ class Rover:
         }
 
     async def enable(self) -> None:
-        """Enable."""
+        """Record the command to enable."""
         self.told.append("enable")
 
     async def set_speed(self, wheel_speed_rad_s: Sequence[float]) -> None:
-        """Turn."""
+        """Record the speed."""
         self.told.append(f"speed {wheel_speed_rad_s[0]:.3f}")
 
     async def quick_stop(self) -> None:
-        """Stop."""
+        """Record the quick stop."""
         self.told.append("quick stop")
 
     async def disable(self) -> None:
-        """Disable."""
+        """Record the command to disable."""
         self.told.append("disable")
         if self.problem:
             raise DriveError(self.problem, node_id=3)
@@ -106,14 +106,14 @@ async def serving(folder: Path, rover: Rover | None, **control: Any) -> AsyncIte
 
 
 def estimate_of(snapshot: Snapshot) -> Any:
-    """Return any estimate, of this snapshot."""
+    """Return an estimate of this snapshot."""
     whole = estimate()
     object.__setattr__(whole, "snapshot", snapshot)
     return whole
 
 
 class Client:
-    """Says lines, and reads them. `serving` closes them all at its end."""
+    """Sends and reads lines; `serving` closes all clients at its end."""
 
     opened: ClassVar[list["Client"]] = []
 
@@ -138,7 +138,7 @@ class Client:
             return REPLY.validate_json(await self.reader.readline())
 
     async def ask(self, request: object) -> Any:
-        """Say and hear."""
+        """Send a line and return the reply."""
         self.say(request)
         return await self.hear()
 
@@ -155,7 +155,7 @@ LONG = {"command": "traverse", "distance_m": 10.0, "speed_m_s": 0.022}
 
 
 async def test_only_the_group_may_open_it(tmp_path: Path) -> None:
-    """Mode 0660, the group that is configured, and gone when the daemon is."""
+    """The socket has mode 0660 and the configured group, and is removed when the daemon stops."""
     async with serving(tmp_path, Rover()) as (_, path):
         found = path.stat()
         assert stat.S_IMODE(found.st_mode) == 0o660
@@ -169,7 +169,7 @@ NOBODY = 65534
 
 @pytest.mark.parametrize(("group", "error"), [(NOBODY, ""), (NOBODY - 1, "PermissionError")])
 async def test_the_kernel_lets_the_groups_members_in_and_nobody_else(group: int, error: str) -> None:
-    """Another user, once in the group and once not; nothing but the group decides."""
+    """Another user may connect as a member of the group, and may not otherwise."""
     if os.geteuid() != 0:
         group, error = os.getegid(), ""  # only root can become somebody else: at least we get in
     with tempfile.TemporaryDirectory(dir="/tmp") as folder:  # every user may pass through
@@ -184,8 +184,8 @@ async def test_the_kernel_lets_the_groups_members_in_and_nobody_else(group: int,
     assert done.stderr.strip().splitlines()[-1:] == ([] if not error else [f"{error}: [Errno 13] Permission denied"])
 
 
-async def test_a_traverse_is_driven_and_its_end_is_told(tmp_path: Path) -> None:
-    """With its time beforehand, and how far it is on the way."""
+async def test_a_traverse_is_driven_and_its_end_is_reported(tmp_path: Path) -> None:
+    """The client gets the duration at once, the progress during the traverse, and its end."""
     rover = Rover()
     async with serving(tmp_path, rover) as (_, path):
         client = await Client.to(path)
@@ -198,8 +198,8 @@ async def test_a_traverse_is_driven_and_its_end_is_told(tmp_path: Path) -> None:
     assert rover.told == ["enable", "speed 0.667", "speed 0.000", "disable"]
 
 
-async def test_the_client_that_commanded_it_disappears(tmp_path: Path) -> None:
-    """The wheels are stopped at once."""
+async def test_the_client_that_commanded_it_disconnects(tmp_path: Path) -> None:
+    """The wheels are quick-stopped when the connection that commanded the traverse closes."""
     rover = Rover()
     async with serving(tmp_path, rover) as (_, path):
         client = await Client.to(path)
@@ -211,8 +211,8 @@ async def test_the_client_that_commanded_it_disappears(tmp_path: Path) -> None:
         assert isinstance(await again.ask(SHORT), Accepted)
 
 
-async def test_another_client_that_disappears_changes_nothing(tmp_path: Path) -> None:
-    """Looking is free."""
+async def test_another_client_that_disconnects_changes_nothing(tmp_path: Path) -> None:
+    """A client that asked for the status may disconnect during a traverse without effect."""
     rover = Rover()
     async with serving(tmp_path, rover) as (_, path):
         client = await Client.to(path)
@@ -232,7 +232,7 @@ async def test_another_client_that_disappears_changes_nothing(tmp_path: Path) ->
 
 @pytest.mark.parametrize(("quick", "ending"), [(True, "quick-stopped"), (False, "stopped")])
 async def test_anybody_in_the_group_may_stop_it(tmp_path: Path, quick: bool, ending: str) -> None:
-    """Whoever commanded it is told."""
+    """Another client may stop the traverse, and the commanding client gets its end."""
     async with serving(tmp_path, Rover()) as (_, path):
         client = await Client.to(path)
         await client.ask(LONG)
@@ -244,7 +244,7 @@ async def test_anybody_in_the_group_may_stop_it(tmp_path: Path, quick: bool, end
 
 
 async def test_a_lost_node_ends_it(tmp_path: Path) -> None:
-    """The network has stopped the wheels already; the client learns why."""
+    """The network has stopped the wheels, and the client gets the reason."""
     async with serving(tmp_path, Rover()) as (sink, path):
         client = await Client.to(path)
         await client.ask(LONG)
@@ -254,7 +254,7 @@ async def test_a_lost_node_ends_it(tmp_path: Path) -> None:
 
 
 async def test_stop_without_a_traverse_takes_the_power_off_all_the_same(tmp_path: Path) -> None:
-    """Whoever says stop means it."""
+    """`stop` disables the drives also when no traverse is driven."""
     rover = Rover()
     async with serving(tmp_path, rover) as (_, path):
         client = await Client.to(path)
@@ -271,7 +271,7 @@ async def test_stop_without_a_traverse_takes_the_power_off_all_the_same(tmp_path
 async def test_a_traverse_that_cannot_be_is_refused_with_the_reason(
     tmp_path: Path, rover: Rover | None, said: str
 ) -> None:
-    """Nothing has been told to the drives then."""
+    """No command is sent to the drives then."""
     async with serving(tmp_path, rover) as (_, path):
         refused = await (await Client.to(path)).ask(LONG | ({"speed_m_s": 9} if said.endswith("m/s") else {}))
         assert isinstance(refused, Refused)
@@ -294,8 +294,8 @@ async def test_a_traverse_that_cannot_be_is_refused_with_the_reason(
         b'{"command": "traverse", "distance_m": 1, "speed_m_s": 0.01, "over": "mqtt"}',
     ],
 )
-async def test_nonsense_is_refused_and_the_connection_goes_on(tmp_path: Path, line: bytes) -> None:
-    """With what the commands are."""
+async def test_an_invalid_request_is_refused_and_the_connection_goes_on(tmp_path: Path, line: bytes) -> None:
+    """The refusal names the commands, and the next request is answered."""
     rover = Rover()
     async with serving(tmp_path, rover) as (_, path):
         client = await Client.to(path)
@@ -309,14 +309,14 @@ async def test_nonsense_is_refused_and_the_connection_goes_on(tmp_path: Path, li
 @settings(max_examples=200, deadline=None)
 @given(st.binary(max_size=200))
 def test_no_line_ever_raises_anything(line: bytes) -> None:
-    """Whatever is sent, the answer is one of the protocol's."""
+    """Any line is answered by a reply of the protocol."""
     sink = ControlSink(Configuration(), lambda: None)
     reply = asyncio.run(sink._answer(line, None))  # type: ignore[arg-type]
     assert REPLY.validate_json(reply.line()) == reply
 
 
 async def test_a_line_without_end_is_cut_off_and_the_daemon_goes_on(tmp_path: Path) -> None:
-    """No client can fill the daemon's memory."""
+    """A line over the limit closes its connection, and other clients are served."""
     async with serving(tmp_path, Rover()) as (_, path):
         client = await Client.to(path)
         client.writer.write(b"x" * (2 * LINE_LIMIT))
@@ -326,7 +326,7 @@ async def test_a_line_without_end_is_cut_off_and_the_daemon_goes_on(tmp_path: Pa
 
 
 async def test_the_socket_of_a_killed_daemon_is_taken_over(tmp_path: Path) -> None:
-    """And that of a living one is not."""
+    """The socket of a killed daemon is replaced; that of a running one, and another kind of file, are not."""
     path = tmp_path / "control.sock"
     dead = socket.socket(socket.AF_UNIX)
     dead.bind(str(path))
@@ -341,8 +341,8 @@ async def test_the_socket_of_a_killed_daemon_is_taken_over(tmp_path: Path) -> No
         open_control_socket(tmp_path / "other.sock", "rovers")
 
 
-async def test_a_socket_that_cannot_be_made_is_told_and_the_rest_goes_on(tmp_path: Path) -> None:
-    """It is tried again."""
+async def test_a_socket_that_cannot_be_made_is_reported_and_the_rest_goes_on(tmp_path: Path) -> None:
+    """The reason is in `problem`, the task keeps running, and creation is tried again."""
     configuration = Configuration(control=Control(socket=tmp_path / "control.sock", group="no-such-group"))
     sink = ControlSink(configuration, lambda: None)
     task = asyncio.create_task(sink.run())
@@ -356,7 +356,7 @@ async def test_a_socket_that_cannot_be_made_is_told_and_the_rest_goes_on(tmp_pat
 async def test_clients_are_told_why_they_cannot_speak_to_the_daemon(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Not running, no permission, or gone in the middle: each with its cure and its exit status."""
+    """Each of no daemon, no permission and a closed connection has its message and its exit status."""
     path = tmp_path / "control.sock"
 
     async def failure(prepare: Callable[[], object] = lambda: None) -> ControlError:

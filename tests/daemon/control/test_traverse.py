@@ -14,18 +14,18 @@ KAPVIK = {"radius_m": 0.075, "speed_limit_m_s": 0.05, "distance_limit_m": 1000.0
 
 
 class QuickClock(Clock):
-    """Time passes as soon as somebody waits for it; `at` runs something when its time has come."""
+    """A clock that advances only when it is waited for; `at` runs functions at given times."""
 
     def __init__(self, at: Sequence[tuple[float, Callable[[], None]]] = ()) -> None:
         self.now = 100.0
         self.at = [(100.0 + seconds, action) for seconds, action in at]
 
     def now_s(self) -> float:
-        """Return the time as it is now."""
+        """Return the current time."""
         return self.now
 
     async def wait(self, event: asyncio.Event, seconds: float) -> None:
-        """Let the time pass at once."""
+        """Advance the time."""
         await asyncio.sleep(0)
         until = self.now + seconds
         while self.at and self.at[0][0] <= until and not event.is_set():
@@ -37,7 +37,7 @@ class QuickClock(Clock):
 
 @dataclass
 class Rover:
-    """Remembers what it was told; may refuse."""
+    """Records the commands; may refuse some."""
 
     told: list[object] = field(default_factory=list)
     refuses: dict[str, str] = field(default_factory=dict)
@@ -49,29 +49,29 @@ class Rover:
             raise DriveError(self.refuses[what], node_id=3)
 
     async def enable(self) -> None:
-        """Enable."""
+        """Record the command to enable."""
         await self._do("enable")
 
     async def set_speed(self, wheel_speed_rad_s: Sequence[float]) -> None:
-        """Turn."""
+        """Record the speed."""
         assert len(wheel_speed_rad_s) == 6
         await self._do("speed", wheel_speed_rad_s[0])
 
     async def quick_stop(self) -> None:
-        """Stop."""
+        """Record the quick stop."""
         await self._do("quick stop")
 
     async def disable(self) -> None:
-        """Disable."""
+        """Record the command to disable."""
         await self._do("disable")
 
     def watch(self) -> Callable[[], bool]:
-        """Say whether it stands."""
+        """Return a function that says whether the wheels stand still."""
         return lambda: self.stands
 
 
 def traverse(rover: Rover, clock: Clock, reports: list[float] | None = None) -> Traverse:
-    """Return Kapvik's traverse."""
+    """Return a traverse of Kapvik."""
     return Traverse(plan(), rover, rover.watch, (reports if reports is not None else []).append, clock)
 
 
@@ -81,7 +81,7 @@ def plan() -> Plan:
 
 
 def test_ten_metres_at_kapviks_speed_take_454_54_seconds() -> None:
-    """As in the paper."""
+    """10 m at 2.2 cm/s take 454.54 s, as in the paper."""
     assert plan().duration_s == pytest.approx(454.545454, abs=1e-6)
     assert plan().wheel_speed_rad_s == pytest.approx(0.293333, abs=1e-6)
     assert plan_traverse(1.0, -0.02, **KAPVIK).wheel_speed_rad_s < 0
@@ -104,7 +104,7 @@ def test_ten_metres_at_kapviks_speed_take_454_54_seconds() -> None:
 def test_what_must_not_be_driven_is_refused_with_every_reason(
     distance: float, speed: float, problems: list[str]
 ) -> None:
-    """At once, and with the place where the limits are."""
+    """Every exceeded limit is named at once, and where the limits are configured."""
     with pytest.raises(TraverseError) as caught:
         plan_traverse(distance, speed, **KAPVIK)
     assert len(caught.value.problems) == len(problems) + 1
@@ -114,7 +114,7 @@ def test_what_must_not_be_driven_is_refused_with_every_reason(
 
 
 async def test_it_turns_constantly_for_its_time_and_stops_clean() -> None:
-    """Then the power is taken off, and no quick stop was needed."""
+    """The wheels turn at one speed for the duration, stop, and are disabled without a quick stop."""
     rover, clock, reports = Rover(), QuickClock(), []
     outcome = await traverse(rover, clock, reports).run()
     assert outcome.ending is Ending.FINISHED
@@ -134,21 +134,21 @@ async def interrupted(rover: Rover, *, quick: bool) -> Outcome:
 
 
 async def test_it_can_be_stopped_clean() -> None:
-    """With the drives' own ramp."""
+    """`stop` without `quick` stops the wheels with the drives' ramp."""
     rover = Rover()
     assert await interrupted(rover, quick=False) == Outcome(Ending.STOPPED, 100.0, "wanted")
     assert rover.told[-2:] == [("speed", 0.0), "disable"]
 
 
 async def test_it_can_be_stopped_at_once() -> None:
-    """Without waiting for anything."""
+    """`stop` with `quick` quick-stops without waiting for a standstill."""
     rover = Rover()
     assert await interrupted(rover, quick=True) == Outcome(Ending.QUICK_STOPPED, 100.0, "wanted")
     assert rover.told[2:] == ["quick stop", "disable"]
 
 
 async def test_a_clean_stop_that_does_not_come_becomes_a_quick_one() -> None:
-    """The wheels are measured, not believed."""
+    """Wheels that are measured to turn after the time for a standstill are quick-stopped."""
     rover = Rover(stands=False)
     outcome = await traverse(rover, QuickClock()).run()
     assert outcome.ending is Ending.QUICK_STOPPED
@@ -157,7 +157,7 @@ async def test_a_clean_stop_that_does_not_come_becomes_a_quick_one() -> None:
 
 
 async def test_a_quick_stop_overrides_a_clean_one_under_way() -> None:
-    """And not the other way round."""
+    """A quick stop overrides a stop with the ramp, and not the reverse."""
     rover, clock = Rover(stands=False), QuickClock()
     driven = traverse(rover, clock)
     clock.at = [(100.0, lambda: driven.stop("gently", quick=False)), (100.0, lambda: driven.stop("now", quick=True))]
@@ -168,8 +168,8 @@ async def test_a_quick_stop_overrides_a_clean_one_under_way() -> None:
     assert rover.told[-2:] == ["quick stop", "disable"]
 
 
-async def test_drives_that_cannot_be_enabled_are_told_and_nothing_turns() -> None:
-    """The network has disabled them again."""
+async def test_drives_that_cannot_be_enabled_are_reported_and_nothing_turns() -> None:
+    """The traverse fails with the drive's error, and no speed is set."""
     rover = Rover(refuses={"enable": "stays in fault"})
     outcome = await traverse(rover, QuickClock()).run()
     assert outcome.ending is Ending.FAILED
@@ -179,7 +179,7 @@ async def test_drives_that_cannot_be_enabled_are_told_and_nothing_turns() -> Non
 
 @pytest.mark.parametrize("quick", [True, False])
 async def test_one_that_is_stopped_while_the_drives_are_enabled_never_turns(quick: bool) -> None:
-    """Whoever wanted it may be gone before it has begun."""
+    """No speed is set after a stop that came while the drives were being enabled."""
     rover = Rover()
     driven = traverse(rover, QuickClock())
     driven.stop("gone", quick=quick)
@@ -188,22 +188,22 @@ async def test_one_that_is_stopped_while_the_drives_are_enabled_never_turns(quic
 
 
 async def test_a_drive_that_refuses_ends_in_a_quick_stop() -> None:
-    """In the middle of the traverse."""
+    """A drive's error during the traverse ends in a quick stop."""
     rover = Rover(refuses={"speed": "the drive is in fault"})
     outcome = await traverse(rover, QuickClock()).run()
     assert outcome.ending is Ending.QUICK_STOPPED
     assert rover.told[-2:] == ["quick stop", "disable"]
 
 
-async def test_a_stop_that_is_not_confirmed_is_said_so() -> None:
-    """That is when a person has to act."""
+async def test_a_stop_that_is_not_confirmed_is_reported() -> None:
+    """A quick stop that is not confirmed ends the traverse as failed, with the error."""
     outcome = await interrupted(Rover(refuses={"quick stop": "does not stop"}), quick=True)
     assert outcome.ending is Ending.FAILED
     assert "does not stop" in outcome.text
 
 
 async def test_cancelling_it_stops_the_wheels() -> None:
-    """The daemon is being stopped."""
+    """Cancellation quick-stops and disables the wheels."""
     rover = Rover()
     task = asyncio.create_task(traverse(rover, Clock()).run())
     await until(lambda: ("speed", plan().wheel_speed_rad_s) in rover.told)

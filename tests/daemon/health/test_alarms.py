@@ -1,4 +1,4 @@
-"""The same facts, the same alarms; and every alarm can be told off again."""
+"""Alarms follow from their inputs alone, and every alarm has a known name."""
 
 import dataclasses
 
@@ -31,14 +31,14 @@ TROUBLES = [
 
 
 def test_all_is_well() -> None:
-    """Then nothing is said; a node that boots is no alarm yet."""
+    """Without a problem there is no alarm, and a node that boots is no problem yet."""
     nodes = {13: NodeStatus(CELL, NodePhase.BOOTING), 22: NodeStatus(SPEED, NodePhase.OPERATIONAL)}
     assert current_alarms(AlarmInputs(nodes=nodes)) == {}
 
 
 @pytest.mark.parametrize(("fact", "value", "name", "severity"), TROUBLES)
 def test_each_trouble_is_one_alarm_with_its_cure(fact: str, value: object, name: str, severity: Severity) -> None:
-    """Under a name that is known, so that it can be ended."""
+    """Each problem gives one alarm, with severity, text and cure, under a name from `alarm_names`."""
     alarms = current_alarms(dataclasses.replace(AlarmInputs(), **{fact: value}))
     assert list(alarms) == [name]
     assert alarms[name].severity is severity
@@ -49,7 +49,7 @@ def test_each_trouble_is_one_alarm_with_its_cure(fact: str, value: object, name:
 
 @pytest.mark.parametrize("phase", [NodePhase.LOST, NodePhase.FAILED])
 def test_a_node_that_is_missing_is_an_alarm_of_its_own(phase: NodePhase) -> None:
-    """One that need not be there is a warning."""
+    """A required node gives an error, another one a warning."""
     nodes = {13: NodeStatus(CELL, phase, text="silent"), 22: NodeStatus(SPEED, phase)}
     alarms = current_alarms(AlarmInputs(nodes=nodes))
     assert {name: alarm.severity for name, alarm in alarms.items()} == {

@@ -1,4 +1,4 @@
-"""systemd hears what it is told, and the watchdog is fed only while every task answers."""
+"""systemd gets each notification, and task liveness names the tasks that do not report in time."""
 
 import os
 import socket
@@ -10,8 +10,8 @@ from regolithd.daemon.health.liveness import TaskLiveness
 from regolithd.daemon.health.sd_notify import READY, notify, watchdog_period_s
 
 
-def test_systemd_hears_what_it_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One datagram, as sd_notify(3) says."""
+def test_systemd_gets_each_notification(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One datagram is sent to the socket that NOTIFY_SOCKET names."""
     path = tmp_path / "notify"
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as listener:
         listener.bind(str(path))
@@ -22,7 +22,7 @@ def test_systemd_hears_what_it_is_told(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_without_systemd_or_with_a_dead_one_nothing_happens(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The daemon runs anywhere."""
+    """Without a socket, or with one that nobody reads, no error is raised."""
     monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
     notify(READY)
     monkeypatch.setenv("NOTIFY_SOCKET", str(tmp_path / "nobody"))
@@ -32,7 +32,7 @@ def test_without_systemd_or_with_a_dead_one_nothing_happens(tmp_path: Path, monk
 def test_the_watchdog_is_fed_twice_as_often_as_asked_and_only_by_whom_it_concerns(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """sd_watchdog_enabled(3)."""
+    """The period is half of WATCHDOG_USEC, and None in a process that WATCHDOG_PID does not name."""
     monkeypatch.delenv("WATCHDOG_USEC", raising=False)
     assert watchdog_period_s() is None
     monkeypatch.setenv("WATCHDOG_USEC", "10000000")
@@ -43,7 +43,7 @@ def test_the_watchdog_is_fed_twice_as_often_as_asked_and_only_by_whom_it_concern
 
 
 def test_a_task_that_is_silent_for_too_long_is_named() -> None:
-    """Each has its own patience."""
+    """A task is overdue when its own timeout has passed since its last report."""
     now = 0
     liveness = TaskLiveness(lambda: now)
     liveness.expect("bus", 1.0)

@@ -1,4 +1,4 @@
-"""A sensor that repeats itself is noticed, and nothing else is."""
+"""A sensor whose reading no longer changes is detected, and no other."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ RANDOM = np.random.default_rng(5)
 def snapshots(
     rate_Hz: float, seconds: float, *, frozen: tuple[int, ...] = (), speed: float = 400.0, noise: float = 0.3
 ) -> list[Snapshot]:
-    """Return a drive on which some load cells (1–6) stay at what they say."""
+    """Return a drive on which the readings of some load cells (1–6) do not change."""
     made = []
     for k in range(int(rate_Hz * seconds)):
         values = np.full((len(QUANTITIES), 6), np.nan)
@@ -34,7 +34,7 @@ def snapshots(
 
 
 def watch(*drives: list[Snapshot]) -> tuple[tuple[Quantity, int], ...]:
-    """Return what is found stuck at the end."""
+    """Return the sensors that are stuck at the end."""
     watching = StuckSensorDetector()
     for drive in drives:
         for snapshot in drive:
@@ -44,32 +44,32 @@ def watch(*drives: list[Snapshot]) -> tuple[tuple[Quantity, int], ...]:
 
 @pytest.mark.parametrize("rate_Hz", [2.0, 10.0, 100.0])
 def test_a_load_that_stays_the_same_is_stuck(rate_Hz: float) -> None:
-    """After twenty snapshots and five seconds, whichever is longer; one or two of them."""
+    """One or two constant load cells are stuck after 20 snapshots and 5 s, whichever is longer."""
     assert watch(snapshots(rate_Hz, 12, frozen=(3,))) == ((LOAD, 3),)
     assert watch(snapshots(rate_Hz, 12, frozen=(2, 6))) == ((LOAD, 2), (LOAD, 6))
     assert watch(snapshots(rate_Hz, 4.9, frozen=(3,))) == ()
 
 
 def test_it_is_over_with_the_first_reading_that_differs() -> None:
-    """A sensor that is exchanged is believed at once."""
+    """The first reading that differs ends the detection."""
     assert watch(snapshots(10, 12, frozen=(3,)), snapshots(10, 0.3)) == ()
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_an_ordinary_drive_has_no_stuck_sensor(seed: int) -> None:
-    """Ten minutes at 10 Hz with only the last digit trembling."""
+    """Ten minutes at 10 Hz with noise of one digit give no detection."""
     del seed
     assert watch(snapshots(10, 30, noise=0.0005)) == ()
 
 
 def test_who_stands_or_has_no_noise_at_all_is_not_stuck() -> None:
-    """Then a value that stays says nothing."""
+    """Constant readings are not judged while the wheels stand still, or when all of them are constant."""
     assert watch(snapshots(10, 12, frozen=(3,), speed=0.0)) == ()
     assert watch(snapshots(10, 12, noise=0.0)) == ()
 
 
 def test_what_is_not_measured_is_not_stuck() -> None:
-    """NaN is never the same as NaN, and a gap begins the count anew."""
+    """NaN does not count as a constant reading, and a gap restarts the count."""
     drive = snapshots(10, 12, frozen=(3,))
     for snapshot in drive[::40]:
         snapshot.values[ROW[LOAD], 2] = np.nan

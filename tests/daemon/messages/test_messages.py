@@ -1,4 +1,4 @@
-"""What is published is what the models and the documents say."""
+"""What is published agrees with the message models and the generated documents."""
 
 import json
 import re
@@ -24,7 +24,7 @@ SESSION = "20130611T140312Z-5f1c"
 
 @pytest.mark.parametrize("missing_wheel", [None, 0, 3])
 def test_what_is_written_is_what_the_models_would_write(missing_wheel: int | None) -> None:
-    """To the byte: the fast way must not drift from the models."""
+    """The encoder's JSON equals that of the models, byte by byte."""
     snapshot, wheels = encode(estimate(missing_wheel=missing_wheel), SESSION)
     assert SnapshotMessage.model_validate_json(snapshot).model_dump_json().encode() == snapshot
     for wheel in wheels:
@@ -32,7 +32,7 @@ def test_what_is_written_is_what_the_models_would_write(missing_wheel: int | Non
 
 
 def test_numbers_arrive_to_the_last_bit() -> None:
-    """A subscriber may repeat every calculation."""
+    """A number that a subscriber parses equals the one that was sent."""
     sent = estimate()
     snapshot, wheels = encode(sent, SESSION)
     received = SnapshotMessage.model_validate_json(snapshot)
@@ -44,7 +44,7 @@ def test_numbers_arrive_to_the_last_bit() -> None:
 
 
 def test_what_was_not_measured_is_null_and_not_valid() -> None:
-    """Never NaN, which is no JSON, and never the value of before."""
+    """A missing value is null, neither NaN nor the previous value, and its wheel is not valid."""
     snapshot, wheels = encode(estimate(missing_wheel=3), SESSION)
     received = json.loads(snapshot)
     assert received["load_N"][3] is None
@@ -54,14 +54,14 @@ def test_what_was_not_measured_is_null_and_not_valid() -> None:
 
 
 def test_an_input_outside_the_training_range_is_marked_by_name() -> None:
-    """For the wheel that it concerns."""
+    """The input is named for the wheel concerned."""
     snapshot, wheels = encode(estimate(), SESSION)
     assert json.loads(snapshot)["outside_training_range"] == [[], [], [], [], ["slip"], []]
     assert json.loads(wheels[4])["outside_training_range"] == ["slip"]
 
 
 def test_a_late_message_differs_in_its_mark_alone() -> None:
-    """And can be marked twice."""
+    """Marking a message as late changes `late` alone, and marking it twice changes nothing more."""
     snapshot, _ = encode(estimate(), SESSION)
     late = as_late(snapshot)
     assert json.loads(late) == json.loads(snapshot) | {"late": True}
@@ -71,14 +71,14 @@ def test_a_late_message_differs_in_its_mark_alone() -> None:
 
 
 def test_a_stored_message_of_an_older_schema_keeps_its_version_when_it_is_marked_late() -> None:
-    """A store that an older version filled is delivered after an upgrade."""
+    """Messages that an older version stored are delivered after an upgrade, with their own schema version."""
     assert (
         as_late(b'{"schema_version":1,"late":false,"session":"a"}') == b'{"schema_version":1,"late":true,"session":"a"}'
     )
 
 
 def test_every_model_written_live_can_be_marked_late() -> None:
-    """The mark stands at the same place in every message."""
+    """`late` is at the same place in every message, however it was written."""
     state = StateMessage(
         session=SESSION, sequence=1, time=iso_time(0), state="online", reason="connected", software_version="0"
     )
@@ -87,19 +87,19 @@ def test_every_model_written_live_can_be_marked_late() -> None:
 
 
 def test_times_keep_their_nanoseconds() -> None:
-    """Also below a second and before a round one."""
+    """All nine decimals are written, leading zeros included."""
     assert iso_time(1_370_959_642_018_291_001) == "2013-06-11T14:07:22.018291001Z"
     assert iso_time(1_000_000_007) == "1970-01-01T00:00:01.000000007Z"
 
 
 def test_documents_are_fresh() -> None:
-    """`regolithd schema --write docs/messages` was run after the last change of a model."""
+    """The documents equal what `regolithd schema --write docs/messages` writes."""
     written = {path.name: path.read_text(encoding="utf-8") for path in DOCS.iterdir()}
     assert written == documents(), "run: regolithd schema --write docs/messages"
 
 
 def test_schemas_accept_what_is_sent_and_refuse_what_is_not() -> None:
-    """Each schema is itself valid JSON Schema 2020-12."""
+    """Each schema is valid JSON Schema 2020-12, accepts an encoded message, and refuses a wrong one."""
     snapshot, wheels = encode(estimate(missing_wheel=2), SESSION)
     for channel in CHANNELS:
         jsonschema.Draft202012Validator.check_schema(json.loads((DOCS / f"{channel.name}.schema.json").read_text()))
@@ -112,7 +112,7 @@ def test_schemas_accept_what_is_sent_and_refuse_what_is_not() -> None:
 
 
 def test_every_message_has_an_example_that_its_schema_accepts() -> None:
-    """As a reader would check it: from the documents alone."""
+    """The example in the AsyncAPI document is valid against the schema file."""
     document = json.loads((DOCS / "asyncapi.json").read_text())
     for channel in CHANNELS:
         (shown,) = document["components"]["messages"][channel.message.__name__]["examples"]
@@ -121,7 +121,7 @@ def test_every_message_has_an_example_that_its_schema_accepts() -> None:
 
 
 def test_every_reference_in_the_asyncapi_document_leads_somewhere() -> None:
-    """And every channel has its operation, with QoS and retain."""
+    """Every reference resolves, and every channel has an operation with QoS and retain flag."""
     document = json.loads((DOCS / "asyncapi.json").read_text())
 
     def references(node: object) -> list[str]:
@@ -142,14 +142,14 @@ def test_every_reference_in_the_asyncapi_document_leads_somewhere() -> None:
 
 
 def test_no_message_is_taken_with_a_field_too_many() -> None:
-    """A reader of a schema version knows what it gets."""
+    """A message with an unknown field is refused."""
     snapshot, _ = encode(estimate(), SESSION)
     with pytest.raises(ValidationError):
         SnapshotMessage.model_validate(json.loads(snapshot) | {"extra": 1})
 
 
 def test_the_readme_of_the_messages_shows_the_example_of_each() -> None:
-    """Each block is JSON, in the order of the channels, and text is not escaped."""
+    """Each block of the page is valid JSON and the channel's example, in the order of the channels."""
     shown = [
         json.loads(block) for block in re.findall(r"```json\n(.*?)\n```", documents()["README.md"], flags=re.DOTALL)
     ]
@@ -157,7 +157,7 @@ def test_the_readme_of_the_messages_shows_the_example_of_each() -> None:
 
 
 def test_text_in_an_example_is_written_as_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A reader sees `Ω`, not its escape."""
+    """Characters such as `Ω` are not escaped."""
     monkeypatch.setattr("regolithd.daemon.messages.documents.example", lambda _: {"cure": "120 Ω"})
     assert documents()["README.md"].count('"120 Ω"') == len(CHANNELS)
     assert '"120 Ω"' in documents()["asyncapi.json"]

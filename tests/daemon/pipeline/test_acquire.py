@@ -1,4 +1,4 @@
-"""One SYNC, one snapshot: what did not come is NaN, and every reading is accounted for."""
+"""One snapshot for each SYNC: what did not come is NaN, and every reading is counted."""
 
 import numpy as np
 import pytest
@@ -20,24 +20,24 @@ MS = 1_000_000
 
 
 def acquisition() -> Acquisition:
-    """Return one that knows six motor controllers."""
+    """Return the acquisition of six motor controllers."""
     return Acquisition(MOTORS, PDOS, PERIOD_NS)
 
 
 def reading(node: int, time_ns: int, current: float = 0.08) -> Reading:
-    """Return one motor's TPDO."""
+    """Return one motor's TPDO as a reading."""
     return Reading(time_ns, node, 0x180 + node, ((MOTOR_CURRENT, current), (MOTOR_SPEED, 400.0)))
 
 
 def window(taken: Acquisition, k: int, nodes: range | tuple[int, ...] = range(1, 7)) -> list[Snapshot]:
-    """Feed one SYNC and its answers; return what closed."""
+    """Feed one SYNC and its answers; return the snapshots that closed."""
     start = k * PERIOD_NS
     items = [Sync(start), *(reading(node, start + node * MS, current=k + node / 10) for node in nodes)]
     return [snapshot for item in items if (snapshot := taken.accept(item))]
 
 
 def test_the_first_window_closes_at_the_next_sync_and_later_ones_when_everybody_has_answered() -> None:
-    """Who will answer is learned from the bus, not assumed."""
+    """Which PDOs to wait for follows from the windows before."""
     taken = acquisition()
     assert window(taken, 0) == []
     first, second = window(taken, 1)
@@ -48,7 +48,7 @@ def test_the_first_window_closes_at_the_next_sync_and_later_ones_when_everybody_
 
 
 def test_a_value_that_did_not_come_is_nan_and_counted_never_repeated() -> None:
-    """Node 3 is silent in the third window."""
+    """Node 3 does not answer in the third window."""
     taken = acquisition()
     for k in range(2):
         window(taken, k)
@@ -59,7 +59,7 @@ def test_a_value_that_did_not_come_is_nan_and_counted_never_repeated() -> None:
 
 
 def test_a_lost_node_delays_three_snapshots_and_no_more_and_is_taken_up_again_when_it_returns() -> None:
-    """Whoever stopped answering is not waited for for ever."""
+    """A PDO that stopped coming is awaited for three windows."""
     taken = acquisition()
     for k in range(3):
         window(taken, k)
@@ -71,7 +71,7 @@ def test_a_lost_node_delays_three_snapshots_and_no_more_and_is_taken_up_again_wh
 
 
 def test_an_answer_that_comes_after_the_next_sync_is_never_taken_for_a_fresh_one() -> None:
-    """Node 6 answers SYNC 2 only after SYNC 3, and then SYNC 3: the second is the right one."""
+    """Node 6 answers SYNC 2 after SYNC 3, then SYNC 3, and the second answer is accepted."""
     taken = acquisition()
     for k in range(2):
         window(taken, k)
@@ -87,7 +87,7 @@ def test_an_answer_that_comes_after_the_next_sync_is_never_taken_for_a_fresh_one
 
 
 def test_answers_that_came_in_a_burst_across_a_sync_are_told_apart() -> None:
-    """Node 6 was held up for two SYNCs; its answers come around the third, and only the third's own counts."""
+    """Node 6 is delayed by two SYNCs, and of its three answers only that to the newest is accepted."""
     taken = acquisition()
     for k in range(2):
         window(taken, k)
@@ -105,8 +105,8 @@ def test_answers_that_came_in_a_burst_across_a_sync_are_told_apart() -> None:
     assert closed.motor_current_A[5] == pytest.approx(4.6)
 
 
-def test_a_single_answer_after_a_missing_one_is_in_doubt_for_three_windows() -> None:
-    """It may be the missing one; after three windows with one answer each, that one is taken for lost."""
+def test_a_single_answer_after_a_missing_one_is_ambiguous_for_three_windows() -> None:
+    """It may be the missing one; after three windows with one answer each, the missing one counts as lost."""
     taken = acquisition()
     for k in range(2):
         window(taken, k)
@@ -117,7 +117,7 @@ def test_a_single_answer_after_a_missing_one_is_in_doubt_for_three_windows() -> 
 
 
 def test_an_answer_outside_the_synchronous_window_is_late() -> None:
-    """Its node would sample the next SYNC before this answer counts."""
+    """An answer in the last tenth of the period is late."""
     taken = acquisition()
     taken.accept(Sync(0))
     taken.accept(reading(1, int(0.95 * PERIOD_NS)))
@@ -128,7 +128,7 @@ def test_an_answer_outside_the_synchronous_window_is_late() -> None:
 
 
 def test_foreign_duplicate_and_early_readings_are_counted_and_not_taken() -> None:
-    """The first of two is kept."""
+    """Each is counted under its name, and of a duplicate the first is kept."""
     taken = acquisition()
     taken.accept(reading(1, 0))
     taken.accept(Sync(PERIOD_NS))
@@ -143,7 +143,7 @@ def test_foreign_duplicate_and_early_readings_are_counted_and_not_taken() -> Non
 
 
 def test_what_one_node_measures_for_the_body_stands_at_all_wheels_and_nothing_can_be_changed_later() -> None:
-    """A snapshot is frozen."""
+    """A quantity of the body has its value in all six columns, and the arrays are read-only."""
     taken = Acquisition((NodeDescription(22, GROUND_SPEED_SENSOR, None),), (0x196,), PERIOD_NS)
     taken.accept(Sync(1_234_567_891))
     taken.accept(Reading(1_235_000_000, 22, 0x196, ((GROUND_SPEED, 0.0215),)))
@@ -157,7 +157,7 @@ def test_what_one_node_measures_for_the_body_stands_at_all_wheels_and_nothing_ca
 
 @given(st.lists(st.tuples(st.integers(0, 7), st.integers(0, 20 * PERIOD_NS)), max_size=200))
 def test_every_reading_is_accounted_for_whatever_the_order(events: list[tuple[int, int]]) -> None:
-    """Node 0 stands for a SYNC, 7 for a stranger; times may go backwards."""
+    """The counts add up for any order of SYNCs, readings and unknown nodes, and for times that go backwards."""
     taken = acquisition()
     snapshots = [
         snapshot

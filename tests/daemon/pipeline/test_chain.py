@@ -1,4 +1,4 @@
-"""Whatever is on the bus, the chain survives it and accounts for it; and it is cheap."""
+"""The chain accepts any frames, counts every reading, and takes little computing time."""
 
 import time
 from collections.abc import Callable
@@ -28,7 +28,7 @@ MODELS = load_models(Configuration.model_validate(KAPVIK))
 
 @st.composite
 def traffic(draw: st.DrawFn) -> list[Frame]:
-    """Draw frames that mostly look like the rover's, with any content, at times that mostly rise."""
+    """Draw frames that are mostly like the rover's, with any content, at times that mostly increase."""
     now, frames = 10**18, []
     for _ in range(draw(st.integers(0, 120))):
         now += draw(st.sampled_from([1000, 100_000, 10_000_000, 500_000_000, -1_000_000_000, 10**12]))
@@ -43,7 +43,7 @@ def traffic(draw: st.DrawFn) -> list[Frame]:
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(traffic())
 def test_no_frame_makes_it_raise_and_every_reading_is_accounted_for(frames: list[Frame]) -> None:
-    """Any content, any order, clocks that jump: an estimate for each snapshot, each of which can be written down."""
+    """Any content, order and clock jumps give one estimate for each snapshot, which can be encoded."""
     chain = Chain(Configuration.model_validate(KAPVIK), MODELS)
     estimates = chain.feed(frames)
     counters = chain.acquisition.counters
@@ -56,7 +56,7 @@ def test_no_frame_makes_it_raise_and_every_reading_is_accounted_for(frames: list
 
 
 def test_slip_is_measured_configured_or_none(drive: Callable, configuration: Configuration) -> None:
-    """From ground speed; from the configuration where its node is silent; none where the wheel stands."""
+    """It is measured with ground speed, configured without, and none where the wheel stands still."""
     models = load_models(configuration)
     rolling = Chain(configuration, models).feed(drive().frames(10))[-1]
     assert set(rolling.slip_source) == {SlipSource.MEASURED}
@@ -100,7 +100,7 @@ def test_backward_is_as_forward_with_the_signs_turned(drive: Callable, configura
 def test_at_100_Hz_everything_from_frame_to_message_and_file_takes_less_than_a_fifth_of_one_core(
     drive: Callable, tmp_path: Path
 ) -> None:
-    """Processor time, not wall time: 2 ms for each snapshot, where 0.5 ms were measured on two shared cores."""
+    """The processor time is under 2 ms for each snapshot; 0.5 ms were measured on two shared cores."""
     configuration = Configuration.model_validate(KAPVIK | {"sync": {"rate_Hz": 100.0}})
     chain = Chain(configuration, MODELS)
     recorder = Recorder(Recording(directory=tmp_path), "can0", {})

@@ -1,4 +1,4 @@
-"""Intervals twice a second – once the drivetrain is known, and for the wheel that the posterior was trained for."""
+"""There is a posterior twice a second, for a calibrated drivetrain and the wheel that the network was trained for."""
 
 from collections.abc import Callable
 
@@ -21,7 +21,7 @@ def changed(configuration: Configuration, **tables: dict[str, object]) -> Config
 
 
 def estimates(configuration: Configuration, drive: Callable, rate_Hz: float, snapshots: int) -> list[Estimate]:
-    """Return what the chain makes of a straight drive."""
+    """Return the chain's estimates of a straight drive."""
     models = load_models(configuration)
     return Chain(configuration, models).feed(drive(rate_Hz=rate_Hz).frames(snapshots))
 
@@ -30,7 +30,7 @@ def estimates(configuration: Configuration, drive: Callable, rate_Hz: float, sna
 def test_a_calibrated_rover_has_a_posterior_twice_a_second(
     configuration: Configuration, drive: Callable, rate_Hz: float
 ) -> None:
-    """At any rate, and its intervals are in order and around something."""
+    """At any SYNC rate, with ordered quantiles and intervals that narrow with time."""
     settings = changed(configuration, drivetrain=CALIBRATED, sync={"rate_Hz": rate_Hz})
     made = estimates(settings, drive, rate_Hz, int(15 * rate_Hz))
     posteriors = [estimate.posterior for estimate in made if estimate.posterior is not None]
@@ -47,24 +47,24 @@ def test_a_calibrated_rover_has_a_posterior_twice_a_second(
 def test_a_rover_without_a_calibrated_drivetrain_has_no_posterior(
     configuration: Configuration, drive: Callable
 ) -> None:
-    """It would take the drivetrain for soil."""
+    """An unknown no-load current would be attributed to the soil."""
     assert load_posterior(configuration) is None
     assert all(estimate.posterior is None for estimate in estimates(configuration, drive, 2.0, 20))
 
 
 def test_it_can_be_switched_off(configuration: Configuration) -> None:
-    """Though everything is known."""
+    """`[posterior] enabled = false` loads no model, calibrated or not."""
     assert load_posterior(changed(configuration, drivetrain=CALIBRATED, posterior={"enabled": False})) is None
 
 
 def test_a_posterior_for_another_wheel_is_refused(configuration: Configuration) -> None:
-    """With the cure."""
+    """The error names both radii and what to do."""
     with pytest.raises(PosteriorModelError, match=r"trained for wheels of 0\.075 m radius, not 0\.1 m\. Train one"):
         load_posterior(changed(configuration, drivetrain=CALIBRATED, wheel={"radius_m": 0.1}))
 
 
 def test_a_brake_says_how_well_the_gain_is_known() -> None:
-    """Where a wheel had one; elsewhere, and without any, it is what was stated of Eq. 11's constants."""
+    """A wheel with a brake test has its standard deviation, any other that of Eq. 11's constants."""
     assert gain_relative_std(Drivetrain(gain_relative_std=0.05)) == pytest.approx(0.05)
     one = Drivetrain(gain_relative_std=0.05, gain_factor=0.8, gain_factor_std=(0.008, 0, 0, 0, 0, 0))  # type: ignore[arg-type]
     assert gain_relative_std(one) == pytest.approx((0.01 + 5 * 0.05) / 6)

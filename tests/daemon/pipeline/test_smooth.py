@@ -1,4 +1,4 @@
-"""Drops go, steps stay, what did not arrive stays missing."""
+"""Momentary drops are removed, steps are kept, and missing values stay missing."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def noisy(rate_Hz: float, seconds: float, std: float = 0.1, seed: int = 1) -> np
 def test_a_momentary_drop_leaves_less_than_a_tenth_of_what_the_low_pass_alone_would(
     rate_Hz: float, lasting_s: float
 ) -> None:
-    """However deep: the current goes to a fifth."""
+    """The current drops to a fifth for a moment."""
     steady = noisy(rate_Hz, 40)
     begin = int(20 * rate_Hz)
     dropped = steady.copy()
@@ -47,7 +47,7 @@ def test_a_momentary_drop_leaves_less_than_a_tenth_of_what_the_low_pass_alone_wo
 @pytest.mark.parametrize("rate_Hz", [2.0, 10.0, 100.0])
 @pytest.mark.parametrize("depth", [0.25, 0.6, 1.5])
 def test_a_step_that_stays_is_never_hidden(rate_Hz: float, depth: float) -> None:
-    """Half of it within 3 s, nine tenths within 5.5 s, and all of it in the end – even below zero."""
+    """Half of it shows within 3 s, nine tenths within 5.5 s, and all of it in the end, also below zero."""
     before = noisy(rate_Hz, 60)
     torque = before.copy()
     begin = int(30 * rate_Hz)
@@ -59,13 +59,13 @@ def test_a_step_that_stays_is_never_hidden(rate_Hz: float, depth: float) -> None
 
 
 def test_rejecting_one_side_alone_biases_what_has_no_drops_by_little() -> None:
-    """Gaussian noise of 30 % lifts the mean by less than 2 % (the seven samples of 2 Hz underrate their spread)."""
+    """Gaussian noise of 30 % raises the mean by less than 2 %."""
     torque = noisy(2.0, 5000, std=0.3)
     assert 0 < smooth(torque, 2.0)[20:].mean() - 1 < 0.02
 
 
 def test_what_did_not_arrive_stays_missing_and_disturbs_nothing() -> None:
-    """A gap is a gap, not a repetition."""
+    """A missing value is NaN in the result, and the values after it are not affected."""
     torque = noisy(2.0, 30, std=0.0)
     torque[20:23, 2] = np.nan
     smoothed = smooth(torque, 2.0)
@@ -75,7 +75,7 @@ def test_what_did_not_arrive_stays_missing_and_disturbs_nothing() -> None:
 
 
 def test_a_reset_wheel_begins_anew_and_the_others_go_on() -> None:
-    """After it stood still."""
+    """A reset wheel's first value passes unfiltered, and the other wheels are not affected."""
     smoother = Smoother(2.0, **DEFAULTS.model_dump())
     for k in range(20):
         smoother.step(k * 500_000_000, np.full(6, 1.0), np.full(6, 50.0), np.full(6, 0.02))
@@ -86,7 +86,7 @@ def test_a_reset_wheel_begins_anew_and_the_others_go_on() -> None:
 
 
 def test_a_clock_that_is_set_back_does_no_harm() -> None:
-    """By an hour: the next value changes nothing, and from then on all is as before."""
+    """After a clock set back by an hour, one value has no effect and the following ones are filtered as before."""
     smoother = Smoother(2.0, **DEFAULTS.model_dump())
     six = np.full(6, 1.0)
     for k in range(10):
@@ -97,7 +97,7 @@ def test_a_clock_that_is_set_back_does_no_harm() -> None:
 
 
 def test_both_parts_can_be_turned_off() -> None:
-    """Then everything passes as it is."""
+    """With threshold and time constant 0 every value passes unchanged."""
     torque = noisy(10.0, 3)
     np.testing.assert_array_equal(smooth(torque, 10.0, window_s=0.0, time_constant_s=0.0), torque)
     np.testing.assert_array_equal(smooth(torque, 10.0, threshold=0.0, time_constant_s=0.0), torque)
@@ -106,7 +106,7 @@ def test_both_parts_can_be_turned_off() -> None:
 @settings(max_examples=50, deadline=None)
 @given(st.lists(st.lists(st.floats(-100, 100) | st.just(np.nan), min_size=6, max_size=6), min_size=1, max_size=60))
 def test_the_result_stays_within_what_came_in_and_is_missing_exactly_where_nothing_did(rows: list[list[float]]) -> None:
-    """Whatever comes in."""
+    """For any input the result is between its extremes, and NaN exactly where the input is."""
     torque = np.array(rows)
     smoothed = smooth(torque, 2.0)
     np.testing.assert_array_equal(np.isnan(smoothed), np.isnan(torque))

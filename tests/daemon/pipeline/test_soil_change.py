@@ -1,4 +1,4 @@
-"""The soil gives way, and the rover says so, with what speaks for it."""
+"""A change of soil raises one alarm, with its evidence, and a steady drive raises none."""
 
 import numpy as np
 
@@ -30,7 +30,7 @@ def noisy(half_seconds: int) -> np.ndarray:
 
 
 def test_a_fall_of_torque_raises_one_alarm_within_fifteen_seconds() -> None:
-    """From medium soil to LETE sand: 0.4 to 0.15 N·m, after four minutes."""
+    """The torque falls from 0.4 to 0.15 N·m, as from medium soil to LETE sand, after four minutes."""
     torque = noisy(600)
     torque[480:] -= 0.25
     (alarm,) = watch(torque)
@@ -43,7 +43,7 @@ def test_a_fall_of_torque_raises_one_alarm_within_fifteen_seconds() -> None:
 
 
 def test_a_steady_drive_momentary_drops_and_missing_wheels_raise_none() -> None:
-    """Twenty minutes, with a drop to nothing every ten seconds and a wheel that is not measured for a minute."""
+    """Twenty minutes with a drop to zero every ten seconds, and one wheel missing for a minute, raise no alarm."""
     torque = noisy(2400)
     torque[::20, 1] = 0.0
     torque[600:720, 4] = np.nan
@@ -52,7 +52,7 @@ def test_a_steady_drive_momentary_drops_and_missing_wheels_raise_none() -> None:
 
 
 def test_through_the_whole_pipeline_the_alarm_says_how_likely_the_soil_is_weaker() -> None:
-    """From medium soil to LETE sand on the virtual rover, at 2 Hz and 5 cm/s."""
+    """The virtual rover drives from medium soil onto LETE sand, at 2 Hz and 5 cm/s."""
     stretches = (Stretch(soil=SOILS["medium-soil"], until_m=8.0), Stretch(soil=SOILS["lete-sand"]))
     scenario = Scenario(ground=Ground(stretches=stretches))
     world = VirtualWorld(scenario)

@@ -1,4 +1,4 @@
-"""A network is refused with everything that is wrong with it, or gives six estimates in one go."""
+"""A terrain network that does not fit is refused with every reason; one that fits estimates six wheels in one call."""
 
 import dataclasses
 from collections.abc import Callable
@@ -21,7 +21,7 @@ KNOWN = {
 def test_six_wheels_are_estimated_and_what_is_outside_the_training_range_is_marked(
     make_network: Callable[..., Path],
 ) -> None:
-    """Wheel 3 lacks its slip; 4, 5 and 6 each have one input outside."""
+    """Wheel 3 lacks its slip; wheels 4, 5 and 6 each have one input outside."""
     terrain = TerrainNetwork(make_network()).estimate(KNOWN)
     np.testing.assert_allclose(terrain.cohesion_Pa, [3000, 4000, np.nan, 6000, 7000, 9000], rtol=1e-6)
     tangent = KNOWN["slip"] + 5 * KNOWN["motor_current_A"]
@@ -34,12 +34,12 @@ def test_six_wheels_are_estimated_and_what_is_outside_the_training_range_is_mark
 
 
 def test_a_card_survives_its_metadata(card: ModelCard) -> None:
-    """Training writes it, the rover reads it."""
+    """A model card that is written to metadata reads back equal."""
     assert read_card(card.metadata()) == card
 
 
-def test_everything_wrong_with_a_card_is_told_at_once(card: ModelCard) -> None:
-    """Wrong unit, unknown name, empty range, outputs swapped, no version, no gain."""
+def test_everything_wrong_with_a_card_is_reported_at_once(card: ModelCard) -> None:
+    """Wrong unit, unknown name, empty range, swapped outputs, no version and no gain are six problems."""
     wrong = dataclasses.replace(
         card,
         version="",
@@ -53,25 +53,25 @@ def test_everything_wrong_with_a_card_is_told_at_once(card: ModelCard) -> None:
 
 
 def test_a_network_without_a_card_is_refused(make_network: Callable[..., Path]) -> None:
-    """Numbers of unknown unit are worse than none."""
+    """The error names the missing metadata."""
     with pytest.raises(TerrainModelError, match=r"network.onnx: its metadata do not fit: regolithd.inputs is missing"):
         TerrainNetwork(make_network(metadata={}))
 
 
 def test_a_network_whose_layers_disagree_with_its_card_is_refused(make_network: Callable[..., Path]) -> None:
-    """Four columns in, three named."""
+    """The model has four input columns, its card names three."""
     with pytest.raises(TerrainModelError, match=r"expected \(N, 3\) of floats"):
         TerrainNetwork(make_network(weights=np.ones((4, 2))))
 
 
 def test_a_network_that_gives_no_numbers_is_refused(make_network: Callable[..., Path]) -> None:
-    """It is run once before it is trusted."""
+    """A model whose result is NaN is refused when it is loaded."""
     with pytest.raises(TerrainModelError, match="no finite numbers"):
         TerrainNetwork(make_network(weights=np.full((3, 2), np.nan)))
 
 
 def test_a_missing_or_broken_file_is_refused(tmp_path: Path) -> None:
-    """With its path, and the cure."""
+    """The error names the file and what to do."""
     with pytest.raises(ModelError, match=r"absent.onnx: no such file. Train one \(`regolithd train`\)"):
         TerrainNetwork(tmp_path / "absent.onnx")
     broken = tmp_path / "broken.onnx"

@@ -77,7 +77,7 @@ def test_an_alarm_is_published_when_it_begins_changes_and_ends_and_not_between(s
 
 
 async def test_a_connection_takes_two_windows_of_publishes_without_a_warning(tmp_path: Path) -> None:
-    """Aiomqtt warns, at each further call, above a threshold of pending calls."""
+    """The threshold above which aiomqtt warns of pending calls is two windows."""
 
     class NoMessages:
         def birth(self) -> bytes:

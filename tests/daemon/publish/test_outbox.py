@@ -1,4 +1,4 @@
-"""Whatever the order of storing, sending, acknowledging, losing the connection and being killed: nothing is lost."""
+"""No message is lost, for any order of storing, sending, acknowledging, disconnecting and being killed."""
 
 from pathlib import Path
 
@@ -12,18 +12,18 @@ from regolithd.daemon.publish.spool import Spool
 
 
 def message(number: int) -> bytes:
-    """Return a payload that tells its number and can be marked."""
+    """Return a payload that holds its number and can be marked late."""
     return write({"schema_version": 2, "late": False, "number": number})
 
 
 def number_of(letter: OutgoingMessage) -> int:
-    """Return the number that a letter tells; its mark must be its payload's."""
+    """Return the number in a message's payload; its `late` must agree with the payload's."""
     assert letter.payload.startswith(b'{"schema_version":2,"late":' + (b"true" if letter.late else b"false"))
     return int(letter.payload.split(b":")[-1].rstrip(b"}"))
 
 
 class World:
-    """A daemon and a broker; what the broker has got is in `arrived`, as (number, late)."""
+    """A daemon and a broker; what the broker received is in `arrived`, as (number, late)."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -39,19 +39,19 @@ class World:
         self.outbox = Outbox(self.spool)
 
     def store(self, count: int) -> None:
-        """Measure something."""
+        """Store a message."""
         for _ in range(count):
             self.outbox.store("snapshot", message(self.stored))
             self.stored += 1
 
     def connect(self, _: int = 0) -> None:
-        """Begin a new connection, whatever was before."""
+        """Begin a new connection."""
         self.flying.clear()
         self.outbox.connected()
         self.is_connected = True
 
     def send(self, count: int) -> None:
-        """Send some; the broker gets them."""
+        """Send some messages, which the broker receives."""
         while self.is_connected and count:
             letter = next(self.outbox.waiting(), None)
             if letter is None:
@@ -62,13 +62,13 @@ class World:
             count -= 1
 
     def acknowledge(self, count: int) -> None:
-        """The daemon hears from the broker that it has some of them; the last first, to be difficult."""
+        """Acknowledge some messages, the last first."""
         taken, self.flying = self.flying[:count], self.flying[count:]
         for letter in reversed(taken):
             self.outbox.acknowledged(letter)
 
     def lose(self, _: int) -> None:
-        """Lose the connection, with whatever is on its way."""
+        """Lose the connection with all unacknowledged messages."""
         self.is_connected = False
         self.flying.clear()
 
@@ -87,7 +87,7 @@ STEPS = ("store", "connect", "send", "acknowledge", "lose", "kill")
 def test_everything_arrives_in_order_and_what_comes_twice_is_marked(
     tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[str, int]]
 ) -> None:
-    """And once all is acknowledged, nothing waits."""
+    """Once everything is acknowledged, nothing waits."""
     world = World(tmp_path_factory.mktemp("outbox"))
     for step, count in steps:
         getattr(world, step)(count)
@@ -107,14 +107,14 @@ def test_everything_arrives_in_order_and_what_comes_twice_is_marked(
 
 @pytest.fixture
 def outbox(tmp_path: Path) -> Outbox:
-    """One that is connected."""
+    """An outbox that is connected."""
     box = Outbox(Spool(tmp_path, 1_000_000))
     box.connected()
     return box
 
 
 def test_what_is_sent_soon_is_live_and_what_waited_is_late(outbox: Outbox, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also on a connection that never broke: its window may have been full."""
+    """A message that waited is late, also on a connection that was never lost."""
     now = 1_000
     monkeypatch.setattr("time.monotonic_ns", lambda: now)
     outbox.store("snapshot", message(0))
@@ -126,7 +126,7 @@ def test_what_is_sent_soon_is_live_and_what_waited_is_late(outbox: Outbox, monke
 
 
 def test_only_the_newest_of_a_retained_topic_is_retained_when_late(outbox: Outbox) -> None:
-    """An old state must not overwrite the current one at the broker."""
+    """An older state must not overwrite the current one at the broker."""
     outbox.store("node/3", message(0))
     outbox.store("node/3", message(1))
     outbox.store("snapshot", message(2))
@@ -135,8 +135,8 @@ def test_only_the_newest_of_a_retained_topic_is_retained_when_late(outbox: Outbo
     assert [(letter.retain, letter.late) for letter in outbox.waiting()] == [(False, True), (True, True), (False, True)]
 
 
-def test_the_current_states_are_said_again_to_a_broker_that_may_have_forgotten(outbox: Outbox) -> None:
-    """Those that it had acknowledged, marked; the others come from the store anyway."""
+def test_the_current_states_are_sent_again_in_a_new_connection(outbox: Outbox) -> None:
+    """The retained messages that were acknowledged before are sent again, marked late."""
     outbox.store("node/3", message(0))
     outbox.store("alarm/bus", message(1))
     letter = next(outbox.waiting())
@@ -148,7 +148,7 @@ def test_the_current_states_are_said_again_to_a_broker_that_may_have_forgotten(o
 
 
 def test_of_live_messages_the_newest_counts(outbox: Outbox) -> None:
-    """A slow connection shows now, not then."""
+    """A live message replaces a waiting one on the same topic."""
     outbox.add_live({"wheel/1": b"old", "wheel/2": b"old"})
     outbox.add_live({"wheel/1": b"new"})
     assert outbox.take_live() == {"wheel/1": b"new", "wheel/2": b"old"}
@@ -157,6 +157,6 @@ def test_of_live_messages_the_newest_counts(outbox: Outbox) -> None:
 
 
 def test_measured_values_are_never_retained() -> None:
-    """A retained measurement is a repeated one."""
+    """Neither `snapshot` nor `wheel/…` has the retain flag."""
     assert not any(is_retained(topic) for topic in ("snapshot", "wheel/1", "emcy", "event", "health"))
     assert all(is_retained(topic) for topic in ("state", "node/3", "alarm/bus"))

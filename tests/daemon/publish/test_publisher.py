@@ -1,4 +1,4 @@
-"""What was published arrives: in order, late ones marked, whatever happens to the broker."""
+"""Stored messages arrive in order, late ones marked, whatever happens to the broker."""
 
 import asyncio
 import gc
@@ -25,14 +25,14 @@ QUICK = {"first": 0.05, "longest": 0.2}
 
 
 def configuration(folder: Path, port: int, **mqtt: Any) -> Configuration:
-    """Return a rover whose broker is here."""
+    """Return a configuration for a broker on this computer."""
     settings: dict[str, Any] = {"host": "127.0.0.1", "port": port, "keepalive_s": 2} | mqtt
     return Configuration(mqtt=Mqtt(spool_directory=folder, **settings))
 
 
 @asynccontextmanager
 async def running(publisher: Publisher) -> AsyncIterator[asyncio.Task[None]]:
-    """Run a publisher, and stop it as the daemon does."""
+    """Run a publisher, and stop it by cancellation as the daemon does."""
     task = asyncio.create_task(publisher.run())
     try:
         yield task
@@ -43,13 +43,13 @@ async def running(publisher: Publisher) -> AsyncIterator[asyncio.Task[None]]:
 
 
 def new_publisher(folder: Path, port: int, **mqtt: Any) -> Publisher:
-    """Return a publisher that tries again quickly."""
+    """Return a publisher that reconnects after a short delay."""
     settings = configuration(folder, port, **mqtt)
     return Publisher(settings, Spool(folder, 10_000_000), backoff=Backoff(**QUICK))
 
 
 async def test_every_snapshot_and_every_wheel_arrives_live(mosquitto: Mosquitto, tmp_path: Path) -> None:
-    """In order, not marked, and the store is empty afterwards."""
+    """All arrive in order, not marked late, and the store is empty afterwards."""
     publisher = new_publisher(tmp_path, mosquitto.port)
     async with listening(Subscriber(mosquitto.port)) as subscriber, running(publisher):
         await until(lambda: publisher.connected)
@@ -66,7 +66,7 @@ async def test_every_snapshot_and_every_wheel_arrives_live(mosquitto: Mosquitto,
 
 
 async def test_birth_and_clean_death_pair_up(mosquitto: Mosquitto, tmp_path: Path) -> None:
-    """`offline` is published by ourselves, retained, before the connection is closed."""
+    """`offline` is published by the daemon, retained, before it disconnects."""
     publisher = new_publisher(tmp_path, mosquitto.port)
     async with listening(Subscriber(mosquitto.port)) as subscriber:
         async with running(publisher):
@@ -83,7 +83,7 @@ async def test_birth_and_clean_death_pair_up(mosquitto: Mosquitto, tmp_path: Pat
 async def test_while_the_broker_is_away_nothing_is_lost_and_late_ones_are_marked(
     mosquitto: Mosquitto, tmp_path: Path
 ) -> None:
-    """Acquisition goes on at its pace; afterwards every snapshot has come once or is marked, in order."""
+    """Acquisition continues, and afterwards every snapshot has arrived in order, repeated ones marked late."""
     keep_sessions(mosquitto)
     publisher = new_publisher(tmp_path, mosquitto.port)
     async with listening(Subscriber(mosquitto.port)) as subscriber:
@@ -98,7 +98,7 @@ async def test_while_the_broker_is_away_nothing_is_lost_and_late_ones_are_marked
 
 
 def keep_sessions(mosquitto: Mosquitto) -> None:
-    """Let the broker remember its subscribers through a restart, as the rover's does (systemd/mosquitto)."""
+    """Let the broker keep its subscribers' sessions through a restart, as the rover's does (systemd/mosquitto)."""
     mosquitto.stop()
     mosquitto.settings += f"persistence true\npersistence_location {mosquitto.folder}/\n"
     mosquitto.start()
@@ -124,7 +124,7 @@ async def through_an_outage(publisher: Publisher, subscriber: Subscriber, mosqui
 async def test_a_frozen_broker_is_noticed_and_nothing_is_lost(
     mosquitto: Mosquitto, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its connections stay open and nothing answers: QoS 0 would call that a success."""
+    """A stopped process keeps its connections open, so only the missing acknowledgements show it."""
     monkeypatch.setattr("regolithd.daemon.publish.connection.ACKNOWLEDGE_TIMEOUT_S", 0.5)
     publisher = new_publisher(tmp_path, mosquitto.port)
     async with listening(Subscriber(mosquitto.port)) as subscriber, running(publisher):
@@ -148,7 +148,7 @@ async def test_a_frozen_broker_is_noticed_and_nothing_is_lost(
 
 
 async def test_an_estimate_is_taken_at_once_whatever_the_broker_does(mosquitto: Mosquitto, tmp_path: Path) -> None:
-    """More than the window and the socket hold, with no turn of the loop in between."""
+    """More estimates than the window and the socket take are accepted without a turn of the event loop."""
     publisher = new_publisher(tmp_path, mosquitto.port)
     async with running(publisher):
         await until(lambda: publisher.connected)
@@ -161,7 +161,7 @@ async def test_an_estimate_is_taken_at_once_whatever_the_broker_does(mosquitto: 
 
 
 async def test_the_next_start_delivers_what_the_last_one_could_not(mosquitto: Mosquitto, tmp_path: Path) -> None:
-    """Marked late, under the session that measured it."""
+    """They are marked late, and keep the session that stored them."""
     first = new_publisher(tmp_path / "spool", unused_port())
     async with running(first):
         for sequence in range(10):
@@ -198,7 +198,7 @@ def node_fields(phase: str, text: str) -> dict[str, Any]:
 async def test_the_retained_state_of_a_node_is_its_newest_also_after_an_outage(
     mosquitto: Mosquitto, tmp_path: Path
 ) -> None:
-    """A broker that forgot everything is told again; what is old never overwrites what is new."""
+    """A broker that lost its retained messages gets them again, and an old one never replaces a new one."""
     publisher = new_publisher(tmp_path, mosquitto.port)
     async with running(publisher):
         await until(lambda: publisher.connected)
@@ -227,10 +227,10 @@ async def test_the_retained_state_of_a_node_is_its_newest_also_after_an_outage(
         ({"password_file": Path("/nowhere/password"), "username": "me"}, "/nowhere/password"),
     ],
 )
-async def test_a_broker_that_cannot_be_reached_is_told_once(
+async def test_a_broker_that_cannot_be_reached_is_reported_once(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, settings: dict[str, Any], said: str
 ) -> None:
-    """With the cure, and tried again all the while."""
+    """The reason is logged once, with what to do, while attempts go on."""
     caplog.set_level(logging.INFO, "regolithd.daemon.publish")
     publisher = new_publisher(tmp_path, unused_port(), **settings)
     async with running(publisher):
@@ -241,10 +241,10 @@ async def test_a_broker_that_cannot_be_reached_is_told_once(
     assert said in told[0]
 
 
-async def test_a_refused_password_is_told_and_tried_again_until_it_is_mended(
+async def test_a_refused_password_is_reported_and_tried_again_until_it_is_corrected(
     mosquitto: Mosquitto, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """The broker's operator may mend it without touching the daemon."""
+    """The broker's operator may correct it without a restart of the daemon."""
     mosquitto.stop()
     open_to_all, mosquitto.settings = mosquitto.settings, "allow_anonymous false\n"
     mosquitto.start()
@@ -261,7 +261,7 @@ async def test_a_refused_password_is_told_and_tried_again_until_it_is_mended(
 
 @pytest.fixture
 def secured(mosquitto: Mosquitto) -> Mosquitto:
-    """A broker that speaks TLS alone, with a certificate that it has signed itself."""
+    """A broker that accepts TLS only, with a self-signed certificate."""
     if shutil.which("openssl") is None:
         pytest.skip("no openssl here: apt-get install openssl")
     key, certificate = mosquitto.folder / "key.pem", mosquitto.folder / "certificate.pem"
@@ -275,7 +275,7 @@ def secured(mosquitto: Mosquitto) -> Mosquitto:
 
 
 async def test_messages_go_over_tls_to_a_broker_that_proves_itself(secured: Mosquitto, tmp_path: Path) -> None:
-    """By an authority that the configuration names."""
+    """The certificate authority is that of `[mqtt] ca_file`."""
     publisher = new_publisher(tmp_path, secured.port, tls=True, ca_file=secured.folder / "certificate.pem")
     async with running(publisher):
         await until(lambda: publisher.connected)
@@ -286,7 +286,7 @@ async def test_messages_go_over_tls_to_a_broker_that_proves_itself(secured: Mosq
 # paho leaves the socket of a failed handshake to the garbage collector.
 @pytest.mark.filterwarnings("ignore:Exception ignored in. <ssl.SSLSocket:pytest.PytestUnraisableExceptionWarning")
 async def test_a_broker_that_does_not_prove_itself_gets_nothing(secured: Mosquitto, tmp_path: Path) -> None:
-    """The system's authorities do not know it."""
+    """A certificate that no known authority has signed is refused."""
     publisher = new_publisher(tmp_path, secured.port, tls=True)
     async with running(publisher):
         await until(lambda: "TLS failed" in publisher.problem)
@@ -295,8 +295,8 @@ async def test_a_broker_that_does_not_prove_itself_gets_nothing(secured: Mosquit
     gc.collect()  # here, where the warning is expected
 
 
-async def test_two_of_the_same_name_are_told_so(mosquitto: Mosquitto, tmp_path: Path) -> None:
-    """The broker throws out the one for the other; neither floods it with attempts, and nothing is lost."""
+async def test_two_of_the_same_name_are_reported(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """The broker disconnects one for the other, both back off, and the reason names the rover's name."""
     rivals = [new_publisher(tmp_path / name, mosquitto.port) for name in "ab"]
     async with running(rivals[0]), running(rivals[1]):
         await until(lambda: all(rival.report.connections >= 3 for rival in rivals))
@@ -304,7 +304,7 @@ async def test_two_of_the_same_name_are_told_so(mosquitto: Mosquitto, tmp_path: 
 
 
 async def test_the_daemon_subscribes_to_nothing(mosquitto: Mosquitto, tmp_path: Path) -> None:
-    """So nothing can be commanded over MQTT: the broker's own log has no subscription of ours."""
+    """The broker's log has no subscription of the daemon, so nothing can be commanded over MQTT."""
     mosquitto.stop()
     mosquitto.settings += "log_type all\n"
     mosquitto.start()
@@ -320,7 +320,7 @@ async def test_the_daemon_subscribes_to_nothing(mosquitto: Mosquitto, tmp_path: 
 
 
 def test_waiting_doubles_is_bounded_and_differs_from_rover_to_rover() -> None:
-    """And begins anew after a success."""
+    """The delay starts again at the shortest after a success."""
     backoff = Backoff(first=1.0, longest=20.0)
     delays = [backoff.next() for _ in range(8)]
     for delay, whole in zip(delays, (1, 2, 4, 8, 16, 20, 20, 20), strict=True):

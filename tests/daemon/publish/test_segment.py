@@ -1,4 +1,4 @@
-"""One file of the store: descriptors, and writes that the disk refuses."""
+"""One file of the store: duplicate descriptors, refused writes, and foreign files."""
 
 import errno
 import os
@@ -10,7 +10,7 @@ from regolithd.daemon.publish.segment import MAGIC, Segment, pack, unpack
 
 
 def test_a_duplicate_descriptor_outlives_the_segments_own(tmp_path: Path) -> None:
-    """A thread syncs the file while the segment is closed; of a closed one there is no duplicate."""
+    """A closed segment has no duplicate, but one made before stays open."""
     segment = Segment.create(tmp_path, 7)
     segment.append(pack("snapshot", b"{}"))
     duplicate = segment.duplicate()
@@ -28,7 +28,7 @@ def test_a_duplicate_descriptor_outlives_the_segments_own(tmp_path: Path) -> Non
 def test_a_record_that_the_disk_does_not_take_whole_leaves_no_trace(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, taken: int | None
 ) -> None:
-    """The records before and after it can be read."""
+    """The records before and after it are read."""
     segment = Segment.create(tmp_path, 0)
     segment.append(pack("event", b"first"))
     write = os.write
@@ -49,7 +49,7 @@ def test_a_record_that_the_disk_does_not_take_whole_leaves_no_trace(
 
 
 def test_a_file_that_is_not_a_segment_holds_no_records() -> None:
-    """Its first bytes are checked."""
+    """A file without the magic bytes gives no record."""
     data = MAGIC + pack("event", b"payload")
     assert [record.payload for record, _ in unpack(data, 0)] == [b"payload"]
     assert list(unpack(b"x" + data[1:], 0)) == []

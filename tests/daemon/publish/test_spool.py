@@ -1,4 +1,4 @@
-"""Nothing that was stored is lost but by its bound, whatever kills the process."""
+"""No stored message is lost except by the size limit, whatever kills the process."""
 
 import os
 from pathlib import Path
@@ -12,19 +12,19 @@ from regolithd.daemon.publish.spool import RECENT, Spool, SpoolError
 
 
 def payload(index: int) -> bytes:
-    """Return a payload that tells its index, and whose size differs from the next."""
+    """Return a payload that holds its index, and whose size differs from the next."""
     return b"%d " % index + b"x" * (index % 97)
 
 
 def fill(spool: Spool, count: int) -> None:
-    """Store `count` messages, each telling its index."""
+    """Store `count` messages, each with its index."""
     for _ in range(count):
         index = spool.next
         assert spool.append("snapshot", payload(index)) == index
 
 
 def everything(spool: Spool) -> list[int]:
-    """Return the indices of all that waits, read in order; each must hold what was stored."""
+    """Return the indices of all waiting messages, in order; each must hold what was stored."""
     found: list[int] = []
     position = spool.first
     while records := spool.read(position):
@@ -36,7 +36,7 @@ def everything(spool: Spool) -> list[int]:
 
 
 def test_what_was_stored_comes_back_in_order(tmp_path: Path) -> None:
-    """Across many files, and from memory or disk alike."""
+    """They come back across several files, from memory and from disk."""
     spool = Spool(tmp_path, 1_000_000, segment_bytes=2000)
     fill(spool, RECENT + 300)
     assert everything(spool) == list(range(RECENT + 300))
@@ -44,7 +44,7 @@ def test_what_was_stored_comes_back_in_order(tmp_path: Path) -> None:
 
 
 def test_the_next_process_finds_what_was_not_acknowledged(tmp_path: Path) -> None:
-    """And nothing that was."""
+    """It finds every message that was not acknowledged, and no other."""
     spool = Spool(tmp_path, 1_000_000, segment_bytes=2000)
     fill(spool, 300)
     spool.acknowledge(120, 120)
@@ -68,7 +68,7 @@ def test_indices_go_on_after_everything_was_acknowledged(tmp_path: Path) -> None
 
 
 def test_files_go_as_soon_as_all_in_them_is_acknowledged(tmp_path: Path) -> None:
-    """A broker that keeps up leaves one file."""
+    """One file is left when everything is acknowledged."""
     spool = Spool(tmp_path, 1_000_000, segment_bytes=500)
     for index in range(200):
         fill(spool, 1)
@@ -79,7 +79,7 @@ def test_files_go_as_soon_as_all_in_them_is_acknowledged(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("cut", [1, 5, 9, 10, 11, 40])
 def test_a_torn_tail_costs_its_own_record_alone(tmp_path: Path, cut: int) -> None:
-    """A kill in the middle of a write, or a power cut."""
+    """A record that was written in part is lost, and no other."""
     spool = Spool(tmp_path, 1_000_000)
     fill(spool, 41)
     spool.close()
@@ -93,7 +93,7 @@ def test_a_torn_tail_costs_its_own_record_alone(tmp_path: Path, cut: int) -> Non
 
 
 def test_zeros_at_the_end_are_no_records(tmp_path: Path) -> None:
-    """What some file systems leave after a power cut."""
+    """Some file systems leave zeros after a power cut."""
     spool = Spool(tmp_path, 1_000_000)
     fill(spool, 10)
     spool.close()
@@ -103,8 +103,8 @@ def test_zeros_at_the_end_are_no_records(tmp_path: Path) -> None:
     assert everything(Spool(tmp_path, 1_000_000)) == list(range(10))
 
 
-def test_a_rotten_record_in_the_middle_costs_the_rest_of_its_file(tmp_path: Path) -> None:
-    """Reading goes on with the next file, and what is missing is counted when the rest is acknowledged."""
+def test_a_corrupt_record_in_the_middle_costs_the_rest_of_its_file(tmp_path: Path) -> None:
+    """Reading continues with the next file, and the lost records are counted as dropped."""
     spool = Spool(tmp_path, 1_000_000, segment_bytes=1000)
     fill(spool, 100)
     spool.close()
@@ -122,8 +122,8 @@ def test_a_rotten_record_in_the_middle_costs_the_rest_of_its_file(tmp_path: Path
 
 
 @pytest.mark.parametrize("rotten", [b"", b"short", bytes(12), b"\xff" * 12])
-def test_a_rotten_cursor_sends_again_rather_than_loses(tmp_path: Path, rotten: bytes) -> None:
-    """What is sent again is marked late; what is lost is lost."""
+def test_a_corrupt_cursor_sends_again_rather_than_loses(tmp_path: Path, rotten: bytes) -> None:
+    """With an invalid cursor every stored message is sent again."""
     spool = Spool(tmp_path, 1_000_000)
     fill(spool, 10)
     spool.acknowledge(5, 5)
@@ -133,7 +133,7 @@ def test_a_rotten_cursor_sends_again_rather_than_loses(tmp_path: Path, rotten: b
 
 
 def test_full_means_that_the_oldest_go_and_are_counted(tmp_path: Path) -> None:
-    """The files never take more than the limit."""
+    """The files never exceed the limit."""
     spool = Spool(tmp_path, 20_000, segment_bytes=2000)
     for _ in range(1000):
         fill(spool, 1)
@@ -145,7 +145,7 @@ def test_full_means_that_the_oldest_go_and_are_counted(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_keeps_messages_in_memory_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Publishing goes on; what came before and after is on disk."""
+    """A message that the disk refuses is kept in memory and counted; those before and after are on disk."""
     spool = Spool(tmp_path, 1_000_000)
     fill(spool, 5)
     write = os.write
@@ -163,7 +163,7 @@ def test_a_full_disk_keeps_messages_in_memory_and_says_so(tmp_path: Path, monkey
 def test_a_failing_disk_raises_nothing_once_the_store_is_open(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str
 ) -> None:
-    """A card that turned read-only on the way: acquisition and publishing go on."""
+    """Storing, reading and acknowledging raise nothing on a disk that became read-only."""
     spool = Spool(tmp_path, 20_000, segment_bytes=2000)
     fill(spool, 30)
 
@@ -182,7 +182,7 @@ def test_a_failing_disk_raises_nothing_once_the_store_is_open(
 
 
 def test_files_that_cannot_be_read_are_skipped_and_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is still in memory goes on its way."""
+    """Messages that are still in memory are read."""
     spool = Spool(tmp_path, 1_000_000, segment_bytes=2000)
     fill(spool, RECENT + 100)
 
@@ -196,7 +196,7 @@ def test_files_that_cannot_be_read_are_skipped_and_counted(tmp_path: Path, monke
 
 
 def test_a_second_process_is_refused(tmp_path: Path) -> None:
-    """Two would acknowledge each other's messages."""
+    """Two processes would acknowledge each other's messages."""
     spool = Spool(tmp_path, 1_000_000)
     with pytest.raises(SpoolError, match="another regolithd uses it"):
         Spool(tmp_path, 1_000_000)
@@ -204,15 +204,15 @@ def test_a_second_process_is_refused(tmp_path: Path) -> None:
     Spool(tmp_path, 1_000_000).close()
 
 
-def test_a_folder_that_cannot_be_made_is_told_with_the_key_to_mend(tmp_path: Path) -> None:
-    """Whoever the user is."""
+def test_a_folder_that_cannot_be_made_is_reported_with_the_key_to_correct(tmp_path: Path) -> None:
+    """The error names the key of the folder, for any user."""
     (tmp_path / "file").touch()
     with pytest.raises(SpoolError, match=r"\[mqtt\] spool_directory"):
         Spool(tmp_path / "file" / "spool", 1_000_000)
 
 
 def test_syncing_survives_what_happens_meanwhile(tmp_path: Path) -> None:
-    """Files may be acknowledged and deleted between the beginning of a sync and its end."""
+    """Files may be acknowledged and deleted during a sync."""
     spool = Spool(tmp_path, 1_000_000, segment_bytes=500)
     fill(spool, 50)
     sync = spool.begin_sync()
@@ -241,7 +241,7 @@ steps = st.lists(
 def test_any_history_of_storing_acknowledging_and_killing_loses_nothing(
     tmp_path_factory: pytest.TempPathFactory, history: list[tuple[str, int]]
 ) -> None:
-    """A kill may leave half a record behind, as if it had come in the middle of the next write."""
+    """A kill may leave half a record behind."""
     folder = tmp_path_factory.mktemp("spool")
     spool = Spool(folder, 10_000_000, segment_bytes=700)
     first = end = 0

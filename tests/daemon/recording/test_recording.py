@@ -1,4 +1,4 @@
-"""What was recorded reads back the same to the last bit, whole or cut off anywhere."""
+"""A recording reads back equal to the last bit, complete or truncated."""
 
 import json
 import math
@@ -37,7 +37,7 @@ FRAMES = st.builds(
 
 @given(FRAMES)
 def test_a_frame_survives_its_line(frame: Frame) -> None:
-    """Times are whole microseconds."""
+    """A frame that is written as a line of the log reads back equal."""
     assert parse_line(frame_line(frame, "can0")) == frame
 
 
@@ -50,12 +50,12 @@ def test_a_frame_survives_its_line(frame: Frame) -> None:
     ],
 )
 def test_extended_remote_and_error_frames_survive_too(frame: Frame) -> None:
-    """As can-utils write them."""
+    """They are written as can-utils write them, and read back equal."""
     assert parse_line(frame_line(frame, "can0")) == frame
 
 
-def test_nonsense_is_no_frame() -> None:
-    """Nor is a line that was cut off."""
+def test_an_invalid_line_is_no_frame() -> None:
+    """An incomplete line, and one in another format, is not a frame."""
     whole = frame_line(Frame(1_000_000, 0x181, b"\x01\x02"), "can0")
     assert all(parse_line(whole[:cut]) is None for cut in range(len(whole)))
     assert parse_line("(1.5) can0 181#00\n") is None
@@ -94,7 +94,7 @@ def recorded(folder: Path, frames: list[Frame], configuration: Configuration) ->
 def test_a_replayed_log_gives_the_same_numbers_to_the_last_bit(
     tmp_path: Path, drive: Callable, configuration: Configuration
 ) -> None:
-    """Live and replayed differ only in where the frames come from."""
+    """The digest of a replay equals that of the live run."""
     _, log, live = recorded(tmp_path, list(drive(nodes_silent=frozenset({3})).frames(50)), configuration)
     chain, replayed = Chain(configuration, load_models(configuration)), Digest()
     for estimate in chain.feed(read_log(log)):
@@ -104,7 +104,7 @@ def test_a_replayed_log_gives_the_same_numbers_to_the_last_bit(
 
 
 def test_the_digest_sees_a_change_of_one_bit(drive: Callable, configuration: Configuration) -> None:
-    """Else equal digests would prove nothing."""
+    """Other noise gives another digest, the same noise the same."""
     models = load_models(configuration)
     digests = []
     for seed in (1, 1, 2):
@@ -116,7 +116,7 @@ def test_the_digest_sees_a_change_of_one_bit(drive: Callable, configuration: Con
 
 
 def test_snapshots_read_back_to_the_last_bit(tmp_path: Path, drive: Callable, configuration: Configuration) -> None:
-    """JSON keeps every digit, and null stays NaN."""
+    """JSON keeps every digit, and null reads back as NaN."""
     frames = list(drive(nodes_silent=frozenset({2})).frames(10))
     mcap, _, _ = recorded(tmp_path, frames, configuration)
     chain = Chain(configuration, load_models(configuration))
@@ -129,7 +129,7 @@ def test_snapshots_read_back_to_the_last_bit(tmp_path: Path, drive: Callable, co
 def test_a_file_cut_off_anywhere_reads_as_far_as_it_goes(
     tmp_path: Path, drive: Callable, configuration: Configuration
 ) -> None:
-    """Each flush is safe; nothing raises, whatever the cut."""
+    """Every message before the last flush is read, and nothing raises, wherever the file ends."""
     mcap, _, _ = recorded(tmp_path, list(drive(rate_Hz=100).frames(60)), configuration)
     whole = mcap.read_bytes()
     cut_file = tmp_path / "cut.mcap"
@@ -144,7 +144,7 @@ def test_a_file_cut_off_anywhere_reads_as_far_as_it_goes(
 
 
 def test_the_oldest_files_go_when_the_limit_is_reached(tmp_path: Path, drive: Callable) -> None:
-    """And nobody else's."""
+    """Files of other programs are kept."""
     foreign = tmp_path / "notes.log"
     foreign.write_text("mine")
     clock = iter(range(10**18, 2 * 10**18, 60 * 10**9))
@@ -165,7 +165,7 @@ def test_the_oldest_files_go_when_the_limit_is_reached(tmp_path: Path, drive: Ca
 def test_a_disk_that_others_fill_costs_old_recordings_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, drive: Callable
 ) -> None:
-    """Far below the limit, but the disk has less left than the reserve until two files are gone."""
+    """Below the limit, the oldest files are deleted while the disk has less than the reserve."""
     frames = list(drive().frames(5))
 
     def record(hour: int) -> None:
@@ -188,7 +188,7 @@ def test_a_disk_that_others_fill_costs_old_recordings_first(
 
 
 def test_a_disk_that_fails_stops_the_recording_and_nothing_else(tmp_path: Path, drive: Callable) -> None:
-    """It says why, and begins again when it can."""
+    """`problem` has the reason, and recording begins again when the disk works."""
     now = 10**18
     place = tmp_path / "recordings"
     place.write_text("a file where a folder should be")
@@ -208,7 +208,7 @@ def test_a_disk_that_fails_stops_the_recording_and_nothing_else(tmp_path: Path, 
 
 
 def test_numbers_that_are_not_are_null(drive: Callable, configuration: Configuration, tmp_path: Path) -> None:
-    """The file is JSON that every reader takes."""
+    """No message of the file contains NaN."""
     mcap, _, _ = recorded(tmp_path, list(drive(nodes_silent=frozenset({5})).frames(3)), configuration)
     for message in read_messages(mcap):
         assert not any(
@@ -222,7 +222,7 @@ def test_numbers_that_are_not_are_null(drive: Callable, configuration: Configura
 def test_a_recording_of_version_0_1_is_compared_under_todays_names(
     tmp_path: Path, drive: Callable, configuration: Configuration
 ) -> None:
-    """Its estimates have `belief` where they now have `posterior`; a number that differs is still found."""
+    """Its `belief` is compared with today's `posterior`, and a difference in the last bit is found."""
     calibrated = {"no_load_current_A": 0.037, "no_load_current_std_A": 0.001, "gain_relative_std": 0.03}
     configuration = Configuration.model_validate(configuration.model_dump() | {"drivetrain": calibrated})
     mcap, log, digest = recorded(tmp_path, list(drive(rate_Hz=2.0).frames(20)), configuration)
@@ -250,12 +250,12 @@ def test_a_recording_of_version_0_1_is_compared_under_todays_names(
     ("one", "other"), [(1.0, 1), ("1", 1), (None, ""), (0.0, -0.0), (("a", "b"), ("ab", "")), (1.0, 1.0 + 2**-52)]
 )
 def test_the_digest_differs_for_values_that_differ_in_type_sign_or_last_bit(one: object, other: object) -> None:
-    """Otherwise equal digests could hide a difference."""
+    """Equal digests mean equal values."""
     assert b"".join(_flattened((one,))) == b"".join(_flattened((one,)))
     assert b"".join(_flattened((one,))) != b"".join(_flattened((other,)))
 
 
 def test_the_digest_refuses_a_value_that_it_cannot_encode() -> None:
-    """A new field of an unknown type must not be left out silently."""
+    """A field of an unknown type is not left out silently."""
     with pytest.raises(TypeError, match="no encoding"):
         list(_flattened(([1.0],)))
