@@ -4,7 +4,7 @@
 
 new_enough() { command -v "$1" >/dev/null && "$1" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; }
 
-# find_python: prints $PYTHON, or the first of python3, python3.14 … python3.11 that is new enough; else an error and its cure.
+# find_python: prints $PYTHON, or the first of python3, python3.14 … python3.11 that is new enough; else an error and its remedy.
 find_python() {
   local candidate found
   [ -n "${PYTHON:-}" ] || command -v python3 >/dev/null || install_packages python3 python3-venv >&2 || true
@@ -16,7 +16,7 @@ find_python() {
   done
   found=$("${PYTHON:-python3}" --version 2>/dev/null || echo "no ${PYTHON:-python3}")
   echo "regolithd needs Python 3.11 or newer; here is $found." >&2
-  echo "Cure: install one (Debian 12: apt-get install python3 python3-venv; Ubuntu 22.04: python3.11 python3.11-venv)," >&2
+  echo "Remedy: install one (Debian 12: apt-get install python3 python3-venv; Ubuntu 22.04: python3.11 python3.11-venv)," >&2
   echo "      or name one: make … PYTHON=/path/to/python3.12" >&2
   return 1
 }
@@ -27,7 +27,7 @@ need_venv() {
   "$1" -c 'import ensurepip, venv' 2>/dev/null && return
   package=$("$1" -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')
   install_packages "$package" || {
-    echo "$1 cannot make virtual environments. Cure: sudo apt-get install $package" >&2
+    echo "$1 cannot make virtual environments. Remedy: sudo apt-get install $package" >&2
     return 1
   }
 }

@@ -33,7 +33,7 @@ class DriverError(Exception):
         What happened, without a full stop.
     node_id, index, subindex
         Where it happened; at the start of the message.
-    cure
+    remedy
         What to do about it; at the end of the message.
     """
 
@@ -44,13 +44,13 @@ class DriverError(Exception):
         node_id: int | None = None,
         index: int | None = None,
         subindex: int = 0,
-        cure: str = "",
+        remedy: str = "",
     ) -> None:
         self.what = what
         self.node_id = node_id
         self.index = index
         self.subindex = subindex
-        self.cure = cure
+        self.remedy = remedy
         super().__init__(self._message())
 
     def locate(self, node_id: int) -> None:
@@ -66,7 +66,7 @@ class DriverError(Exception):
             places.append(f"object 0x{self.index:04X}:{self.subindex:02X}")
         place = ", ".join(places)
         message = f"{place}: {self.what}" if place else self.what
-        return f"{message}. {self.cure}" if self.cure else message
+        return f"{message}. {self.remedy}" if self.remedy else message
 
 
 class BusError(DriverError, OSError):

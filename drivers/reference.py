@@ -14,7 +14,7 @@ from regolithd.drivers.devices.device import Command, Measured
 from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.devices.registry import DEVICES
 from regolithd.drivers.master.boot_configuration import Write, boot_writes
-from regolithd.drivers.master.boot_error import CURES
+from regolithd.drivers.master.boot_error import REMEDIES
 from regolithd.drivers.master.bus_load import bus_load
 from regolithd.drivers.master.status import NetworkSettings
 from regolithd.drivers.virtual.rover import KAPVIK
@@ -129,7 +129,7 @@ def _writes(device: Device, node_id: int) -> tuple[Write, ...]:
 def _reasons() -> Iterator[str]:
     yield "## Boot errors"
     rows = ["| reason | remedy |", "|---|---|"]
-    rows += [f"| `{reason}` | {cure} |" for reason, cure in CURES.items()]
+    rows += [f"| `{reason}` | {remedy} |" for reason, remedy in REMEDIES.items()]
     yield "\n".join(rows)
 
 

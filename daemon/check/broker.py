@@ -37,8 +37,8 @@ async def check_broker(configuration: Configuration) -> list[Finding]:
             took = time.monotonic() - began
     except (MqttError, OSError) as error:  # OSError: the password file, the certificate, no answer
         place, _, rest = reason_of(error, mqtt).partition(": ")
-        text, _, cure = rest.partition(". ")
-        return [wrong("broker", f"{place.removeprefix('MQTT broker ')}: {text}", cure)]
+        text, _, remedy = rest.partition(". ")
+        return [wrong("broker", f"{place.removeprefix('MQTT broker ')}: {text}", remedy)]
     secured = "TLS" if mqtt.tls else "no TLS"
     who = mqtt.username or "anyone (no username)"
     return [good("broker", f"{mqtt.host}:{mqtt.port} accepts {who}, {secured}, after {1e3 * took:.0f} ms")]

@@ -40,7 +40,11 @@ async def check_bus(configuration: Configuration, running: Status | None) -> lis
         async with open_bus(bus.interface, bus.channel, bitrate=bus.bitrate) as opened:
             found = await probe(opened, configuration.nodes.described())
     except BusError as error:
-        return [*link, wrong("bus", error.what, error.cure), unknown("nodes", "they cannot be probed without the bus")]
+        return [
+            *link,
+            wrong("bus", error.what, error.remedy),
+            unknown("nodes", "they cannot be probed without the bus"),
+        ]
     return [*(link or [good("bus", f"{bus.interface} {bus.channel} is open")]), *load, *judge_nodes(found)]
 
 
@@ -51,8 +55,8 @@ def check_link(bus: Bus, details: dict[str, Any]) -> list[Finding]:
     if not folder.exists():
         there = [each.name for each in sorted(_LINKS.glob("*")) if _text(each / "type") == CAN_LINK]
         others = f"there are {', '.join(there)}" if there else "there is no CAN link at all"
-        cure = "Plug in the CAN adapter and load its module, or correct [bus] channel."
-        return [wrong("bus", f"there is no link {bus.channel!r}; {others}", cure)]
+        remedy = "Plug in the CAN adapter and load its module, or correct [bus] channel."
+        return [wrong("bus", f"there is no link {bus.channel!r}; {others}", remedy)]
     if _text(folder / "type") != CAN_LINK:
         return [wrong("bus", f"{bus.channel!r} is no CAN link", "Correct [bus] channel.")]
     if not int(_text(folder / "flags") or "0", 16) & _UP:
@@ -74,8 +78,8 @@ def check_load(configuration: Configuration) -> list[Finding]:
     if share <= _HIGH_LOAD:
         return []
     text = f"at {rate_Hz:g} Hz its frames take up to {share:.0%} of {bitrate} bit/s"
-    cure = "Lower [sync] rate_Hz, or raise the bit rate of all nodes and [bus] bitrate."
-    return [(warning if share <= 1.0 else wrong)("bus load", text, cure)]
+    remedy = "Lower [sync] rate_Hz, or raise the bit rate of all nodes and [bus] bitrate."
+    return [(warning if share <= 1.0 else wrong)("bus load", text, remedy)]
 
 
 def judge_link(bus: Bus, details: dict[str, Any]) -> Finding:
@@ -86,11 +90,11 @@ def judge_link(bus: Bus, details: dict[str, Any]) -> Finding:
     state = str(data.get("state", "")).lower()
     if bitrate is not None and bitrate != bus.bitrate:
         text = f"{bus.channel} runs at {bitrate} bit/s, [bus] bitrate says {bus.bitrate}"
-        cure = f"`sudo ip link set {bus.channel} down`, then up with the right one; or correct [bus] bitrate."
-        return wrong("bus", text, cure)
+        remedy = f"`sudo ip link set {bus.channel} down`, then up with the right one; or correct [bus] bitrate."
+        return wrong("bus", text, remedy)
     if state in {"bus-off", "error-passive", "error-warning"}:
-        cure = "Check cable, termination (120 Ω at both ends), bit rate, and that another node is on the bus."
-        return (wrong if state == "bus-off" else warning)("bus", f"{bus.channel} is in state {state}", cure)
+        remedy = "Check cable, termination (120 Ω at both ends), bit rate, and that another node is on the bus."
+        return (wrong if state == "bus-off" else warning)("bus", f"{bus.channel} is in state {state}", remedy)
     speed = f"{bitrate} bit/s" if bitrate else f"a {kind.get('info_kind', 'CAN')} link, which has no bit rate"
     return good("bus", f"{bus.channel} is up: {speed}{', ' + state if state else ''}")
 
@@ -119,7 +123,7 @@ def judge_nodes(found: list[Probe]) -> list[Finding]:
     """Return a finding for each node with a problem, and one for all the others."""
     lines = [
         (wrong if each.node.required else warning)(
-            f"node {each.node.node_id}", f"{each.node.kind}: {each.problem}", each.cure
+            f"node {each.node.node_id}", f"{each.node.kind}: {each.problem}", each.remedy
         )
         for each in found
         if each.problem

@@ -21,7 +21,7 @@ CLOCK_JUMP_NS = 50_000_000
 EARLIEST_PLAUSIBLE_S = 1_735_689_600  # 2025-01-01; a computer without a battery-backed clock starts earlier
 LARGE_ERROR_S = 0.1
 _TIME_ERROR = 5  # return value: not synchronised
-_CURE = "Set up time synchronisation: `apt install chrony`, or `timedatectl set-ntp true`."
+_REMEDY = "Set up time synchronisation: `apt install chrony`, or `timedatectl set-ntp true`."
 
 
 class _Timex(ctypes.Structure):
@@ -61,14 +61,16 @@ def kernel_clock_state() -> ClockState | None:
 def judge_clock(state: ClockState | None, jump_ns: int, now_s: float) -> Finding:
     """Judge the clock from the kernel's state, a jump during the observation, and its time."""
     if now_s < EARLIEST_PLAUSIBLE_S:
-        return wrong("clock", f"the date is {time.strftime('%Y-%m-%d', time.gmtime(now_s))}: it was never set", _CURE)
+        return wrong("clock", f"the date is {time.strftime('%Y-%m-%d', time.gmtime(now_s))}: it was never set", _REMEDY)
     if abs(jump_ns) > CLOCK_JUMP_NS:
         text = f"it jumped by {jump_ns / 1e9:+.3f} s within a second"
         return wrong("clock", text, "Let only one service adjust it, and by slewing, not by steps.")
     if state is None:
         return unknown("clock", f"the kernel ({os.uname().sysname}) does not say whether it is synchronised")
     if not state.synchronised:
-        return warning("clock", "it is not synchronised: times differ from other computers', and may jump later", _CURE)
+        return warning(
+            "clock", "it is not synchronised: times differ from other computers', and may jump later", _REMEDY
+        )
     if state.largest_error_s > LARGE_ERROR_S:
         text = f"it is synchronised, but may be wrong by {state.largest_error_s:.3f} s"
         return warning("clock", text, "Wait until it has converged, or use a nearer time server.")

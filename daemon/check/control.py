@@ -34,15 +34,15 @@ def check_control(configuration: Configuration, running: Status | ControlError |
     try:
         number = group_id(control.group)
     except ControlSocketError as error:
-        what, _, cure = str(error).partition(". ")
-        return [wrong("control", what, cure)]
+        what, _, remedy = str(error).partition(". ")
+        return [wrong("control", what, remedy)]
     if isinstance(running, ControlError):
-        what, _, cure = str(running).partition(". ")
-        return [warning("control", what, cure)]
+        what, _, remedy = str(running).partition(". ")
+        return [warning("control", what, remedy)]
     member = os.geteuid() == 0 or number in {*os.getgroups(), os.getegid()}
     if not member:
-        cure = f"`sudo usermod -aG {control.group} $USER`, and log in again."
-        return [warning("control", f"you are not in the group {control.group!r} and may not command the rover", cure)]
+        remedy = f"`sudo usermod -aG {control.group} $USER`, and log in again."
+        return [warning("control", f"you are not in the group {control.group!r} and may not command the rover", remedy)]
     if running is None:
         return [unknown("control", f"you may command; no daemon is running at {control.socket}")]
     return [good("control", f"you may command; a daemon answers at {control.socket}")]

@@ -36,8 +36,8 @@ def check_folder(subject: str, folder: Path, limit_MB: float, key: str) -> Findi
     except OSError as error:
         return unknown(subject, f"{folder}: {error.strerror}", "Check as the daemon's user: sudo -u regolithd …")
     if not may_write:
-        cure = f"Make the daemon's user its owner, or choose another: {key}. As that user: sudo -u regolithd …"
-        return wrong(subject, f"{there} cannot be written by you ({_user()})", cure)
+        remedy = f"Make the daemon's user its owner, or choose another: {key}. As that user: sudo -u regolithd …"
+        return wrong(subject, f"{there} cannot be written by you ({_user()})", remedy)
     wanted = max(0.0, limit_MB - used)
     if free < wanted:
         text = f"{folder} may grow by {wanted:.0f} MB, but the disk has {free:.0f} MB"

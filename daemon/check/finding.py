@@ -17,12 +17,12 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One line of the report. `cure` is empty where there is nothing to do."""
+    """One line of the report. `remedy` is empty where there is nothing to do."""
 
     subject: str
     verdict: Verdict
     text: str
-    cure: str = ""
+    remedy: str = ""
 
 
 def good(subject: str, text: str) -> Finding:
@@ -30,16 +30,16 @@ def good(subject: str, text: str) -> Finding:
     return Finding(subject, Verdict.GOOD, text)
 
 
-def warning(subject: str, text: str, cure: str) -> Finding:
+def warning(subject: str, text: str, remedy: str) -> Finding:
     """Return a finding of something that reduces accuracy or safety."""
-    return Finding(subject, Verdict.WARNING, text, cure)
+    return Finding(subject, Verdict.WARNING, text, remedy)
 
 
-def wrong(subject: str, text: str, cure: str) -> Finding:
+def wrong(subject: str, text: str, remedy: str) -> Finding:
     """Return a finding of something that does not work."""
-    return Finding(subject, Verdict.WRONG, text, cure)
+    return Finding(subject, Verdict.WRONG, text, remedy)
 
 
-def unknown(subject: str, text: str, cure: str = "") -> Finding:
+def unknown(subject: str, text: str, remedy: str = "") -> Finding:
     """Return that something could not be checked, and why."""
-    return Finding(subject, Verdict.UNKNOWN, text, cure)
+    return Finding(subject, Verdict.UNKNOWN, text, remedy)

@@ -105,7 +105,7 @@ def _table(findings: list[Finding], config: Path) -> Table:
     for finding in findings:
         style = _STYLES[finding.verdict]
         text = Text(finding.text, style="" if finding.verdict == "good" else style)
-        if finding.cure:
-            text.append(f"\n→ {finding.cure}", style="default not bold")
+        if finding.remedy:
+            text.append(f"\n→ {finding.remedy}", style="default not bold")
         table.add_row(Text(_MARKS[finding.verdict], style=style), finding.subject, text)
     return table

@@ -60,7 +60,7 @@ async def _traverse(path: Path, distance_m: float, speed_m_s: float) -> int:
         daemon.send(TraverseRequest(distance_m=distance_m, speed_m_s=speed_m_s))
         end = await _follow(daemon)
     if isinstance(end, Refused):
-        typer.echo(f"Not driven: {end.text} {end.cure}".rstrip(), err=True)
+        typer.echo(f"Not driven: {end.text} {end.remedy}".rstrip(), err=True)
         return 1
     typer.echo(f"{end.ending.value.capitalize()} after {end.elapsed_s:.3f} s, {end.turned_m:.3f} m turned: {end.text}.")
     if end.ending == "finished":
@@ -124,5 +124,5 @@ async def _stop(path: Path, *, quick: bool) -> int:
     if isinstance(reply, Done):
         typer.echo(reply.text)
         return 0
-    typer.echo(f"Not stopped: {getattr(reply, 'text', reply)} {getattr(reply, 'cure', '')}".rstrip(), err=True)
+    typer.echo(f"Not stopped: {getattr(reply, 'text', reply)} {getattr(reply, 'remedy', '')}".rstrip(), err=True)
     return 1

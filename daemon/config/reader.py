@@ -37,12 +37,12 @@ class Problem:
     key: str
     expected: str
     found: str
-    cure: str
+    remedy: str
 
     def __str__(self) -> str:
         """Return the problem as one line that an editor can jump to."""
         place = self.file if self.line is None else f"{self.file}:{self.line}"
-        return f"{place}: {self.key}: expected {self.expected}, found {self.found}. {self.cure}"
+        return f"{place}: {self.key}: expected {self.expected}, found {self.found}. {self.remedy}"
 
 
 class ConfigurationError(Exception):
@@ -121,18 +121,18 @@ def _problem(details: ErrorDetails, text: str, path: Path) -> Problem:
     expected = re.sub(r"^(Input|Value|String|Tuple) should (be |have |match )?", "", details["msg"])
     found = "a table" if isinstance(details["input"], dict) else repr(details["input"])
     default = _default(location)
-    cure = f"Change it, or leave it out for {default}." if default is not None else "Change it."
-    return Problem(str(path), line_of(text, location), key, expected, found, cure)
+    remedy = f"Change it, or leave it out for {default}." if default is not None else "Change it."
+    return Problem(str(path), line_of(text, location), key, expected, found, remedy)
 
 
 def _unknown_key(location: list[str], key: str, text: str, path: Path) -> Problem:
     model = _model_at(location[:-1])
     known = list(model.model_fields) if model else []
     near = difflib.get_close_matches(location[-1], known, n=1)
-    cure = f"Did you mean {near[0]}?" if near else "Remove it."
+    remedy = f"Did you mean {near[0]}?" if near else "Remove it."
     where = f"[{'.'.join(location[:-1])}]" if location[:-1] else "the file"
     return Problem(
-        str(path), line_of(text, location), key, f"a key that {where} has ({', '.join(known)})", location[-1], cure
+        str(path), line_of(text, location), key, f"a key that {where} has ({', '.join(known)})", location[-1], remedy
     )
 
 
@@ -156,8 +156,8 @@ def _default(location: list[str]) -> str | None:
 
 def _problems_together(configuration: Configuration, text: str, path: Path) -> list[Problem]:
     return [
-        Problem(str(path), line_of(text, key.split(".")), key, expected, found, cure)
-        for key, expected, found, cure in _checks_together(configuration)
+        Problem(str(path), line_of(text, key.split(".")), key, expected, found, remedy)
+        for key, expected, found, remedy in _checks_together(configuration)
     ]
 
 

@@ -72,13 +72,13 @@ async def control_connection(path: Path) -> AsyncIterator[ControlConnection]:
     try:
         reader, writer = await asyncio.open_unix_connection(path, limit=LINE_LIMIT)
     except (FileNotFoundError, ConnectionRefusedError) as error:
-        cure = "Start it (`systemctl start regolithd`), or give its configuration with --config."
-        raise ControlError(f"No daemon is running: no answer at {path}. {cure}", EX_UNAVAILABLE) from error
+        remedy = "Start it (`systemctl start regolithd`), or give its configuration with --config."
+        raise ControlError(f"No daemon is running: no answer at {path}. {remedy}", EX_UNAVAILABLE) from error
     except PermissionError as error:
-        cure = (
+        remedy = (
             "Only the control group's members may command the rover: `sudo usermod -aG regolithd $USER`; log in again."
         )
-        raise ControlError(f"No permission to open {path}. {cure}", EX_NOPERM) from error
+        raise ControlError(f"No permission to open {path}. {remedy}", EX_NOPERM) from error
     except OSError as error:
         raise ControlError(f"{path}: {error.strerror or error}.", EX_UNAVAILABLE) from error
     try:

@@ -15,7 +15,7 @@ A client sends a request; the daemon replies with one line, or, during a travers
     ← {"event": "status", "rover": "kapvik", "nodes": [{"node_id": 1, "phase": "operational", …}, …], …}
 
     → {"command": "dance"}
-    ← {"event": "refused", "code": "bad-request", "text": "…", "cure": "…"}
+    ← {"event": "refused", "code": "bad-request", "text": "…", "remedy": "…"}
 
 A client that commanded a traverse keeps its connection open: when the connection closes, for any reason, the wheels are
 quick-stopped. It may send `stop` in the meantime. Any other client may stop the traverse too; there is one at a time.
@@ -110,7 +110,7 @@ class Refused(_Line):
     event: Literal["refused"] = "refused"
     code: Code
     text: str
-    cure: str = ""
+    remedy: str = ""
 
 
 class NodeLine(_Line):

@@ -162,7 +162,7 @@ class ControlSink:
             request = REQUEST.validate_json(line)
         except ValidationError as error:
             problems = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
-            return Refused(code=Code.BAD_REQUEST, text=problems, cure="The commands are traverse, stop and status.")
+            return Refused(code=Code.BAD_REQUEST, text=problems, remedy="The commands are traverse, stop and status.")
         match request:
             case TraverseRequest():
                 return self._begin(request, writer)
@@ -184,7 +184,7 @@ class ControlSink:
         except TraverseError as error:
             return Refused(code=Code.LIMIT, text=str(error))
         if self._traverse is not None:
-            return Refused(code=Code.BUSY, text="A traverse is being driven.", cure="`regolithd stop` ends it.")
+            return Refused(code=Code.BUSY, text="A traverse is being driven.", remedy="`regolithd stop` ends it.")
         rover = self._rover()
         if refusal := _not_ready(rover):
             return refusal
@@ -241,7 +241,7 @@ class ControlSink:
         try:
             await rover.disable()
         except DriverError as error:
-            return Refused(code=Code.NOT_READY, text=str(error), cure="Cut the power of the motors.")
+            return Refused(code=Code.NOT_READY, text=str(error), remedy="Cut the power of the motors.")
         return Done(text="No traverse was being driven; the drives are disabled.")
 
     def _status(self) -> Status:
@@ -276,7 +276,7 @@ def _ended(outcome: Outcome, plan: Plan) -> Ended:
 def _not_ready(rover: Rover | None) -> Refused | None:
     """Return the refusal if no traverse can begin now, or None."""
     if rover is None:
-        return Refused(code=Code.NOT_READY, text="The CAN bus is not open.", cure="`regolithd check` says why.")
+        return Refused(code=Code.NOT_READY, text="The CAN bus is not open.", remedy="`regolithd check` says why.")
     missing = [
         f"{status.node.kind} {node_id} is {status.phase.value}"
         for node_id, status in rover.status.items()
@@ -287,7 +287,7 @@ def _not_ready(rover: Rover | None) -> Refused | None:
     return Refused(
         code=Code.NOT_READY,
         text=f"Not every node is operational: {', '.join(missing)}.",
-        cure="`regolithd status` says why; power them, or correct [nodes].",
+        remedy="`regolithd status` says why; power them, or correct [nodes].",
     )
 
 

@@ -23,8 +23,8 @@ def group_id(group: str) -> int:
     try:
         return int(group) if group.isdigit() else grp.getgrnam(group).gr_gid
     except KeyError:
-        cure = f"Create it (`groupadd --system {group}`), or name another: [control] group."
-        raise ControlSocketError(f"there is no group {group!r}. {cure}") from None
+        remedy = f"Create it (`groupadd --system {group}`), or name another: [control] group."
+        raise ControlSocketError(f"there is no group {group!r}. {remedy}") from None
 
 
 def open_control_socket(path: Path, group: str) -> socket.socket:
@@ -45,8 +45,8 @@ def open_control_socket(path: Path, group: str) -> socket.socket:
         listener.listen(8)
     except OSError as error:
         listener.close()
-        cure = f"The daemon's user must own the folder and be a member of {group!r}: [control] socket and group."
-        raise ControlSocketError(f"{path}: {error.strerror or error}. {cure}") from error
+        remedy = f"The daemon's user must own the folder and be a member of {group!r}: [control] socket and group."
+        raise ControlSocketError(f"{path}: {error.strerror or error}. {remedy}") from error
     return listener
 
 

@@ -30,7 +30,7 @@ class Alarm:
     name: str
     severity: Severity
     text: str
-    cure: str
+    remedy: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,21 +77,21 @@ def _node_alarms(nodes: Iterable[NodeStatus]) -> Iterable[Alarm]:
             continue
         severity = Severity.ERROR if status.node.required else Severity.WARNING
         what = status.text or f"node {status.node.node_id} is {status.phase.value}"
-        cure = "Check its power and its connection. It is booted again as soon as its heartbeat returns."
-        yield Alarm(f"node-{status.node.node_id}", severity, what, cure)
+        remedy = "Check its power and its connection. It is booted again as soon as its heartbeat returns."
+        yield Alarm(f"node-{status.node.node_id}", severity, what, remedy)
 
 
 def _bus_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
     if inputs.bus_problem:
         yield Alarm("bus", Severity.CRITICAL, inputs.bus_problem, "`regolithd check` gives details.")
     elif severity := _BUS_SEVERITY.get(inputs.bus_state):
-        cure = (
+        remedy = (
             "Check cable, termination (120 Ω at both ends) and bit rate; `ip -details link` shows the error counters."
         )
-        yield Alarm("bus", severity, f"the bus is in state {inputs.bus_state.value}", cure)
+        yield Alarm("bus", severity, f"the bus is in state {inputs.bus_state.value}", remedy)
     if inputs.kernel_drops:
-        cure = "Lower [sync] rate_Hz, or stop other programs on this computer."
-        yield Alarm("kernel", Severity.ERROR, f"the kernel dropped {inputs.kernel_drops} frames in this run", cure)
+        remedy = "Lower [sync] rate_Hz, or stop other programs on this computer."
+        yield Alarm("kernel", Severity.ERROR, f"the kernel dropped {inputs.kernel_drops} frames in this run", remedy)
 
 
 def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
@@ -120,11 +120,11 @@ def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
     if inputs.stuck:
         which = ", ".join(f"{quantity.name} of wheel {wheel}" for quantity, wheel in inputs.stuck)
         text = f"{which}: the reading has been exactly constant for seconds, while other wheels' readings change"
-        cure = "Do not use it: switch the node off and on, check its connector, replace it."
-        yield Alarm("sensor", Severity.ERROR, text, cure)
+        remedy = "Do not use it: switch the node off and on, check its connector, replace it."
+        yield Alarm("sensor", Severity.ERROR, text, remedy)
     if inputs.soil_change:
-        cure = "Stop before the wheels dig in, and look: drive with less slip, another way, or back."
-        yield Alarm("soil-change", Severity.WARNING, inputs.soil_change, cure)
+        remedy = "Stop before the wheels dig in, and look: drive with less slip, another way, or back."
+        yield Alarm("soil-change", Severity.WARNING, inputs.soil_change, remedy)
     if inputs.clock_jump_s:
         text = f"the clock jumped by {inputs.clock_jump_s:+.3f} s: times before and after are not comparable"
         yield Alarm("clock", Severity.WARNING, text, "Synchronise it before the daemon starts (time-sync.target).")

@@ -23,4 +23,4 @@ class AlarmMessage(Header):
     severity: Severity
     since: Time
     text: str
-    cure: str
+    remedy: str

@@ -72,7 +72,7 @@ _ALARM = {
     "severity": "error",
     "since": "2013-06-11T14:07:22.001700000Z",
     "text": "node 13 (load-cell) lost: its heartbeat stopped 0.7 s ago",
-    "cure": "Check its power and its connection. It is booted again as soon as its heartbeat returns.",
+    "remedy": "Check its power and its connection. It is booted again as soon as its heartbeat returns.",
 }
 _HEALTH = {
     "uptime_s": 250.0,

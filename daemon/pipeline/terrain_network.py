@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     import onnxruntime
 
-CURE = "Train one (`regolithd train`), or correct [estimator] model."
+REMEDY = "Train one (`regolithd train`), or correct [estimator] model."
 
 
 class TerrainModelError(ModelError):
@@ -38,7 +38,7 @@ class TerrainNetwork:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._session = open_session(path, CURE)
+        self._session = open_session(path, REMEDY)
         self.card = _card(path, self._session)
         self._low = np.array([[variable.low] for variable in self.card.inputs])
         self._high = np.array([[variable.high] for variable in self.card.inputs])

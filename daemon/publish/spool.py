@@ -89,8 +89,8 @@ class Spool:
             self.directory.mkdir(parents=True, exist_ok=True)
             lock = os.open(self.directory / "lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o640)
         except OSError as error:
-            cure = "Make this folder writable for the daemon's user, or choose another: [mqtt] spool_directory."
-            raise SpoolError(f"{self.directory}: cannot be written: {error.strerror}. {cure}") from error
+            remedy = "Make this folder writable for the daemon's user, or choose another: [mqtt] spool_directory."
+            raise SpoolError(f"{self.directory}: cannot be written: {error.strerror}. {remedy}") from error
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:

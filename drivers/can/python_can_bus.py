@@ -79,7 +79,7 @@ class PythonCanBus(Bus):
         except (can.CanError, OSError, ValueError, TypeError) as error:
             raise BusOpenError(
                 f"cannot open channel {self.channel!r} of interface {self.interface!r}: {error}",
-                cure="Is the adapter plugged in? These interfaces there are: "
+                remedy="Is the adapter plugged in? These interfaces there are: "
                 + ", ".join(sorted(can.VALID_INTERFACES)),
             ) from error
 

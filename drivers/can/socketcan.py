@@ -65,7 +65,7 @@ class SocketCanBus(Bus):
                     self.counters.transmit_failures += 1
                     raise BusFullError(
                         f"{self.channel}: the transmit queue stayed full for {_RETRY_TOTAL_S:g} s",
-                        cure=f"Does any other node acknowledge? Then: ip link set {self.channel} txqueuelen 1000",
+                        remedy=f"Does any other node acknowledge? Then: ip link set {self.channel} txqueuelen 1000",
                     ) from error
                 self.counters.transmit_retries += 1
                 await asyncio.sleep(wait_s)
@@ -121,7 +121,7 @@ class SocketCanBus(Bus):
         if error.errno in _GONE:
             self._lost(error)
         return BusDownError(
-            f"{self.channel}: cannot send: {error.strerror}", cure=f"Bring it up: ip link set {self.channel} up"
+            f"{self.channel}: cannot send: {error.strerror}", remedy=f"Bring it up: ip link set {self.channel} up"
         )
 
     def _lost(self, error: OSError) -> None:
@@ -150,7 +150,7 @@ def _open_socket(channel: str) -> socket.socket:
     except OSError as error:
         raise BusOpenError(
             f"this kernel has no SocketCAN: {error.strerror}",
-            cure="modprobe can_raw; or use another interface (`virtual` needs nothing)",
+            remedy="modprobe can_raw; or use another interface (`virtual` needs nothing)",
         ) from error
     try:
         opened.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
@@ -163,7 +163,7 @@ def _open_socket(channel: str) -> socket.socket:
         opened.close()
         raise BusOpenError(
             f"cannot open {channel}: {error.strerror}",
-            cure=f"`ip link show {channel}` must list it; a real one: ip link set {channel} up type can bitrate "
+            remedy=f"`ip link show {channel}` must list it; a real one: ip link set {channel} up type can bitrate "
             f"1000000 restart-ms 100; one for tests: ip link add dev {channel} type vcan && ip link set up {channel}",
         ) from error
     return opened

@@ -49,7 +49,7 @@ def variable(eds: Path, index: int, subindex: int = 0) -> ODVariable:
             f"the EDS file {eds.name} has no such object",
             index=index,
             subindex=subindex,
-            cure="Put the device's own EDS file in its place, or map another object",
+            remedy="Put the device's own EDS file in its place, or map another object",
         )
     return entry
 

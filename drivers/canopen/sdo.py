@@ -98,12 +98,12 @@ def upload(index: int, subindex: int) -> Transfer:
         unused = answer[0] >> 1 & 0b111
         data += answer[1 : 8 - unused]
         if len(data) > _MOST_BYTES:
-            raise SdoProtocolError("sends without end", index=index, subindex=subindex, cure=_FIRMWARE)
+            raise SdoProtocolError("sends without end", index=index, subindex=subindex, remedy=_FIRMWARE)
         last = bool(answer[0] & _LAST_SEGMENT)
         toggle ^= _TOGGLE
     if size is not None and len(data) != size:
         raise SdoProtocolError(
-            f"announced {size} bytes and sent {len(data)}", index=index, subindex=subindex, cure=_FIRMWARE
+            f"announced {size} bytes and sent {len(data)}", index=index, subindex=subindex, remedy=_FIRMWARE
         )
     return data
 
@@ -157,19 +157,19 @@ def _check_segment(answer: bytes, expected: int, toggle: int, index: int, subind
     if answer[0] & _SPECIFIER != expected:
         raise _unexpected(answer, index, subindex)
     if answer[0] & _TOGGLE != toggle:
-        raise SdoProtocolError(ABORT_TEXTS[ABORT_TOGGLE], index=index, subindex=subindex, cure=_FIRMWARE)
+        raise SdoProtocolError(ABORT_TEXTS[ABORT_TOGGLE], index=index, subindex=subindex, remedy=_FIRMWARE)
 
 
 def _length_checked(answer: bytes, index: int, subindex: int) -> bytes:
     if len(answer) != _INITIATE.size:
         what = f"answered with {len(answer)} bytes where SDO frames have 8"
-        raise SdoProtocolError(what, index=index, subindex=subindex, cure=_FIRMWARE)
+        raise SdoProtocolError(what, index=index, subindex=subindex, remedy=_FIRMWARE)
     return answer
 
 
 def _unexpected(answer: bytes, index: int, subindex: int) -> SdoProtocolError:
     what = f"answered with command 0x{answer[0]:02X}, which is none for this request"
-    return SdoProtocolError(what, index=index, subindex=subindex, cure=_FIRMWARE)
+    return SdoProtocolError(what, index=index, subindex=subindex, remedy=_FIRMWARE)
 
 
 def _raise_abort(answer: bytes, index: int, subindex: int) -> None:

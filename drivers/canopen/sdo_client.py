@@ -83,7 +83,7 @@ class SdoClient:
                     node_id=self.node_id,
                     index=index,
                     subindex=subindex,
-                    cure=f"Is the node powered and wired, and is its node-ID {self.node_id}?",
+                    remedy=f"Is the node powered and wired, and is its node-ID {self.node_id}?",
                 ) from error
 
     async def _converse(self, transfer: Transfer) -> bytes:

@@ -28,7 +28,7 @@ class BootReason(StrEnum):
     BUS_DOWN = "bus-down"  # nothing can be sent
 
 
-CURES = {
+REMEDIES = {
     BootReason.NO_BOOT_UP: "Is it powered and wired, is its node-ID right, and has the bus its two 120 Ω terminators?",
     BootReason.NO_SDO_ANSWER: "Does another device use this node-ID? If not, the node hangs: power it off and on",
     BootReason.WRONG_DEVICE_TYPE: "Another kind of device has this node-ID: correct the wiring, or rover.toml",
@@ -55,4 +55,4 @@ class BootError(DriverError):
         self, reason: BootReason, what: str, *, node_id: int, index: int | None = None, subindex: int = 0
     ) -> None:
         self.reason = reason
-        super().__init__(what, node_id=node_id, index=index, subindex=subindex, cure=CURES[reason])
+        super().__init__(what, node_id=node_id, index=index, subindex=subindex, remedy=REMEDIES[reason])

@@ -136,11 +136,11 @@ class Drive:
         await self.remote.sdo.write(CONTROLWORD, 0, word.to_bytes(2, "little"))
 
     async def _not_enabled(self) -> DriveError:
-        cure = "See its emergency messages; cut its supply and switch it on again"
+        remedy = "See its emergency messages; cut its supply and switch it on again"
         if self.state is DriveState.FAULT:
             code = await self.remote.sdo.read_number(ERROR_CODE)
-            return self._error(f"stays in fault, error code 0x{code:04X}", cure)
-        return self._error(f"is still in {self.state} after {_ENABLE_TIMEOUT_S:g} s", cure)
+            return self._error(f"stays in fault, error code 0x{code:04X}", remedy)
+        return self._error(f"is still in {self.state} after {_ENABLE_TIMEOUT_S:g} s", remedy)
 
-    def _error(self, what: str, cure: str) -> DriveError:
-        return DriveError(what, node_id=self.node_id, cure=cure)
+    def _error(self, what: str, remedy: str) -> DriveError:
+        return DriveError(what, node_id=self.node_id, remedy=remedy)

@@ -5,7 +5,7 @@ consumer matches on the class:
 
     match event:
         case NodeBooted(node_id=node_id, identity=identity): …
-        case NodeBootFailed(reason=reason, text=text, cure=cure): …
+        case NodeBootFailed(reason=reason, text=text, remedy=remedy): …
         case NodeLost(): …
 """
 
@@ -50,7 +50,7 @@ class NodeBootFailed:
     node_id: int
     reason: BootReason
     text: str
-    cure: str
+    remedy: str
 
 
 @dataclass(frozen=True, slots=True)

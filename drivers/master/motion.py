@@ -53,12 +53,12 @@ class Motion:
     async def set_speed(self, wheel_speed_rad_s: Sequence[float]) -> None:
         """See `Network.set_speed`."""
         if self._locked:
-            raise DriveError(f"the wheels are locked: {self._locked}", cure="Enable them")
+            raise DriveError(f"the wheels are locked: {self._locked}", remedy="Enable them")
         for node_id, drive in self._drives.items():
             if not self._operational(node_id):
                 raise DriveError("the drive is not operational", node_id=node_id)
             if drive.state is not DriveState.ENABLED:
-                raise DriveError(f"the drive is in {drive.state}", node_id=node_id, cure="Enable it first")
+                raise DriveError(f"the drive is in {drive.state}", node_id=node_id, remedy="Enable it first")
         self.moving = any(wheel_speed_rad_s)
         try:
             for drive in self._drives.values():

@@ -15,7 +15,7 @@ from regolithd.drivers.devices.decoding.decoder import Decoder
 from regolithd.drivers.devices.decoding.signals import NodeState
 from regolithd.drivers.errors import BusError, SdoError
 from regolithd.drivers.master.boot import compare_identity, read_identity
-from regolithd.drivers.master.boot_error import CURES, BootReason
+from regolithd.drivers.master.boot_error import REMEDIES, BootReason
 from regolithd.drivers.master.remote_node import RemoteNode
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class Probe:
     identity: Identity | None
     nmt_state: NmtState | None
     problem: str = ""
-    cure: str = ""
+    remedy: str = ""
 
 
 async def probe(
@@ -79,20 +79,20 @@ async def _ask(remote: RemoteNode) -> Identity | SdoError | BusError:
 def _probe(remote: RemoteNode, found: Identity | SdoError | BusError) -> Probe:
     node, state = remote.node, remote.state
     if isinstance(found, BusError):
-        return Probe(node, answers=False, identity=None, nmt_state=state, problem=str(found), cure=found.cure)
+        return Probe(node, answers=False, identity=None, nmt_state=state, problem=str(found), remedy=found.remedy)
     if isinstance(found, SdoError):
-        problem, cure = _no_answer(remote, found)
-        return Probe(node, answers=False, identity=None, nmt_state=state, problem=problem, cure=cure)
+        problem, remedy = _no_answer(remote, found)
+        return Probe(node, answers=False, identity=None, nmt_state=state, problem=problem, remedy=remedy)
     difference = compare_identity(node, found)
     if difference is None:
         return Probe(node, answers=True, identity=found, nmt_state=state)
     reason, problem = difference
-    return Probe(node, answers=True, identity=found, nmt_state=state, problem=problem, cure=CURES[reason])
+    return Probe(node, answers=True, identity=found, nmt_state=state, problem=problem, remedy=REMEDIES[reason])
 
 
 def _no_answer(remote: RemoteNode, error: SdoError) -> tuple[str, str]:
     if remote.state is NmtState.STOPPED:
         return "it is in NMT state stopped, in which it answers nothing", "The daemon resets it when it starts"
     if remote.state is not None:
-        return f"its heartbeat says {remote.state.text}, but: {error.what}", CURES[BootReason.NO_SDO_ANSWER]
-    return error.what, CURES[BootReason.NO_BOOT_UP]
+        return f"its heartbeat says {remote.state.text}, but: {error.what}", REMEDIES[BootReason.NO_SDO_ANSWER]
+    return error.what, REMEDIES[BootReason.NO_BOOT_UP]

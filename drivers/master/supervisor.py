@@ -84,7 +84,7 @@ class Supervisor:
             self._status = replace(self._status, phase=NodePhase.FAILED, reason=error.reason, text=text)
             self._reported_lost = True
             if not said_before:  # one event, however often it is tried
-                self._emit(NodeBootFailed(time.time_ns(), node_id, error.reason, text, error.cure))
+                self._emit(NodeBootFailed(time.time_ns(), node_id, error.reason, text, error.remedy))
         else:
             self._note_return()
             boots = self._status.boots + 1

@@ -29,7 +29,7 @@ REPORTS = "BENCH_REPORTS"
 NO_REPORT_TIMEOUT_s = 600
 """A guest counts as hung after this time without a report: longer than its boot and the longest test's time limit."""
 WITH_WHEELS = '"$0" "$1" && exec env PIP_NO_INDEX=1 PIP_FIND_LINKS="$1" "${@:2}"'
-CURES = {
+REMEDIES = {
     "vcan": "apt-get install user-mode-linux iproute2 kmod hostname (Debian), or root on a kernel that has vcan",
     "systemd": "apt-get install user-mode-linux iproute2 kmod hostname systemd (Debian; Ubuntu has no user-mode-linux)",
 }
@@ -53,7 +53,7 @@ def guest_of(item: pytest.Item) -> str | None:
 
 
 def why_not(guest: str) -> str | None:
-    """Return why a guest cannot run on this machine, and the cure; None if it can."""
+    """Return why a guest cannot run on this machine, and the remedy; None if it can."""
     if shutil.which("linux.uml") and shutil.which("ip") and Path("/usr/lib/uml/modules").is_dir():
         return None
     if guest == "vcan" and shutil.which("ip"):
@@ -62,7 +62,7 @@ def why_not(guest: str) -> str | None:
         )
         if tried.returncode == 0:
             return None
-    return f"no {guest} here: {CURES[guest]}"
+    return f"no {guest} here: {REMEDIES[guest]}"
 
 
 @dataclass

@@ -11,7 +11,7 @@ from regolithd.drivers.errors import BusDownError, DriverError, SdoTimeoutError
 
 def test_a_message_has_place_problem_and_remedy() -> None:
     """An error message consists of node and object, what happened, and the remedy, as far as they are known."""
-    error = SdoTimeoutError("no answer within 0.5 s", node_id=3, index=0x1018, subindex=1, cure="Is it powered?")
+    error = SdoTimeoutError("no answer within 0.5 s", node_id=3, index=0x1018, subindex=1, remedy="Is it powered?")
     assert str(error) == "node 3, object 0x1018:01: no answer within 0.5 s. Is it powered?"
     assert str(BusDownError("vcan0: cannot send")) == "vcan0: cannot send"
 

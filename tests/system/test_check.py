@@ -36,7 +36,7 @@ def test_faulty_nodes_are_found_and_named(stack: Stack) -> None:
     assert found["nodes"]["text"].startswith("10 of 12")
     assert found["node 13"]["verdict"] == found["node 4"]["verdict"] == "wrong"
     assert "0x" in found["node 4"]["text"]
-    assert found["node 13"]["cure"]
+    assert found["node 13"]["remedy"]
     stack.inject_fault("on 13")
     stack.inject_fault("clear 4")
 

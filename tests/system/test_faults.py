@@ -192,7 +192,7 @@ async def lost_node(rig: Rig) -> None:
     alarm = await rig.until_received(f"alarm/node-{LOAD_CELL}", active=True)
     assert alarm["severity"] == "error"
     assert alarm["text"]
-    assert alarm["cure"]
+    assert alarm["remedy"]
     await rig.until_snapshots(5, only_wheel_3_is_missing, "no load of wheel 3")
 
 

@@ -112,7 +112,7 @@ socket = "{tmp_path}/control.sock"
 
 
 async def test_a_broker_that_accepts_us_and_one_that_does_not(mosquitto: Mosquitto, tmp_path: Path) -> None:
-    """A broker that accepts the credentials is good, one that refuses is wrong and the cure names the keys."""
+    """A broker that accepts the credentials is good, one that refuses is wrong and the remedy names the keys."""
     settings = Mqtt(host="127.0.0.1", port=mosquitto.port)
     (finding,) = await check_broker(Configuration(mqtt=settings))
     assert finding.verdict is Verdict.GOOD
@@ -121,7 +121,7 @@ async def test_a_broker_that_accepts_us_and_one_that_does_not(mosquitto: Mosquit
     mosquitto.start()
     (finding,) = await check_broker(Configuration(mqtt=settings))
     assert (finding.verdict, "refused" in finding.text) == (Verdict.WRONG, True)
-    assert "password_file" in finding.cure
+    assert "password_file" in finding.remedy
     absent = settings.model_copy(update={"username": "me", "password_file": tmp_path / "absent"})
     (finding,) = await check_broker(Configuration(mqtt=absent))
     assert "absent" in finding.text
@@ -150,7 +150,7 @@ def test_a_link_is_judged_by_what_iproute2_says(details: dict, verdict: Verdict,
     """Bit rate and error state decide; without iproute2, that the link is up."""
     finding = judge_link(Bus(), details)
     assert (finding.verdict, said in finding.text) == (verdict, True)
-    assert bool(finding.cure) == (verdict is not Verdict.GOOD)
+    assert bool(finding.remedy) == (verdict is not Verdict.GOOD)
 
 
 def test_a_link_that_is_no_can_link_is_reported() -> None:
@@ -189,8 +189,8 @@ def test_each_node_that_is_not_right_has_its_line() -> None:
     found = judge_nodes(
         [
             Probe(motor, answers=True, identity=None, nmt_state=None),
-            Probe(cell, answers=False, identity=None, nmt_state=None, problem="no answer", cure="power it"),
-            Probe(speed, answers=False, identity=None, nmt_state=None, problem="no answer", cure="power it"),
+            Probe(cell, answers=False, identity=None, nmt_state=None, problem="no answer", remedy="power it"),
+            Probe(speed, answers=False, identity=None, nmt_state=None, problem="no answer", remedy="power it"),
         ]
     )
     assert [(finding.subject, finding.verdict) for finding in found] == [
@@ -276,7 +276,7 @@ async def test_who_may_command_is_reported(tmp_path: Path) -> None:
     assert (finding.verdict, "no daemon is running" in finding.text) == (Verdict.UNKNOWN, True)
     assert check_control(configuration, status("operational"))[0].verdict is Verdict.GOOD
     (finding,) = check_control(configuration, ControlError("No permission to open it. Join the group.", 77))
-    assert (finding.verdict, finding.cure) == (Verdict.WARNING, "Join the group.")
+    assert (finding.verdict, finding.remedy) == (Verdict.WARNING, "Join the group.")
 
     silent = await asyncio.start_unix_server(lambda _, writer: writer.close(), configuration.control.socket)
     async with silent:

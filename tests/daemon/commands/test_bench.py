@@ -72,7 +72,7 @@ def test_a_control_socket_has_one_owner(tmp_path: Path) -> None:
         assert inject(control, "counts").returncode == 0
 
 
-def test_without_a_running_bench_the_cure_is_printed(tmp_path: Path) -> None:
+def test_without_a_running_bench_the_remedy_is_printed(tmp_path: Path) -> None:
     """`bench-fault` fails and asks whether `regolithd bench` is running."""
     answer = inject(tmp_path / "nothing.sock", "off", "3")
     assert answer.returncode == 1

@@ -34,8 +34,8 @@ def test_every_key_of_the_model_is_shown_in_the_shipped_file() -> None:
             assert f"{key} = " in text, f"{name}.{key}"
 
 
-def test_five_mistakes_are_five_problems_with_file_line_key_and_cure() -> None:
-    """Each problem has its file, line, key and cure, those between two keys included."""
+def test_five_mistakes_are_five_problems_with_file_line_key_and_remedy() -> None:
+    """Each problem has its file, line, key and remedy, those between two keys included."""
     text = """\
 [sync]
 rate_Hz = 500

@@ -261,7 +261,7 @@ async def test_stop_without_a_traverse_takes_the_power_off_all_the_same(tmp_path
         assert "drives are disabled" in (await client.ask({"command": "stop"})).text
         assert rover.told == ["disable"]
         rover.problem = "does not stop"
-        assert (await client.ask({"command": "stop"})).cure == "Cut the power of the motors."
+        assert (await client.ask({"command": "stop"})).remedy == "Cut the power of the motors."
 
 
 @pytest.mark.parametrize(

@@ -37,13 +37,13 @@ def test_all_is_well() -> None:
 
 
 @pytest.mark.parametrize(("fact", "value", "name", "severity"), TROUBLES)
-def test_each_trouble_is_one_alarm_with_its_cure(fact: str, value: object, name: str, severity: Severity) -> None:
-    """Each problem gives one alarm, with severity, text and cure, under a name from `alarm_names`."""
+def test_each_trouble_is_one_alarm_with_its_remedy(fact: str, value: object, name: str, severity: Severity) -> None:
+    """Each problem gives one alarm, with severity, text and remedy, under a name from `alarm_names`."""
     alarms = current_alarms(dataclasses.replace(AlarmInputs(), **{fact: value}))
     assert list(alarms) == [name]
     assert alarms[name].severity is severity
     assert alarms[name].text
-    assert alarms[name].cure
+    assert alarms[name].remedy
     assert name in alarm_names([])
 
 

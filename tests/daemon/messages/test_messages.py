@@ -158,6 +158,6 @@ def test_the_readme_of_the_messages_shows_the_example_of_each() -> None:
 
 def test_text_in_an_example_is_written_as_it_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     """Characters such as `Ω` are not escaped."""
-    monkeypatch.setattr("regolithd.daemon.messages.documents.example", lambda _: {"cure": "120 Ω"})
+    monkeypatch.setattr("regolithd.daemon.messages.documents.example", lambda _: {"remedy": "120 Ω"})
     assert documents()["README.md"].count('"120 Ω"') == len(CHANNELS)
     assert '"120 Ω"' in documents()["asyncapi.json"]

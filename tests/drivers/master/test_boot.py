@@ -11,7 +11,7 @@ from regolithd.drivers.devices.load_cell import LOAD_CELL
 from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
 from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.errors import DictionaryError
-from regolithd.drivers.master.boot_error import CURES, BootReason
+from regolithd.drivers.master.boot_error import REMEDIES, BootReason
 from regolithd.drivers.master.events import NodeBooted, NodeBootFailed
 from regolithd.drivers.master.network import NodePhase
 
@@ -35,9 +35,9 @@ async def test_a_boot_failure_has_its_reason_and_the_repaired_node_boots(reason:
     """The reason has a remedy, a second node is not affected, and the node boots once the fault is cleared."""
     async with rig([MOTOR, CELL], faults=[FAULTS[reason]]) as r:
         failed = await r.wait_for_event(NodeBootFailed)
-        assert (failed.node_id, failed.reason, failed.cure) == (4, reason, CURES[reason])
+        assert (failed.node_id, failed.reason, failed.remedy) == (4, reason, REMEDIES[reason])
         assert "node 4" in failed.text
-        assert failed.cure in failed.text
+        assert failed.remedy in failed.text
         await r.wait_for_event(NodeBooted, node_id=11)
         assert r.network.status[4].phase in (NodePhase.FAILED, NodePhase.BOOTING)
         for line in ("clear 4", "off 4", "on 4") if reason is BootReason.NO_BOOT_UP else ("clear 4",):
@@ -108,4 +108,4 @@ async def test_an_unusable_eds_is_a_boot_failure(monkeypatch: pytest.MonkeyPatch
 
 def test_every_boot_reason_has_a_remedy() -> None:
     """The table of remedies is complete."""
-    assert set(CURES) == set(BootReason)
+    assert set(REMEDIES) == set(BootReason)

@@ -268,7 +268,7 @@ async def test_a_scan_reads_identities_and_changes_nothing() -> None:
         assert found[1].problem == ""
         assert found[1].identity.vendor == 0xFB
         assert "product code" in found[2].problem
-        assert found[2].cure
+        assert found[2].remedy
         assert not found[3].answers
-        assert found[3].cure
+        assert found[3].remedy
         assert found[11].answers
