@@ -14,8 +14,8 @@ from rich.console import Console
 from regolithd.calibration.validation.blind_trials.errors import ProofError
 from regolithd.calibration.validation.blind_trials.isolation import describe
 from regolithd.calibration.validation.machine_trials.batch import SOLVER, Batch, run_batch
+from regolithd.calibration.validation.machine_trials.cases.plan import KINDS, plan_batch
 from regolithd.calibration.validation.machine_trials.machines import MACHINES
-from regolithd.calibration.validation.machine_trials.plan import KINDS, plan_batch
 from regolithd.calibration.validation.machine_trials.score import Figures, Verdict, figures, judge
 from regolithd.calibration.validation.machine_trials.table import line, score_table, shares_table
 

@@ -26,16 +26,16 @@ import numpy as np
 from regolithd.calibration.validation.blind_trials.commitment import Commitment, Truth, file_digest, read_opened
 from regolithd.calibration.validation.blind_trials.errors import OtherBatchError, SolverError
 from regolithd.calibration.validation.blind_trials.isolation import run_isolated
-from regolithd.calibration.validation.machine_trials.files import write_recording, write_simulation
-from regolithd.calibration.validation.machine_trials.generator import GROWN, Case, Recorded, make_case
-from regolithd.calibration.validation.machine_trials.strength import readings
+from regolithd.calibration.validation.machine_trials.cases.files import write_recording, write_simulation
+from regolithd.calibration.validation.machine_trials.cases.generator import GROWN, Case, Recorded, make_case
+from regolithd.calibration.validation.machine_trials.cases.strength import readings
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from regolithd.calibration.validation.machine_trials.machine import Effect
-    from regolithd.calibration.validation.machine_trials.plan import Plan
+    from regolithd.calibration.validation.machine_trials.cases.plan import Plan
+    from regolithd.calibration.validation.machine_trials.physics.machine import Effect
 
 SOLVER = (
     f"{shlex.quote(sys.executable)} -m regolithd mismatch {{recording}} --simulation {{simulation}} --json {{answer}}"

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 from rich.table import Table
 
+from regolithd.calibration.validation.machine_trials.cases.plan import KINDS
 from regolithd.calibration.validation.machine_trials.machines import MACHINES
-from regolithd.calibration.validation.machine_trials.plan import KINDS
 
 if TYPE_CHECKING:
     from regolithd.calibration.validation.machine_trials.score import Figures, Verdict

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.validation.machine_trials import effects
-from regolithd.calibration.validation.machine_trials.machine import (
+from regolithd.calibration.validation.machine_trials.physics import effects
+from regolithd.calibration.validation.machine_trials.physics.machine import (
     Drive,
     Effect,
     Inside,
@@ -19,7 +19,7 @@ from regolithd.calibration.validation.machine_trials.machine import (
     Values,
     World,
 )
-from regolithd.calibration.validation.machine_trials.signals import between, stairs
+from regolithd.calibration.validation.machine_trials.physics.signals import between, stairs
 
 if TYPE_CHECKING:
     from numpy.random import Generator

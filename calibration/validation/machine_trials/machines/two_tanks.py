@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import constants
 
-from regolithd.calibration.validation.machine_trials import effects
-from regolithd.calibration.validation.machine_trials.machine import (
+from regolithd.calibration.validation.machine_trials.physics import effects
+from regolithd.calibration.validation.machine_trials.physics.machine import (
     Array,
     Drive,
     Effect,
@@ -21,7 +21,7 @@ from regolithd.calibration.validation.machine_trials.machine import (
     Values,
     World,
 )
-from regolithd.calibration.validation.machine_trials.signals import between, stairs, wander
+from regolithd.calibration.validation.machine_trials.physics.signals import between, stairs, wander
 
 if TYPE_CHECKING:
     from numpy.random import Generator

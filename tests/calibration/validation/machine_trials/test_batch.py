@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from regolithd.calibration.validation.blind_trials.commitment import read_opened
 from regolithd.calibration.validation.machine_trials.batch import Batch, run_case
-from regolithd.calibration.validation.machine_trials.plan import plan_case
+from regolithd.calibration.validation.machine_trials.cases.plan import plan_case
 
 if TYPE_CHECKING:
     from pathlib import Path

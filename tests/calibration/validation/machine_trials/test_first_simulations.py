@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.validation.machine_trials.batch import write_case
-from regolithd.calibration.validation.machine_trials.files import write_simulation
-from regolithd.calibration.validation.machine_trials.generator import make_case
-from regolithd.calibration.validation.machine_trials.machine import Machine, Schedule, Units, World
+from regolithd.calibration.validation.machine_trials.cases.files import write_simulation
+from regolithd.calibration.validation.machine_trials.cases.generator import make_case
+from regolithd.calibration.validation.machine_trials.cases.plan import plan_case
 from regolithd.calibration.validation.machine_trials.machines import MACHINES
-from regolithd.calibration.validation.machine_trials.plan import plan_case
+from regolithd.calibration.validation.machine_trials.physics.machine import Machine, Schedule, Units, World
 
 if TYPE_CHECKING:
     from pathlib import Path

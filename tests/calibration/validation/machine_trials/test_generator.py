@@ -13,18 +13,18 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.validation import machine_trials
-from regolithd.calibration.validation.machine_trials.files import write_recording
-from regolithd.calibration.validation.machine_trials.generator import Case, draw, make_case
-from regolithd.calibration.validation.machine_trials.machine import Effect, Schedule, World
-from regolithd.calibration.validation.machine_trials.machines import MACHINES
-from regolithd.calibration.validation.machine_trials.plan import KINDS, NEEDING, TURN, Plan, plan_batch, plan_case
-from regolithd.calibration.validation.machine_trials.signals import correlated_noise, moves, noise_spectrum
-from regolithd.calibration.validation.machine_trials.strength import (
+from regolithd.calibration.validation.machine_trials.cases.files import write_recording
+from regolithd.calibration.validation.machine_trials.cases.generator import Case, draw, make_case
+from regolithd.calibration.validation.machine_trials.cases.plan import KINDS, NEEDING, TURN, Plan, plan_batch, plan_case
+from regolithd.calibration.validation.machine_trials.cases.strength import (
     delayed,
     of_strength,
     readings,
     relative_strength,
 )
+from regolithd.calibration.validation.machine_trials.machines import MACHINES
+from regolithd.calibration.validation.machine_trials.physics.machine import Effect, Schedule, World
+from regolithd.calibration.validation.machine_trials.physics.signals import correlated_noise, moves, noise_spectrum
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

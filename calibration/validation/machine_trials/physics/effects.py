@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.validation.machine_trials.machine import Array, Effect, Maker, World
+from regolithd.calibration.validation.machine_trials.physics.machine import Array, Effect, Maker, World
 
 if TYPE_CHECKING:
     from numpy.random import Generator

@@ -14,7 +14,7 @@ from regolithd.calibration.validation.machine_trials.machines import MACHINES
 if TYPE_CHECKING:
     from numpy.random import Generator
 
-    from regolithd.calibration.validation.machine_trials.machine import Machine
+    from regolithd.calibration.validation.machine_trials.physics.machine import Machine
 
 Names = tuple[str, ...]
 CORRECTED = ("corrected-unchanged", "corrected-grown", "corrected-gone", "corrected-new")

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.validation.machine_trials.fmu import build_fmu
+from regolithd.calibration.validation.machine_trials.cases.fmu import build_fmu
 
 if TYPE_CHECKING:
-    from regolithd.calibration.validation.machine_trials.generator import Recorded
-    from regolithd.calibration.validation.machine_trials.machine import Machine, Units
+    from regolithd.calibration.validation.machine_trials.cases.generator import Recorded
+    from regolithd.calibration.validation.machine_trials.physics.machine import Machine, Units
 
-TEMPLATES = Path(__file__).parent / "first_simulations"
+TEMPLATES = Path(__file__).parent.parent / "first_simulations"
 VARIABLES = """[variables]
 heater_voltage = "heater_voltage_V"
 ambient = "ambient_temperature_degC"

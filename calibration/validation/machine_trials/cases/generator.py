@@ -11,7 +11,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.validation.machine_trials.machine import (
+from regolithd.calibration.validation.machine_trials.cases.strength import (
+    NoiseLaw,
+    difference,
+    margin,
+    of_strength,
+    parameter_tangents,
+    readings,
+    relative_strength,
+    rivals,
+)
+from regolithd.calibration.validation.machine_trials.machines import MACHINES
+from regolithd.calibration.validation.machine_trials.physics.machine import (
     Array,
     Effect,
     Machine,
@@ -22,23 +33,12 @@ from regolithd.calibration.validation.machine_trials.machine import (
     Values,
     World,
 )
-from regolithd.calibration.validation.machine_trials.machines import MACHINES
-from regolithd.calibration.validation.machine_trials.signals import correlated_noise
-from regolithd.calibration.validation.machine_trials.strength import (
-    NoiseLaw,
-    difference,
-    margin,
-    of_strength,
-    parameter_tangents,
-    readings,
-    relative_strength,
-    rivals,
-)
+from regolithd.calibration.validation.machine_trials.physics.signals import correlated_noise
 
 if TYPE_CHECKING:
     from numpy.random import Generator
 
-    from regolithd.calibration.validation.machine_trials.plan import Plan
+    from regolithd.calibration.validation.machine_trials.cases.plan import Plan
 
 LEAST_MARGIN = 40.0
 """Least Δχ² between the truth and the nearest other single explanation: six deviations."""

@@ -13,14 +13,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import brentq
 
-from regolithd.calibration.validation.machine_trials.signals import noise_spectrum
+from regolithd.calibration.validation.machine_trials.physics.signals import noise_spectrum
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.random import Generator
 
-    from regolithd.calibration.validation.machine_trials.machine import Array, Effect, Mask, Readings, Values, World
+    from regolithd.calibration.validation.machine_trials.physics.machine import (
+        Array,
+        Effect,
+        Mask,
+        Readings,
+        Values,
+        World,
+    )
 
 RIVAL_DRAWS = 2
 """How often each rival is drawn: on another axis, from another onset, of another width."""

@@ -9,7 +9,7 @@ import tempfile
 import zipfile
 from pathlib import Path
 
-SOURCES = Path(__file__).parent / "first_simulations"
+SOURCES = Path(__file__).parent.parent / "first_simulations"
 PLATFORM = {"linux": ("linux64", ".so"), "darwin": ("darwin64", ".dylib")}
 STAMP = (1980, 1, 1, 0, 0, 0)
 """Time of every file in the archive, so that the same source gives the same archive."""
