@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from regolithd.calibration.mismatch.data.recording import read_recording
-from regolithd.calibration.mismatch.problem.problem import build_problem
+from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.simulation.load import load_simulation
 
 HERE = Path(__file__).resolve().parent

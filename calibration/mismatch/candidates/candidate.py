@@ -92,7 +92,10 @@ class Candidate:
     by the sign of the speed if it does, and shows it as it is otherwise."""
     free: ClassVar[Mapping[str, tuple[float, float]]] = {}
     """Continuous shape parameters with their least and greatest value. The ending of the name is the unit: `_s`, `_K`,
-    `_degC`, `_rad_s`; without one of these it has none. `onset_s` is the time at which an effect begins."""
+    `_degC`, `_rad_s`; without one of these it has none."""
+    change_point: ClassVar[str] = "onset_s"
+    """The shape parameter, where a candidate has it, that is the time at which the effect begins. Its Δχ² is no smooth
+    function of it, so that it has an interval of its own."""
     experiment_minutes: ClassVar[tuple[int, int]] = (10, 120)
     """The least and the most minutes that the experiment may be asked to last (a choice: a drive has to settle, and a
     rover's battery lasts some two hours)."""
@@ -134,6 +137,17 @@ class Candidate:
         A free parameter that is not a key of `shape` is left alone.
         """
         return self.free
+
+    def search_range(
+        self, problem: Problem, shape: Shape, name: str, bounds: tuple[float, float]
+    ) -> tuple[float, float]:
+        """Return where to optimise a free shape parameter: about its value, to the neighbouring points of a grid."""
+        limits, at, (low, high) = problem.thresholds, float(shape[name]), bounds
+        if name == self.change_point:
+            reach = limits.onset_reach * problem.length_s
+        else:
+            reach = limits.shape_reach * max(abs(at), limits.shape_reach_floor * (high - low))
+        return max(low, at - reach), min(high, at + reach)
 
     def parameters(self, shape: Shape, values: Sequence[float]) -> dict[str, float]:
         """Return what the answer reports, by name: the coefficients' values and the free shape parameters.

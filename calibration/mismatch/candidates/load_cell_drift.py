@@ -8,7 +8,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
-from regolithd.calibration.mismatch.signal.hat_basis import broken_lines
+from regolithd.calibration.mismatch.signal.hat_basis import hat_functions
 from regolithd.calibration.mismatch.signal.noise import estimate_noise
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def _without_posture(problem: Problem, values: Array) -> Array:
         posture = np.column_stack((pitch, roll, pitch**2, roll**2, pitch * roll))
         known = np.isfinite(values[:, k])
         if known.sum() > LEAST_READINGS:
-            line = broken_lines(problem.time_s[:, 0], known, POSTURE_KNOTS) or [np.ones(len(pitch))]
+            line = hat_functions(problem.time_s[:, 0], known, POSTURE_KNOTS) or [np.ones(len(pitch))]
             beside = np.column_stack((posture, *line))
             fitted = np.linalg.lstsq(beside[known], values[known, k], rcond=None)[0][: posture.shape[1]]
             rest = values[known, k] - posture[known] @ fitted
@@ -131,7 +131,7 @@ def _without_posture(problem: Problem, values: Array) -> Array:
 def _wander(problem: Problem, reading: Array) -> Array:
     """Return the least-squares broken line over time through one cell's reading."""
     known = np.isfinite(reading)
-    hats = broken_lines(problem.time_s[:, 0], known, WANDER_KNOTS)
+    hats = hat_functions(problem.time_s[:, 0], known, WANDER_KNOTS)
     if not hats:
         return np.zeros(len(reading))
     columns = np.stack(hats, axis=1)

@@ -1,4 +1,4 @@
-"""What to drive, and for how long, to tell effects apart that one recording cannot."""
+"""The experiment that tells effects apart which one recording cannot: what to drive, and for how long."""
 
 from __future__ import annotations
 
@@ -7,49 +7,49 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.inference.sensitivity import NINE_IN_TEN
-from regolithd.calibration.mismatch.selection.subset_selection import PER_COEFFICIENT
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.selection.subset_selection import Search, Term
+    from regolithd.calibration.mismatch.regression.group import Term
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
-SMALLEST = 0.05
-"""Of the mean magnitude of the predicted channel: the least effect that an experiment is to show."""
-REMAINS = 0.1
-"""Of a friction's energy, outside what gain, cohesion and friction angle can imitate once speed and direction vary."""
+ROUNDED_TO_MINUTES = 5
 
 
-def experiment_for(search: Search, given: Sequence[Term], members: Sequence[Term]) -> str:
+def experiment_for(
+    equations: NormalEquations, given: Sequence[Term], members: Sequence[Term], entry_threshold: float
+) -> str:
     """Return the drives that vary each member's covariate alone, and how many minutes they take.
 
     Where the simulation's free parameters can imitate a member, a drive without load is added: soil has no part in it.
     """
     candidates = [member.group.candidate for member in members if member.group.candidate is not None]
     drives = list(dict.fromkeys(candidate.experiment for candidate in candidates))
-    if any(_imitated(search, given, member) for member in members):
-        drives.append(search.dictionary.problem.simulation.unloaded_experiment)
+    if any(_imitated(equations, given, member) for member in members):
+        drives.append(equations.problem.simulation.unloaded_experiment)
     sentence = "; then ".join(filter(None, drives))
     least = max((candidate.experiment_minutes[0] for candidate in candidates), default=0)
     most = max((candidate.experiment_minutes[1] for candidate in candidates), default=0)
-    return f"{sentence[:1].upper()}{sentence[1:]}; {_minutes_needed(search, least, most)} minutes in all."
+    minutes = int(np.clip(minutes_needed(equations, entry_threshold), least, most))
+    return f"{sentence[:1].upper()}{sentence[1:]}; {minutes} minutes in all."
 
 
-def _imitated(search: Search, given: Sequence[Term], member: Term) -> bool:
+def _imitated(equations: NormalEquations, given: Sequence[Term], member: Term) -> bool:
     """Return whether free parameters can imitate most of a member that is there without load too."""
-    candidate = member.group.candidate
-    return candidate is not None and candidate.acts_unloaded and search.share_outside(given, member) < REMAINS
+    candidate, least = member.group.candidate, equations.thresholds.experiment_tolerance
+    return candidate is not None and candidate.acts_unloaded and equations.tolerance(given, member) < least
 
 
-def _minutes_needed(search: Search, least: int, most: int) -> int:
-    """Return how long a drive must last before an effect of the smallest size shows nine times in ten.
+def minutes_needed(equations: NormalEquations, entry_threshold: float) -> float:
+    """Return how many minutes must be driven before the smallest effect shows nine times in ten.
 
-    A drive that moves the right covariates leaves about a tenth of an effect outside the free parameters' reach; each
-    reading then adds to its gain what the noise of this recording lets it.
+    A drive that varies the right covariates leaves a tenth of an effect outside the span of the free parameters; each
+    reading then adds to its Δχ² what the noise of this recording allows.
     """
-    problem = search.dictionary.problem
-    needed = (sqrt(search.threshold + PER_COEFFICIENT) + NINE_IN_TEN) ** 2
+    problem, limits = equations.problem, equations.thresholds
+    needed = (sqrt(entry_threshold + limits.coefficient_penalty) + limits.detection_quantile) ** 2
     readings = 60 / problem.recording.step_s
-    gained = REMAINS * readings * float(search.weights.sum()) * (SMALLEST * problem.mean_size) ** 2
-    return int(np.clip(5 * np.ceil(needed / gained / 5), least, most))
+    weights = float(equations.weights.sum())
+    size = limits.effect_of_experiment * problem.mean_size
+    gained = limits.experiment_tolerance * readings * weights * size**2
+    return float(ROUNDED_TO_MINUTES * np.ceil(needed / gained / ROUNDED_TO_MINUTES))

@@ -8,21 +8,30 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.selection.best_subsets import acceptable, best_per_family, enough
-from regolithd.calibration.mismatch.selection.cross_validation import squares
-from regolithd.calibration.mismatch.selection.subset_selection import Fit, Search, Term
+from regolithd.calibration.mismatch.selection.best_subsets import (
+    acceptable,
+    best_of_each_candidate,
+    passes_entry_test,
+)
+from regolithd.calibration.mismatch.selection.cross_validation import squares_on_fold, training_equations
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.regression.design_matrix import Group
-    from regolithd.calibration.mismatch.signal.noise import Noise
+    from regolithd.calibration.mismatch.regression.group import Fit, Group, Term
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
+LARGEST_SET = 3
+TRIED_NEXT = 3
+"""Further effects tried beside those that were chosen."""
+TRIED_FIRST, TRIED_SECOND = 6, 2
+"""Pairs tried when one effect was chosen: so many first effects, and so many beside each."""
+
 
 @dataclass(frozen=True)
-class HeldOut:
+class HeldOutErrors:
     """Root mean squares over all held-out blocks.
 
     Attributes
@@ -37,50 +46,55 @@ class HeldOut:
     with_it: tuple[float, ...]
 
 
-def hold_out(search: Search, named: Fit, noise: Noise, groups: Sequence[Group]) -> HeldOut:
+def held_out_errors(
+    equations: NormalEquations, named: Fit, groups: Sequence[Group], entry_threshold: float
+) -> HeldOutErrors:
     """Choose and fit on all folds but one, measure on that one, for each fold in turn.
 
-    `groups` are the grid as it was before any data refined it.
+    `groups` are those to choose from: the grid as it was before any data optimised its shapes.
     """
-    dictionary = search.dictionary
-    count, wheels = len(dictionary.gram), len(noise.deviation)
-    totals = np.zeros((2, wheels))
-    by_term = np.zeros((2, len(named.terms), wheels))
-    kept = dictionary.groups
-    for fold in range(count):
-        others = [f for f in range(count) if f != fold] or [fold]
-        train = Search(dictionary, search.nuisance, noise.weights, others)
-        train.threshold = search.threshold
-        dictionary.groups = list(groups)
-        chosen = _chosen(train)
-        dictionary.groups = kept
-        without = squares(train, train.fit(()), fold)
-        with_all = squares(train, train.fit(chosen), fold)
-        totals += np.stack((without, with_all))
+    design, wheels = equations.design, len(equations.weights)
+    before, after = np.zeros(wheels), np.zeros(wheels)
+    without = np.zeros((len(named.terms), wheels))
+    for fold in range(len(design.gram)):
+        train = training_equations(equations, fold)
+        chosen = chosen_effects(train.with_groups(groups), entry_threshold)
+        before += squares_on_fold(design, train.fit(()), fold)
+        after += squares_on_fold(design, train.fit(chosen), fold)
         for index, term in enumerate(named.terms):
-            rest = tuple(t for t in chosen if t.name != term.name)
-            by_term[0, index] += squares(train, train.fit(rest), fold)
-            by_term[1, index] += with_all
-    counts = dictionary.counts.sum(axis=0)
-    rms = np.sqrt(totals.sum(axis=1) / counts.sum())
+            rest = tuple(other for other in chosen if other.name != term.name)
+            without[index] += squares_on_fold(design, train.fit(rest), fold)
+    counts = design.counts.sum(axis=0)
     on = [list(term.wheels) for term in named.terms]
-    pairs = [[float(np.sqrt(by_term[k, i, w].sum() / counts[w].sum())) for i, w in enumerate(on)] for k in (0, 1)]
-    return HeldOut(float(rms[0]), float(rms[1]), tuple(pairs[0]), tuple(pairs[1]))
+    return HeldOutErrors(
+        before=_rms(before, counts),
+        after=_rms(after, counts),
+        without=tuple(_rms(squares[w], counts[w]) for squares, w in zip(without, on, strict=True)),
+        with_it=tuple(_rms(after[w], counts[w]) for w in on),
+    )
 
 
-def _chosen(train: Search) -> tuple[Term, ...]:
-    """Choose by the same rules on these folds alone, on the grid: forwards, with one look at what pairs do better."""
+def _rms(squares: Array, counts: Array) -> float:
+    return float(np.sqrt(squares.sum() / counts.sum()))
+
+
+def chosen_effects(train: NormalEquations, entry_threshold: float) -> tuple[Term, ...]:
+    """Choose by the same tests on these folds alone, on the grid: forwards, and once among pairs."""
     terms: tuple[Term, ...] = ()
-    for _ in range(3):
-        found = best_per_family(train, terms)
+    for _ in range(LARGEST_SET):
+        found = best_of_each_candidate(train, terms)
         if not found:
             break
-        trials = [(*terms, t) for _, t in found[:3]]
+        trials = [(*terms, term) for _, term in found[:TRIED_NEXT]]
         if len(terms) == 1:
-            trials += [(a, b) for _, a in best_per_family(train, ())[:6] for _, b in best_per_family(train, (a,))[:2]]
+            trials += [
+                (one, other)
+                for _, one in best_of_each_candidate(train, ())[:TRIED_FIRST]
+                for _, other in best_of_each_candidate(train, (one,))[:TRIED_SECOND]
+            ]
         ranked = sorted((train.fit(trial) for trial in trials), key=train.score, reverse=True)
         best = next((fit for fit in ranked if acceptable(train, fit)), None)
-        if best is None or not enough(train, best, train.fit(terms)):
+        if best is None or not passes_entry_test(train, best, train.fit(terms), entry_threshold):
             break
         terms = best.terms
     return terms

@@ -5,33 +5,35 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from regolithd.calibration.mismatch.problem.problem import Problem
-    from regolithd.calibration.mismatch.signal.noise import Noise
+    from regolithd.calibration.mismatch.signal.noise import NoiseModel
 
-FOLDS = 5
-LONGEST_MEMORY_S = 60.0
+Index = NDArray[np.int64]
 
 
-def blocks_of_time(problem: Problem, noise: Noise) -> NDArray[np.int64]:
-    """Return each instant's block, shape (time,): long against the noise's memory, yet enough of them for folds.
+def blocks_of_time(problem: Problem, noise: NoiseModel) -> Index:
+    """Return each instant's block, shape (time,).
 
-    Runs are never mixed in one block. Blocks of the same number stay together when data are held out.
+    A block is long against the noise's autocorrelation time, and short enough that every fold has several. No block
+    holds instants of two runs.
     """
-    step = problem.recording.step_s
-    wanted = np.clip(10 * noise.memory * step, 20.0, LONGEST_MEMORY_S)
-    wanted = min(wanted, max(problem.length_s / (6 * FOLDS), 2 * step))
-    number = np.floor(problem.time_s[:, 0] / wanted).astype(np.int64)
+    limits, step_s = problem.thresholds, problem.recording.step_s
+    wanted_s = limits.block_autocorrelation_times * noise.autocorrelation_time * step_s
+    wanted_s = np.clip(wanted_s, limits.shortest_block_s, limits.longest_block_s)
+    longest_s = problem.length_s / (limits.blocks_per_fold * limits.folds)
+    length_s = min(wanted_s, max(longest_s, 2 * step_s))
+    number = np.floor(problem.time_s[:, 0] / length_s).astype(np.int64)
     pairs = np.stack((problem.recording.run, number), axis=1)
     return np.unique(pairs, axis=0, return_inverse=True)[1].ravel()
 
 
-def folds_of_blocks(problem: Problem, blocks: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return each instant's fold, shape (time,): whole runs where there are several, else every fifth block."""
+def folds_of_blocks(problem: Problem, blocks: Index) -> Index:
+    """Return each instant's fold, shape (time,): whole runs where there are enough, else every fifth block."""
+    folds = problem.thresholds.folds
     runs = np.unique(problem.recording.run)
-    if len(runs) >= FOLDS:
-        return np.searchsorted(runs, problem.recording.run) % FOLDS
-    return blocks % FOLDS
+    if len(runs) >= folds:
+        return np.searchsorted(runs, problem.recording.run) % folds
+    return blocks % folds

@@ -1,12 +1,13 @@
-"""All columns of all candidates, and their sums of products: after this, the search is algebra on small matrices.
+"""The design matrix: every column of every group, with sums of products for each wheel and each fold.
 
-Sums are kept for each wheel and each fold. A term on any set of wheels, fitted on any set of folds, is then a matter
-of adding them up: time is walked through once.
+A term on any set of wheels, fitted on any set of folds, needs only those sums: time is walked through once for each
+column. A design matrix is immutable; `extended` returns one with further columns.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,139 +16,161 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
     from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.group import Group
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 
-FIRST_ROOM = 640
-"""Columns to make room for at first: about what a rover's library needs."""
+FIRST_CAPACITY = 640
+"""Columns allocated at first: about what a rover's library needs."""
 
 
-@dataclass(frozen=True)
-class Group:
-    """Columns that enter together: one candidate in one shape, or a smooth curve over a covariate without a name.
+class _Storage:
+    """Growing arrays behind a design matrix and those that it was extended from, which see only their own columns."""
 
-    Attributes
-    ----------
-    name: the candidate's, or the covariate's
-    columns: where its columns are in the dictionary
-    signs: the coefficients' signs, 0 for either
-    sharing: "all" and/or "one"
-    complexity: the price of its shape having been chosen from many
-    """
+    def __init__(self, folds: int, wheels: int, instants: int) -> None:
+        self.used = 0
+        self.columns: Single = np.zeros((0, wheels, instants), np.float32)
+        self.gram: Array = np.zeros((folds, wheels, 0, 0))
+        self.moment: Array = np.zeros((folds, wheels, 0))
 
-    name: str
-    columns: tuple[int, ...]
-    signs: tuple[int, ...]
-    sharing: tuple[str, ...]
-    complexity: float
-    candidate: Candidate | None = None
-    shape: Shape = field(default_factory=dict)
-    flavour: str = ""
-    quieter: float = 1.0
-    """How many times less noise there is where its columns live than the long run has: for a line in the spectrum."""
-    evidence: tuple[Array, Array] | None = None
-    """For a fault of another channel: for each wheel, what that channel says for it, and how large it is there."""
+    def branched(self, used: int) -> _Storage:
+        """Return a copy with the first `used` columns."""
+        copy = _Storage(self.gram.shape[0], *self.columns.shape[1:])
+        copy.used = used
+        copy.columns = self.columns[:used].copy()
+        copy.gram, copy.moment = self.gram[:, :, :used, :used].copy(), self.moment[:, :, :used].copy()
+        return copy
 
-    alive: NDArray[np.bool_] | None = None
-    """Which column does anything on which wheel (column, wheel); all of them on all where it is not said."""
-
-    @property
-    def span(self) -> slice:
-        """Its columns, which lie side by side."""
-        return slice(self.columns[0], self.columns[-1] + 1)
-
-    @property
-    def named(self) -> bool:
-        """A candidate, not a curve."""
-        return self.candidate is not None
+    def reserve(self, size: int) -> None:
+        """Grow the arrays by a quarter at least, so that growth costs little on the whole."""
+        capacity = len(self.columns)
+        if size <= capacity:
+            return
+        more = max(size, capacity + capacity // 4, FIRST_CAPACITY)
+        self.columns = _grown(self.columns, more, (0,))
+        self.gram = _grown(self.gram, more, (2, 3))
+        self.moment = _grown(self.moment, more, (2,))
 
 
-class Dictionary:
-    """Columns (scaled to a root mean square of 1 over the mask) and their moments.
+def _grown(values: NDArray[Any], length: int, axes: tuple[int, ...]) -> NDArray[Any]:
+    """Return an array with these axes lengthened by zeros."""
+    grown = np.zeros([length if axis in axes else size for axis, size in enumerate(values.shape)], values.dtype)
+    grown[tuple(slice(0, size) for size in values.shape)] = values
+    return grown
+
+
+@dataclass(frozen=True, eq=False)
+class DesignMatrix:
+    """Columns, scaled to a root mean square of 1 over the mask, and their sums of products.
 
     Attributes
     ----------
+    problem: what the columns were made from
     groups: which columns enter together
+    order: the instants in the order of folds, shape (time,)
+    cuts: where each fold begins and ends in that order, shape (fold + 1,)
     residual: measured less predicted, shape (wheel, time), in the order of folds
-    order: the instants in the order of folds
-    scale: what each column was divided by
-    energy, counts: sum of squares and number of the residual's values, shape (fold, wheel)
+    energy, counts: sum of squares and number of the residual's readings, shape (fold, wheel)
+    scale: what each column was divided by, shape (column,)
     """
 
-    def __init__(self, problem: Problem, folds: NDArray[np.int64]) -> None:
-        self.problem = problem
-        self.groups: list[Group] = []
-        self.order = np.argsort(folds, kind="stable")
-        self.cuts = np.searchsorted(folds[self.order], np.arange(folds.max() + 2))
-        self.residual: Single = self._arranged((problem.measured - problem.filled)[None])[0]
-        self._wheels, self._folds = problem.mask.shape[1], len(self.cuts) - 1
-        self._size = 0
-        self._columns: Single = np.zeros((0, self._wheels, len(folds)), np.float32)
-        self._gram: Array = np.zeros((self._folds, self._wheels, 0, 0))
-        self._moment: Array = np.zeros((self._folds, self._wheels, 0))
-        self.scale: Array = np.zeros(0)
-        parts = self._parts(self.residual)
-        self.energy: Array = np.stack([np.sum(part.astype(np.float64) ** 2, axis=1) for part in parts])
-        known = self._parts(problem.mask.T[:, self.order].astype(np.float64))
-        self.counts: Array = np.stack([np.sum(part, axis=1) for part in known])
+    problem: Problem
+    groups: tuple[Group, ...]
+    order: NDArray[np.int64]
+    cuts: NDArray[np.int64]
+    residual: Single
+    energy: Array
+    counts: Array
+    scale: Array
+    _storage: _Storage = field(repr=False)
+
+    @property
+    def size(self) -> int:
+        """Number of columns."""
+        return len(self.scale)
 
     @property
     def columns(self) -> Single:
         """Every column, shape (column, wheel, time), in the order of folds, 0 outside the mask."""
-        return self._columns[: self._size]
+        return self._storage.columns[: self.size]
 
     @property
     def gram(self) -> Array:
         """Sums of products of columns, shape (fold, wheel, column, column)."""
-        return self._gram[:, :, : self._size, : self._size]
+        return self._storage.gram[:, :, : self.size, : self.size]
 
     @property
     def moment(self) -> Array:
         """Sums of products of columns and residual, shape (fold, wheel, column)."""
-        return self._moment[:, :, : self._size]
+        return self._storage.moment[:, :, : self.size]
 
-    def _arranged(self, values: Array) -> Single:
-        """Return (column, time, wheel) as (column, wheel, time) in the order of folds, 0 outside the mask."""
-        kept = np.where(self.problem.mask, values, 0.0)
-        return np.ascontiguousarray(np.swapaxes(kept, 1, 2)[:, :, self.order], dtype=np.float32)
+    def with_groups(self, groups: Sequence[Group]) -> DesignMatrix:
+        """Return the same columns with other groups to choose from."""
+        return replace(self, groups=tuple(groups))
 
-    def _parts(self, values: NDArray[Any]) -> list[NDArray[Any]]:
-        return [values[..., a:b] for a, b in zip(self.cuts[:-1], self.cuts[1:], strict=True)]
-
-    def append(self, columns: Sequence[Array]) -> list[int]:
-        """Add columns of shape (time, wheel) and return their places."""
+    def extended(self, columns: Sequence[Array]) -> tuple[DesignMatrix, tuple[int, ...]]:
+        """Return a design matrix with further columns of shape (time, wheel), and their indices."""
         if not len(columns):
-            return []
-        fresh = self._arranged(np.stack(columns))
-        scale = np.sqrt(np.sum(fresh.astype(np.float64) ** 2, axis=(1, 2)) / max(int(self.problem.mask.sum()), 1))
+            return self, ()
+        fresh = _arranged(self.problem, self.order, np.stack(columns))
+        energy = np.sum(fresh.astype(np.float64) ** 2, axis=(1, 2))
+        scale = np.sqrt(energy / max(int(self.problem.mask.sum()), 1))
         scale = np.where(scale > 0, scale, 1.0)
         fresh /= scale[:, None, None].astype(np.float32)
-        old, new = self._size, self._size + len(fresh)
-        self._make_room(new)
-        self._columns[old:new] = fresh
-        self._size = new
-        self.scale = np.concatenate((self.scale, scale))
-        parts = (self._parts(values) for values in (self.columns, fresh, self.residual))
-        for f, (part, added, residual) in enumerate(zip(*parts, strict=True)):
-            for w in range(self._wheels):
-                cross = added[:, w] @ part[:, w].T
-                self._gram[f, w, old:new, :new] = cross
-                self._gram[f, w, :new, old:new] = cross.T
-                self._moment[f, w, old:new] = added[:, w] @ residual[w]
-        return list(range(old, new))
+        storage = self._storage if self._storage.used == self.size else self._storage.branched(self.size)
+        self._store(storage, fresh)
+        grown = replace(self, scale=np.concatenate((self.scale, scale)), _storage=storage)
+        return grown, tuple(range(self.size, grown.size))
 
-    def _make_room(self, size: int) -> None:
-        """Let the arrays grow by half as much again, so that growing costs little on the whole."""
-        room = len(self._columns)
-        if size <= room:
-            return
-        more = max(size, room + room // 4, FIRST_ROOM)
-        for name, axes in (("_columns", (0,)), ("_gram", (2, 3)), ("_moment", (2,))):
-            before = getattr(self, name)
-            shape = tuple(more if axis in axes else length for axis, length in enumerate(before.shape))
-            grown = np.zeros(shape, before.dtype)
-            grown[tuple(slice(0, length) for length in before.shape)] = before
-            setattr(self, name, grown)
+    def _store(self, storage: _Storage, fresh: Single) -> None:
+        """Write columns and their products with all columns up to them behind those that are there."""
+        old, new = storage.used, storage.used + len(fresh)
+        storage.reserve(new)
+        storage.columns[old:new] = fresh
+        storage.used = new
+        parts = (_folds_of(values, self.cuts) for values in (storage.columns[:new], fresh, self.residual))
+        for fold, (part, added, residual) in enumerate(zip(*parts, strict=True)):
+            for wheel in range(part.shape[1]):
+                cross = added[:, wheel] @ part[:, wheel].T
+                storage.gram[fold, wheel, old:new, :new] = cross
+                storage.gram[fold, wheel, :new, old:new] = cross.T
+                storage.moment[fold, wheel, old:new] = added[:, wheel] @ residual[wheel]
+
+    def in_time(self, values: NDArray[Any]) -> Array:
+        """Return (…, wheel, time in the order of folds) as (…, time, wheel) in the order of time."""
+        restored = np.empty_like(values)
+        restored[..., self.order] = values
+        return np.swapaxes(restored, -1, -2)
+
+
+def empty_design(problem: Problem, folds: NDArray[np.int64]) -> DesignMatrix:
+    """Return a design matrix without columns; `folds` is each instant's fold, shape (time,)."""
+    order = np.argsort(folds, kind="stable")
+    cuts = np.searchsorted(folds[order], np.arange(folds.max() + 2))
+    residual = _arranged(problem, order, (problem.measured - problem.filled)[None])[0]
+    energy = [np.sum(part.astype(np.float64) ** 2, axis=1) for part in _folds_of(residual, cuts)]
+    known = _folds_of(problem.mask.T[:, order].astype(np.float64), cuts)
+    return DesignMatrix(
+        problem=problem,
+        groups=(),
+        order=order,
+        cuts=cuts,
+        residual=residual,
+        energy=np.stack(energy),
+        counts=np.stack([np.sum(part, axis=1) for part in known]),
+        scale=np.zeros(0),
+        _storage=_Storage(len(cuts) - 1, *residual.shape),
+    )
+
+
+def _arranged(problem: Problem, order: NDArray[np.int64], values: Array) -> Single:
+    """Return (column, time, wheel) as (column, wheel, time) in the order of folds, 0 outside the mask."""
+    kept = np.where(problem.mask, values, 0.0)
+    return np.ascontiguousarray(np.swapaxes(kept, 1, 2)[:, :, order], dtype=np.float32)
+
+
+def _folds_of(values: NDArray[Any], cuts: NDArray[np.int64]) -> list[NDArray[Any]]:
+    """Return an array's parts along its last axis, one for each fold."""
+    return [values[..., a:b] for a, b in pairwise(cuts)]

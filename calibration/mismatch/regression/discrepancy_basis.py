@@ -1,8 +1,9 @@
-"""What a law may be wrong by: no law of friction or soil is nature's to the last percent.
+"""Discrepancy of a law: no law of friction or soil is exact to the last percent.
 
 Kennedy and O'Hagan (2001) put a discrepancy beside a model and let the data and a prior share it out. Here each effect
-may be larger or smaller than its law along its covariate, and from wheel to wheel, by a share with a standard
-deviation of `FORM`: it widens the intervals where the data leave it open, and is measured where they do not.
+may be larger or smaller than its law along its covariate, and from wheel to wheel, by a share with the standard
+deviation `Thresholds.discrepancy_std`: it widens the intervals where the data leave it open, and is fitted where they
+do not.
 """
 
 from __future__ import annotations
@@ -13,33 +14,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.residuals import contribution
-from regolithd.calibration.mismatch.signal.hat_basis import broken_lines
+from regolithd.calibration.mismatch.signal.hat_basis import hat_functions
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.selection.subset_selection import Fit, Search
+    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.group import Fit, Term
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
-FORM = 0.15
-"""Standard deviation of an effect's share by which its law is wrong, at each knot and on each wheel."""
-KNOTS = 6
 CONSTANT = frozenset({"direction", "none"})
-"""What is said to be constant may be wrong in just that: it is bent along time."""
-WITHOUT_A_FORM = frozenset({"wheel_row", "wheel_angle"})
-"""Covariates along which there is no law that could be wrong."""
+"""Covariates of constant effects: such an effect may be wrong in being constant, and varies along time."""
+WITHOUT_A_LAW = frozenset({"wheel_row", "wheel_angle"})
+"""Covariates along which no law can be wrong."""
 
 
-def bends(search: Search, fit: Fit, index: int) -> Array:
-    """Return how one effect would change were its law wrong by its whole self, shape (bend, time, wheel)."""
-    problem, term = search.dictionary.problem, fit.terms[index]
-    effect = contribution(search, fit, index)
+def discrepancy_basis(equations: NormalEquations, fit: Fit, index: int) -> Array:
+    """Return the changes of an effect whose law is wrong by its whole size, shape (basis function, time, wheel)."""
+    problem, term = equations.problem, fit.terms[index]
+    effect = contribution(equations, fit, index)
+    values = _covariate(problem, term)
     found = []
-    covariate = term.group.candidate.covariate if term.group.candidate else "none"
-    covariate = "time" if covariate in CONSTANT else covariate
-    if covariate in problem.covariates and covariate not in WITHOUT_A_FORM:
-        values = problem.covariates[covariate]
-        values = values if np.nanmin(values) >= 0 or covariate == "temperature" else np.abs(values)
-        found += [hat * effect for hat in broken_lines(values, problem.mask & (effect != 0), KNOTS)]
+    if values is not None:
+        hats = hat_functions(values, problem.mask & (effect != 0), problem.thresholds.discrepancy_knots)
+        found += [hat * effect for hat in hats]
     if len(term.wheels) > 1:
         found += [effect * (np.arange(effect.shape[1]) == wheel) for wheel in term.wheels]
     return np.stack(found) if found else np.zeros((0, *effect.shape))
+
+
+def _covariate(problem: Problem, term: Term) -> Array | None:
+    """Return what an effect's law depends on, shape (time, wheel); speeds and the like without their sign."""
+    name = term.group.candidate.covariate if term.group.candidate else "none"
+    name = "time" if name in CONSTANT else name
+    if name not in problem.covariates or name in WITHOUT_A_LAW:
+        return None
+    values = problem.covariates[name]
+    return values if np.nanmin(values) >= 0 or name == "temperature" else np.abs(values)

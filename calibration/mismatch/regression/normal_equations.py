@@ -1,180 +1,244 @@
-"""Fills the dictionary: tangents of the free parameters, every candidate's grid, and curves without a name."""
+"""Weighted normal equations of sets of terms beside the free parameters, on given folds.
+
+The Δχ² of a set is what it takes from the weighted sum of squares beyond what the free parameters, held by their
+priors, take alone. Weights are one over the long-run variance of the noise, so Δχ² is twice a log likelihood ratio.
+The equations are immutable: other weights, further columns or another prior make new ones.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.problem.prior import own_name
-from regolithd.calibration.mismatch.regression.design_matrix import Dictionary, Group
-from regolithd.calibration.mismatch.signal.hat_basis import broken_lines
-from regolithd.calibration.mismatch.signal.spectrum import padded_length, power_of_sums
+from regolithd.calibration.mismatch.regression.group import Fit, Term
+from regolithd.calibration.mismatch.regression.penalties import penalty, visible_in_own_channel
+from regolithd.calibration.mismatch.regression.schur import (
+    delta_chi2_of_each,
+    delta_chi2_together,
+    explained_part,
+    schur_complement,
+    schur_diagonal,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
-    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape, Sharing
     from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
+    from regolithd.calibration.mismatch.regression.group import Group
+    from regolithd.calibration.mismatch.regression.nuisance import Nuisance
+    from regolithd.calibration.mismatch.thresholds import Thresholds
 
 Array = NDArray[np.float64]
+Columns = tuple[tuple[int, tuple[int, ...]], ...]
 
-OWN_SHARE = 1 / 3
-"""Of a parameter's standard deviation: what wheels of one make differ by. More hides what differs by row or by load."""
-CURVE_KNOTS = 8
-TIME_KNOTS = 48
-"""Time has no physics of its own that is smooth: spells and beats must show, down to a fortieth of the recording."""
-BETWEEN_WHEELS = 0.2
-"""Share of a covariate's variance that must be within wheels."""
-LEAST_BEATS = 4
-"""Beats in a recording, below which a sine over time is no more than a slow curve."""
-SHORTEST_BEAT = 5.0
-"""Readings in a beat."""
-NOT_FOR_CURVES = frozenset({"direction", "wheel_angle", "wheel_acceleration", "place"})
+SINGULAR = 1e-10
+"""Relative eigenvalue below which a direction of the normal equations counts as undetermined: rounding of float32."""
 
 
-@dataclass(frozen=True)
-class Nuisance:
-    """The simulation's free parameters: where their tangents are, and how far the priors let them go."""
+@dataclass(frozen=True, eq=False)
+class NormalEquations:
+    """Sums of products of all columns, weighted, on some folds; made by `normal_equations`.
 
-    names: tuple[str, ...]
-    columns: tuple[int, ...]
-    precision: Array
-    """One over the variance of each scaled coefficient."""
+    Attributes
+    ----------
+    design: the columns
+    nuisance: the free parameters and their priors
+    weights: one over the long-run variance, shape (wheel,)
+    folds: the folds whose instants are fitted
+    gram: weighted sums of products, shape (wheel, column, column)
+    moment: weighted sums of products with the residual, shape (wheel, column)
+    """
 
+    design: DesignMatrix
+    nuisance: Nuisance
+    weights: Array
+    folds: tuple[int, ...]
+    gram: Array = field(repr=False)
+    moment: Array = field(repr=False)
 
-def add_nuisance(dictionary: Dictionary) -> Nuisance:
-    """Add ∂prediction/∂parameter of every parameter that the priors leave free, and of each wheel's own part of it."""
-    problem, simulation = dictionary.problem, dictionary.problem.simulation
-    free = {name: prior.std for name, prior in simulation.parameters.items() if prior.std > 0}
-    names, stds, tangents = list(free), list(free.values()), [problem.tangent(name) for name in free]
-    wheels = problem.recording.wheels
-    for name in free if len(wheels) > 1 else ():
-        if name in simulation.own_to_each_wheel:
-            names += [own_name(name, wheel) for wheel in wheels]
-            stds += [OWN_SHARE * free[name]] * len(wheels)
-            tangents += [np.where(np.array(wheels) == wheel, problem.tangent(name), 0.0) for wheel in wheels]
-    places = dictionary.append(tangents)
-    # A coefficient of a column that was divided by its scale is the parameter's shift times that scale.
-    precision = 1 / (np.array(stds) * dictionary.scale[places]) ** 2 if places else np.zeros(0)
-    return Nuisance(tuple(names), tuple(places), precision)
+    @property
+    def problem(self) -> Problem:
+        """What the columns were made from."""
+        return self.design.problem
 
+    @property
+    def thresholds(self) -> Thresholds:
+        """The numbers that decide."""
+        return self.design.problem.thresholds
 
-def add_candidate(
-    dictionary: Dictionary, candidate: Candidate, shapes: Sequence[Shape], quieter: Sequence[float] = ()
-) -> list[Group]:
-    """Add a candidate in each of these shapes; `quieter` says where there is less noise than in the long run."""
-    problem, made, columns = dictionary.problem, [], []
-    start = len(dictionary.columns)
-    price = 2 * float(np.log(candidate.shape_count(problem)))
-    for shape, less in zip(shapes, quieter or [1.0] * len(shapes), strict=True):
-        found = np.asarray(candidate.columns(problem, shape), np.float64)
-        places = tuple(range(start, start + len(found)))
-        start += len(found)
-        columns += list(found)
-        signs = tuple(c.sign for c in candidate.coefficients[: len(found)])
-        signs += (0,) * (len(found) - len(signs))
-        paid = price + candidate.prior_penalty(problem, shape)
-        made.append(
-            Group(
-                candidate.name,
-                places,
-                signs,
-                candidate.sharing,
-                paid,
-                candidate,
-                shape,
-                quieter=less,
-                evidence=candidate.own_channel_evidence(problem, shape),
-                alive=np.any(np.where(problem.mask, found, 0.0) != 0, axis=1) if len(found) > 1 else None,
-            )
+    @property
+    def all_wheels(self) -> tuple[int, ...]:
+        """Indices of all wheels."""
+        return tuple(range(len(self.weights)))
+
+    @property
+    def wheel_sets(self) -> Mapping[tuple[int, ...], str]:
+        """Wheels that may share an effect, and whether these are all, one alone, or some."""
+        found = {self.all_wheels: "all"}
+        for some in self.problem.wheel_sets:
+            found.setdefault(some, "some")
+        return {**{(w,): "one" for w in self.all_wheels}, **found}
+
+    def weighted(self, weights: Array) -> NormalEquations:
+        """Return the equations with other weights of the wheels."""
+        if np.array_equal(weights, self.weights):
+            return self
+        return normal_equations(self.design, self.nuisance, weights, self.folds)
+
+    def over(self, design: DesignMatrix) -> NormalEquations:
+        """Return the equations of a design matrix that this one was extended to."""
+        old, size = len(self.gram[0]), design.size
+        gram = np.zeros((len(self.weights), size, size))
+        gram[:, :old, :old] = self.gram
+        for fold in self.folds:
+            gram[:, old:, :] += design.gram[fold][:, old:, :]
+        gram[:, old:, :] *= self.weights[:, None, None]
+        gram[:, :old, old:] = np.swapaxes(gram[:, old:, :old], 1, 2)
+        moment = design.moment[list(self.folds)].sum(axis=0) * self.weights[:, None]
+        return replace(self, design=design, gram=gram, moment=moment)
+
+    def with_groups(self, groups: Sequence[Group]) -> NormalEquations:
+        """Return the equations with other groups to choose from."""
+        return replace(self, design=self.design.with_groups(groups))
+
+    def with_nuisance(self, nuisance: Nuisance) -> NormalEquations:
+        """Return the equations with other priors of the free parameters."""
+        return replace(self, nuisance=nuisance)
+
+    def fit(self, terms: Iterable[Term]) -> Fit:
+        """Fit terms and free parameters together."""
+        terms = tuple(terms)
+        columns = self._columns(terms)
+        matrix, moment = self._normal(columns)
+        base = len(self.nuisance.columns)
+        inverse = _inverse(matrix)
+        solved = inverse @ moment
+        delta_chi2 = float(moment @ solved)
+        if base:
+            delta_chi2 -= float(moment[:base] @ np.linalg.solve(matrix[:base, :base], moment[:base]))
+        return Fit(terms, columns, solved, inverse, delta_chi2)
+
+    def penalty(self, term: Term) -> float:
+        """Return what a term has to gain beyond chance, in Δχ²."""
+        return penalty(term, len(self.weights), self.thresholds)
+
+    def score(self, fit: Fit) -> float:
+        """Return Δχ² less the penalties; a term at frequencies of little noise counts by so much more."""
+        total = fit.delta_chi2
+        for index, term in enumerate(fit.terms):
+            if term.group.noise_reduction > 1:
+                values, span = fit.coefficients[fit.of_term(index)], term.group.span
+                own = sum(float(values @ self.gram[w][span, span] @ values) for w in term.wheels)
+                total += (term.group.noise_reduction - 1) * own
+        return total - sum(self.penalty(term) for term in fit.terms)
+
+    def further(self, given: Iterable[Term], groups: Sequence[Group] | None = None) -> list[tuple[float, Term]]:
+        """Return the further Δχ² of every group beside `given`, on each set of wheels that may share it."""
+        wanted = self.design.groups if groups is None else groups
+        fitted = self.fit(given)
+        at = np.array(sorted({column for group in wanted for column in group.columns}), np.int64)
+        place = {int(column): k for k, column in enumerate(at)}
+        signs = np.zeros(len(at))
+        for group in wanted:
+            signs[[place[column] for column in group.columns]] = group.signs
+        energies = self.gram[:, at, at]
+        found: list[tuple[float, Term]] = []
+        for wheels, kind in self.wheel_sets.items():
+            chosen = list(wheels)
+            cross = self.cross(fitted.columns, at, wheels)
+            left = self.moment[chosen][:, at].sum(axis=0) - fitted.coefficients @ cross
+            energy = energies[chosen].sum(axis=0)
+            complement = schur_diagonal(energy, cross, fitted.covariance)
+            singles = delta_chi2_of_each(left, complement, energy, signs, self.thresholds.least_tolerance)
+            for group in wanted:
+                if not (group.may_be_shared(kind) or len(self.weights) == 1):
+                    continue
+                here = [place[column] for column in group.columns]
+                if len(here) == 1:
+                    gain = float(singles[here[0]])
+                else:
+                    gain = self._together(group, wheels, left[here], explained_part(cross[:, here], fitted.covariance))
+                term = Term(group, wheels)
+                if gain > 0 and visible_in_own_channel(term, self.thresholds):
+                    found.append((gain * group.noise_reduction, term))
+        return found
+
+    def _together(self, group: Group, wheels: tuple[int, ...], left: Array, explained: Array) -> float:
+        """Return the Δχ² of a group of several columns."""
+        own = sum(
+            (self.gram[w][group.span, group.span] for w in wheels[1:]), self.gram[wheels[0]][group.span, group.span]
         )
-    dictionary.append(columns)
-    dictionary.groups += made
-    return made
+        return delta_chi2_together(
+            left, own - explained, float(np.max(np.diag(own))), group.signs, self.thresholds.least_tolerance
+        )
+
+    def cross(self, fitted: Columns, at: NDArray[np.int64], wheels: tuple[int, ...]) -> Array:
+        """Return sums of products of fitted columns and others that act on `wheels`, shape (fitted, other)."""
+        index = np.array([column for column, _ in fitted], np.int64)
+        total = np.zeros((len(index), len(at)))
+        for wheel in wheels:
+            on = np.array([wheel in of_column for _, of_column in fitted], np.float64)
+            total += on[:, None] * self.gram[wheel][np.ix_(index, at)]
+        return total
+
+    def own_and_complement(self, given: Iterable[Term], term: Term) -> tuple[Array, Array]:
+        """Return a term's sums of products, and their Schur complement beside `given` and the free parameters."""
+        columns = self._columns((*given, term))
+        size = len(columns) - len(term.group.columns)
+        matrix, _ = self._normal(columns)
+        inverse = _inverse(matrix[:size, :size]) if size else np.zeros((0, 0))
+        own = matrix[size:, size:]
+        return own, schur_complement(own, matrix[:size, size:], inverse)
+
+    def tolerance(self, given: Iterable[Term], term: Term) -> float:
+        """Return the share of a term's energy outside the span of all else in the fit: 1 / variance inflation."""
+        own, complement = self.own_and_complement(given, term)
+        return float(complement[0, 0] / max(float(own[0, 0]), 1e-300))
+
+    def _columns(self, terms: tuple[Term, ...]) -> Columns:
+        base = [(column, self.all_wheels) for column in self.nuisance.columns]
+        return tuple(base + [(column, term.wheels) for term in terms for column in term.group.columns])
+
+    def _normal(self, columns: Columns) -> tuple[Array, Array]:
+        """Return matrix and moment of the normal equations of these columns, the priors included."""
+        index = [column for column, _ in columns]
+        share = membership(columns, len(self.weights))
+        matrix = np.zeros((len(columns), len(columns)))
+        for w in self.all_wheels:
+            matrix += np.outer(share[:, w], share[:, w]) * self.gram[w][np.ix_(index, index)]
+        base = len(self.nuisance.columns)
+        matrix[range(base), range(base)] += self.nuisance.precision
+        return matrix, np.einsum("cw,wc->c", share, self.moment[:, index])
 
 
-def add_candidates(dictionary: Dictionary, candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Add every candidate that this recording can have; return those."""
-    fitting = [candidate for candidate in candidates if candidate.applies(dictionary.problem)]
-    for candidate in fitting:
-        add_candidate(dictionary, candidate, candidate.shapes(dictionary.problem))
-    return fitting
+def normal_equations(
+    design: DesignMatrix, nuisance: Nuisance, weights: Array, folds: Sequence[int] | None = None
+) -> NormalEquations:
+    """Sum the products over the folds (all of them where none are given) and weigh them."""
+    folds = tuple(range(len(design.gram)) if folds is None else folds)
+    empty = NormalEquations(
+        design=design,
+        nuisance=nuisance,
+        weights=weights,
+        folds=folds,
+        gram=np.zeros((len(weights), 0, 0)),
+        moment=np.zeros((len(weights), 0)),
+    )
+    return empty.over(design)
 
 
-def _opposed(problem: Problem, covariate: str) -> dict[str, Array]:
-    """Return how an effect may differ over the machine: what tilts or turns it acts oppositely on its two sides."""
-    direction = np.nan_to_num(problem.covariates.get("direction", np.ones(problem.mask.shape)))
-    if covariate in {"roll", "yaw_rate"} and problem.side is not None:
-        return {"drag, opposite sides": direction * problem.side}
-    if covariate == "pitch" and problem.row is not None and np.ptp(problem.row) > 0:
-        return {"drag, opposite ends": direction * (problem.row - np.mean(problem.row))}
-    return {}
+def membership(columns: Columns, wheel_count: int) -> Array:
+    """Return 1 where a column acts on a wheel, else 0, shape (column, wheel)."""
+    share = np.zeros((len(columns), wheel_count))
+    for row, (_, wheels) in enumerate(columns):
+        share[row, list(wheels)] = 1
+    return share
 
 
-def add_curves(dictionary: Dictionary) -> None:
-    """Add, for each covariate, broken lines that act as drag, as an offset, and in proportion to the prediction."""
-    problem = dictionary.problem
-    flavours = {"offset": np.ones(problem.mask.shape), "gain": problem.filled}
-    if "direction" in problem.covariates:
-        flavours["drag"] = np.nan_to_num(problem.covariates["direction"])
-    for name, values in problem.covariates.items():
-        if name in NOT_FOR_CURVES:
-            continue
-        if _tells_wheels_apart(problem, values):
-            continue
-        curve = np.abs(values) if name == "wheel_speed" else values
-        hats = broken_lines(curve, problem.mask, CURVE_KNOTS)
-        if len(hats) < 3:
-            continue
-        for flavour, factor in {**flavours, **_opposed(problem, name)}.items():
-            sharing: tuple[Sharing, ...] = ("all",) if "opposite" in flavour else ("all", "one")
-            _add_curve(dictionary, name, [hat * factor for hat in hats], flavour, sharing)
-    speed = problem.covariates.get("wheel_speed")
-    if speed is not None and np.nanmin(speed) < 0:
-        # What acts one way only is neither a drag nor an offset.
-        _add_curve(dictionary, "wheel_speed", broken_lines(speed, problem.mask, CURVE_KNOTS), "each way")
-    flavour = "drag" if "drag" in flavours else "offset"
-    hats = broken_lines(problem.covariates["time"], problem.mask, TIME_KNOTS)
-    _add_curve(dictionary, "time", [hat * flavours[flavour] for hat in hats], flavour)
-
-
-def _add_curve(
-    dictionary: Dictionary,
-    covariate: str,
-    columns: Sequence[Array],
-    flavour: str,
-    sharing: tuple[Sharing, ...] = ("all", "one"),
-    price: float = 0.0,
-) -> None:
-    """Add columns without a name, of either sign."""
-    if places := dictionary.append(columns):
-        signs = (0,) * len(places)
-        dictionary.groups.append(Group(covariate, tuple(places), signs, sharing, price, None, {}, flavour))
-
-
-def _tells_wheels_apart(problem: Problem, values: Array) -> bool:
-    """Say whether a covariate hardly varies but from wheel to wheel: a curve over it would be a name for the wheels."""
-    known = values[problem.mask & np.isfinite(values)]
-    return problem.variance_within(values) < BETWEEN_WHEELS * float(np.var(known))
-
-
-def add_beat(dictionary: Dictionary, residual: Array) -> None:
-    """Add the sine over time, acting as drag, that the residual [time, wheel] shows most of: what switches on board."""
-    problem = dictionary.problem
-    along = np.nan_to_num(problem.covariates.get("direction", np.ones(problem.mask.shape)))
-    time_s, step_s = problem.time_s[:, 0], problem.recording.step_s
-    lowest, highest = LEAST_BEATS / problem.length_s, 1 / (SHORTEST_BEAT * step_s)
-    if lowest >= highest:
-        return
-    place = np.rint(time_s / step_s).astype(np.int64)
-    length = padded_length(int(place[-1]))
-    frequency_Hz = np.fft.rfftfreq(length, step_s)
-    power = np.stack([power_of_sums(place, values, length) for values in (residual * along * problem.mask).T])
-    for wheels in (power.sum(axis=0), *power):
-        sought = np.where((frequency_Hz >= lowest) & (frequency_Hz <= highest), wheels, 0.0)
-        phase = 2 * np.pi * frequency_Hz[np.argmax(sought)] * problem.time_s
-        price = 2 * float(np.log(problem.length_s * highest))
-        _add_curve(dictionary, "time", [along * np.cos(phase), along * np.sin(phase)], "drag, periodic", price=price)
+def _inverse(matrix: Array) -> Array:
+    """Return the pseudo-inverse: undetermined directions have no part in the solution."""
+    return np.linalg.pinv(matrix, rcond=SINGULAR, hermitian=True).astype(np.float64)

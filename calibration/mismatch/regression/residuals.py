@@ -1,4 +1,4 @@
-"""What a fit explains, instant by instant: the residual that it leaves, and what each of its terms adds."""
+"""What a fit explains at each instant: the residual that it leaves, and the contribution of each term."""
 
 from __future__ import annotations
 
@@ -8,48 +8,49 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.selection.subset_selection import Fit, Search
+    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
-NOW_AND_THEN = 0.4
-"""What counts of an effect's size at the times when it acts, if at others it does not."""
 
-
-def residual_of(search: Search, fit: Fit) -> Array:
+def residual_of(equations: NormalEquations, fit: Fit) -> Array:
     """Return measured less fitted, shape (time, wheel), 0 outside the mask."""
-    dictionary = search.dictionary
-    left = dictionary.residual.astype(np.float64)
+    design = equations.design
+    left = design.residual.astype(np.float64)
     for (column, wheels), value in zip(fit.columns, fit.coefficients, strict=True):
         for w in wheels:
-            left[w] -= value * dictionary.columns[column, w]
-    restored = np.empty_like(left)
-    restored[:, dictionary.order] = left
-    return np.where(dictionary.problem.mask, restored.T, 0.0)
+            left[w] -= value * design.columns[column, w]
+    return np.where(design.problem.mask, design.in_time(left), 0.0)
 
 
-def contribution(search: Search, fit: Fit, index: int) -> Array:
+def contribution(equations: NormalEquations, fit: Fit, index: int) -> Array:
     """Return what a term adds to the prediction, shape (time, wheel)."""
-    dictionary, term = search.dictionary, fit.terms[index]
-    total = np.zeros(dictionary.residual.shape)
+    design, term = equations.design, fit.terms[index]
+    total = np.zeros(design.residual.shape)
     for column, value in zip(term.group.columns, fit.coefficients[fit.of_term(index)], strict=True):
         for w in term.wheels:
-            total[w] += value * dictionary.columns[column, w]
-    restored = np.empty_like(total)
-    restored[:, dictionary.order] = total
-    return restored.T
+            total[w] += value * design.columns[column, w]
+    return design.in_time(total)
 
 
-def size_of(search: Search, fit: Fit, index: int) -> float:
-    """Return a term's size on its wheels, as a share of the channel's mean magnitude."""
-    problem, on = search.dictionary.problem, list(fit.terms[index].wheels)
-    return magnitude(contribution(search, fit, index)[:, on][problem.mask[:, on]] ** 2) / problem.mean_size
+def where_it_acts(equations: NormalEquations, fit: Fit, index: int) -> Array:
+    """Return a term's contribution to each reading of its wheels, shape (reading,)."""
+    on = list(fit.terms[index].wheels)
+    return contribution(equations, fit, index)[:, on][equations.problem.mask[:, on]]
 
 
-def magnitude(power: Array) -> float:
-    """Return how large an effect with these squares is where it acts.
+def relative_size(equations: NormalEquations, fit: Fit, index: int) -> float:
+    """Return a term's active root mean square on its wheels over the channel's mean magnitude."""
+    squares = where_it_acts(equations, fit, index) ** 2
+    return active_rms(squares, equations.thresholds.active_share) / equations.problem.mean_size
 
-    Of a constant effect that is its root mean square; of one that acts now and then, two fifths of what it has then.
+
+def active_rms(squares: Array, active_share: float) -> float:
+    """Return how large an effect with these squares is while it acts.
+
+    Of a constant effect that is its root mean square; of an intermittent one, `active_share` of the root mean square
+    weighted by its own squares.
     """
-    then = np.sum(power**2) / max(float(np.sum(power)), 1e-300)
-    return float(np.sqrt(max(np.mean(power), NOW_AND_THEN**2 * then)))
+    weighted = np.sum(squares**2) / max(float(np.sum(squares)), 1e-300)
+    return float(np.sqrt(max(np.mean(squares), active_share**2 * weighted)))

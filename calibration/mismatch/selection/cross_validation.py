@@ -1,7 +1,7 @@
-"""Whether what a term gains comes back on data that did not fit it: on other runs, or other blocks of time.
+"""Cross-validation of a named effect: whether its Δχ² comes back on folds that did not fit it.
 
-On stationary data a sum of cross-validated gains is the gain in sample less about two for each coefficient. Where far
-less comes back, the coefficient differs from run to run: the term describes an occasion, not the machine.
+On stationary data a cross-validated Δχ² is the one in sample less about two for each coefficient. Where far less comes
+back, the coefficient differs from run to run: the effect belongs to an occasion, not to the machine.
 """
 
 from __future__ import annotations
@@ -11,72 +11,84 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.selection.subset_selection import Fit, Search, Term
+from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations, normal_equations
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
+    from regolithd.calibration.mismatch.regression.group import Fit, Term
+
 Array = NDArray[np.float64]
 
-COMES_BACK = 0.5
-"""The least share of a term's gain that must come back where it was not fitted."""
 
-
-def squares(train: Search, fit: Fit, fold: int) -> Array:
-    """Return the sum of squared errors of a fit on a fold, for each wheel."""
-    dictionary = train.dictionary
-    total = dictionary.energy[fold].copy()
+def squares_on_fold(design: DesignMatrix, fit: Fit, fold: int) -> Array:
+    """Return the sum of squared errors of a fit on a fold, shape (wheel,)."""
+    total = design.energy[fold].copy()
     for w in range(len(total)):
         on = [(c, v) for (c, wheels), v in zip(fit.columns, fit.coefficients, strict=True) if w in wheels]
         if not on:
             continue
         at = [c for c, _ in on]
         values = np.array([v for _, v in on])
-        total[w] += (
-            values @ dictionary.gram[fold, w][np.ix_(at, at)] @ values - 2 * values @ dictionary.moment[fold, w, at]
-        )
+        total[w] += values @ design.gram[fold, w][np.ix_(at, at)] @ values - 2 * values @ design.moment[fold, w, at]
     return total
 
 
-def gains_elsewhere(search: Search, terms: Sequence[Term], index: int) -> Array:
-    """Return what a term gains on each fold when the others fitted it, shape (fold,)."""
+def other_folds(design: DesignMatrix, fold: int) -> list[int]:
+    """Return all folds but one; that one where there is no other."""
+    return [f for f in range(len(design.gram)) if f != fold] or [fold]
+
+
+def training_equations(equations: NormalEquations, fold: int) -> NormalEquations:
+    """Return the normal equations of all folds but one."""
+    design = equations.design
+    return normal_equations(design, equations.nuisance, equations.weights, other_folds(design, fold))
+
+
+def gains_on_other_folds(equations: NormalEquations, terms: Sequence[Term], index: int) -> Array:
+    """Return a term's Δχ² on each fold when the other folds fitted it, shape (fold,)."""
     rest = [term for i, term in enumerate(terms) if i != index]
-    count = len(search.dictionary.gram)
-    gains = np.zeros(count)
-    for fold in range(count):
-        others = [f for f in range(count) if f != fold] or [fold]
-        train = Search(search.dictionary, search.nuisance, search.weights, others)
-        saved = squares(train, train.fit(rest), fold) - squares(train, train.fit(terms), fold)
-        gains[fold] = float(np.sum(saved * search.weights))
+    gains = np.zeros(len(equations.design.gram))
+    for fold in range(len(gains)):
+        train = training_equations(equations, fold)
+        less = squares_on_fold(train.design, train.fit(rest), fold)
+        saved = less - squares_on_fold(train.design, train.fit(terms), fold)
+        gains[fold] = float(np.sum(saved * equations.weights))
     return gains
 
 
-def margin(search: Search, terms: Sequence[Term], index: int, enough: float) -> float:
-    """Return by how much a term transfers: not at all where negative.
+def transfer_margin(equations: NormalEquations, terms: Sequence[Term], index: int, entry_threshold: float) -> float:
+    """Return by how much a term passes the test of transfer; negative: it does not.
 
-    At least half of its gain must come back; and where folds are whole runs, the best of them left out, what the others
-    say must still be `enough` for a name: a finding that hangs on one run is none.
+    A share of its Δχ² must come back. Where folds are whole runs, the other runs must suffice for entry without the
+    best of them: an effect that depends on one run is none of the machine.
     """
+    limits, design = equations.thresholds, equations.design
     rest = [term for i, term in enumerate(terms) if i != index]
-    gains = gains_elsewhere(search, terms, index)
-    # Of a gain that the priors alone pay (a parameter need not stray), no data can give anything back: what the data
-    # gained is asked for. A coefficient that was fitted costs about two on data that did not fit it.
+    gains = gains_on_other_folds(equations, terms, index)
+    # Of a gain that the priors alone pay (a parameter need not stray), no data can give anything back: only what the
+    # data gained is asked for.
     gained = sum(
-        float((squares(search, search.fit(rest), fold) - squares(search, search.fit(terms), fold)) @ search.weights)
+        float(
+            (squares_on_fold(design, equations.fit(rest), fold) - squares_on_fold(design, equations.fit(terms), fold))
+            @ equations.weights
+        )
         for fold in range(len(gains))
     )
-    found = float(gains.sum()) + 2 * len(terms[index].group.columns) - COMES_BACK * gained
-    if len(np.unique(search.dictionary.problem.recording.run)) < len(gains):
+    expected_loss = limits.coefficient_cost * len(terms[index].group.columns)
+    found = float(gains.sum()) + expected_loss - limits.transferred_share * gained
+    if len(np.unique(equations.problem.recording.run)) < len(gains):
         return found
-    return min(found, float(gains.sum() - gains.max()) - enough - terms[index].price(len(search.weights)))
+    return min(found, float(gains.sum() - gains.max()) - entry_threshold - equations.penalty(terms[index]))
 
 
-def that_transfer(search: Search, named: Fit, enough: float) -> Fit:
-    """Leave out terms that do not transfer, the worst first, until all that stay do."""
+def drop_what_does_not_transfer(equations: NormalEquations, named: Fit, entry_threshold: float) -> Fit:
+    """Return the fit without terms that do not transfer; the worst is left out first, then all are tested again."""
     while named.terms:
-        margins = [margin(search, named.terms, index, enough) for index in range(len(named.terms))]
+        margins = [transfer_margin(equations, named.terms, index, entry_threshold) for index in range(len(named.terms))]
         worst = int(np.argmin(margins))
         if margins[worst] >= 0:
             break
-        named = search.fit([term for index, term in enumerate(named.terms) if index != worst])
+        named = equations.fit(named.without(worst))
     return named

@@ -1,4 +1,4 @@
-"""The decision: how loud the noise is, what a residual suggests, which names stay, and what is left without one."""
+"""The decision: the noise, the shapes that a residual suggests, the named effects, and what stays unexplained."""
 
 from __future__ import annotations
 
@@ -9,112 +9,99 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
-from regolithd.calibration.mismatch.regression.normal_equations import add_beat, add_candidate
+from regolithd.calibration.mismatch.regression.candidate_groups import with_candidate
 from regolithd.calibration.mismatch.regression.residuals import residual_of
-from regolithd.calibration.mismatch.selection.best_subsets import UNNAMED_BY, best_named, enough
-from regolithd.calibration.mismatch.selection.cross_validation import that_transfer
-from regolithd.calibration.mismatch.selection.sign_flip_test import naming_threshold
-from regolithd.calibration.mismatch.selection.smooth_terms import without_a_name
-from regolithd.calibration.mismatch.signal.noise import Noise, estimate_noise
+from regolithd.calibration.mismatch.regression.smooth_groups import with_periodic_terms
+from regolithd.calibration.mismatch.selection.best_subsets import best_subsets, passes_entry_test
+from regolithd.calibration.mismatch.selection.cross_validation import drop_what_does_not_transfer
+from regolithd.calibration.mismatch.selection.noise_estimation import noise_beside_terms
+from regolithd.calibration.mismatch.selection.sign_flip_test import entry_threshold
+from regolithd.calibration.mismatch.selection.smooth_terms import weigh_against_smooth_terms
+from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
-    from regolithd.calibration.mismatch.selection.subset_selection import Fit, Search, Term
+    from regolithd.calibration.mismatch.regression.group import Fit, Term
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
-QUICK_MEMORY = 5.0
-FORCED_TERMS = 4
-SMOOTH = 12
-"""Columns of a curve that cannot follow the noise itself."""
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Decision:
-    """What was decided, with all that led to it."""
+    """What was decided, and what the inference needs.
 
-    search: Search
-    noise: Noise
+    Attributes
+    ----------
+    equations: with all columns that were made, weighted by the final noise
+    noise: estimated beside all that was found
+    entry_threshold: score above which an effect was named
+    named: fit of the named effects
+    unnamed: smooth terms that nothing named explains
+    whole: fit of both together
+    """
+
+    equations: NormalEquations
+    noise: NoiseModel
+    entry_threshold: float
     named: Fit
     unnamed: tuple[Term, ...]
     whole: Fit
-    """Named and unnamed together."""
 
 
-def settle_noise(search: Search) -> tuple[Noise, Array]:
-    """Estimate the noise from what is left when anything at all that explains something is taken out; return both.
-
-    An effect that is not taken out looks like noise that never forgets, and then hides itself. So first the most
-    telling terms are taken out as if the noise forgot quickly, whether they are significant or not: their few
-    coefficients cost the estimate little. Then again, with that noise, only what is significant.
-    """
-    mask = search.dictionary.problem.mask
-    noise = estimate_noise(residual_of(search, search.fit(())), mask)
-    quick = Noise(noise.deviation, min(noise.memory, QUICK_MEMORY))
-    terms: list[Term] = []
-    for _ in range(FORCED_TERMS):
-        _weigh(search, quick)
-        terms += [term for _, term in _most_telling(search, terms)]
-    noise = estimate_noise(residual_of(search, search.fit(terms)), mask)
-    terms = []
-    for _ in range(2 * FORCED_TERMS):
-        _weigh(search, noise)
-        found = [term for score, term in _most_telling(search, terms) if score > 0.5 * UNNAMED_BY]
-        if not found:
-            break
-        terms += found
-    left = residual_of(search, search.fit(terms))
-    noise = estimate_noise(left, mask)
-    _weigh(search, noise)
-    return noise, left
+def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decision:
+    """Choose the named effects, and the smooth terms that nothing named explains."""
+    problem, limits = equations.problem, equations.thresholds
+    noise, left = noise_beside_terms(equations)
+    equations = equations.weighted(noise.weights)
+    threshold = entry_threshold(equations, left, blocks_of_time(problem, noise))
+    equations = with_proposed_shapes(equations, candidates)
+    equations, subsets = best_subsets(equations)
+    named = _largest_that_passes(equations, subsets, threshold)
+    named = drop_what_does_not_transfer(equations, named, threshold)
+    simpler = [fit for fit in subsets[1:] if len(fit.terms) < len(named.terms)]
+    named, unnamed = weigh_against_smooth_terms(equations, named, simpler, threshold)
+    whole = equations.fit((*named.terms, *unnamed))
+    noise = estimate_noise(residual_of(equations, whole), problem.mask, limits)
+    equations = equations.weighted(noise.weights)
+    return Decision(
+        equations=equations,
+        noise=noise,
+        entry_threshold=threshold,
+        named=equations.fit(named.terms),
+        unnamed=unnamed,
+        whole=equations.fit((*named.terms, *unnamed)),
+    )
 
 
-def _weigh(search: Search, noise: Noise) -> None:
-    search.weights = noise.weights
-    search.refresh()
+def _largest_that_passes(equations: NormalEquations, subsets: Sequence[Fit], threshold: float) -> Fit:
+    """Return the last set, from the empty one upwards, that passes the entry test against the one before."""
+    named = subsets[0]
+    for fit in subsets[1:]:
+        if passes_entry_test(equations, fit, named, threshold):
+            named = fit
+    return named
 
 
-def _most_telling(search: Search, terms: Sequence[Term]) -> list[tuple[float, Term]]:
-    """Return the term with the best score beside these, if there is any; of curves only the smooth ones."""
-    wheels = len(search.weights)
-    smooth = [group for group in search.dictionary.groups if len(group.columns) <= SMOOTH]
-    scored = [(gain - term.price(wheels), term) for gain, term in search.conditional(terms, smooth)]
-    return [max(scored, key=lambda pair: pair[0])] if scored else []
-
-
-def seek_in_residual(search: Search, candidates: Sequence[Candidate], terms: Iterable[Term]) -> None:
-    """Let candidates with too fine a grid look at the residual for their shapes."""
-    problem = search.dictionary.problem
-    residual = residual_of(search, search.fit(terms))
-    counts = np.maximum(problem.mask.sum(axis=0), 1)
-    memory = float(np.median(counts / np.maximum(search.weights * np.sum(residual**2, axis=0), 1e-300)))
+def with_proposed_shapes(equations: NormalEquations, candidates: Sequence[Candidate]) -> NormalEquations:
+    """Return equations with the shapes and the sines over time that the residual of the free parameters suggests."""
+    problem = equations.problem
+    residual = residual_of(equations, equations.fit(()))
+    autocorrelation_time = _autocorrelation_time(equations, residual)
+    design = equations.design
     for candidate in candidates:
         if shapes := candidate.propose_shapes(problem, residual):
-            quieter = [
-                max(memory / candidate.autocorrelation_time_at(problem, residual, shape), 1.0) for shape in shapes
+            reductions = [
+                max(autocorrelation_time / candidate.autocorrelation_time_at(problem, residual, shape), 1.0)
+                for shape in shapes
             ]
-            add_candidate(search.dictionary, candidate, shapes, quieter)
-    add_beat(search.dictionary, residual)
-    search.refresh()
+            design, _ = with_candidate(design, candidate, shapes, reductions)
+    return equations.over(with_periodic_terms(design, residual))
 
 
-def decide(search: Search, candidates: Sequence[Candidate]) -> Decision:
-    """Choose names, and say what is left without."""
-    noise, left = settle_noise(search)
-    none = search.fit(())
-    search.threshold = naming_threshold(search, left, blocks_of_time(search.dictionary.problem, noise))
-    seek_in_residual(search, candidates, ())
-    sets = best_named(search)[1:]
-    named = none
-    for fit in sets:
-        if enough(search, fit, named):
-            named = fit
-    named = that_transfer(search, named, search.threshold)
-    named, unnamed = without_a_name(search, named, [fit for fit in sets if len(fit.terms) < len(named.terms)])
-    whole = search.fit((*named.terms, *unnamed))
-    noise = estimate_noise(residual_of(search, whole), search.dictionary.problem.mask)
-    search.weights = noise.weights
-    search.refresh()
-    return Decision(search, noise, search.fit(named.terms), unnamed, search.fit((*named.terms, *unnamed)))
+def _autocorrelation_time(equations: NormalEquations, residual: Array) -> float:
+    """Return the autocorrelation time that the weights imply for a residual [time, wheel]."""
+    counts = np.maximum(equations.problem.mask.sum(axis=0), 1)
+    return float(np.median(counts / np.maximum(equations.weights * np.sum(residual**2, axis=0), 1e-300)))

@@ -1,145 +1,175 @@
-"""Shape parameters between the grid's points: an onset to the second, a Stribeck speed, an order."""
+"""Optimisation of shape parameters between the grid's points: an onset to the second, a Stribeck speed, an order."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.normal_equations import add_candidate
-from regolithd.calibration.mismatch.selection.subset_selection import Search, Term
+from regolithd.calibration.mismatch.regression.candidate_groups import coefficient_signs, with_candidate
+from regolithd.calibration.mismatch.regression.group import Term
+from regolithd.calibration.mismatch.regression.schur import delta_chi2_together, schur_complement
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
+Single = NDArray[np.float32]
 
-GOLDEN = (np.sqrt(5) - 1) / 2
-SETTLES = 4
+GOLDEN_RATIO = (np.sqrt(5) - 1) / 2
+SCAN_POINTS = 7
+GOLDEN_STEPS = 14
+"""Narrows the interval by a factor of 0.618^14 = 1/840."""
 
 
-class Profile:
-    """The gain of one candidate as a function of its shape, with other terms in the fit."""
+@dataclass(frozen=True, eq=False)
+class ShapeProfile:
+    """The Δχ² of one candidate on some wheels as a function of its shape, with other terms in the fit.
 
-    def __init__(self, search: Search, others: Sequence[Term], candidate: Candidate, wheels: tuple[int, ...]) -> None:
-        self.search, self.candidate, self.wheels = search, candidate, wheels
-        dictionary = search.dictionary
-        fitted = search.fit(others)
-        self._problem = dictionary.problem
-        count = dictionary.columns.shape[2]
-        self._others = np.zeros((len(fitted.columns), len(wheels), count), np.float32)
-        for row, (column, on) in enumerate(fitted.columns):
-            for place, wheel in enumerate(wheels):
-                if wheel in on:
-                    self._others[row, place] = dictionary.columns[column, wheel]
-        self._inverse = fitted.covariance
-        self._weights = np.sqrt(search.weights[list(wheels)])[:, None].astype(np.float32)
-        residual = dictionary.residual[list(wheels)].astype(np.float64)
-        residual -= np.einsum("r,rwt->wt", fitted.coefficients, self._others, optimize=True)
-        self._left = (residual * self._weights).astype(np.float32)
-        self._flat = (self._others * self._weights).reshape(len(self._others), -1)
+    Attributes
+    ----------
+    equations, candidate, wheels: what is asked
+    inverse: of the other terms' normal equations
+    fitted: the other terms' columns, weighted, shape (column, wheels × time)
+    left: what they leave of the residual, weighted, shape (wheels × time,)
+    """
+
+    equations: NormalEquations
+    candidate: Candidate
+    wheels: tuple[int, ...]
+    inverse: Array
+    fitted: Single
+    left: Single
 
     def along(self, shape: Shape, name: str) -> Callable[[float], float]:
-        """Return the gain as a function of one shape parameter."""
+        """Return Δχ² as a function of one shape parameter."""
         return lambda value: self({**shape, name: value})
 
     def __call__(self, shape: Shape) -> float:
-        """Return the further gain."""
-        dictionary = self.search.dictionary
-        columns = np.asarray(self.candidate.columns(self._problem, shape), np.float64)
-        kept = np.where(self._problem.mask, columns, 0.0)[:, :, list(self.wheels)]
-        fresh = np.swapaxes(kept, 1, 2)[:, :, dictionary.order].astype(np.float32) * self._weights
-        rows = fresh.reshape(len(fresh), -1)
-        cross = (rows @ self._flat.T).astype(np.float64)
-        matrix = (rows @ rows.T).astype(np.float64)
-        own = np.max(np.diag(matrix))
-        matrix -= cross @ self._inverse @ cross.T
-        moment = (rows @ self._left.ravel()).astype(np.float64)
-        values, vectors = np.linalg.eigh(matrix)
-        good = values > 1e-3 * own
-        along = vectors[:, good].T @ moment
-        coefficients = vectors[:, good] @ (along / values[good])
-        signs = [c.sign for c in self.candidate.coefficients[: len(rows)]]
-        if any(s * c < 0 for s, c in zip(signs, coefficients, strict=False)):
-            return 0.0
-        return float(np.sum(along**2 / values[good]))
+        """Return the further Δχ²."""
+        rows = self._weighted_rows(shape)
+        cross = (rows @ self.fitted.T).astype(np.float64)
+        own = (rows @ rows.T).astype(np.float64)
+        moment = (rows @ self.left).astype(np.float64)
+        return delta_chi2_together(
+            moment,
+            schur_complement(own, cross.T, self.inverse),
+            float(np.max(np.diag(own))),
+            coefficient_signs(self.candidate, len(rows)),
+            self.equations.thresholds.least_tolerance,
+        )
+
+    def _weighted_rows(self, shape: Shape) -> Single:
+        problem, design = self.equations.problem, self.equations.design
+        columns = np.asarray(self.candidate.columns(problem, shape), np.float64)
+        kept = np.where(problem.mask, columns, 0.0)[:, :, list(self.wheels)]
+        fresh = np.swapaxes(kept, 1, 2)[:, :, design.order].astype(np.float32)
+        return (fresh * _root_weights(self.equations, self.wheels)).reshape(len(fresh), -1)
 
 
-def refined(search: Search, others: Sequence[Term], term: Term) -> Term:
-    """Return the term with its free shape parameters where they gain most; the dictionary gains its columns."""
+def shape_profile(
+    equations: NormalEquations, others: Sequence[Term], candidate: Candidate, wheels: tuple[int, ...]
+) -> ShapeProfile:
+    """Fit the other terms and return the candidate's profile beside them."""
+    design, fitted = equations.design, equations.fit(others)
+    columns = np.zeros((len(fitted.columns), len(wheels), design.columns.shape[2]), np.float32)
+    for row, (column, on) in enumerate(fitted.columns):
+        for place, wheel in enumerate(wheels):
+            if wheel in on:
+                columns[row, place] = design.columns[column, wheel]
+    weights = _root_weights(equations, wheels)
+    residual = design.residual[list(wheels)].astype(np.float64)
+    residual -= np.einsum("r,rwt->wt", fitted.coefficients, columns, optimize=True)
+    return ShapeProfile(
+        equations=equations,
+        candidate=candidate,
+        wheels=wheels,
+        inverse=fitted.covariance,
+        fitted=(columns * weights).reshape(len(columns), -1),
+        left=(residual * weights).astype(np.float32).ravel(),
+    )
+
+
+def _root_weights(equations: NormalEquations, wheels: tuple[int, ...]) -> Single:
+    return np.sqrt(equations.weights[list(wheels)])[:, None].astype(np.float32)
+
+
+def optimised_shape(equations: NormalEquations, others: Sequence[Term], term: Term) -> tuple[NormalEquations, Term]:
+    """Return the term with its free shape parameters at the largest Δχ², and equations that have its columns."""
     candidate = term.group.candidate
     if candidate is None:
-        return term
+        return equations, term
     if not any(name in term.group.shape for name in candidate.free):
-        return _settled(search, others, term)
-    profile = Profile(search, others, candidate, term.wheels)
+        return _self_consistent(equations, others, term)
+    profile = shape_profile(equations, others, candidate, term.wheels)
     best, gain = dict(term.group.shape), profile(term.group.shape)
-    problem = search.dictionary.problem
-    for name, (low, high) in candidate.bounds(problem, best).items():
-        if name not in best:
-            continue
-        reach = _reach(problem.length_s, name, float(best[name]), low, high)
-        value, found = maximise(profile.along(best, name), *reach)
-        if found > gain:
-            best, gain = {**best, name: value}, found
-    return _settled(search, others, _reshaped(search, term, best))
+    for name, bounds in candidate.bounds(equations.problem, best).items():
+        if name in best:
+            between = candidate.search_range(equations.problem, best, name, bounds)
+            value, found = maximise(profile.along(best, name), *between)
+            if found > gain:
+                best, gain = {**best, name: value}, found
+    equations, term = _reshaped(equations, term, best)
+    return _self_consistent(equations, others, term)
 
 
-def _settled(search: Search, others: Sequence[Term], term: Term) -> Term:
+def _self_consistent(equations: NormalEquations, others: Sequence[Term], term: Term) -> tuple[NormalEquations, Term]:
     """Return the term with a shape that agrees with its coefficients, as far as a few steps lead there."""
-    for _ in range(SETTLES):
+    for _ in range(equations.thresholds.self_consistency_steps):
         if (candidate := term.group.candidate) is None:
             break
-        fit = search.fit((*others, term))
-        scale = search.dictionary.scale[list(term.group.columns)]
+        fit = equations.fit((*others, term))
+        scale = equations.design.scale[list(term.group.columns)]
         values = fit.coefficients[fit.of_term(len(others))] / scale
-        settled = candidate.self_consistent_shape(search.dictionary.problem, term.group.shape, values.tolist())
-        if settled == term.group.shape:
+        shape = candidate.self_consistent_shape(equations.problem, term.group.shape, values.tolist())
+        if shape == term.group.shape:
             break
-        term = _reshaped(search, term, settled)
-    return term
+        equations, term = _reshaped(equations, term, shape)
+    return equations, term
 
 
-def _reshaped(search: Search, term: Term, shape: Shape) -> Term:
-    """Return the term in another shape; the dictionary gains its columns."""
+def _reshaped(equations: NormalEquations, term: Term, shape: Shape) -> tuple[NormalEquations, Term]:
+    """Return the term in another shape, and equations that have its columns."""
     candidate = term.group.candidate
     if candidate is None or shape == term.group.shape:
-        return term
-    (group,) = add_candidate(search.dictionary, candidate, [shape], [term.group.quieter])
-    search.refresh()
-    return Term(group, term.wheels)
+        return equations, term
+    design, (group,) = with_candidate(equations.design, candidate, [shape], [term.group.noise_reduction])
+    return equations.over(design), Term(group, term.wheels)
 
 
-def _reach(length_s: float, name: str, at: float, low: float, high: float) -> tuple[float, float]:
-    """Return where to look: to the neighbouring points of the grid."""
-    if name == "onset_s":
-        return max(low, at - 0.05 * length_s), min(high, at + 0.05 * length_s)
-    spread = 0.35 * max(abs(at), 0.2 * (high - low))
-    return max(low, at - spread), min(high, at + spread)
+def maximise(function: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
+    """Return argument and value of the largest of a coarse scan, then of golden sections around it.
 
-
-def maximise(function: Callable[[float], float], low: float, high: float, steps: int = 14) -> tuple[float, float]:
-    """Return argument and value of the largest of a coarse scan, then golden sections around it."""
-    points = np.linspace(low, high, 7)
+    `scipy.optimize.minimize_scalar` has no scan before its bounded search, and stops elsewhere: published answers
+    would change in their last digits.
+    """
+    points = np.linspace(low, high, SCAN_POINTS)
     values = [function(float(x)) for x in points]
     top = int(np.argmax(values))
-    a, b = float(points[max(top - 1, 0)]), float(points[min(top + 1, 6)])
+    ends = float(points[max(top - 1, 0)]), float(points[min(top + 1, SCAN_POINTS - 1)])
     best, value = float(points[top]), values[top]
-    c, d = b - GOLDEN * (b - a), a + GOLDEN * (b - a)
-    fc, fd = function(c), function(d)
-    for _ in range(steps):
-        if fc > fd:
-            b, d, fd = d, c, fc
-            c = b - GOLDEN * (b - a)
-            fc = function(c)
-        else:
-            a, c, fc = c, d, fd
-            d = a + GOLDEN * (b - a)
-            fd = function(d)
-    for x, f in ((c, fc), (d, fd)):
-        if f > value:
-            best, value = x, f
+    for x, found in golden_section(function, *ends):
+        if found > value:
+            best, value = x, found
     return best, value
+
+
+def golden_section(function: Callable[[float], float], low: float, high: float) -> tuple[tuple[float, float], ...]:
+    """Return the last two inner points and their values after narrowing an interval around a maximum."""
+    left, right = high - GOLDEN_RATIO * (high - low), low + GOLDEN_RATIO * (high - low)
+    at_left, at_right = function(left), function(right)
+    for _ in range(GOLDEN_STEPS):
+        if at_left > at_right:
+            high, right, at_right = right, left, at_left
+            left = high - GOLDEN_RATIO * (high - low)
+            at_left = function(left)
+        else:
+            low, left, at_left = left, right, at_right
+            right = low + GOLDEN_RATIO * (high - low)
+            at_right = function(right)
+    return (left, at_left), (right, at_right)

@@ -1,109 +1,121 @@
-"""What the search finds where nothing is: the residual with its blocks' signs drawn anew, searched in the same way.
+"""Sign-flip test: the score that a search finds where nothing is missing.
 
-A block of one wheel keeps its own autocorrelation and size, and its sign says nothing when nothing is missing. The
-largest score over all candidates, shapes and wheels then has one distribution for the whole search.
+The residual's blocks get new signs and are searched in the same way. A block of one wheel keeps its own autocorrelation
+and size; its sign carries no information where nothing is missing. The largest score over all candidates, shapes and
+wheels then has one distribution for the whole search (a randomisation test, Winkler et al., 2014).
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.selection.subset_selection import Search, Term, shared
+from regolithd.calibration.mismatch.regression.group import Fit, Term
+from regolithd.calibration.mismatch.regression.normal_equations import membership
+from regolithd.calibration.mismatch.regression.penalties import full_penalty
+from regolithd.calibration.mismatch.regression.schur import delta_chi2_of_each, schur_diagonal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.regression.design_matrix import Group
+    from regolithd.calibration.mismatch.regression.group import Group
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
-
-DRAWS = 600
-FALSE_NAMES = 0.005
-"""How often a search may name something where nothing is."""
-LEAST, MOST = 5.0, 12.0
-"""Six hundred draws do not know their own tail: what they say of it is held within these."""
+Index = NDArray[np.int64]
 
 
-def naming_threshold(search: Search, residual: Array, blocks: NDArray[np.int64]) -> float:
-    """Return the score above which a term earns its name."""
-    chance = largest_by_chance(search, (), residual, blocks)
-    return float(np.clip(np.quantile(chance, 1 - FALSE_NAMES) + 1.0, LEAST, MOST))
+def entry_threshold(equations: NormalEquations, residual: Array, blocks: Index) -> float:
+    """Return the score above which a term may be named: a quantile of the largest score by chance, within limits."""
+    limits = equations.thresholds
+    by_chance = largest_by_chance(equations, residual, blocks)
+    quantile = np.quantile(by_chance, 1 - limits.false_name_rate) + limits.sign_flip_margin
+    return float(np.clip(quantile, limits.least_entry, limits.largest_entry))
 
 
-def largest_by_chance(search: Search, given: Sequence[Term], residual: Array, blocks: NDArray[np.int64]) -> Array:
+@dataclass(frozen=True, eq=False)
+class _Draws:
+    """Moments of the columns in each draw, and the free parameters' coefficients there.
+
+    Attributes
+    ----------
+    columns: indices in the design matrix, in the order of the moments
+    moments: shape (draw, wheel, column)
+    fit: of the free parameters
+    coefficients: of the free parameters in each draw, shape (draw, parameter)
+    """
+
+    columns: Index
+    moments: Array
+    fit: Fit
+    coefficients: Array
+
+
+def largest_by_chance(equations: NormalEquations, residual: Array, blocks: Index) -> Array:
     """Return the largest score of single-column candidates in each draw, shape (draw,).
 
-    `residual` [time, wheel] has no structure left, or as little as possible: what stays in it looks like chance.
+    `residual` [time, wheel] has as little structure as possible: what is left of it counts as chance.
     """
-    groups = [g for g in search.dictionary.groups if g.named and len(g.columns) == 1]
+    draws = equations.thresholds.sign_flip_draws
+    groups = [group for group in equations.design.groups if group.named and len(group.columns) == 1]
     if not groups:
-        return np.zeros(DRAWS)
-    fitted = search.fit(given)
-    columns = sorted({c for c, _ in fitted.columns} | {g.columns[0] for g in groups})
-    place = {column: k for k, column in enumerate(columns)}
-    moments = _flipped(_block_scores(search, columns, residual, blocks))
-    largest = np.full(DRAWS, -np.inf)
-    share = np.zeros((len(fitted.columns), len(search.weights)))
-    for row, (_, wheels) in enumerate(fitted.columns):
-        share[row, list(wheels)] = 1
-    at = [place[c] for c, _ in fitted.columns]
-    nuisance = np.einsum("dwc,cw->dc", moments[:, :, at], share) @ fitted.covariance
-    for pattern, kind in search.patterns.items():
-        fitting = [g for g in groups if shared(g, kind) or len(search.weights) == 1]
-        if fitting:
-            scores = _scores(
-                search, fitting, pattern, moments, place, nuisance, fitted.columns, share, fitted.covariance
-            )
+        return np.zeros(draws)
+    drawn = _draw(equations, groups, residual, blocks)
+    largest = np.full(draws, -np.inf)
+    for wheels, kind in equations.wheel_sets.items():
+        shared = [group for group in groups if group.may_be_shared(kind) or len(equations.weights) == 1]
+        if shared:
+            scores = _scores(equations, shared, wheels, drawn)
             largest = np.maximum(largest, scores.max(axis=1))
     return largest
 
 
-def _block_scores(search: Search, columns: list[int], residual: Array, blocks: NDArray[np.int64]) -> Array:
-    """Return Σ column × residual × weight over each block, shape (block, wheel, column)."""
-    dictionary = search.dictionary
-    in_order = blocks[dictionary.order]
+def _draw(equations: NormalEquations, groups: Sequence[Group], residual: Array, blocks: Index) -> _Draws:
+    fit = equations.fit(())
+    columns = np.array(sorted({c for c, _ in fit.columns} | {group.columns[0] for group in groups}), np.int64)
+    scores = block_scores(equations, columns, residual, blocks)
+    moments = sign_flipped(scores, equations.thresholds.sign_flip_draws)
+    at = np.searchsorted(columns, [c for c, _ in fit.columns])
+    share = membership(fit.columns, len(equations.weights))
+    coefficients = np.einsum("dwc,cw->dc", moments[:, :, at], share) @ fit.covariance
+    return _Draws(columns, moments, fit, coefficients)
+
+
+def block_scores(equations: NormalEquations, columns: Index, residual: Array, blocks: Index) -> Array:
+    """Return the sum of column × residual × weight over each block, shape (block, wheel, column)."""
+    design = equations.design
+    in_order = blocks[design.order]
     by_block = np.argsort(in_order, kind="stable")
     starts = np.flatnonzero(np.diff(in_order[by_block], prepend=-1))
-    weighted = (residual * search.weights)[dictionary.order].T[:, by_block].astype(np.float32)
-    sums = [np.add.reduceat(dictionary.columns[c][:, by_block] * weighted, starts, axis=1).T for c in columns]
+    weighted = (residual * equations.weights)[design.order].T[:, by_block].astype(np.float32)
+    sums = [np.add.reduceat(design.columns[c][:, by_block] * weighted, starts, axis=1).T for c in columns]
     return np.stack(sums, axis=2).astype(np.float64)
 
 
-def _flipped(scores: Array) -> Array:
-    """Return moments with the blocks' signs drawn anew, shape (draw, wheel, column)."""
+def sign_flipped(scores: Array, draws: int) -> Array:
+    """Return moments with the signs of the blocks drawn anew, shape (draw, wheel, column)."""
     generator = np.random.default_rng(0)
-    signs = generator.choice([-1.0, 1.0], (DRAWS, *scores.shape[:2]))
+    signs = generator.choice([-1.0, 1.0], (draws, *scores.shape[:2]))
     return np.einsum("dbw,bwc->dwc", signs, scores, optimize=True)
 
 
-def _scores(
-    search: Search,
-    groups: Sequence[Group],
-    pattern: tuple[int, ...],
-    moments: Array,
-    place: dict[int, int],
-    nuisance: Array,
-    fitted: Sequence[tuple[int, tuple[int, ...]]],
-    share: Array,
-    inverse: Array,
-) -> Array:
-    """Return gain less price of each group in each draw, shape (draw, group)."""
-    at = [g.columns[0] for g in groups]
-    rows = [c for c, _ in fitted]
-    chosen = list(pattern)
-    reach = np.zeros((len(rows), len(at)))
-    for w in chosen:
-        reach += share[:, w, None] * search.gram[w][np.ix_(rows, at)]
-    own = search.gram[chosen][:, at, at].sum(axis=0)
-    single = own - np.einsum("sp,st,tp->p", reach, inverse, reach)
-    left = moments[:, chosen][:, :, [place[c] for c in at]].sum(axis=1) - nuisance @ reach
-    signs = np.array([g.signs[0] for g in groups])
-    new = single > 1e-3 * own
-    gain = np.where(new & (left * signs >= 0), left**2 / np.where(new, single, 1.0), 0.0)
-    # Another channel's word is no help here: draws do not touch it.
-    terms = [Term(g, pattern) for g in groups]
-    prices = np.array([term.price(len(search.weights)) + term.bonus for term in terms])
-    return gain - prices
+def _scores(equations: NormalEquations, groups: Sequence[Group], wheels: tuple[int, ...], drawn: _Draws) -> Array:
+    """Return Δχ² less penalty of each group in each draw, shape (draw, group)."""
+    chosen = list(wheels)
+    at = np.array([group.columns[0] for group in groups], np.int64)
+    cross = equations.cross(drawn.fit.columns, at, wheels)
+    energy = equations.gram[chosen][:, at, at].sum(axis=0)
+    moment = drawn.moments[:, chosen][:, :, np.searchsorted(drawn.columns, at)].sum(axis=1)
+    gain = delta_chi2_of_each(
+        moment - drawn.coefficients @ cross,
+        schur_diagonal(energy, cross, drawn.fit.covariance),
+        energy,
+        np.array([group.signs[0] for group in groups]),
+        equations.thresholds.least_tolerance,
+    )
+    # Draws do not touch another channel: what it credits to a fault is left out.
+    terms = [Term(group, wheels) for group in groups]
+    return gain - np.array([full_penalty(term, len(equations.weights), equations.thresholds) for term in terms])

@@ -1,6 +1,7 @@
-"""What has no name: curves that explain more than the names do, or much that they leave.
+"""Smooth terms against named effects: what stays unexplained.
 
-Where one covariate's curve explains clearly more than any name does, the names have not earned it.
+A smooth term wins in two ways: beside the named effects, where it explains much that they leave; and against them,
+where one covariate's curve scores more than several effects of other covariates, which then only imitate it.
 """
 
 from __future__ import annotations
@@ -10,116 +11,127 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
+from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
 from regolithd.calibration.mismatch.selection.best_subsets import (
-    BESIDE_THE_UNKNOWN,
-    UNNAMED_BY,
     acceptable,
-    best_per_family,
-    wandering,
+    best_of_each_smooth_term,
+    wheels_of_faulty_sensors,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.selection.subset_selection import Fit, Search, Term
-
-WORTH_A_CURVE = 0.01
-"""Of the residual's power on its wheels: what is less may be significant and is still nothing to worry about."""
-SHAPE_MISFIT = 0.12
-"""A name whose form explains all but this share of what a free curve could explain has the right form: nature's
-friction curves are not ours to the last percent."""
-ONE_IN_A_THOUSAND = 3.09
-"""Quantile of the normal density."""
+    from regolithd.calibration.mismatch.regression.group import Fit, Term
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 
-def without_a_name(search: Search, named: Fit, simpler: Sequence[Fit]) -> tuple[Fit, tuple[Term, ...]]:
-    """Hold the names against curves that have none.
+def weigh_against_smooth_terms(
+    equations: NormalEquations, named: Fit, simpler: Sequence[Fit], entry_threshold: float
+) -> tuple[Fit, tuple[Term, ...]]:
+    """Return the effects that keep their names, and the smooth terms that they leave.
 
-    A curve wins in two ways: beside the names, where it finds much that they leave; and against them, where one curve
-    says more than several names of unlike covariates, which then only imitate it. But a single name that leaves
-    nothing significant beside it is simpler than either.
+    A simpler set (`simpler`, smallest first) that leaves nothing significant is preferred to a smooth term.
     """
-    alone = best_per_family(search, (), named=False)
+    alone = best_of_each_smooth_term(equations, ())
     if not alone:
         return named, ()
-    named = _that_stay(search, named)
+    named = drop_transients(equations, named)
     curve = alone[0][1]
-    by_curve = search.fit((curve,))
-    imitated = len(named.terms) > 1 and search.score(by_curve) > search.score(named) + search.threshold
-    imitated &= any(_covariate(term) != curve.name for term in named.terms)
+    imitated = _imitates_a_curve(equations, named, curve, entry_threshold)
     for fit in simpler if imitated else ():
-        if _left_over(search, fit) is None:
+        if unexplained_beside(equations, fit) is None:
             return fit, ()
-    left = _left_over(search, named)
+    left = unexplained_beside(equations, named)
     if left is None and not imitated:
         return named, ()
+    beside = _effects_beside_curve(equations, named, curve, entry_threshold)
+    if left is None or imitated or equations.score(beside) >= equations.score(equations.fit((*named.terms, left))):
+        kept = equations.fit([term for term in beside.terms if term.group.named])
+        return drop_what_a_curve_explains(equations, kept, curve), (curve,)
+    return drop_what_a_curve_explains(equations, named, left), (left,)
+
+
+def _imitates_a_curve(equations: NormalEquations, named: Fit, curve: Term, entry_threshold: float) -> bool:
+    """Return whether one curve scores clearly more than several effects, of which some have other covariates."""
+    if len(named.terms) < 2 or all(_covariate(term) == curve.name for term in named.terms):
+        return False
+    return equations.score(equations.fit((curve,))) > equations.score(named) + entry_threshold
+
+
+def _effects_beside_curve(equations: NormalEquations, named: Fit, curve: Term, entry_threshold: float) -> Fit:
+    """Return the fit of a curve with those effects that still pass the entry threshold beside it."""
     kept: tuple[Term, ...] = ()
-    fit = by_curve
+    fit = equations.fit((curve,))
     for term in named.terms:
-        trial = search.fit((*kept, term, curve))
-        if search.score(trial) - search.score(fit) > search.threshold and acceptable(search, trial):
+        trial = equations.fit((*kept, term, curve))
+        if equations.score(trial) - equations.score(fit) > entry_threshold and acceptable(equations, trial):
             kept, fit = (*kept, term), trial
-    if left is None or imitated or search.score(fit) >= search.score(search.fit((*named.terms, left))):
-        return _that_stand_beside(search, search.fit(kept), curve), (curve,)
-    return _that_stand_beside(search, named, left), (left,)
+    return fit
 
 
-def _left_over(search: Search, named: Fit) -> Term | None:
-    """Return the curve that finds much which the names leave, if one does."""
-    curves = best_per_family(search, named.terms, named=False)
-    left = [(score, term) for score, term in curves if not set(term.wheels) <= wandering(named)]
-    if not left or left[0][0] <= UNNAMED_BY:
+def unexplained_beside(equations: NormalEquations, named: Fit) -> Term | None:
+    """Return the best smooth term beside the effects, if it is significant, large, and more than a law's misfit."""
+    limits, faulty = equations.thresholds, wheels_of_faulty_sensors(named)
+    curves = best_of_each_smooth_term(equations, named.terms)
+    left = [(score, term) for score, term in curves if not set(term.wheels) <= faulty]
+    if not left or left[0][0] <= limits.smooth_term_entry:
         return None
-    beside = search.fit((*named.terms, left[0][1]))
-    on = list(left[0][1].wheels)
-    power = np.sum(contribution(search, beside, len(named.terms))[:, on] ** 2)
-    if power < WORTH_A_CURVE * np.sum(residual_of(search, named)[:, on] ** 2):
+    curve = left[0][1]
+    beside = equations.fit((*named.terms, curve))
+    on = list(curve.wheels)
+    power = np.sum(contribution(equations, beside, len(named.terms))[:, on] ** 2)
+    if power < limits.smooth_term_power * np.sum(residual_of(equations, named)[:, on] ** 2):
         return None
-    misfit = (beside.gain - named.gain) / max(beside.gain, 1e-9)
-    return None if named.terms and misfit < SHAPE_MISFIT else left[0][1]
+    misfit = (beside.delta_chi2 - named.delta_chi2) / max(beside.delta_chi2, 1e-9)
+    return None if named.terms and misfit < limits.form_misfit else curve
 
 
 def _covariate(term: Term) -> str:
-    """Return the covariate whose curve could imitate a term: that of speed, along the motion, holds a constant drag."""
+    """Return the covariate whose curve can imitate a term: that of speed, along the motion, holds a constant drag."""
     found = term.group.candidate.covariate if term.group.candidate else term.name
     return "wheel_speed" if found == "direction" else found
 
 
-def _that_stand_beside(search: Search, named: Fit, curve: Term) -> Fit:
-    """Leave out names that say little beside a curve that says much: what has no form leaks into every form."""
-    both = search.fit((*named.terms, curve))
-    unknown = both.gain - named.gain
+def drop_what_a_curve_explains(equations: NormalEquations, named: Fit, curve: Term) -> Fit:
+    """Leave out effects that gain little beside a curve that gains much: what has no law leaks into every law."""
+    both = equations.fit((*named.terms, curve))
+    unknown = both.delta_chi2 - named.delta_chi2
     kept = []
     for index, term in enumerate(named.terms):
-        rest = [*named.terms[:index], *named.terms[index + 1 :], curve]
-        if both.gain - search.fit(rest).gain >= BESIDE_THE_UNKNOWN * unknown:
+        without = equations.fit((*named.without(index), curve))
+        if both.delta_chi2 - without.delta_chi2 >= equations.thresholds.beside_smooth_share * unknown:
             kept.append(term)
-    return search.fit(kept)
+    return equations.fit(kept)
 
 
-def _that_stay(search: Search, named: Fit) -> Fit:
-    """Leave out changes that come and go: what wears or drives onto other soil does not heal.
+def drop_transients(equations: NormalEquations, named: Fit) -> Fit:
+    """Leave out changes that come and go: what wears, or drives onto other soil, does not heal.
 
-    They show in a curve over time on the same wheels that is significant beside them; one covariate and one place need
-    no price for having been chosen from many.
+    They show in a curve over time on the same wheels that is significant beside them. One covariate on given wheels
+    was not selected from many, so a plain test of its Δχ² suffices.
     """
+    curves = [
+        group
+        for group in equations.design.groups
+        if not group.named and group.name == "time" and group.coupling != PERIODIC
+    ]
     kept = []
-    curves = [g for g in search.dictionary.groups if not g.named and g.name == "time" and "periodic" not in g.flavour]
     for term in named.terms:
-        # What another channel shows by itself may come and go: a sensor does.
-        changes = _covariate(term) == "time" and term.group.evidence is None
-        beside = search.conditional(named.terms, curves) if changes else []
-        more = [
-            gain / (gain + named.gain)
+        # A sensor's fault, which its own channel shows, may come and go.
+        is_change = _covariate(term) == "time" and term.group.own_channel is None
+        beside = equations.further(named.terms, curves) if is_change else []
+        shares = [
+            gain / (gain + named.delta_chi2)
             for gain, curve in beside
-            if curve.wheels == term.wheels and gain > _by_chance(len(curve.group.columns))
+            if curve.wheels == term.wheels and gain > _chi2_quantile(equations, len(curve.group.columns))
         ]
-        if max(more, default=0.0) < SHAPE_MISFIT:
+        if max(shares, default=0.0) < equations.thresholds.form_misfit:
             kept.append(term)
-    return named if len(kept) == len(named.terms) else search.fit(kept)
+    return named if len(kept) == len(named.terms) else equations.fit(kept)
 
 
-def _by_chance(columns: int) -> float:
-    """Return what that many coefficients gain one time in a thousand where nothing is (Wilson and Hilferty)."""
-    spread = 2 / (9 * columns)
-    return columns * (1 - spread + ONE_IN_A_THOUSAND * float(np.sqrt(spread))) ** 3
+def _chi2_quantile(equations: NormalEquations, columns: int) -> float:
+    """Return the Δχ² that so many coefficients gain by chance at the level of the test of transients."""
+    from scipy.special import chdtri  # noqa: PLC0415  # the laptop's; reading a recording must not load SciPy
+
+    return float(chdtri(columns, equations.thresholds.transient_level))

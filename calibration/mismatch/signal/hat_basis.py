@@ -1,4 +1,4 @@
-"""Curves without a name: broken lines over a covariate."""
+"""Hat functions: the basis of piecewise linear functions of a covariate."""
 
 from __future__ import annotations
 
@@ -7,17 +7,28 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+OUTER_QUANTILES = (0.005, 0.995)
+"""Quantiles of the covariate at the outermost knots: single extreme readings do not move them."""
+FEWEST_KNOTS = 3
 
-def broken_lines(values: Array, mask: NDArray[np.bool_], knots: int) -> list[Array]:
-    """Return hat functions that sum to 1, on knots that share the data evenly; 0 where the covariate is unknown."""
+
+def hat_functions(values: Array, mask: NDArray[np.bool_], knots: int) -> list[Array]:
+    """Return hat functions of a covariate, each of the covariate's shape; they sum to 1 where it is known.
+
+    Knots are halfway between quantiles and an even spacing. Empty where the covariate has fewer than three knots.
+    """
     known = mask & np.isfinite(values)
     if not known.any():
         return []
-    inside = values[known]
-    low, high = (float(q) for q in np.quantile(inside, [0.005, 0.995]))
-    at = np.unique(0.5 * (np.quantile(inside, np.linspace(0.005, 0.995, knots)) + np.linspace(low, high, knots)))
-    if len(at) < 3 or at[-1] - at[0] <= 0:
+    at = _knots(values[known], knots)
+    if len(at) < FEWEST_KNOTS or at[-1] - at[0] <= 0:
         return []
     clipped = np.clip(np.where(known, values, at[0]), at[0], at[-1])
     hats = [np.interp(clipped, at, row) for row in np.eye(len(at))]
     return [np.where(known, hat, 0.0) for hat in hats]
+
+
+def _knots(inside: Array, count: int) -> Array:
+    low, high = (float(q) for q in np.quantile(inside, OUTER_QUANTILES))
+    quantiles = np.quantile(inside, np.linspace(*OUTER_QUANTILES, count))
+    return np.unique(0.5 * (quantiles + np.linspace(low, high, count)))

@@ -1,4 +1,4 @@
-"""The noise as it is: its size on each wheel, how long it remembers, and the blocks in which it may be taken as new."""
+"""Model of a residual's noise: standard deviation on each wheel and one autocorrelation time."""
 
 from __future__ import annotations
 
@@ -7,48 +7,60 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
+
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Noise:
-    """The residual's noise.
+class NoiseModel:
+    """Stationary noise with a standard deviation of its own on each wheel.
 
     Attributes
     ----------
-    deviation: standard deviation on each wheel, shape (wheel,)
-    memory: Σ of the autocorrelation over all lags: how many values count as one, at least 1
+    deviation: standard deviation, shape (wheel,)
+    autocorrelation_time: sum of the autocorrelation over all lags [readings], at least 1: so many readings carry as
+        much information as one independent reading
     """
 
     deviation: Array
-    memory: float
+    autocorrelation_time: float
 
     @property
     def weights(self) -> Array:
-        """One over the long-run variance, for each wheel: what makes a sum of squares a log-likelihood."""
-        return 1 / (self.deviation**2 * self.memory)
+        """One over the long-run variance, shape (wheel,): a weighted sum of squares is then −2 log likelihood."""
+        return 1 / (self.deviation**2 * self.autocorrelation_time)
 
 
-def estimate_noise(residual: Array, mask: NDArray[np.bool_]) -> Noise:
-    """Estimate from a residual that has no structure left, or as little as possible; shape (time, wheel).
+def estimate_noise(residual: Array, mask: NDArray[np.bool_], thresholds: Thresholds = THRESHOLDS) -> NoiseModel:
+    """Estimate the noise from a residual [time, wheel] that holds as little structure as possible.
 
-    The autocorrelation is pooled over wheels and summed until it first falls into its own uncertainty (Geyer's
-    initial sequence): further lags would only add noise.
+    The autocorrelation is pooled over wheels and summed up to the lag at which it first falls below its own standard
+    error (Geyer, 1992): further lags would add variance and no bias.
     """
     clean = np.where(mask, residual, 0.0)
-    counts = np.maximum(mask.sum(axis=0), 1)
-    deviation = np.sqrt(np.sum(clean**2, axis=0) / counts)
-    deviation = np.where(
-        deviation > 0, deviation, np.median(deviation[deviation > 0]) if np.any(deviation > 0) else 1.0
-    )
-    size = 2 ** int(np.ceil(np.log2(2 * len(clean))))
-    scaled = np.fft.rfft(clean / deviation, size, axis=0)
-    known = np.fft.rfft(mask.astype(np.float64), size, axis=0)
-    lags = len(clean) // 10
-    products = np.fft.irfft(np.abs(scaled) ** 2, size, axis=0)[:lags].sum(axis=1)
-    pairs = np.fft.irfft(np.abs(known) ** 2, size, axis=0)[:lags].sum(axis=1)
-    correlation = products / np.maximum(pairs, 1)
-    doubt = 2 / np.sqrt(max(float(mask.sum()), 1.0))
-    quiet = np.flatnonzero(correlation[1:] < doubt)
-    end = int(quiet[0]) + 1 if quiet.size else lags
-    return Noise(deviation, float(max(1.0, 1 + 2 * np.sum(correlation[1:end]))))
+    deviation = _deviation(clean, mask)
+    lags = int(thresholds.longest_lag_share * len(clean))
+    correlation = _autocorrelation(clean / deviation, mask, lags)
+    standard_error = thresholds.lag_significance / np.sqrt(max(float(mask.sum()), 1.0))
+    insignificant = np.flatnonzero(correlation[1:] < standard_error)
+    end = int(insignificant[0]) + 1 if insignificant.size else lags
+    return NoiseModel(deviation, float(max(1.0, 1 + 2 * np.sum(correlation[1:end]))))
+
+
+def _deviation(clean: Array, mask: NDArray[np.bool_]) -> Array:
+    """Return each wheel's standard deviation; where a wheel has none, the median of the others."""
+    deviation = np.sqrt(np.sum(clean**2, axis=0) / np.maximum(mask.sum(axis=0), 1))
+    positive = deviation[deviation > 0]
+    return np.where(deviation > 0, deviation, np.median(positive) if positive.size else 1.0)
+
+
+def _autocorrelation(scaled: Array, mask: NDArray[np.bool_], lags: int) -> Array:
+    """Return the autocorrelation at lags from 0, pooled over the wheels, shape (lag,)."""
+    size = 2 ** int(np.ceil(np.log2(2 * len(scaled))))
+
+    def summed(values: Array) -> Array:
+        spectrum = np.fft.rfft(values, size, axis=0)
+        return np.asarray(np.fft.irfft(np.abs(spectrum) ** 2, size, axis=0)[:lags].sum(axis=1))
+
+    return summed(scaled) / np.maximum(summed(mask.astype(np.float64)), 1)

@@ -1,4 +1,4 @@
-"""The spectrum of what is summed over evenly spaced places, of angle or of time: where a residual has a line."""
+"""Power spectrum of values summed over evenly spaced places, of angle or of time."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-FINER = 4
-"""Points of the spectrum for each that the places resolve, so that a line between two is not overlooked."""
+ZERO_PADDING = 4
+"""Factor of zero padding: a line halfway between two resolved frequencies then loses a few percent of its power."""
 
 
 def padded_length(last_place: int) -> int:
-    """Return how many places to transform: a power of two, which is quick, and `FINER`."""
-    return FINER * int(2 ** np.ceil(np.log2(last_place + 2)))
+    """Return the length of the transform: `ZERO_PADDING` times the next power of two."""
+    return ZERO_PADDING * int(2 ** np.ceil(np.log2(last_place + 2)))
 
 
 def power_of_sums(place: NDArray[np.int64], values: Array, length: int) -> Array:

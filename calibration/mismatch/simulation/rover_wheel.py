@@ -168,13 +168,22 @@ class RoverWheel(Simulation):
         speed = self._wheel_speed(inputs)
         return {**found, "wheel_speed": speed, "time": inputs["t_s"], "place": self._place_m(inputs, speed)}
 
-    def side(self, wheels: Sequence[int]) -> Array | None:
+    def side(self, wheels: Sequence[int]) -> Array:
         """Odd wheels are on the left."""
         return np.array([-1.0 if wheel % 2 else 1.0 for wheel in wheels])
 
-    def row(self, wheels: Sequence[int]) -> Array | None:
+    def row(self, wheels: Sequence[int]) -> Array:
         """1, 2 in front; 3, 4 in the middle; 5, 6 behind."""
         return np.array([(wheel - 1) // 2 for wheel in wheels], np.float64)
+
+    def contrasts(self, covariate: str, wheels: Sequence[int]) -> Mapping[str, Array]:
+        """Roll and yaw rate act oppositely on the two sides, pitch on front and rear."""
+        side, row = self.side(wheels), self.row(wheels)
+        if covariate in {"roll", "yaw_rate"}:
+            return {"opposite sides": side}
+        if covariate == "pitch" and np.ptp(row) > 0:
+            return {"opposite ends": row - np.mean(row)}
+        return {}
 
     def variants(self) -> Mapping[str, float]:
         """Physics that the model has in it, switched off: candidates switch it on."""

@@ -16,7 +16,7 @@ from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.comparison import Comparison, compare
 from regolithd.calibration.mismatch.corrected import corrected_tables, effect_of, stated_effects
 from regolithd.calibration.mismatch.data.recording import from_columns
-from regolithd.calibration.mismatch.problem.problem import build_problem
+from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.simulation.load import load_simulation
 from regolithd.calibration.toml_document import to_toml
 

@@ -11,10 +11,11 @@ from drives import columns, recording, simulation
 
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.data.recording import from_columns
-from regolithd.calibration.mismatch.problem.problem import Problem, build_problem
+from regolithd.calibration.mismatch.problem.build import build_problem
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.problem.problem import Problem
 
 CONTRACT = {
     "coulomb-friction": "direction",

@@ -1,0 +1,108 @@
+"""Collinearity: effects and free parameters of which one could stand for another in this recording."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from regolithd.calibration.mismatch.answer import Indistinguishable
+from regolithd.calibration.mismatch.inference.experiment import experiment_for
+from regolithd.calibration.mismatch.regression.group import Term
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+EXACT = 1e12
+"""Prior precision of a scaled coefficient that counts as known exactly."""
+
+
+def collinear_sets(equations: NormalEquations, given: Fit, entry_threshold: float) -> tuple[Indistinguishable, ...]:
+    """Return sets of effects of which each could stand for each, were it there at a size worth telling apart.
+
+    What the simulation's free parameters can imitate belongs to a set as well: constant speed on flat ground makes
+    Coulomb friction, viscous friction and cohesion one.
+    """
+    terms = representatives(equations)
+    like = {
+        one: {two for two in terms if two != one and imitates(equations, given, terms[one], terms[two])}
+        for one in terms
+    }
+    found, seen = [], set()
+    for name in terms:
+        members = _mutual(name, like)
+        if frozenset(members) in seen:
+            continue
+        seen.add(frozenset(members))
+        first = [terms[member][0] for member in members]
+        names = (*members, *parameters_like(equations, given.terms, first))
+        if len(names) > 1:
+            experiment = experiment_for(equations, given.terms, first, entry_threshold)
+            found.append(Indistinguishable(names, experiment))
+    return tuple(found)
+
+
+def _mutual(name: str, like: dict[str, set[str]]) -> list[str]:
+    """Return a set of effects, in alphabetical order, of which each is like each."""
+    members = {name}
+    for other in sorted(like[name]):
+        if all(other in like[member] and member in like[other] for member in members):
+            members.add(other)
+    return sorted(members)
+
+
+def representatives(equations: NormalEquations) -> dict[str, list[Term]]:
+    """Return every shape of each candidate that all wheels may share, if it has few columns."""
+    found: dict[str, list[Term]] = {}
+    most = equations.thresholds.most_imitating_columns
+    for group in equations.design.groups:
+        shared = "all" in group.sharing or len(equations.weights) == 1
+        if group.named and shared and len(group.columns) <= most:
+            found.setdefault(group.name, []).append(Term(group, equations.all_wheels))
+    return found
+
+
+def energy_apart(equations: NormalEquations, given: Sequence[Term], term: Term, factor: float = 1.0) -> float:
+    """Return the Δχ² of a term outside the span of all else, at `factor` times the size worth telling apart."""
+    counts = equations.weights @ equations.design.counts.sum(axis=0)
+    size = equations.thresholds.effect_to_tell_apart * equations.problem.mean_size
+    return float(factor * equations.tolerance(given, term) * size**2 * counts)
+
+
+def imitates(equations: NormalEquations, given: Fit, one: list[Term], two: list[Term]) -> bool:
+    """Return whether some shape of `two` would pass for the middle shape of `one` one time in twenty.
+
+    Where the free parameters hide an effect of the size worth telling apart, one that is just found is meant, unless
+    that is implausibly large.
+    """
+    limits, term = equations.thresholds, one[len(one) // 2]
+    alone = energy_apart(equations, given.terms, term)
+    if alone < 2 * limits.told_apart / limits.largest_plausible_factor**2:
+        return False
+    factor = max(2 * limits.told_apart / alone, 1.0)
+    return any(energy_apart(equations, (*given.terms, other), term, factor) < limits.told_apart for other in two)
+
+
+def parameters_like(equations: NormalEquations, given: Sequence[Term], members: Sequence[Term]) -> list[str]:
+    """Return the free parameters, by their names as effects, that could stand for every member."""
+    names = equations.problem.simulation.parameter_effects
+    return [
+        names[name]
+        for place, name in enumerate(equations.nuisance.names)
+        if name in names and _parameter_like(equations, given, members, place)
+    ]
+
+
+def _parameter_like(equations: NormalEquations, given: Sequence[Term], members: Sequence[Term], place: int) -> bool:
+    """Return whether a parameter, were it as wrong as that takes, could stand for every member."""
+    limits, nuisance = equations.thresholds, equations.nuisance
+    free = equations.with_nuisance(nuisance.with_precision(place, 0.0))
+    if max(energy_apart(free, given, member) for member in members) >= limits.told_apart:
+        return False
+    if len(members) > 1:
+        return True
+    # One effect alone is taken for a parameter only where the parameter's own uncertainty hides it.
+    exact = equations.with_nuisance(nuisance.with_precision(place, EXACT))
+    hidden = energy_apart(equations, given, members[0]) <= limits.told_apart
+    return hidden and energy_apart(exact, given, members[0]) >= 2 * limits.told_apart

@@ -1,0 +1,141 @@
+"""The arrays behind an answer: residuals over time and over each covariate, parameters, and the terms to add."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.answer import Contribution, Curve, Evidence
+from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
+from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.regression.smooth_groups import WITHOUT_SMOOTH_TERM
+from regolithd.calibration.mismatch.signal.binning import binned_means, even_edges
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+    from regolithd.calibration.mismatch.selection.decision import Decision
+    from regolithd.calibration.mismatch.signal.noise import NoiseModel
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+CURVE_BINS = 24
+FEWEST_READINGS = 100
+"""Readings below which no curve is made."""
+WITHOUT_CURVE = WITHOUT_SMOOTH_TERM - {"direction"}
+
+
+def evidence_of(decision: Decision) -> Evidence:
+    """Return what a picture of the answer needs."""
+    equations, named, noise = decision.equations, decision.named, decision.noise
+    problem = equations.problem
+    nan = np.where(problem.mask, 0.0, np.nan)
+    before, after = (residual_of(equations, fit) + nan for fit in (equations.fit(()), named))
+    blocks = blocks_of_time(problem, noise)
+    return Evidence(
+        channel=problem.simulation.channel,
+        unit=problem.simulation.unit,
+        time_s=problem.time_s[:, 0],
+        wheels=problem.recording.wheels,
+        measured=problem.measured,
+        before=problem.measured - before,
+        after=problem.measured - after,
+        map_time_s=_block_centres(problem, blocks),
+        map_before=_standardised_block_means(problem, noise, before, blocks),
+        map_after=_standardised_block_means(problem, noise, after, blocks),
+        curves=_curves(decision, before, after),
+        values=calibrated_values(equations, named),
+        contributions=_contributions(equations, named),
+        problem=problem,
+    )
+
+
+def wheel_names(problem: Problem, wheels: Sequence[int]) -> tuple[int, ...]:
+    """Return the names of those wheels of which something is known."""
+    return tuple(problem.recording.wheels[w] for w in wheels if problem.mask[:, w].any())
+
+
+def calibrated_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:
+    """Return the simulation's parameters, and each wheel's own deviations, as the fit has them."""
+    problem, nuisance = equations.problem, equations.nuisance
+    shift = fit.coefficients[: len(nuisance.names)] / equations.design.scale[list(nuisance.columns)]
+    moved = dict(zip(nuisance.names, shift.tolist(), strict=True))
+    return {name: problem.values.get(name, 0.0) + moved.get(name, 0.0) for name in {**problem.values, **moved}}
+
+
+def _contributions(equations: NormalEquations, fit: Fit) -> tuple[Contribution, ...]:
+    """Return the named terms as a corrected simulation holds them."""
+    scale = equations.design.scale
+    return tuple(
+        Contribution(
+            name=term.name,
+            shape=term.group.shape,
+            coefficients=tuple((fit.coefficients[fit.of_term(i)] / scale[list(term.group.columns)]).tolist()),
+            wheels=wheel_names(equations.problem, term.wheels),
+        )
+        for i, term in enumerate(fit.terms)
+    )
+
+
+def _block_centres(problem: Problem, blocks: Index) -> Array:
+    count = int(blocks.max()) + 1
+    return np.bincount(blocks, problem.time_s[:, 0], count) / np.bincount(blocks, minlength=count)
+
+
+def _standardised_block_means(problem: Problem, noise: NoiseModel, residual: Array, blocks: Index) -> Array:
+    """Return block means of the residual along the motion over their standard errors, shape (block, wheel)."""
+    along = problem.covariates.get("direction", np.ones(problem.mask.shape))
+    count = int(blocks.max()) + 1
+    signed, wheels = np.nan_to_num(residual * along), range(residual.shape[1])
+    sums = np.stack([np.bincount(blocks, signed[:, w], count) for w in wheels], axis=1)
+    counts = np.stack([np.bincount(blocks, problem.mask[:, w], count) for w in wheels], axis=1)
+    errors = noise.deviation * np.sqrt(noise.autocorrelation_time * np.maximum(counts, 1))
+    return np.where(counts > 0, sums / errors, np.nan)
+
+
+def _curves(decision: Decision, before: Array, after: Array) -> tuple[Curve, ...]:
+    """Return the residual against each covariate, most significant first, on the wheels that terms concern."""
+    problem = decision.equations.problem
+    wheels = sorted({w for term in decision.whole.terms for w in term.wheels}) or list(decision.equations.all_wheels)
+    couplings = {"offset": np.ones(problem.mask.shape), "gain": np.sign(problem.filled)}
+    if "direction" in problem.covariates:
+        couplings["drag"] = problem.covariates["direction"]
+    found = [
+        _curve(problem, name, coupling, (before * factor, after * factor), decision.noise, wheels)
+        for name in problem.covariates
+        if name not in WITHOUT_CURVE
+        for coupling, factor in couplings.items()
+    ]
+    curves = [curve for curve in found if curve is not None]
+    return tuple(sorted(curves, key=lambda curve: -float(np.mean((curve.before / curve.standard_error) ** 2))))
+
+
+def _curve(
+    problem: Problem, name: str, coupling: str, residuals: Sequence[Array], noise: NoiseModel, wheels: list[int]
+) -> Curve | None:
+    """Return mean residuals in bins of a covariate; None where there are too few readings or values."""
+    values = problem.covariates[name]
+    kept = problem.mask & np.isfinite(values)
+    kept[:, [w for w in range(kept.shape[1]) if w not in wheels]] = False
+    if kept.sum() < FEWEST_READINGS:
+        return None
+    edges = even_edges(values[kept], CURVE_BINS)
+    if len(edges) < 3:
+        return None
+    binned = binned_means(values[kept], edges, *(residual[kept] for residual in residuals))
+    variance = np.mean(noise.deviation[wheels] ** 2) * noise.autocorrelation_time
+    return Curve(
+        covariate=name,
+        coupling=coupling,
+        at=binned.at,
+        before=binned.means[0],
+        after=binned.means[1],
+        standard_error=float(np.sqrt(variance)) / np.sqrt(binned.count),
+        wheels=tuple(problem.recording.wheels[w] for w in wheels),
+    )

@@ -1,0 +1,141 @@
+"""Sandwich covariance: how much estimated coefficients scatter, whatever the autocorrelation of the noise.
+
+The covariance is A⁻¹ B A⁻¹ with A the information and B the covariance of the scores' sums over blocks of time (Huber,
+1967; Liang and Zeger, 1986). Shape parameters enter by the slope of the prediction with them, and inexact laws by their
+discrepancy (`regression.discrepancy_basis`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.regression.discrepancy_basis import discrepancy_basis
+from regolithd.calibration.mismatch.regression.residuals import residual_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+SINGULAR = 1e-9
+"""Relative eigenvalue below which a direction counts as undetermined."""
+
+
+@dataclass(frozen=True)
+class ShapeSlope:
+    """A shape parameter's part in the linearised fit.
+
+    Attributes
+    ----------
+    term: index of the term in the fit
+    name: the shape parameter's
+    scale: root mean square of the prediction's slope with it: its column is divided by this
+    """
+
+    term: int
+    name: str
+    scale: float
+
+
+@dataclass(frozen=True, eq=False)
+class Linearisation:
+    """A fit as a linear function of everything that is uncertain.
+
+    Attributes
+    ----------
+    columns: coefficients' columns, then shape parameters' slopes, then discrepancies, shape (column, time, wheel)
+    precision: prior precision of each, shape (column,)
+    slopes: what the columns after the coefficients' are
+    ends: where each term's discrepancies begin, and after the last one end, shape (term + 1,)
+    """
+
+    columns: Array
+    precision: Array
+    slopes: tuple[ShapeSlope, ...]
+    ends: Index
+
+    def of_term(self, fit: Fit, index: int) -> list[int]:
+        """Return the places of all columns of a term: its coefficients', slopes and discrepancies."""
+        coefficients = fit.of_term(index)
+        shapes = [len(fit.columns) + place for place, slope in enumerate(self.slopes) if slope.term == index]
+        return [*range(coefficients.start, coefficients.stop), *shapes, *range(self.ends[index], self.ends[index + 1])]
+
+
+def linearised(equations: NormalEquations, fit: Fit) -> Linearisation:
+    """Return the linearisation of a fit."""
+    columns = [*_coefficient_columns(equations, fit)]
+    slopes = []
+    for slope, column in _shape_slopes(equations, fit):
+        slopes.append(slope)
+        columns.append(column)
+    shape = equations.problem.mask.shape
+    discrepancies = [discrepancy_basis(equations, fit, index) for index in range(len(fit.terms))]
+    sizes = [len(basis) for basis in discrepancies]
+    precision = np.full(sum(sizes), equations.thresholds.discrepancy_std**-2)
+    precision = np.concatenate((np.zeros(len(columns)), precision))
+    precision[: len(equations.nuisance.columns)] = equations.nuisance.precision
+    stacked = np.stack(columns) if columns else np.zeros((0, *shape))
+    ends = len(columns) + np.cumsum([0, *sizes])
+    return Linearisation(np.concatenate((stacked, *discrepancies)), precision, tuple(slopes), ends)
+
+
+def _coefficient_columns(equations: NormalEquations, fit: Fit) -> Iterator[Array]:
+    """Yield each coefficient's column on its wheels, shape (time, wheel)."""
+    design = equations.design
+    for column, wheels in fit.columns:
+        values = np.zeros(design.residual.shape)
+        for w in wheels:
+            values[w] = design.columns[column, w]
+        yield design.in_time(values)
+
+
+def _shape_slopes(equations: NormalEquations, fit: Fit) -> Iterator[tuple[ShapeSlope, Array]]:
+    """Yield the prediction's slope with each shape parameter that is no change point, shape (time, wheel)."""
+    problem, design = equations.problem, equations.design
+    for index, term in enumerate(fit.terms):
+        candidate, shape = term.group.candidate, term.group.shape
+        if candidate is None:
+            continue
+        values = fit.coefficients[fit.of_term(index)] / design.scale[list(term.group.columns)]
+        for name, (low, high) in candidate.bounds(problem, shape).items():
+            if name not in shape or name == candidate.change_point:
+                continue
+            step = equations.thresholds.slope_step * (high - low)
+            changed = candidate.columns(problem, {**shape, name: float(shape[name]) + step})
+            slope = np.einsum("c,ctw->tw", values, changed - candidate.columns(problem, shape)) / step
+            on = np.zeros(slope.shape[1])
+            on[list(term.wheels)] = 1
+            slope = np.where(problem.mask, slope, 0.0) * on
+            scale = float(np.sqrt(np.mean(slope**2)))
+            if scale > 0:
+                yield ShapeSlope(index, name, scale), slope / scale
+
+
+def sandwich(equations: NormalEquations, fit: Fit, linearisation: Linearisation, blocks: Index) -> tuple[Array, Array]:
+    """Return how far all would move from where they stand, and their covariance.
+
+    The fit's own coefficients are at their optimum, priors included, and do not move; what was not fitted does.
+    """
+    columns, precision, weights = linearisation.columns, linearisation.precision, equations.weights
+    information = np.einsum("atw,w,btw->ab", columns, weights, columns, optimize=True)
+    inverse = np.linalg.pinv(information + np.diag(precision), rcond=SINGULAR, hermitian=True)
+    scores = columns * (residual_of(equations, fit) * weights)[None]
+    sums = block_sums(scores, blocks)
+    count = int(blocks.max()) + 1
+    middle = sums.T @ sums * count / max(count - 1, 1) + np.diag(precision)
+    pull = np.where(np.arange(len(information)) < len(fit.columns), 0.0, sums.sum(axis=0))
+    return inverse @ pull, inverse @ middle @ inverse
+
+
+def block_sums(scores: Array, blocks: Index) -> Array:
+    """Return the scores' sums over each block of each wheel, shape (block × wheel, column): independent draws."""
+    sums = np.add.reduceat(scores, np.flatnonzero(np.diff(blocks, prepend=-1)), axis=1)
+    return sums.transpose(1, 2, 0).reshape(-1, len(scores))

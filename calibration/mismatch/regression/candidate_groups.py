@@ -1,0 +1,66 @@
+"""Groups of candidates: each candidate's columns in each shape, with their penalties."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.regression.group import Group
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
+
+Array = NDArray[np.float64]
+
+
+def coefficient_signs(candidate: Candidate, count: int) -> tuple[int, ...]:
+    """Return the sign of each of `count` columns; columns beyond the declared coefficients may have either."""
+    declared = tuple(coefficient.sign for coefficient in candidate.coefficients[:count])
+    return declared + (0,) * (count - len(declared))
+
+
+def with_candidate(
+    design: DesignMatrix, candidate: Candidate, shapes: Sequence[Shape], noise_reductions: Sequence[float] = ()
+) -> tuple[DesignMatrix, tuple[Group, ...]]:
+    """Return the design matrix with a candidate in each of these shapes, and the new groups.
+
+    `noise_reductions` is how much less noise there is at the frequencies of each shape than in the long run.
+    """
+    problem, groups = design.problem, []
+    columns: list[Array] = []
+    selected_from_many = 2 * float(np.log(candidate.shape_count(problem)))
+    for shape, reduction in zip(shapes, noise_reductions or [1.0] * len(shapes), strict=True):
+        found = np.asarray(candidate.columns(problem, shape), np.float64)
+        first = design.size + len(columns)
+        columns += list(found)
+        groups.append(
+            Group(
+                name=candidate.name,
+                columns=tuple(range(first, first + len(found))),
+                signs=coefficient_signs(candidate, len(found)),
+                sharing=candidate.sharing,
+                selection_penalty=selected_from_many + candidate.prior_penalty(problem, shape),
+                candidate=candidate,
+                shape=shape,
+                noise_reduction=reduction,
+                own_channel=candidate.own_channel_evidence(problem, shape),
+                acting=np.any(np.where(problem.mask, found, 0.0) != 0, axis=1) if len(found) > 1 else None,
+            )
+        )
+    extended, _ = design.extended(columns)
+    return extended.with_groups((*design.groups, *groups)), tuple(groups)
+
+
+def with_candidates(
+    design: DesignMatrix, candidates: Sequence[Candidate]
+) -> tuple[DesignMatrix, tuple[Candidate, ...]]:
+    """Return the design matrix with every candidate that this recording allows, in its grid of shapes; and those."""
+    applicable = tuple(candidate for candidate in candidates if candidate.applies(design.problem))
+    for candidate in applicable:
+        design, _ = with_candidate(design, candidate, candidate.shapes(design.problem))
+    return design, applicable

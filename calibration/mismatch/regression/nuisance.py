@@ -1,0 +1,61 @@
+"""Nuisance parameters: the simulation's free parameters, fitted with every set of terms and held by their priors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.problem.prior import own_name
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """Where the free parameters' tangents are in the design matrix, and how firmly their priors hold them.
+
+    Attributes
+    ----------
+    names: of the parameters; a wheel's own deviation is named by `own_name`
+    columns: indices in the design matrix
+    precision: one over the prior variance of each scaled coefficient, shape (parameter,)
+    """
+
+    names: tuple[str, ...]
+    columns: tuple[int, ...]
+    precision: Array
+
+    def with_precision(self, place: int, value: float) -> Nuisance:
+        """Return the same parameters with another precision of one of them."""
+        precision = self.precision.copy()
+        precision[place] = value
+        return replace(self, precision=precision)
+
+
+def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:
+    """Add ∂prediction/∂parameter of every parameter whose prior has a spread, and of each wheel's own deviation."""
+    names, stds, tangents = _tangents(design.problem)
+    design, places = design.extended(tangents)
+    # The coefficient of a column that was divided by its scale is the parameter's shift times that scale.
+    precision = 1 / (np.array(stds) * design.scale[list(places)]) ** 2 if places else np.zeros(0)
+    return design, Nuisance(tuple(names), places, precision)
+
+
+def _tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
+    """Return names, prior standard deviations and tangents, shape (time, wheel) each."""
+    simulation, wheels = problem.simulation, problem.recording.wheels
+    free = {name: prior.std for name, prior in simulation.parameters.items() if prior.std > 0}
+    names, stds, tangents = list(free), list(free.values()), [problem.tangent(name) for name in free]
+    for name in free if len(wheels) > 1 else ():
+        if name in simulation.own_to_each_wheel:
+            names += [own_name(name, wheel) for wheel in wheels]
+            stds += [problem.thresholds.own_share * free[name]] * len(wheels)
+            tangents += [np.where(np.array(wheels) == wheel, problem.tangent(name), 0.0) for wheel in wheels]
+    return names, stds, tangents

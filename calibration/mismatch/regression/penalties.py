@@ -1,0 +1,45 @@
+"""What a term has to gain beyond chance: penalties in units of Δχ² (twice a log likelihood ratio)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.regression.group import Term
+    from regolithd.calibration.mismatch.thresholds import Thresholds
+
+
+def penalty(term: Term, wheel_count: int, thresholds: Thresholds) -> float:
+    """Return the penalty of a term less what its own channel credits to it."""
+    return full_penalty(term, wheel_count, thresholds) - own_channel_credit(term, thresholds)
+
+
+def full_penalty(term: Term, wheel_count: int, thresholds: Thresholds) -> float:
+    """Return the penalty of a term's coefficients, of its shape's selection, and of the choice of its wheels."""
+    group, acting = term.group, term.group.acting
+    count = len(group.columns) if acting is None else np.sum(acting[:, list(term.wheels)].any(axis=1))
+    total = thresholds.coefficient_penalty * float(count) + group.selection_penalty
+    if len(term.wheels) < wheel_count:
+        total += 2 * float(np.log(2 * wheel_count))
+        # One wheel alone is the rule for some faults and the exception for what all wheels are built with.
+        total += thresholds.single_wheel_penalty if "all" in group.sharing else 0.0
+    return total
+
+
+def own_channel_credit(term: Term, thresholds: Thresholds) -> float:
+    """Return the part of a fault's Δχ² in its own channel that counts in the predicted one: one cause for both."""
+    if term.group.own_channel is None:
+        return 0.0
+    return min(thresholds.own_channel_share * _own_channel_gain(term), thresholds.largest_own_channel_credit)
+
+
+def visible_in_own_channel(term: Term, thresholds: Thresholds) -> bool:
+    """Return whether a fault's own channel shows it; true of what has no other channel."""
+    return term.group.own_channel is None or _own_channel_gain(term) > thresholds.own_channel_visible
+
+
+def _own_channel_gain(term: Term) -> float:
+    assert term.group.own_channel is not None  # noqa: S101  # the callers asked
+    return float(np.sum(term.group.own_channel[0][list(term.wheels)]))

@@ -1,0 +1,61 @@
+"""Schur complements: what columns still explain beside others that are fitted already.
+
+With normal equations in blocks, [[A, B], [Bᵀ, C]], the columns of the second block have the energy C − Bᵀ A⁻¹ B outside
+the span of the first. Their Δχ² beside the first is rᵀ (C − Bᵀ A⁻¹ B)⁻¹ r, with r their moment on the first's residual
+(Frisch, Waugh and Lovell).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Array = NDArray[np.float64]
+
+
+def explained_part(cross: Array, inverse: Array) -> Array:
+    """Return Bᵀ A⁻¹ B, shape (new, new), from B of shape (fitted, new) and A⁻¹."""
+    return cross.T @ inverse @ cross
+
+
+def schur_complement(own: Array, cross: Array, inverse: Array) -> Array:
+    """Return C − Bᵀ A⁻¹ B, shape (new, new)."""
+    return own - explained_part(cross, inverse)
+
+
+def schur_diagonal(own_diagonal: Array, cross: Array, inverse: Array) -> Array:
+    """Return the diagonal of the Schur complement alone, shape (new,): for many columns, each by itself."""
+    return own_diagonal - np.einsum("sp,st,tp->p", cross, inverse, cross)
+
+
+def delta_chi2_of_each(
+    moment: Array, complement: Array, own_diagonal: Array, signs: Array, least_tolerance: float
+) -> Array:
+    """Return the Δχ² of columns each by itself, shape (…, new).
+
+    It is 0 for a column that is a combination of the fitted ones, or whose coefficient has the wrong sign.
+    """
+    new = complement > least_tolerance * own_diagonal
+    allowed = new & (moment * signs >= 0)
+    return np.where(allowed, moment**2 / np.where(new, complement, 1.0), 0.0)
+
+
+def delta_chi2_together(
+    moment: Array, complement: Array, largest_energy: float, signs: Sequence[int], least_tolerance: float
+) -> float:
+    """Return the Δχ² of columns together; 0 where a coefficient has the wrong sign.
+
+    Directions with less than `least_tolerance` of the largest column's energy are left out.
+    """
+    values, vectors = np.linalg.eigh(complement)
+    kept = values > least_tolerance * largest_energy
+    along = vectors[:, kept].T @ moment
+    coefficients = vectors[:, kept] @ (along / values[kept])
+    if any(sign * value < 0 for sign, value in zip(signs, coefficients, strict=True)):
+        return 0.0
+    return float(np.sum(along**2 / values[kept]))

@@ -1,0 +1,118 @@
+"""Smooth terms: piecewise linear functions of a covariate, and sines over time, that stand for no known physics."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.regression.group import Group
+from regolithd.calibration.mismatch.signal.hat_basis import FEWEST_KNOTS, hat_functions
+from regolithd.calibration.mismatch.signal.spectrum import padded_length, power_of_sums
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from regolithd.calibration.mismatch.candidates.candidate import Sharing
+    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
+
+Array = NDArray[np.float64]
+
+WITHOUT_SMOOTH_TERM = frozenset({"direction", "wheel_angle", "wheel_acceleration", "place"})
+"""Covariates of two values, without bound, or with their own candidates alone."""
+PERIODIC = "drag, periodic"
+"""Coupling of a sine over time."""
+
+
+def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
+    """Add, for each covariate, smooth terms that act as drag, as an offset, and in proportion to the prediction."""
+    problem = design.problem
+    couplings = couplings_of(problem)
+    for name, values in problem.covariates.items():
+        if name not in WITHOUT_SMOOTH_TERM and not _differs_between_wheels_only(problem, values):
+            curve = np.abs(values) if name == "wheel_speed" else values
+            hats = hat_functions(curve, problem.mask, problem.thresholds.curve_knots)
+            for coupling, factor, sharing in (
+                _ways_to_act(problem, name, couplings) if len(hats) >= FEWEST_KNOTS else ()
+            ):
+                design = _with_group(design, name, [hat * factor for hat in hats], coupling, sharing)
+    speed = problem.covariates.get("wheel_speed")
+    if speed is not None and np.nanmin(speed) < 0:
+        # What acts one way only is neither a drag nor an offset.
+        hats = hat_functions(speed, problem.mask, problem.thresholds.curve_knots)
+        design = _with_group(design, "wheel_speed", hats, "each way")
+    coupling = "drag" if "drag" in couplings else "offset"
+    hats = hat_functions(problem.covariates["time"], problem.mask, problem.thresholds.time_knots)
+    return _with_group(design, "time", [hat * couplings[coupling] for hat in hats], coupling)
+
+
+def couplings_of(problem: Problem) -> dict[str, Array]:
+    """Return the factors, shape (time, wheel), by which a smooth function may act on the prediction."""
+    found = {"offset": np.ones(problem.mask.shape), "gain": problem.filled}
+    if "direction" in problem.covariates:
+        found["drag"] = np.nan_to_num(problem.covariates["direction"])
+    return found
+
+
+def _ways_to_act(
+    problem: Problem, covariate: str, couplings: dict[str, Array]
+) -> Iterator[tuple[str, Array, tuple[Sharing, ...]]]:
+    """Yield coupling, factor and sharing: on all or on one wheel, and oppositely on two parts of the machine."""
+    for coupling, factor in couplings.items():
+        yield coupling, factor, ("all", "one")
+    direction = np.nan_to_num(problem.covariates.get("direction", np.ones(problem.mask.shape)))
+    for name, contrast in problem.contrasts(covariate).items():
+        yield f"drag, {name}", direction * contrast, ("all",)
+
+
+def _with_group(
+    design: DesignMatrix,
+    covariate: str,
+    columns: Sequence[Array],
+    coupling: str,
+    sharing: tuple[Sharing, ...] = ("all", "one"),
+    selection_penalty: float = 0.0,
+) -> DesignMatrix:
+    """Add columns of either sign as one group."""
+    design, places = design.extended(columns)
+    if not places:
+        return design
+    group = Group(
+        name=covariate,
+        columns=places,
+        signs=(0,) * len(places),
+        sharing=sharing,
+        selection_penalty=selection_penalty,
+        coupling=coupling,
+    )
+    return design.with_groups((*design.groups, group))
+
+
+def _differs_between_wheels_only(problem: Problem, values: Array) -> bool:
+    """Return whether a covariate hardly varies but from wheel to wheel: a curve over it would be a list of wheels."""
+    known = values[problem.mask & np.isfinite(values)]
+    return problem.variance_within(values) < problem.thresholds.least_variance_within * float(np.var(known))
+
+
+def with_periodic_terms(design: DesignMatrix, residual: Array) -> DesignMatrix:
+    """Add the strongest sine over time in a residual [time, wheel], acting as drag: of all wheels, and of each."""
+    problem, limits = design.problem, design.problem.thresholds
+    along = np.nan_to_num(problem.covariates.get("direction", np.ones(problem.mask.shape)))
+    time_s, step_s = problem.time_s[:, 0], problem.recording.step_s
+    lowest_Hz, highest_Hz = limits.fewest_periods / problem.length_s, 1 / (limits.shortest_period * step_s)
+    if lowest_Hz >= highest_Hz:
+        return design
+    place = np.rint(time_s / step_s).astype(np.int64)
+    length = padded_length(int(place[-1]))
+    frequency_Hz = np.fft.rfftfreq(length, step_s)
+    searched = (frequency_Hz >= lowest_Hz) & (frequency_Hz <= highest_Hz)
+    power = np.stack([power_of_sums(place, values, length) for values in (residual * along * problem.mask).T])
+    # As many frequencies were open to choice as the recording resolves.
+    selection_penalty = 2 * float(np.log(problem.length_s * highest_Hz))
+    for of_wheels in (power.sum(axis=0), *power):
+        phase = 2 * np.pi * frequency_Hz[np.argmax(np.where(searched, of_wheels, 0.0))] * problem.time_s
+        sines = [along * np.cos(phase), along * np.sin(phase)]
+        design = _with_group(design, "time", sines, PERIODIC, selection_penalty=selection_penalty)
+    return design

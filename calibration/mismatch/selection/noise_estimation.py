@@ -1,0 +1,63 @@
+"""The noise of a residual that still has structure in it: terms are taken out before the noise is estimated.
+
+An effect that is left in makes the noise larger and its autocorrelation time longer, and is then insignificant itself.
+So the most significant terms are taken out first, under a short autocorrelation time, whether they are significant or
+not: their few coefficients hardly lower the estimate. Then, with that noise, only what is significant is taken out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.regression.group import Term
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+Array = NDArray[np.float64]
+
+
+def noise_beside_terms(equations: NormalEquations) -> tuple[NoiseModel, Array]:
+    """Return the noise and the residual [time, wheel] that is left when all that explains something is taken out."""
+    limits = equations.thresholds
+    first = _noise_beside(equations, ())
+    short = min(first.autocorrelation_time, limits.provisional_autocorrelation_time)
+    provisional = equations.weighted(NoiseModel(first.deviation, short).weights)
+    second = _noise_beside(provisional, _most_significant(provisional, limits.provisional_terms, -np.inf))
+    weighted = equations.weighted(second.weights)
+    least_score = limits.noise_term_share * limits.smooth_term_entry
+    terms = _most_significant(weighted, 2 * limits.provisional_terms, least_score)
+    return _noise_beside(weighted, terms), residual_of(weighted, weighted.fit(terms))
+
+
+def _noise_beside(equations: NormalEquations, terms: Sequence[Term]) -> NoiseModel:
+    """Return the noise of what these terms leave."""
+    left = residual_of(equations, equations.fit(terms))
+    return estimate_noise(left, equations.problem.mask, equations.thresholds)
+
+
+def _most_significant(equations: NormalEquations, most: int, least_score: float) -> list[Term]:
+    """Return up to `most` terms by forward selection, as long as each scores more than `least_score`.
+
+    Smooth terms with many columns are left out: they follow the noise itself.
+    """
+    limited = [
+        group for group in equations.design.groups if len(group.columns) <= equations.thresholds.noise_term_columns
+    ]
+    terms: list[Term] = []
+    for _ in range(most):
+        scored = [(gain - equations.penalty(term), term) for gain, term in equations.further(terms, limited)]
+        if not scored:
+            break
+        score, best = max(scored, key=lambda pair: pair[0])
+        if score <= least_score:
+            break
+        terms.append(best)
+    return terms

@@ -1,0 +1,40 @@
+"""Means of quantities in bins of a covariate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BinnedMeans:
+    """Means in bins.
+
+    Attributes
+    ----------
+    at: mean of the covariate, shape (bin,)
+    count: values in a bin, at least 1, shape (bin,)
+    means: of each quantity, shape (bin,) each
+    """
+
+    at: Array
+    count: NDArray[np.int64]
+    means: tuple[Array, ...]
+
+
+def even_edges(values: Array, bins: int) -> Array:
+    """Return bin edges that hold equal numbers of values; fewer where values coincide."""
+    return np.unique(np.quantile(values, np.linspace(0, 1, bins + 1)))
+
+
+def binned_means(values: Array, edges: Array, *quantities: Array) -> BinnedMeans:
+    """Return the means of quantities (n,) in bins of the values (n,); what is beyond the edges is in the outer bins."""
+    bins = len(edges) - 1
+    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
+    count = np.maximum(np.bincount(place, minlength=bins), 1)
+    at, *means = (np.bincount(place, quantity, bins) / count for quantity in (values, *quantities))
+    return BinnedMeans(at, count, tuple(means))

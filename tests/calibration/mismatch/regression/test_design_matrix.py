@@ -1,0 +1,99 @@
+"""The design matrix: scaled columns and their sums of products, which extensions leave alone."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from linear import AXES, INSTANTS, design_of, problem_of, table
+
+from regolithd.calibration.mismatch.regression import design_matrix
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
+
+RNG = np.random.default_rng(0)
+COLUMNS = [RNG.normal(size=(INSTANTS, AXES)) * scale for scale in (1.0, 5.0, 0.1)]
+
+
+@pytest.fixture(scope="module")
+def empty() -> DesignMatrix:
+    """Return a design matrix without columns, of a recording with an outlier."""
+    columns = table(drag=0.3)
+    columns["reading_V"][40] = 1e3
+    return design_of(problem_of(columns))
+
+
+def test_sums_of_products_are_those_of_the_scaled_columns(empty: DesignMatrix) -> None:
+    """For each fold and wheel, outside the mask nothing."""
+    design, places = empty.extended(COLUMNS)
+    assert places == (0, 1, 2)
+    mask, order = design.problem.mask, design.order
+    assert not mask.all()
+    scaled = np.stack([np.where(mask, c, 0) for c in COLUMNS]) / design.scale[:, None, None]
+    np.testing.assert_allclose(np.sqrt((scaled**2).sum(axis=(1, 2)) / mask.sum()), 1)
+    residual = np.where(mask, design.problem.measured - 2.0, 0)
+    for fold, (a, b) in enumerate(zip(design.cuts[:-1], design.cuts[1:], strict=True)):
+        for wheel in range(AXES):
+            here = scaled[:, order[a:b], wheel]
+            np.testing.assert_allclose(design.gram[fold, wheel], here @ here.T, rtol=1e-4, atol=1e-3)
+            np.testing.assert_allclose(design.moment[fold, wheel], here @ residual[order[a:b], wheel], atol=1e-2)
+            assert design.energy[fold, wheel] == pytest.approx(np.sum(residual[order[a:b], wheel] ** 2), rel=1e-4)
+            assert design.counts[fold, wheel] == mask[order[a:b], wheel].sum()
+
+
+def test_columns_added_one_by_one_are_the_same_as_at_once(empty: DesignMatrix) -> None:
+    """Products between old and new columns are made when the new ones come."""
+    at_once, _ = empty.extended(COLUMNS)
+    one_by_one = empty
+    for column in COLUMNS:
+        one_by_one, _ = one_by_one.extended([column])
+    np.testing.assert_allclose(one_by_one.gram, at_once.gram, atol=1e-3)
+    np.testing.assert_allclose(one_by_one.moment, at_once.moment, atol=1e-4)
+    np.testing.assert_array_equal(one_by_one.columns, at_once.columns)
+
+
+def test_extending_leaves_the_first_as_it_was(empty: DesignMatrix) -> None:
+    """Two different extensions of one design matrix do not see each other's columns."""
+    base, _ = empty.extended(COLUMNS[:1])
+    before = base.gram.copy()
+    one, (place,) = base.extended(COLUMNS[1:2])
+    other, (same_place,) = base.extended(COLUMNS[2:])
+    assert place == same_place == 1
+    assert base.size == 1
+    np.testing.assert_array_equal(base.gram, before)
+    assert np.mean(one.columns[1] != other.columns[1]) > 0.99
+    np.testing.assert_allclose(one.extended([])[0].gram, one.gram)
+    straight, _ = empty.extended([COLUMNS[0], COLUMNS[1]])
+    np.testing.assert_allclose(one.gram, straight.gram, atol=1e-3)
+    np.testing.assert_allclose(one.moment, straight.moment, atol=1e-4)
+
+
+def test_growing_beyond_the_capacity_keeps_everything(empty: DesignMatrix, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Columns and products survive a new allocation."""
+    monkeypatch.setattr(design_matrix, "FIRST_CAPACITY", 4)
+    many = [np.roll(COLUMNS[0], k, axis=0) for k in range(12)]
+    design, _ = design_of(empty.problem).extended(many[:3])
+    before = design.gram.copy()
+    for k in range(3, 12, 3):
+        design, places = design.extended(many[k : k + 3])
+        assert places == (k, k + 1, k + 2)
+    np.testing.assert_array_equal(design.gram[:, :, :3, :3], before)
+    np.testing.assert_allclose(design.gram, np.swapaxes(design.gram, 2, 3), atol=1e-3)
+    at_once, _ = empty.extended(many)
+    np.testing.assert_allclose(design.gram, at_once.gram, atol=1e-3)
+
+
+def test_the_order_of_time_is_restored(empty: DesignMatrix) -> None:
+    """A column comes back as it was."""
+    design, _ = empty.extended(COLUMNS[:1])
+    restored = design.in_time(design.columns[0]) * design.scale[0]
+    np.testing.assert_allclose(restored, np.where(design.problem.mask, COLUMNS[0], 0), atol=1e-5)
+
+
+def test_a_column_of_zeros_keeps_the_scale_one(empty: DesignMatrix) -> None:
+    """Nothing is divided by nothing."""
+    design, _ = empty.extended([np.zeros((INSTANTS, AXES))])
+    assert design.scale[0] == 1
+    assert not design.columns.any()

@@ -1,0 +1,107 @@
+"""Groups of the design matrix: free parameters, candidates, smooth terms and discrepancies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from linear import CANDIDATES, INSTANTS, Drag, Level, Power, design_of, equations_of, problem_of, table, term_of
+
+from regolithd.calibration.mismatch.regression.candidate_groups import coefficient_signs, with_candidate
+from regolithd.calibration.mismatch.regression.discrepancy_basis import discrepancy_basis
+from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
+from regolithd.calibration.mismatch.regression.residuals import active_rms, contribution
+from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, with_periodic_terms, with_smooth_terms
+
+PROBLEM = problem_of(table(drag=0.3))
+
+
+def test_free_parameters_have_their_tangents_and_priors() -> None:
+    """The level's tangent is 1, so that the scaled coefficient is the level's shift itself."""
+    design, nuisance = with_nuisance(design_of(PROBLEM))
+    assert nuisance.names == ("level",)
+    np.testing.assert_allclose(nuisance.precision, [1 / 0.5**2], rtol=1e-6)
+    assert design.scale[0] == pytest.approx(1.0)
+    assert nuisance.with_precision(0, 7.0).precision[0] == 7.0
+    assert nuisance.precision[0] == pytest.approx(4.0, rel=1e-6)
+
+
+def test_each_wheel_may_have_a_deviation_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A third as large as the common one, and on its own wheel."""
+    monkeypatch.setattr(Level, "own_to_each_wheel", frozenset({"level"}))
+    design, nuisance = with_nuisance(design_of(PROBLEM))
+    assert nuisance.names == ("level", "level of 1", "level of 2")
+    shift_std = 1 / np.sqrt(nuisance.precision) / design.scale[list(nuisance.columns)]
+    np.testing.assert_allclose(shift_std, [0.5, 0.5 / 3, 0.5 / 3])
+    assert not design.columns[1, 1].any()
+    assert not design.columns[2, 0].any()
+
+
+def test_a_candidate_has_a_group_for_each_shape() -> None:
+    """Each pays for the choice among them."""
+    design, groups = with_candidate(design_of(PROBLEM), Power(), Power().shapes(PROBLEM), [1.0, 2.5])
+    assert [group.columns for group in groups] == [(0,), (1,)]
+    assert [group.shape["power"] for group in groups] == [1.0, 2.0]
+    assert [group.noise_reduction for group in groups] == [1.0, 2.5]
+    assert groups[0].selection_penalty == pytest.approx(2 * np.log(2))
+    assert groups[0].signs == (1,)
+    assert design.groups == groups
+    with pytest.raises(ValueError, match="zip"):
+        with_candidate(design, Power(), Power().shapes(PROBLEM), [1.0])
+
+
+def test_columns_without_a_declared_coefficient_may_have_either_sign() -> None:
+    """A ripple declares one amplitude and has two columns for each wheel."""
+    assert coefficient_signs(Drag(), 1) == (1,)
+    assert coefficient_signs(Drag(), 3) == (1, 0, 0)
+
+
+def test_smooth_terms_cover_covariates_and_couplings() -> None:
+    """Over the speed: as offset, gain and drag, and each way; over time: along the motion."""
+    design = with_smooth_terms(design_of(PROBLEM))
+    found = {(group.name, group.coupling, len(group.columns)) for group in design.groups}
+    assert {("wheel_speed", coupling, 8) for coupling in ("offset", "gain", "drag", "each way")} <= found
+    assert ("time", "drag", 48) in found
+    assert not {"direction", "wheel_angle", "wheel_acceleration"} & {name for name, _, _ in found}
+    assert all(not group.named and set(group.signs) == {0} for group in design.groups)
+
+
+def test_the_strongest_sine_over_time_is_added() -> None:
+    """Of all wheels together and of each, along the motion, at the frequency of the residual's line."""
+    along = PROBLEM.covariates["direction"]
+    residual = along * np.sin(2 * np.pi * 0.05 * PROBLEM.time_s) * np.array([1.0, 0.0])
+    design = with_periodic_terms(design_of(PROBLEM), residual)
+    assert len(design.groups) == 3
+    group = design.groups[0]
+    assert group.coupling == PERIODIC
+    assert group.selection_penalty == pytest.approx(2 * np.log(PROBLEM.length_s / (5 * 0.5)))
+    columns = np.stack([design.in_time(design.columns[c])[:, 0] for c in group.columns], axis=1)
+    left = residual[:, 0] - columns @ np.linalg.lstsq(columns, residual[:, 0], rcond=None)[0]
+    assert np.sum(left**2) < 0.05 * np.sum(residual**2)
+
+
+def test_discrepancies_are_shares_of_the_effect_along_its_covariate_and_on_each_wheel() -> None:
+    """A constant effect varies along time; on one wheel there is nothing to differ between wheels."""
+    equations = equations_of(PROBLEM)
+    fit = equations.fit([term_of(equations, "drag"), term_of(equations, "power", (1,))])
+    both, single = discrepancy_basis(equations, fit, 0), discrepancy_basis(equations, fit, 1)
+    effect = contribution(equations, fit, 0)
+    assert both.shape == (6 + 2, INSTANTS, 2)
+    np.testing.assert_allclose(both[:6].sum(axis=0), effect, atol=1e-9)
+    np.testing.assert_allclose(both[6:].sum(axis=0), effect, atol=1e-9)
+    assert len(single) == 6
+    assert not single[:, :, 0].any()
+
+
+def test_an_intermittent_effect_is_as_large_as_two_fifths_of_itself() -> None:
+    """A constant one is its root mean square."""
+    assert active_rms(np.full(1000, 4.0), 0.4) == pytest.approx(2.0)
+    now_and_then = np.zeros(1000)
+    now_and_then[:10] = 4.0
+    assert active_rms(now_and_then, 0.4) == pytest.approx(0.8)
+    assert active_rms(np.zeros(10), 0.4) == 0
+
+
+def test_every_candidate_is_in_the_design_once_for_each_shape() -> None:
+    """The grid of the four candidates has one, one, two and nine shapes."""
+    names = [group.name for group in equations_of(PROBLEM).design.groups]
+    assert [names.count(candidate.name) for candidate in CANDIDATES] == [1, 1, 2, 9]

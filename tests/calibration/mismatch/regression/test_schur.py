@@ -1,0 +1,83 @@
+"""Schur complements: what explicit regressions say of columns beside others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch.regression.schur import (
+    delta_chi2_of_each,
+    delta_chi2_together,
+    explained_part,
+    schur_complement,
+    schur_diagonal,
+)
+
+RNG = np.random.default_rng(0)
+FITTED, NEW = RNG.normal(size=(200, 4)), RNG.normal(size=(200, 3))
+READING = RNG.normal(size=200) + NEW @ [0.3, -0.2, 0.1]
+INVERSE = np.linalg.inv(FITTED.T @ FITTED)
+CROSS, OWN = FITTED.T @ NEW, NEW.T @ NEW
+
+
+def squares_left(columns: np.ndarray) -> float:
+    """Return the sum of squares that a regression leaves."""
+    left = READING - columns @ np.linalg.lstsq(columns, READING, rcond=None)[0]
+    return float(left @ left)
+
+
+def moment() -> np.ndarray:
+    """Return the new columns' products with what the fitted ones leave."""
+    return NEW.T @ (READING - FITTED @ INVERSE @ FITTED.T @ READING)
+
+
+def test_the_complement_is_the_energy_of_residualised_columns() -> None:
+    """Frisch, Waugh and Lovell: regress the new columns on the fitted ones first."""
+    outside = NEW - FITTED @ INVERSE @ CROSS
+    np.testing.assert_allclose(schur_complement(OWN, CROSS, INVERSE), outside.T @ outside)
+    np.testing.assert_allclose(explained_part(CROSS, INVERSE) + outside.T @ outside, OWN)
+    np.testing.assert_allclose(schur_diagonal(np.diag(OWN), CROSS, INVERSE), np.diag(outside.T @ outside))
+
+
+def test_delta_chi2_is_the_difference_of_residual_sums() -> None:
+    """Of each column by itself, and of all together."""
+    complement = schur_complement(OWN, CROSS, INVERSE)
+    before = squares_left(FITTED)
+    each = delta_chi2_of_each(moment(), np.diag(complement), np.diag(OWN), np.zeros(3), 1e-3)
+    for place, gain in enumerate(each):
+        assert gain == pytest.approx(before - squares_left(np.column_stack((FITTED, NEW[:, place]))))
+    together = delta_chi2_together(moment(), complement, float(np.diag(OWN).max()), (0, 0, 0), 1e-3)
+    assert together == pytest.approx(before - squares_left(np.column_stack((FITTED, NEW))))
+
+
+def test_a_coefficient_of_the_wrong_sign_gains_nothing() -> None:
+    """One wrong sign among several suffices."""
+    complement = schur_complement(OWN, CROSS, INVERSE)
+    energy = float(np.diag(OWN).max())
+    signs = np.sign(np.linalg.solve(complement, moment()))
+    right = delta_chi2_together(moment(), complement, energy, [int(s) for s in signs], 1e-3)
+    assert right > 0
+    for place in range(3):
+        wrong = [int(-s if place == k else s) for k, s in enumerate(signs)]
+        assert delta_chi2_together(moment(), complement, energy, wrong, 1e-3) == 0
+    each = delta_chi2_of_each(moment(), np.diag(complement), np.diag(OWN), -np.sign(moment()), 1e-3)
+    np.testing.assert_array_equal(each, 0)
+
+
+def test_a_combination_of_fitted_columns_gains_nothing() -> None:
+    """Its complement is rounding, and nothing is divided by it."""
+    same = FITTED @ [1.0, -2.0, 0.5, 0.0]
+    cross, own = FITTED.T @ same[:, None], np.array([[same @ same]])
+    complement = schur_complement(own, cross, INVERSE)
+    left = np.array([same @ READING - cross[:, 0] @ INVERSE @ FITTED.T @ READING])
+    assert delta_chi2_of_each(left, np.diag(complement), np.diag(own), np.zeros(1), 1e-3)[0] == 0
+    assert delta_chi2_together(left, complement, float(own[0, 0]), (0,), 1e-3) == 0
+
+
+def test_many_draws_of_moments_are_judged_at_once() -> None:
+    """The shape (draw, column) is kept."""
+    draws = RNG.normal(size=(5, 3))
+    found = delta_chi2_of_each(draws, np.ones(3), np.ones(3), np.array([1, 0, -1]), 1e-3)
+    np.testing.assert_allclose(found[:, 1], draws[:, 1] ** 2)
+    np.testing.assert_allclose(found[:, 0], np.where(draws[:, 0] >= 0, draws[:, 0] ** 2, 0))
+    np.testing.assert_allclose(found[:, 2], np.where(draws[:, 2] <= 0, draws[:, 2] ** 2, 0))

@@ -1,0 +1,68 @@
+"""The noise model: standard deviations and the autocorrelation time of noise whose truth is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
+from regolithd.calibration.mismatch.thresholds import Thresholds
+
+
+def autoregressive(persistence: float, deviations: tuple[float, ...], instants: int = 20_000) -> np.ndarray:
+    """Return first-order autoregressive noise, shape (time, wheel)."""
+    rng = np.random.default_rng(1)
+    values = rng.normal(size=(instants, len(deviations)))
+    for k in range(1, instants):
+        values[k] = persistence * values[k - 1] + np.sqrt(1 - persistence**2) * values[k]
+    return values * np.array(deviations)
+
+
+@pytest.mark.parametrize("persistence", [0.0, 0.5, 0.9])
+def test_an_autoregressive_noise_has_its_autocorrelation_time(persistence: float) -> None:
+    """The sum over all lags of persistence^|lag| is (1 + persistence) / (1 − persistence)."""
+    residual = autoregressive(persistence, (0.5, 2.0))
+    noise = estimate_noise(residual, np.ones(residual.shape, bool))
+    np.testing.assert_allclose(noise.deviation, [0.5, 2.0], rtol=0.05)
+    assert noise.autocorrelation_time == pytest.approx((1 + persistence) / (1 - persistence), rel=0.1)
+
+
+def test_what_is_masked_has_no_part_in_the_estimate() -> None:
+    """Absurd values outside the mask change nothing."""
+    residual = autoregressive(0.5, (1.0, 1.0), 6000)
+    mask = np.random.default_rng(2).uniform(size=residual.shape) > 0.3
+    spoilt = np.where(mask, residual, 1e6)
+    one, other = estimate_noise(residual, mask), estimate_noise(spoilt, mask)
+    np.testing.assert_array_equal(one.deviation, other.deviation)
+    assert one.autocorrelation_time == other.autocorrelation_time
+    assert one.autocorrelation_time == pytest.approx(3.0, rel=0.2)
+
+
+def test_a_wheel_without_residual_takes_the_deviation_of_the_others() -> None:
+    """A silent wheel would else have an infinite weight."""
+    residual = autoregressive(0.0, (1.0, 3.0, 0.0), 2000)
+    noise = estimate_noise(residual, np.ones(residual.shape, bool))
+    assert noise.deviation[2] == pytest.approx(np.median(noise.deviation[:2]))
+    nothing = estimate_noise(np.zeros((300, 2)), np.ones((300, 2), bool))
+    np.testing.assert_array_equal(nothing.deviation, [1.0, 1.0])
+
+
+def test_noise_that_alternates_counts_as_white() -> None:
+    """An autocorrelation time is at least one reading."""
+    residual = np.tile([[1.0], [-1.0]], (500, 1))
+    assert estimate_noise(residual, np.ones(residual.shape, bool)).autocorrelation_time == 1.0
+
+
+def test_lags_end_at_the_threshold() -> None:
+    """With a stricter limit of significance fewer lags are summed."""
+    residual = autoregressive(0.9, (1.0,), 3000)
+    mask = np.ones(residual.shape, bool)
+    strict = estimate_noise(residual, mask, Thresholds(lag_significance=20.0))
+    assert strict.autocorrelation_time < 0.8 * estimate_noise(residual, mask).autocorrelation_time
+    short = estimate_noise(residual, mask, Thresholds(longest_lag_share=0.002))
+    assert short.autocorrelation_time < 0.8 * estimate_noise(residual, mask).autocorrelation_time
+
+
+def test_weights_are_one_over_the_long_run_variance() -> None:
+    """A deviation of 2 and 5 readings for one make 1 / 20."""
+    np.testing.assert_allclose(NoiseModel(np.array([2.0]), 5.0).weights, [0.05])
