@@ -141,19 +141,19 @@ estimates in the field are close to it: 3.6–3.9 kPa and 26–28° for every wh
 
 
 def _record(results: Results) -> str:
-    said, ours = published.SET_500, results.record
+    paper, ours = published.SET_500, results.record
     rows = [
         [
             "c (Pa)",
-            f"{said['cohesion_Pa']:.0f}",
+            f"{paper['cohesion_Pa']:.0f}",
             f"{ours.cohesion_Pa:.0f} ± {ours.cohesion_std_Pa:.0f}",
-            f"{ours.cohesion_Pa - said['cohesion_Pa']:+.0f}",
+            f"{ours.cohesion_Pa - paper['cohesion_Pa']:+.0f}",
         ],
         [
             "φ (°)",
-            f"{said['friction_angle_deg']:.1f}",
+            f"{paper['friction_angle_deg']:.1f}",
             f"{ours.angle_deg:.1f} ± {ours.angle_std_deg:.1f}",
-            f"{ours.angle_deg - said['friction_angle_deg']:+.1f}",
+            f"{ours.angle_deg - paper['friction_angle_deg']:+.1f}",
         ],
     ]
     names = {"radius_m": "r = {:g} m", "width_m": "w = {:g} m", "gain_factor": "gain × {:g}"}
@@ -181,17 +181,17 @@ def _tables(results: Results) -> str:
         ground = each.ground
         rows = []
         for k in range(6):
-            said_c, said_a = published.COHESION_PA[ground][k], published.ANGLE_DEG[ground][k]
+            paper_c, paper_a = published.COHESION_PA[ground][k], published.ANGLE_DEG[ground][k]
             mean_c, mean_a = float(cohesion[:, k].mean()), float(angle[:, k].mean())
             rows.append(
                 [
                     str(k + 1),
-                    f"{said_c} ({published.COHESION_RSD[ground][k]:.1f})",
+                    f"{paper_c} ({published.COHESION_RSD[ground][k]:.1f})",
                     f"{mean_c:.0f} ({relative_std(cohesion)[k]:.1f})",
-                    f"{100 * (mean_c / said_c - 1):+.0f} %",
-                    f"{said_a:.1f} ({published.ANGLE_RSD[ground][k]:.1f})",
+                    f"{100 * (mean_c / paper_c - 1):+.0f} %",
+                    f"{paper_a:.1f} ({published.ANGLE_RSD[ground][k]:.1f})",
                     f"{mean_a:.1f} ({relative_std(angle)[k]:.1f})",
-                    f"{mean_a - said_a:+.1f}",
+                    f"{mean_a - paper_a:+.1f}",
                     f"{relative_std(each.current_A)[k]:.1f} / {relative_std(each.load_N)[k]:.1f}",
                 ]
             )

@@ -94,22 +94,22 @@ def traverse(traverses: Sequence[SyntheticTraverse], path: Path, wheel: int = 5)
         made = figure(11, 6)
         panels = made.subplots(2, 2, sharex=True, sharey="row")
         for column, each in enumerate(traverses):
-            for row, (values, said, label) in enumerate(
+            for row, (values, published_mean, label) in enumerate(
                 (
                     (each.cohesion_Pa / 1e3, published.COHESION_PA[each.ground][wheel - 1] / 1e3, "c (kPa)"),
                     (each.angle_deg, published.ANGLE_DEG[each.ground][wheel - 1], "φ (°)"),
                 )
             ):
-                _trace(panels[row, column], time, values[:, wheel - 1], said, label if column == 0 else "")
+                _trace(panels[row, column], time, values[:, wheel - 1], published_mean, label if column == 0 else "")
             panels[0, column].set_title(f"{each.ground} ground, wheel {wheel}")
             panels[1, column].set_xlabel("time (s)")
         panels[0, 0].legend(loc="lower left", ncols=3, fontsize=9)
         save(made, path)
 
 
-def _trace(panel: Axes, time: Array, values: Array, said: float, label: str) -> None:
+def _trace(panel: Axes, time: Array, values: Array, published_mean: float, label: str) -> None:
     shown = np.s_[::EVERY]
     panel.plot(time[shown], values[shown], color=OURS, linewidth=0.7, label="paper's network, synthetic traverse")
     panel.axhline(values.mean(), color=OURS, linestyle="--", label="its mean")
-    panel.axhline(said, color=PAPER, linewidth=2, label="the paper's mean")
+    panel.axhline(published_mean, color=PAPER, linewidth=2, label="the paper's mean")
     panel.set_ylabel(label)
