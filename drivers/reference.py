@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from regolithd.drivers.canopen.object_dictionary import variable
 from regolithd.drivers.devices.decoding.pdo import rpdos, tpdos
-from regolithd.drivers.devices.device import Command, Measured
+from regolithd.drivers.devices.device import Commanded, Measured
 from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.devices.registry import DEVICES
 from regolithd.drivers.master.boot_configuration import Write, boot_writes
@@ -85,7 +85,7 @@ def _pdo_rows(device: Device, pdo: DevicePdo) -> Iterator[str]:
 def _meaning(each: PdoObject) -> str:
     if isinstance(each, Measured):
         return f"`{each.quantity.name}` = raw × {each.scale:.6g}"
-    return "command" if isinstance(each, Command) else "status"
+    return "command" if isinstance(each, Commanded) else "status"
 
 
 def _node_ids(device: Device) -> str:

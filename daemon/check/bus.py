@@ -12,12 +12,12 @@ from regolithd.daemon.check.finding import Finding, good, unknown, warning, wron
 from regolithd.drivers.can.open_bus import open_bus
 from regolithd.drivers.errors import BusError
 from regolithd.drivers.master.bus_load import bus_load
-from regolithd.drivers.master.scan import probe
+from regolithd.drivers.master.scan import scan
 
 if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Bus, Configuration
     from regolithd.daemon.control.protocol import Status
-    from regolithd.drivers.master.scan import Probe
+    from regolithd.drivers.master.scan import ScanResult
 
 CAN_LINK = "280"  # ARPHRD_CAN, if_arp.h
 _LINKS = Path("/sys/class/net")
@@ -38,7 +38,7 @@ async def check_bus(configuration: Configuration, running: Status | None) -> lis
         return [*link, *load, *nodes_of_daemon(running)]
     try:
         async with open_bus(bus.interface, bus.channel, bitrate=bus.bitrate) as opened:
-            found = await probe(opened, configuration.nodes.described())
+            found = await scan(opened, configuration.nodes.described())
     except BusError as error:
         return [
             *link,
@@ -119,7 +119,7 @@ def _text(path: Path) -> str:
         return ""
 
 
-def judge_nodes(found: list[Probe]) -> list[Finding]:
+def judge_nodes(found: list[ScanResult]) -> list[Finding]:
     """Return a finding for each node with a problem, and one for all the others."""
     lines = [
         (wrong if each.node.required else warning)(

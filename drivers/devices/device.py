@@ -73,14 +73,14 @@ class Validity:
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class Commanded:
     """An object that the master writes by RPDO."""
 
     index: int
     subindex: int = 0
 
 
-PdoObject = Measured | Validity | Command
+PdoObject = Measured | Validity | Commanded
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from regolithd.drivers.canopen.sdo_abort import Abort, AbortError
 from regolithd.drivers.devices.device import (
     EVENT_DRIVEN,
-    Command,
+    Commanded,
     Device,
     Measured,
     PdoLayout,
@@ -274,7 +274,7 @@ MOTOR_CONTROLLER = Device(
         ),
     ),
     # Commands act at once: a quick stop must not wait for a SYNC, nor be lost with it.
-    rpdos=(PdoLayout(1, (Command(CONTROLWORD), Command(TARGET_VELOCITY)), EVENT_DRIVEN),),
+    rpdos=(PdoLayout(1, (Commanded(CONTROLWORD), Commanded(TARGET_VELOCITY)), EVENT_DRIVEN),),
     settings=(
         Setting(MODE, 0, PROFILE_VELOCITY),
         Setting(ABORT_CONNECTION_OPTION, 0, 3),  # on the master's loss: quick stop

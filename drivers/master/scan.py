@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Probe:
+class ScanResult:
     """What was found at the node-ID of a configured node. `problem` is empty where there is none."""
 
     node: NodeDescription
@@ -38,9 +38,9 @@ class Probe:
     remedy: str = ""
 
 
-async def probe(
+async def scan(
     bus: Bus, nodes: Sequence[NodeDescription], *, listen_s: float = 1.0, sdo_timeout_s: float = 0.5
-) -> list[Probe]:
+) -> list[ScanResult]:
     """Read every node's identity, all at once, and listen for heartbeats for `listen_s`.
 
     The bus must have no other reader in this program. While a daemon is booting nodes, its SDO answers may be mistaken
@@ -53,7 +53,7 @@ async def probe(
         await asyncio.sleep(listen_s)
         await asyncio.wait(asking)
         reader.cancel()
-    return [_probe(remote, asked.result()) for remote, asked in zip(remotes, asking, strict=True)]
+    return [_result(remote, asked.result()) for remote, asked in zip(remotes, asking, strict=True)]
 
 
 async def _read(bus: Bus, remotes: Sequence[RemoteNode]) -> None:
@@ -76,18 +76,18 @@ async def _ask(remote: RemoteNode) -> Identity | SdoError | BusError:
         return error
 
 
-def _probe(remote: RemoteNode, found: Identity | SdoError | BusError) -> Probe:
+def _result(remote: RemoteNode, found: Identity | SdoError | BusError) -> ScanResult:
     node, state = remote.node, remote.state
     if isinstance(found, BusError):
-        return Probe(node, answers=False, identity=None, nmt_state=state, problem=str(found), remedy=found.remedy)
+        return ScanResult(node, answers=False, identity=None, nmt_state=state, problem=str(found), remedy=found.remedy)
     if isinstance(found, SdoError):
         problem, remedy = _no_answer(remote, found)
-        return Probe(node, answers=False, identity=None, nmt_state=state, problem=problem, remedy=remedy)
+        return ScanResult(node, answers=False, identity=None, nmt_state=state, problem=problem, remedy=remedy)
     difference = compare_identity(node, found)
     if difference is None:
-        return Probe(node, answers=True, identity=found, nmt_state=state)
+        return ScanResult(node, answers=True, identity=found, nmt_state=state)
     reason, problem = difference
-    return Probe(node, answers=True, identity=found, nmt_state=state, problem=problem, remedy=REMEDIES[reason])
+    return ScanResult(node, answers=True, identity=found, nmt_state=state, problem=problem, remedy=REMEDIES[reason])
 
 
 def _no_answer(remote: RemoteNode, error: SdoError) -> tuple[str, str]:

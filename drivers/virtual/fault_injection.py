@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 from regolithd.drivers.devices.motor_controller import VirtualMotorController
 from regolithd.drivers.virtual.faults import Faults
-from regolithd.drivers.virtual.node import State
+from regolithd.drivers.virtual.node import VirtualNmtState
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -80,7 +80,7 @@ def _drive_fault(node: VirtualNode, words: list[str], now: int) -> None:
 
 def _leave(node: VirtualNode, words: list[str], now: int) -> None:
     del words, now
-    node.enter(State.PRE_OPERATIONAL)
+    node.enter(VirtualNmtState.PRE_OPERATIONAL)
 
 
 def _clear(node: VirtualNode, words: list[str], now: int) -> None:

@@ -15,7 +15,7 @@ from regolithd.drivers.canopen.sdo_abort import Abort, AbortError
 from regolithd.drivers.virtual import emcy, pdo
 from regolithd.drivers.virtual.emcy import EmergencyProducer
 from regolithd.drivers.virtual.faults import Faults
-from regolithd.drivers.virtual.object_dictionary import Dictionary, Key
+from regolithd.drivers.virtual.object_dictionary import Dictionary
 from regolithd.drivers.virtual.sdo_server import SdoServer
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from regolithd.drivers.can.frame import Frame
     from regolithd.drivers.devices.node import NodeDescription
+    from regolithd.drivers.devices.virtual.device import Key
     from regolithd.drivers.devices.virtual.measurement import Measurement
 
 BOOT_NS = 20_000_000
@@ -32,7 +33,7 @@ _SYNC_OBJECT, _CONSUMER, _PRODUCER, _IDENTITY, _ERROR_BEHAVIOUR = 0x1005, 0x1016
 _STAYS, _STOPS = 1, 2  # values of 0x1029:01; 0 (the default) enters pre-operational
 
 
-class State(IntEnum):
+class VirtualNmtState(IntEnum):
     """NMT state, as the heartbeat says it; `OFF` is a node without power."""
 
     OFF = -1
@@ -53,7 +54,7 @@ class VirtualNode:
         self.description = description
         self.faults = Faults()
         self.counts: Counter[str] = Counter()
-        self.state = State.OFF
+        self.state = VirtualNmtState.OFF
         self._emit = emit
         self._now = 0
         self.dictionary = Dictionary(description.device.eds, self.id)
@@ -62,8 +63,8 @@ class VirtualNode:
         self._sdo = SdoServer(self.dictionary)
         self.dictionary.on_write = self._check
         self.dictionary.after_write = self._written
-        self._transmit: list[pdo.Pdo] = []
-        self._receive: dict[int, pdo.Pdo] = {}
+        self._transmit: list[pdo.EnabledPdo] = []
+        self._receive: dict[int, pdo.EnabledPdo] = {}
         self.sync_cob_id = -1
         self._boot_due: int | None = None
         self._heartbeat_due: int | None = None
@@ -75,12 +76,12 @@ class VirtualNode:
     def power_on(self, now: int) -> None:
         """Switch on: everything starts from its power-on values."""
         self._now = now
-        if self.state is State.OFF:
+        if self.state is VirtualNmtState.OFF:
             self._reset(0x0000)
 
     def power_off(self) -> None:
         """Switch off; nothing is sent."""
-        self.state = State.OFF
+        self.state = VirtualNmtState.OFF
         self._boot_due = self._heartbeat_due = self._master_due = None
         self._transmit, self._receive, self.sync_cob_id = [], {}, -1
         self.device.reset()
@@ -92,7 +93,7 @@ class VirtualNode:
 
     def _reset(self, first: int) -> None:
         """Reset the objects from index `first` on: all, or communication (0x1000–0x1FFF) alone."""
-        self.state = State.INITIALISING
+        self.state = VirtualNmtState.INITIALISING
         self.dictionary.reset(first, 0xFFFF if first == 0 else 0x1FFF)
         self._identify()
         self._emergency.reset()
@@ -113,7 +114,7 @@ class VirtualNode:
         self._boot_due = None
         if self.faults.no_boot_up:
             return
-        self.state = State.PRE_OPERATIONAL
+        self.state = VirtualNmtState.PRE_OPERATIONAL
         self.counts["boot_up"] += 1
         self._emit(0, cob_id.ERROR_CONTROL + self.id, b"\0")
 
@@ -124,22 +125,22 @@ class VirtualNode:
         self.counts["nmt"] += 1
         command = data[0]
         if command == 0x01:
-            self.enter(State.OPERATIONAL)
+            self.enter(VirtualNmtState.OPERATIONAL)
         elif command == 0x02:
-            self.enter(State.STOPPED)
+            self.enter(VirtualNmtState.STOPPED)
         elif command == 0x80:
-            self.enter(State.PRE_OPERATIONAL)
+            self.enter(VirtualNmtState.PRE_OPERATIONAL)
         elif command in {0x81, 0x82}:
             if command == 0x82:
                 self.device.connection_lost()
             self._reset(0x0000 if command == 0x81 else 0x1000)
 
-    def enter(self, state: State) -> None:
+    def enter(self, state: VirtualNmtState) -> None:
         """Change the NMT state."""
-        if state is self.state or self.state in {State.OFF, State.INITIALISING}:
+        if state is self.state or self.state in {VirtualNmtState.OFF, VirtualNmtState.INITIALISING}:
             return
         self.state = state
-        if state is State.STOPPED:
+        if state is VirtualNmtState.STOPPED:
             self.device.connection_lost()
         for each in self._transmit:
             each.syncs, each.sent, each.sent_ns = 0, None, self._now
@@ -148,7 +149,12 @@ class VirtualNode:
 
     def receive(self, frame: Frame, now: int) -> None:
         """Take a frame of another node."""
-        if self.state in {State.OFF, State.INITIALISING} or frame.extended or frame.remote or frame.error:
+        if (
+            self.state in {VirtualNmtState.OFF, VirtualNmtState.INITIALISING}
+            or frame.extended
+            or frame.remote
+            or frame.error
+        ):
             return
         self._now = now
         can_id = frame.can_id
@@ -164,7 +170,7 @@ class VirtualNode:
             self._master_heartbeat()
 
     def _request(self, data: bytes) -> None:
-        if self.state is State.STOPPED or self.faults.no_sdo:
+        if self.state is VirtualNmtState.STOPPED or self.faults.no_sdo:
             return
         self.counts["sdo"] += 1
         answer = self._sdo.answer(data)
@@ -173,7 +179,7 @@ class VirtualNode:
 
     def _sync(self) -> None:
         self.counts["sync"] += 1
-        if self.state is not State.OPERATIONAL:
+        if self.state is not VirtualNmtState.OPERATIONAL:
             return
         for each in self._receive.values():
             if each.received is not None:
@@ -188,8 +194,8 @@ class VirtualNode:
             elif each.syncs >= each.transmission_type:
                 self._send(each, each.content(self.dictionary))
 
-    def _receive_rpdo(self, each: pdo.Pdo, data: bytes) -> None:
-        if self.state is not State.OPERATIONAL or self.faults.deaf:
+    def _receive_rpdo(self, each: pdo.EnabledPdo, data: bytes) -> None:
+        if self.state is not VirtualNmtState.OPERATIONAL or self.faults.deaf:
             return
         self.counts["rpdo"] += 1
         if len(data) < each.layout.size:
@@ -202,7 +208,7 @@ class VirtualNode:
         else:
             self._apply(each, data)
 
-    def _apply(self, each: pdo.Pdo, data: bytes) -> None:
+    def _apply(self, each: pdo.EnabledPdo, data: bytes) -> None:
         start = 0
         for key in each.keys:
             end = start + self.dictionary.entries[key].bits // 8
@@ -217,7 +223,7 @@ class VirtualNode:
     def due(self) -> int | None:
         """Return when `tick` has something to do, or None."""
         moments = [self._boot_due, self._heartbeat_due, self._master_due]
-        if self.state is State.OPERATIONAL:
+        if self.state is VirtualNmtState.OPERATIONAL:
             moments += [each.sent_ns + each.event_ns for each in self._transmit if each.event_ns]
         return min((moment for moment in moments if moment is not None), default=None)
 
@@ -230,20 +236,20 @@ class VirtualNode:
             self._heartbeat()
         if self._master_due is not None and now >= self._master_due:
             self._lose_master()
-        if self.state is State.OPERATIONAL:
+        if self.state is VirtualNmtState.OPERATIONAL:
             for each in self._transmit:
                 if each.event_ns and now >= each.sent_ns + each.event_ns:
                     self._send(each, each.content(self.dictionary))
 
     def advance(self, elapsed_s: float) -> None:
         """Advance the device's time."""
-        if self.state is not State.OFF:
+        if self.state is not VirtualNmtState.OFF:
             self.device.advance(elapsed_s)
 
     def measure(self, measurement: Measurement, now: int) -> None:
         """Let the device measure; send what is event-driven and changed."""
         self._now = now
-        if self.state in {State.OFF, State.INITIALISING}:
+        if self.state in {VirtualNmtState.OFF, VirtualNmtState.INITIALISING}:
             return
         if not self.faults.frozen:
             self.device.measure(measurement)
@@ -251,7 +257,7 @@ class VirtualNode:
         if self.faults.status and status is not None:
             raised = self.dictionary.get(status.index, status.subindex) | self.faults.status
             self.dictionary.put(status.index, status.subindex, raised)
-        if self.state is State.OPERATIONAL:
+        if self.state is VirtualNmtState.OPERATIONAL:
             for each in self._transmit:
                 if not each.synchronous and now >= each.sent_ns + each.inhibit_ns:
                     self._send_if_changed(each)
@@ -261,7 +267,7 @@ class VirtualNode:
         due = self._heartbeat_due or 0
         # Keep the phase, but do not send what was missed.
         self._heartbeat_due = due + period if self._now < due + period else self._now + period
-        if not self.faults.no_heartbeat and self.state is not State.INITIALISING:
+        if not self.faults.no_heartbeat and self.state is not VirtualNmtState.INITIALISING:
             self.counts["heartbeat"] += 1
             self._emit(0, cob_id.ERROR_CONTROL + self.id, bytes((self.state,)))
 
@@ -288,18 +294,18 @@ class VirtualNode:
         self._emergency.set(emcy.HEARTBEAT_LOST)
         behaviour = self.dictionary.get(_ERROR_BEHAVIOUR, 1)
         if behaviour == _STOPS:
-            self.enter(State.STOPPED)
-        elif behaviour != _STAYS and self.state is State.OPERATIONAL:
-            self.enter(State.PRE_OPERATIONAL)
+            self.enter(VirtualNmtState.STOPPED)
+        elif behaviour != _STAYS and self.state is VirtualNmtState.OPERATIONAL:
+            self.enter(VirtualNmtState.PRE_OPERATIONAL)
 
     # Sending
 
-    def _send_if_changed(self, each: pdo.Pdo) -> None:
+    def _send_if_changed(self, each: pdo.EnabledPdo) -> None:
         content = each.content(self.dictionary)
         if content != each.sent:
             self._send(each, content)
 
-    def _send(self, each: pdo.Pdo, content: bytes) -> None:
+    def _send(self, each: pdo.EnabledPdo, content: bytes) -> None:
         each.syncs, each.sent, each.sent_ns = 0, content, self._now
         if self.faults.silent:
             return
@@ -309,7 +315,7 @@ class VirtualNode:
         self._emit(self._now + delay if delay else 0, each.cob_id, data)
 
     def _send_emergency(self, can_id: int, data: bytes) -> None:
-        if self.state in {State.PRE_OPERATIONAL, State.OPERATIONAL}:
+        if self.state in {VirtualNmtState.PRE_OPERATIONAL, VirtualNmtState.OPERATIONAL}:
             self.counts["emcy"] += 1
             self._emit(0, can_id, data)
 
@@ -317,7 +323,7 @@ class VirtualNode:
         """Raise an error by command; 0 ends all."""
         if not code:
             self._emergency.clear()
-        elif self.state is not State.OFF:
+        elif self.state is not VirtualNmtState.OFF:
             self._emergency.set(code)
 
     def override_identity(self, sub: int, value: int) -> None:

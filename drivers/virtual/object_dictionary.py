@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
-Key = tuple[int, int]
-"""Index and sub-index."""
+    from regolithd.drivers.devices.virtual.device import Key
 
 _FORMATS = {
     datatypes.UNSIGNED8: "B",

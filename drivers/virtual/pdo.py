@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 from regolithd.drivers.canopen.sdo_abort import Abort, AbortError
 
 if TYPE_CHECKING:
-    from regolithd.drivers.virtual.object_dictionary import Dictionary, Key
+    from regolithd.drivers.devices.virtual.device import Key
+    from regolithd.drivers.virtual.object_dictionary import Dictionary
 
 RPDO, RPDO_MAPPING, TPDO, TPDO_MAPPING = 0x1400, 0x1600, 0x1800, 0x1A00
 DISABLED = 0x8000_0000  # COB-ID bit 31
@@ -29,7 +30,7 @@ _RESERVED_COB_IDS = (
 
 
 @dataclass(slots=True)
-class Pdo:
+class EnabledPdo:
     """One enabled PDO with at least one mapped object."""
 
     cob_id: int
@@ -54,12 +55,12 @@ class Pdo:
         return self.layout.pack(*[values[key] for key in self.keys])
 
 
-def transmit_pdos(dictionary: Dictionary) -> list[Pdo]:
+def transmit_pdos(dictionary: Dictionary) -> list[EnabledPdo]:
     """Return the TPDOs that are enabled."""
     return _compile(dictionary, TPDO, TPDO_MAPPING)
 
 
-def receive_pdos(dictionary: Dictionary) -> dict[int, Pdo]:
+def receive_pdos(dictionary: Dictionary) -> dict[int, EnabledPdo]:
     """Return the RPDOs that are enabled, by COB-ID."""
     return {pdo.cob_id: pdo for pdo in _compile(dictionary, RPDO, RPDO_MAPPING)}
 
@@ -93,7 +94,7 @@ def check(dictionary: Dictionary, key: Key, value: int) -> None:
             _mapped(dictionary, value, transmit=transmit)
 
 
-def _compile(dictionary: Dictionary, communication: int, mapping: int) -> list[Pdo]:
+def _compile(dictionary: Dictionary, communication: int, mapping: int) -> list[EnabledPdo]:
     pdos = []
     for number in range(0x200):
         if communication + number not in dictionary.indices:
@@ -104,7 +105,7 @@ def _compile(dictionary: Dictionary, communication: int, mapping: int) -> list[P
             continue
         keys = tuple(_split(dictionary.get(mapping + number, sub))[0] for sub in range(1, count + 1))
         layout = struct.Struct("<" + "".join(dictionary.entries[key].format for key in keys))
-        pdo = Pdo(cob_id & _COB_ID, dictionary.get(communication + number, 2), keys, layout)
+        pdo = EnabledPdo(cob_id & _COB_ID, dictionary.get(communication + number, 2), keys, layout)
         if communication == TPDO:
             pdo.inhibit_ns = dictionary.get(communication + number, 3) * 100_000
             pdo.event_ns = dictionary.get(communication + number, 5) * 1_000_000

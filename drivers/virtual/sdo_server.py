@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING
 from regolithd.drivers.canopen.sdo_abort import Abort, AbortError
 
 if TYPE_CHECKING:
-    from regolithd.drivers.virtual.object_dictionary import Dictionary, Key
+    from regolithd.drivers.devices.virtual.device import Key
+    from regolithd.drivers.virtual.object_dictionary import Dictionary
 
 _HEADER = struct.Struct("<BHB")
 _ABORT = struct.Struct("<BHBI")

@@ -26,7 +26,7 @@ from regolithd.drivers.devices.ground_speed import GROUND_SPEED_SENSOR
 from regolithd.drivers.devices.load_cell import LOAD_CELL
 from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
 from regolithd.drivers.devices.node import NodeDescription
-from regolithd.drivers.master.scan import Probe
+from regolithd.drivers.master.scan import ScanResult
 
 ROOT = Path(__file__).resolve().parents[3]
 NOW_S = 1_790_000_000.0
@@ -188,9 +188,9 @@ def test_each_node_that_is_not_right_has_its_line() -> None:
     speed = NodeDescription(22, GROUND_SPEED_SENSOR, None, required=False)
     found = judge_nodes(
         [
-            Probe(motor, answers=True, identity=None, nmt_state=None),
-            Probe(cell, answers=False, identity=None, nmt_state=None, problem="no answer", remedy="power it"),
-            Probe(speed, answers=False, identity=None, nmt_state=None, problem="no answer", remedy="power it"),
+            ScanResult(motor, answers=True, identity=None, nmt_state=None),
+            ScanResult(cell, answers=False, identity=None, nmt_state=None, problem="no answer", remedy="power it"),
+            ScanResult(speed, answers=False, identity=None, nmt_state=None, problem="no answer", remedy="power it"),
         ]
     )
     assert [(finding.subject, finding.verdict) for finding in found] == [

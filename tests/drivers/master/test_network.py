@@ -26,7 +26,7 @@ from regolithd.drivers.master.events import (
     NodeLost,
     NodeReturned,
 )
-from regolithd.drivers.master.scan import probe
+from regolithd.drivers.master.scan import scan
 
 if TYPE_CHECKING:
     from regolithd.drivers.devices.device import Quantity
@@ -258,7 +258,7 @@ async def test_a_scan_reads_identities_and_changes_nothing() -> None:
         await r.network.settled()
         await r.stop()
         async with open_bus("virtual", r.bus.channel) as witness:
-            found = {each.node.node_id: each for each in await probe(r.bus, nodes, listen_s=0.1)}
+            found = {each.node.node_id: each for each in await scan(r.bus, nodes, listen_s=0.1)}
             await asyncio.sleep(0.2)
             seen = await witness.receive()
         requests = [frame for frame in seen if frame.can_id & 0x780 == 0x600]

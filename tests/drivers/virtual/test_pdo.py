@@ -11,7 +11,7 @@ import pytest
 from virtual_master import LOAD_CELL_TPDO, MOTOR_TPDO, DriveUnderTest, Master
 
 from regolithd.drivers.virtual import Bench, Measurement
-from regolithd.drivers.virtual.pdo import Pdo
+from regolithd.drivers.virtual.pdo import EnabledPdo
 
 
 class Tilted(Bench):
@@ -150,5 +150,7 @@ def test_a_load_cell_reports_overload_and_invalid_values(load: float, status: in
 
 def test_transmission_types_up_to_240_are_synchronous() -> None:
     """CiA 301, 7.5.2.35: 0 to 240 are synchronous, 254 and 255 event-driven."""
-    synchronous = [kind for kind in (0, 1, 240, 254, 255) if Pdo(0x181, kind, (), struct.Struct("<")).synchronous]
+    synchronous = [
+        kind for kind in (0, 1, 240, 254, 255) if EnabledPdo(0x181, kind, (), struct.Struct("<")).synchronous
+    ]
     assert synchronous == [0, 1, 240]

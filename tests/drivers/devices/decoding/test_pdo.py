@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from regolithd.drivers.devices.decoding.pdo import compile_pdo, tpdos
-from regolithd.drivers.devices.device import Command, Measured, PdoLayout, Validity
+from regolithd.drivers.devices.device import Commanded, Measured, PdoLayout, Validity
 from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
 from regolithd.drivers.devices.registry import DEVICES
 from regolithd.drivers.errors import DictionaryError
@@ -18,7 +18,7 @@ def test_a_layout_is_checked_against_the_eds() -> None:
         (((0x1017, 0),), "may not be mapped"),
         (((0x606C, 0), (0x60FF, 0), (0x6041, 0)), "a frame carries 8"),
     ):
-        layout = PdoLayout(1, tuple(Command(*entry) for entry in entries))
+        layout = PdoLayout(1, tuple(Commanded(*entry) for entry in entries))
         with pytest.raises(DictionaryError, match=what):
             compile_pdo(MOTOR_CONTROLLER, layout, transmit=True)
 
