@@ -34,8 +34,26 @@ def export_onnx(parameters: Parameters, standardisation: Standardisation, radius
     }
     initializers = [numpy_helper.from_array(value.astype(np.float32), name) for name, value in constants.items()]
     initializers += [numpy_helper.from_array(np.array([1]), "one"), numpy_helper.from_array(np.array([2]), "two")]
+    shapes: dict[str, list[str | int | None]] = {"wheels": ["N", 6, FEATURES], "mask": ["N", 6], "known": ["N", KNOWN]}
+    width = int(parameters["out"]["b"].size)
+    graph = helper.make_graph(
+        _nodes(),
+        "posterior",
+        [helper.make_tensor_value_info(name, TensorProto.FLOAT, shape) for name, shape in shapes.items()],
+        [helper.make_tensor_value_info("mixture", TensorProto.FLOAT, ["N", width])],
+        initializers,
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], producer_name="regolithd")
+    model.ir_version = 9
+    helper.set_model_props(model, _metadata(parameters, standardisation, radius_m))
+    onnx.checker.check_model(model)
+    return model
+
+
+def _nodes() -> list[onnx.NodeProto]:
+    """Return the nodes of the graph, from the inputs to the mixture."""
     make = helper.make_node
-    nodes = [
+    return [
         make("Sub", ["wheels", "wheels_mean"], ["wheels_0"]),
         make("Div", ["wheels_0", "wheels_std"], ["wheels_1"]),
         make("Sub", ["known", "known_mean"], ["known_0"]),
@@ -57,33 +75,19 @@ def export_onnx(parameters: Parameters, standardisation: Standardisation, radius
         make("MatMul", ["hidden_5", "out_w"], ["out_0"]),
         make("Add", ["out_0", "out_b"], ["mixture"]),
     ]
-    shapes: dict[str, list[str | int | None]] = {"wheels": ["N", 6, FEATURES], "mask": ["N", 6], "known": ["N", KNOWN]}
-    width = int(parameters["out"]["b"].size)
-    graph = helper.make_graph(
-        nodes,
-        "posterior",
-        [helper.make_tensor_value_info(name, TensorProto.FLOAT, shape) for name, shape in shapes.items()],
-        [helper.make_tensor_value_info("mixture", TensorProto.FLOAT, ["N", width])],
-        initializers,
-    )
-    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], producer_name="regolithd")
-    model.ir_version = 9
+
+
+def _metadata(parameters: Parameters, standardisation: Standardisation, radius_m: float) -> dict[str, str]:
     digest = hashlib.sha256(b"".join(np.asarray(layer["w"]).tobytes() for layer in parameters.values())).hexdigest()
-    helper.set_model_props(
-        model,
-        {
-            "regolithd.version": f"posterior-{digest[:12]}",
-            "regolithd.radius_m": repr(radius_m),
-            "regolithd.targets": json.dumps(
-                [
-                    {"name": name, "centre": float(centre), "unit": float(unit)}
-                    for name, centre, unit in zip(TARGETS, *standardisation.truth, strict=True)
-                ]
-            ),
-        },
-    )
-    onnx.checker.check_model(model)
-    return model
+    targets = [
+        {"name": name, "centre": float(centre), "unit": float(unit)}
+        for name, centre, unit in zip(TARGETS, *standardisation.truth, strict=True)
+    ]
+    return {
+        "regolithd.version": f"posterior-{digest[:12]}",
+        "regolithd.radius_m": repr(radius_m),
+        "regolithd.targets": json.dumps(targets),
+    }
 
 
 def _dense(layer: str, source: str, out: str) -> list[onnx.NodeProto]:

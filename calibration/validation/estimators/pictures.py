@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from regolithd.calibration.posterior.estimator import PosteriorEstimator
+    from regolithd.calibration.terrain.soils import Soils
 
     Array = NDArray[np.float64]
 
@@ -124,33 +125,35 @@ def one_sample(estimator: PosteriorEstimator, path: Path, seed: int = 3) -> None
             (panels[0], one, SINGLE, "one instant of one wheel"),
             (panels[1], many, OURS, "ten seconds of six wheels"),
         ):
-            samples = estimator.mixtures(windows).sample(3000, rng)[0]
-            panel.plot(
-                prior.cohesion_Pa / 1e3, prior.friction_angle_deg, ".", color="#d5d8dc", markersize=2, label="prior"
-            )
-            panel.plot(
-                samples[:, 0] / 1e3,
-                np.degrees(samples[:, 1]),
-                ".",
-                color=colour,
-                markersize=3,
-                alpha=0.5,
-                label="posterior",
-            )
-            for (name, soil), shade in zip(SOILS.items(), SOIL_COLOURS, strict=True):
-                panel.plot(
-                    soil.cohesion_Pa / 1e3,
-                    soil.friction_angle_deg,
-                    "D",
-                    color=shade,
-                    markeredgecolor="white",
-                    label=name,
-                )
-            panel.plot(3.15, 30.0, "*", color="black", markersize=16, label="truth")
+            _scatter(panel, prior, estimator.mixtures(windows).sample(3000, rng)[0], colour)
             panel.set(title=title, xlabel="c (kPa)", xlim=(0, 11), ylim=(4, 43))
         panels[0].set_ylabel("φ (°)")
         panels[1].legend(loc="upper left", bbox_to_anchor=(1, 1))
         save(made, path)
+
+
+def _scatter(panel: Axes, prior: Soils, samples: Array, colour: str) -> None:
+    """Draw samples of prior and posterior, the classes of Table 1, and the truth (sandy loam)."""
+    panel.plot(prior.cohesion_Pa / 1e3, prior.friction_angle_deg, ".", color="#d5d8dc", markersize=2, label="prior")
+    panel.plot(
+        samples[:, 0] / 1e3,
+        np.degrees(samples[:, 1]),
+        ".",
+        color=colour,
+        markersize=3,
+        alpha=0.5,
+        label="posterior",
+    )
+    for (name, soil), shade in zip(SOILS.items(), SOIL_COLOURS, strict=True):
+        panel.plot(
+            soil.cohesion_Pa / 1e3,
+            soil.friction_angle_deg,
+            "D",
+            color=shade,
+            markeredgecolor="white",
+            label=name,
+        )
+    panel.plot(3.15, 30.0, "*", color="black", markersize=16, label="truth")
 
 
 def alarm(delays: Mapping[str, Array], path: Path) -> None:
