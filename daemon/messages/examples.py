@@ -104,7 +104,7 @@ _POSTERIOR = {
     "instants": 20,
 }
 _FIELDS: dict[str, dict[str, Any]] = {
-    "state": {"sequence": 1, "state": "online", "reason": "connected", "software_version": "0.1.0"},
+    "state": {"sequence": 1, "state": "online", "reason": "connected", "software_version": "0.2.0"},
     "snapshot": _SNAPSHOT,
     "wheel": {"model_version": "paper-3:64:2", "wheel": 5, **_WHEEL},
     "posterior": {"sequence": 480, **_POSTERIOR},
