@@ -54,7 +54,7 @@ _CLASSES = {
 _CODES = {
     0x8110: "CAN overrun: messages were lost",
     0x8120: "CAN controller is error passive",
-    0x8130: "life guard or heartbeat error: the node no longer hears its master",
+    0x8130: "life guard or heartbeat error: the node has lost its master",
     0x8140: "recovered from bus-off",
     0x8150: "CAN-ID collision: another node uses the same identifier",
     0x8210: "PDO not processed: too short",
@@ -94,7 +94,7 @@ class Emergency:
 
     @property
     def cleared(self) -> bool:
-        """Whether it says that an error has been reset, rather than that there is one."""
+        """Whether it reports the reset of an error."""
         return self.code == 0
 
 

@@ -39,7 +39,7 @@ class NmtState(IntEnum):
 
 
 def command_frame(command: NmtCommand, node_id: int = ALL_NODES) -> Frame:
-    """Return the frame that tells `node_id` (0: every node) to change its state."""
+    """Return the frame of an NMT command to `node_id` (0: all nodes)."""
     return Frame(0, cob_id.NMT, bytes((command, node_id)))
 
 

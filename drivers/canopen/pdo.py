@@ -68,7 +68,7 @@ def compile_mapping(
     for index, subindex in objects:
         entry = variable(eds, index, subindex)
         if not entry.pdo_mappable:
-            raise DictionaryError("may not be mapped to a PDO, says the EDS", index=index, subindex=subindex)
+            raise DictionaryError("may not be mapped to a PDO, according to the EDS", index=index, subindex=subindex)
         code = struct_code(entry)
         codes.append(code)
         mapping.append(index << 16 | subindex << 8 | 8 * struct.calcsize("<" + code))

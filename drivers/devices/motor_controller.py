@@ -139,7 +139,7 @@ class VirtualMotorController(VirtualDevice):
         self._show()
 
     def fault(self, code: int) -> None:
-        """Make transition 13: react as 0x605E says, then hold in fault (14) until it is reset."""
+        """Make transition 13: react according to 0x605E, then hold in fault (14) until it is reset."""
         if self.state in {PowerState.FAULT_REACTION_ACTIVE, PowerState.FAULT}:
             return
         self.dictionary.put(ERROR_CODE, 0, code)
@@ -152,7 +152,7 @@ class VirtualMotorController(VirtualDevice):
         self._show()
 
     def connection_lost(self) -> None:
-        """React as 0x6007 says."""
+        """React according to 0x6007."""
         option = self.dictionary.get(ABORT_CONNECTION_OPTION)
         was = self.state
         if option == 1:

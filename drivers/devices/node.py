@@ -1,4 +1,4 @@
-"""A node that the configuration says is on the bus."""
+"""Description of a node that is configured to be on the bus."""
 
 from __future__ import annotations
 

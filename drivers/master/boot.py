@@ -207,7 +207,7 @@ class _Boot:
         if not await remote.changed.until(lambda: remote.state is NmtState.OPERATIONAL, timeout_s):
             self._check_restart()
             said = remote.state.text if remote.state else "nothing"
-            raise self._error(BootReason.NOT_OPERATIONAL, f"still says {said} {timeout_s:g} s after the NMT start")
+            raise self._error(BootReason.NOT_OPERATIONAL, f"still reports {said} {timeout_s:g} s after the NMT start")
 
     def _check_restart(self) -> None:
         if self._remote.boot_ups != self._boot_ups:

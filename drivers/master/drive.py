@@ -83,7 +83,7 @@ class Drive:
         return self.state
 
     def take_statusword(self, statusword: int) -> DriveState:
-        """Take a statusword that came by TPDO, and return the state it says."""
+        """Take a statusword that came by TPDO, and return its state."""
         self.statusword = statusword
         self.reported = self.state
         return self.reported

@@ -1,6 +1,6 @@
 """The events that the network reports: boot, loss and return of nodes, emergencies, drive and bus states.
 
-Each event is a frozen dataclass with a time (ns, CLOCK_REALTIME) and a `text` that says what happened. A
+Each event is a frozen dataclass with a time (ns, CLOCK_REALTIME) and a `text` that describes it. A
 consumer matches on the class:
 
     match event:

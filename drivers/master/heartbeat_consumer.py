@@ -33,7 +33,7 @@ async def until_lost(remote: RemoteNode, lost_after_s: float) -> Loss:
             return Loss("it restarted by itself", silent=False)
         if remote.state is not NmtState.OPERATIONAL:
             return Loss(
-                f"it left operational and says {remote.state.text if remote.state else 'nothing'}", silent=False
+                f"it left operational and reports {remote.state.text if remote.state else 'nothing'}", silent=False
             )
 
 

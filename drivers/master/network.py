@@ -235,7 +235,7 @@ class Network:
     def _take_emergency(self, supervisor: Supervisor, emergency: Emergency) -> None:
         node = supervisor.remote.node
         supervisor.count_emergency()
-        said = "error gone" if emergency.cleared else f"error 0x{emergency.code:04X}: {emergency.text}"
+        said = "error reset" if emergency.cleared else f"error 0x{emergency.code:04X}: {emergency.text}"
         text = f"node {node.node_id} ({node.kind}): {said}"
         self._emit(NodeEmergency(emergency.time_ns, node.node_id, emergency, text))
 

@@ -94,5 +94,5 @@ def _no_answer(remote: RemoteNode, error: SdoError) -> tuple[str, str]:
     if remote.state is NmtState.STOPPED:
         return "it is in NMT state stopped, in which it answers nothing", "The daemon resets it when it starts"
     if remote.state is not None:
-        return f"its heartbeat says {remote.state.text}, but: {error.what}", REMEDIES[BootReason.NO_SDO_ANSWER]
+        return f"its heartbeat reports {remote.state.text}, but: {error.what}", REMEDIES[BootReason.NO_SDO_ANSWER]
     return error.what, REMEDIES[BootReason.NO_BOOT_UP]

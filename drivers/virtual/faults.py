@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 class Faults:
     """The present faults of one node; none as constructed."""
 
-    silent: bool = False  # sends no PDO, though its heartbeat says operational
+    silent: bool = False  # sends no PDO, though its heartbeat reports operational
     frozen: bool = False  # repeats the last values
     deaf: bool = False  # ignores RPDOs
     no_boot_up: bool = False

@@ -34,7 +34,7 @@ _STAYS, _STOPS = 1, 2  # values of 0x1029:01; 0 (the default) enters pre-operati
 
 
 class VirtualNmtState(IntEnum):
-    """NMT state, as the heartbeat says it; `OFF` is a node without power."""
+    """NMT state, as in the heartbeat; `OFF` is a node without power."""
 
     OFF = -1
     INITIALISING = 0x00
@@ -68,7 +68,7 @@ class VirtualNode:
         self.sync_cob_id = -1
         self._boot_due: int | None = None
         self._heartbeat_due: int | None = None
-        self._master_due: int | None = None  # runs only once the master has been heard (CiA 301, 7.2.8.3.2.2)
+        self._master_due: int | None = None  # runs only after the first heartbeat of the master (CiA 301, 7.2.8.3.2.2)
         self._master_lost = False
 
     # Power and network management

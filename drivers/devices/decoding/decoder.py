@@ -30,7 +30,7 @@ class Undecodable(StrEnum):
     """Why a frame could not be decoded."""
 
     UNKNOWN_COB_ID = "unknown-cob-id"  # of no configured node: a foreign node, or a wrong configuration
-    WRONG_LENGTH = "wrong-length"  # not as long as its mapping, or its service, says
+    WRONG_LENGTH = "wrong-length"  # not the length of its mapping or service
     UNKNOWN_STATE = "unknown-state"  # a heartbeat with a state that CiA 301 does not have
     EXTENDED = "extended"  # 29-bit identifier: not CANopen
     REMOTE = "remote"  # a remote request, which neither master nor nodes answer
@@ -55,7 +55,7 @@ class Decoder:
         )
 
     def decode(self, frame: Frame) -> Signal | None:
-        """Return what a frame says, or None; never raises."""
+        """Return the signal in a frame, or None; never raises."""
         if frame.error:
             return None  # the controller's report, not a message: `drivers.can.error_frame` reads it
         if frame.extended or frame.remote:

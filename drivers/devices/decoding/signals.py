@@ -20,7 +20,7 @@ class Sync:
 
 
 class Reading(NamedTuple):
-    """One TPDO, decoded to SI units. `values` is empty where the node says that its measurement is not valid.
+    """One TPDO, decoded to SI units. `values` is empty where the node reports that its measurement is not valid.
 
     A named tuple, because it takes a third of a frozen dataclass's time to make (see `can.frame.Frame`).
     """
