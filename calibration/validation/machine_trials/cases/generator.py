@@ -43,6 +43,8 @@ if TYPE_CHECKING:
 LEAST_MARGIN = 40.0
 """Least Δχ² between the truth and the nearest other single explanation: six deviations."""
 ATTEMPTS = 12
+LEAST_DELAY_ROWS = 1.5
+"""A delay below the time between two rows only blurs a step."""
 GROWN, LEAST_LASTING = 1.8, 0.12
 """How much more a grown effect has; how strong one must be that a correction is made from."""
 
@@ -187,6 +189,8 @@ def told_apart(
     """Return the margin of the effect that is hardest to tell; infinite where there is nothing to tell."""
     if not told and plan.kind != "parameter-off":
         return float("inf")
+    if any(effect.delays and effect.size < LEAST_DELAY_ROWS * world.drive.step_s for effect in told):
+        return 0.0
     masks = {channel: world.drive.compared & seen.get(channel, True) for channel in world.base}
     for effect in told:
         for column in effect.needs:

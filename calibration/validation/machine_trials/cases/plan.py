@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import zlib
+from collections import Counter
 from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -59,16 +60,23 @@ def plan_batch(
     if index is not None and machine and kind:
         return [plan_case(0, seed, machine, kind, index)]
     machines, kinds = ([machine] if machine else list(MACHINES)), ([kind] if kind else list(TURN))
-    seen: dict[tuple[str, str], int] = {}
+    seen: Counter[tuple[str, str]] = Counter()
     plans = []
     for number in range(cases):
-        # The machines shift by one each round of kinds, so that every machine meets every kind.
-        who = machines[(number + number // len(kinds)) % len(machines)]
         what = kinds[number % len(kinds)]
-        at = seen.get((who, what), 0)
-        seen[who, what] = at + 1
-        plans.append(plan_case(number, seed, who, what, at))
+        able = [name for name in machines if can_have(MACHINES[name], what)]
+        if not able:
+            continue
+        # Each kind begins with another machine, and then takes them in turn.
+        who = able[(sum(seen[name, what] for name in able) + KINDS.index(what)) % len(able)]
+        plans.append(plan_case(number, seed, who, what, seen[who, what]))
+        seen[who, what] += 1
     return plans
+
+
+def can_have(machine: Machine, kind: str) -> bool:
+    """Return whether a kind has one right answer on this machine."""
+    return machine.parameters_have_no_double if kind == "parameter-off" else True
 
 
 def plan_case(number: int, seed: int, machine: str, kind: str, index: int) -> Plan:

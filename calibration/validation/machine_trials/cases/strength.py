@@ -121,9 +121,9 @@ def parameter_tangents(world: World, law: NoiseLaw, seen: dict[str, Mask]) -> li
 
 
 def rivals(rng: Generator, world: World, law: NoiseLaw, seen: dict[str, Mask], besides: set[str | None]) -> list[Array]:
-    """Return the machine's other named effects, drawn afresh, in units of noise."""
+    """Return the other named effects that fit this machine, drawn afresh, in units of noise."""
     found = []
-    for name, maker in world.machine.effects.items():
+    for name, maker in {**world.machine.effects, **world.machine.rivals}.items():
         for _ in range(RIVAL_DRAWS if name not in besides else 0):
             effect = of_strength(world, maker(rng, world), 0.15)
             found.append(difference(world, law, seen, readings(world, [effect])))

@@ -66,15 +66,6 @@ def respond(drive: Drive, values: Values, _: Inside) -> Readings:
     return {CURRENT: torque / TORQUE_NM_PER_A}
 
 
-def quadratic_drag(_: Generator, world: World) -> Effect:
-    """Drag of a brush roller that also turns at rest: (|ω| + ω₀)² − ω₀², ω₀ a twentieth of the top speed."""
-    speed = world.drive.columns[SPEED]
-    shape = np.tanh(speed / SMOOTH_RAD_S) * ((np.abs(speed) + 0.4) ** 2 - 0.16) / 64
-    name, largest = "quadratic-drag", 10 * world.mean_size(CURRENT)
-    axes = world.machine.every_axis
-    return Effect(name, name, CURRENT, "wheel_speed", axes, added=lambda size: size * shape, largest=largest)
-
-
 def scrub(_: Generator, world: World) -> Effect:
     """Scrub in a turn: the outer wheel pushes and the inner one holds back, soon saturated."""
     shape = SIDE * np.tanh(world.drive.columns[YAW_RATE] / 0.08)
@@ -140,7 +131,7 @@ AGV_DRIVE = Machine(
     effects={
         "coulomb-friction": effects.coulomb(CURRENT, SPEED, SMOOTH_RAD_S, "coulomb_current"),
         "viscous-friction": effects.proportional("viscous-friction", CURRENT, SPEED, "wheel_speed"),
-        "quadratic-drag": quadratic_drag,
+        "quadratic-drag": effects.quadratic(CURRENT, SPEED, SMOOTH_RAD_S, 8.0),
         "cold-lubricant-friction": effects.cold_lubricant(CURRENT, SPEED, SMOOTH_RAD_S, TEMPERATURE),
         "rotor-inertia": effects.proportional("rotor-inertia", CURRENT, ACCELERATION, "wheel_acceleration"),
         "grade-resistance": effects.proportional("grade-resistance", CURRENT, PITCH, "pitch"),
@@ -150,6 +141,11 @@ AGV_DRIVE = Machine(
         "current-sensor-bias": effects.current_bias(CURRENT),
         "sensor-delay": effects.late(CURRENT, 2.0),
     },
+    rivals={
+        "stribeck-friction": effects.stribeck(CURRENT, SPEED, SMOOTH_RAD_S, (0.5, 1.5)),
+        "torque-constant-temperature": effects.magnet_temperature(CURRENT, TEMPERATURE),
+        "load-dependent-efficiency": effects.gear_losses(CURRENT, SPEED, SMOOTH_RAD_S),
+    },
     outside={
         "converter-loss": converter_loss,
         "sagging-tyre": soft_tyre,
@@ -157,6 +153,7 @@ AGV_DRIVE = Machine(
         "caught-in-spells": effects.caught(CURRENT, SPEED, SMOOTH_RAD_S),
     },
     lasting=("viscous-friction", "rotor-inertia", "grade-resistance", "turning-resistance"),
+    parameters_have_no_double=False,  # rolling coefficient: load-dependent losses; mass: Coulomb friction
     slow_column=TEMPERATURE,
     blank_column=YAW_RATE,
     base_units=Units(words(CURRENT, "A", "1.0", TEMPERATURE, "t_s")),

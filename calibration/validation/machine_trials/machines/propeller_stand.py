@@ -107,6 +107,10 @@ PROPELLER_STAND = Machine(
         "bearing-drag": effects.bearing(TORQUE, SPEED, SMOOTH_RAD_S),
         "sensor-delay": effects.late(THRUST, 0.5),
     },
+    rivals={
+        "quadratic-drag": effects.quadratic(TORQUE, SPEED, SMOOTH_RAD_S, 800.0),
+        "stribeck-friction": effects.stribeck(TORQUE, SPEED, SMOOTH_RAD_S, (60.0, 200.0)),
+    },
     outside={
         "ground-effect": ground_effect,
         "resonance": resonance,
@@ -114,6 +118,7 @@ PROPELLER_STAND = Machine(
         "caught-in-spells": effects.caught(TORQUE, SPEED, SMOOTH_RAD_S),
     },
     lasting=("coulomb-friction", "viscous-friction", "rotor-inertia", "sensor-delay"),
+    parameters_have_no_double=False,  # torque coefficient: quadratic drag
     slow_column=TEMPERATURE,
     blank_column=TEMPERATURE,
     base_units=Units(words(TORQUE, "N·m", "1.0", TEMPERATURE, HEIGHT)),

@@ -107,6 +107,7 @@ SERVO_JOINT = Machine(
         "current-sensor-bias": effects.current_bias(CURRENT),
         "sensor-delay": effects.late(CURRENT, 0.5),
     },
+    rivals={"quadratic-drag": effects.quadratic(CURRENT, SPEED, SMOOTH_RAD_S, 3.0)},
     outside={
         "hard-stop": hard_stop,
         "cable-spring": cable_spring,

@@ -81,6 +81,18 @@ def stribeck(channel: str, speed: str, width: float, fade: tuple[float, float]) 
     return make
 
 
+def quadratic(channel: str, speed: str, width: float, top: float) -> Maker:
+    """Drag of a fan or brush roller that also turns at rest: (|ω| + ω₀)² − ω₀², ω₀ a twentieth of the top speed."""
+
+    def make(_: Generator, world: World) -> Effect:
+        speeds, idle = world.drive.columns[speed], top / 20
+        shape = np.tanh(speeds / width) * ((np.abs(speeds) + idle) ** 2 - idle**2) / top**2
+        name, axes, largest = "quadratic-drag", world.machine.every_axis, 10 * world.mean_size(channel)
+        return Effect(name, name, channel, "wheel_speed", axes, added=lambda size: size * shape, largest=largest)
+
+    return make
+
+
 def cold_lubricant(channel: str, speed: str, width: float, temperature: str) -> Maker:
     """Drag that follows Vogel's viscosity, over what it is at 60 °C."""
 

@@ -141,6 +141,10 @@ class Machine:
     blank_column: str
     base_units: Units
     other_units: Units
+    rivals: Mapping[str, Maker] = field(default_factory=dict)
+    """Named effects that this machine never conceals, but that an answer might take another for."""
+    parameters_have_no_double: bool = True
+    """Whether no effect of the contract's list does exactly what a wrong parameter does."""
 
     @property
     def every_axis(self) -> tuple[int, ...]:

@@ -15,7 +15,15 @@ import pytest
 from regolithd.calibration.validation import machine_trials
 from regolithd.calibration.validation.machine_trials.cases.files import write_recording
 from regolithd.calibration.validation.machine_trials.cases.generator import Case, draw, make_case
-from regolithd.calibration.validation.machine_trials.cases.plan import KINDS, NEEDING, TURN, Plan, plan_batch, plan_case
+from regolithd.calibration.validation.machine_trials.cases.plan import (
+    KINDS,
+    NEEDING,
+    TURN,
+    Plan,
+    can_have,
+    plan_batch,
+    plan_case,
+)
 from regolithd.calibration.validation.machine_trials.cases.strength import (
     delayed,
     of_strength,
@@ -182,7 +190,9 @@ def test_other_units_change_names_and_numbers_alone(machine: str, tmp_path: Path
 def test_a_batch_gives_every_machine_every_kind() -> None:
     """A hundred cases hold each machine with each place in the order of kinds, and cases can be made again alone."""
     plans = plan_batch(9, 5 * len(TURN))
-    assert {(plan.machine, plan.kind) for plan in plans} == {(m, k) for m in MACHINES for k in KINDS}
+    every = {(m, k) for m, one in MACHINES.items() for k in KINDS if can_have(one, k)}
+    assert {(plan.machine, plan.kind) for plan in plans} == every
+    assert ("agv-drive", "parameter-off") not in every
     chosen = plans[37]
     (again,) = plan_batch(9, 1, chosen.machine, chosen.kind, chosen.index)
     assert (again.names, again.index) == (chosen.names, chosen.index)
@@ -214,6 +224,12 @@ def test_noise_has_the_spectrum_that_the_margin_is_measured_with() -> None:
     stated = noise_spectrum(4096, 0.9, 0.2)
     for part in (slice(1, 60), slice(300, 600), slice(1500, 2000)):
         assert np.mean(power[part] / stated[part]) == pytest.approx(1, rel=0.05)
+
+
+def test_a_delay_to_be_found_is_longer_than_a_row() -> None:
+    """What is called late is late by more than the time between two rows."""
+    case = make_case(plan_case(0, 5, "agv-drive", "late", 0))
+    assert case.first.effects[0].size > 1.5 * case.first.world.drive.step_s
 
 
 def test_a_late_channel_is_the_same_channel_later() -> None:
