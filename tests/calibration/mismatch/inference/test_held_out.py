@@ -1,0 +1,48 @@
+"""Held-out errors: what neither chose nor fitted an effect."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from linear import NOISE, equations_of, problem_of, table, term_of
+
+from regolithd.calibration.mismatch.inference.held_out import chosen_effects, held_out_errors
+
+
+def test_errors_fall_from_the_effect_to_the_noise() -> None:
+    """Without the drag the error is the noise and the drag together, with it the noise."""
+    equations = equations_of(problem_of(table(drag=0.4)))
+    named = equations.fit([term_of(equations, "drag")])
+    found = held_out_errors(equations, named, equations.design.groups, 8.0)
+    assert found.after == pytest.approx(NOISE, rel=0.05)
+    assert found.before == pytest.approx(np.hypot(NOISE, 0.4), rel=0.1)
+    assert found.without == pytest.approx((found.before,))
+    assert found.with_it == pytest.approx((found.after,))
+
+
+def test_an_effect_on_one_axis_is_measured_there() -> None:
+    """The other axis has no part in its errors."""
+    columns = table()
+    columns["reading_V"] = columns["reading_V"] + 0.4 * np.sign(columns["speed_rad_s"]) * (columns["axis"] == 2)
+    equations = equations_of(problem_of(columns))
+    named = equations.fit([term_of(equations, "drag", (1,))])
+    found = held_out_errors(equations, named, equations.design.groups, 8.0)
+    assert found.without[0] == pytest.approx(np.hypot(NOISE, 0.4), rel=0.1)
+    assert found.without[0] > found.before > found.after
+
+
+def test_without_effects_before_and_after_are_the_same() -> None:
+    """Noise chooses nothing on any fold."""
+    equations = equations_of(problem_of(table()))
+    found = held_out_errors(equations, equations.fit(()), equations.design.groups, 8.0)
+    assert found.before == found.after
+    assert found.without == found.with_it == ()
+
+
+def test_only_the_groups_that_are_given_are_chosen_from() -> None:
+    """A group that data made later is not offered to the folds."""
+    equations = equations_of(problem_of(table(drag=0.4, factor=0.2)))
+    assert {term.name for term in chosen_effects(equations, 8.0)} == {"drag", "power"}
+    without = [group for group in equations.design.groups if group.name != "drag"]
+    assert "drag" not in {term.name for term in chosen_effects(equations.with_groups(without), 8.0)}
+    assert chosen_effects(equations, 1e6) == ()

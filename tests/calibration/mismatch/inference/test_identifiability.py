@@ -1,0 +1,172 @@
+"""Identifiability and sensitivity: what a recording cannot tell apart, and what it would have shown."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from linear import AXES, CANDIDATES, INSTANTS, Constant, Drag, Power, equations_of, problem_of, table, term_of
+
+from regolithd.calibration.mismatch.inference.collinearity import (
+    collinear_sets,
+    energy_apart,
+    imitates,
+    parameters_like,
+    representatives,
+)
+from regolithd.calibration.mismatch.inference.experiment import experiment_for, minutes_needed
+from regolithd.calibration.mismatch.inference.identifiability import indistinguishable, rivals, wrong_choice_rate
+from regolithd.calibration.mismatch.inference.sensitivity import sensitivities, smallest_detectable
+
+THRESHOLD = 8.0
+
+
+def one_speed(drag: float = 0.3) -> dict[str, np.ndarray]:
+    """Return a recording at one size of speed, both ways: it tells a drag from a power of the speed, and no powers."""
+    columns = table()
+    sign = np.sign(columns["speed_rad_s"])
+    speed = 0.8 * np.where(sign == 0, 1.0, sign)
+    noise = columns["reading_V"] - 2.0
+    return {**columns, "speed_rad_s": speed, "reading_V": 2.0 + drag * np.sign(speed) + noise}
+
+
+class LikeDrag(Drag):
+    """Another law that is the drag but for a hundredth."""
+
+    name = "like-drag"
+
+    def columns(self, problem: object, shape: object) -> np.ndarray:
+        """Return nearly sign(ω)."""
+        return super().columns(problem, shape) * (1 + 0.01 * np.sin(problem.time_s))  # type: ignore[arg-type, attr-defined]
+
+
+def test_a_pair_that_is_nearly_one_is_a_set() -> None:
+    """Each could stand for each; what can be told apart is in none."""
+    equations = equations_of(problem_of(table()), (Drag(), LikeDrag(), Power()))
+    sets = collinear_sets(equations, equations.fit(()), THRESHOLD)
+    assert [one.effects for one in sets if "drag" in one.effects] == [("drag", "like-drag")]
+    assert "drive both ways" in sets[0].experiment.lower()
+    terms = representatives(equations)
+    assert imitates(equations, equations.fit(()), terms["drag"], terms["like-drag"])
+    assert not imitates(equations, equations.fit(()), terms["drag"], terms["power"])
+
+
+def test_what_a_free_parameter_hides_is_in_a_set_with_it() -> None:
+    """An offset is the level's error."""
+    equations = equations_of(problem_of(table()), (Constant(), Drag()))
+    offset, drag = term_of(equations, "offset"), term_of(equations, "drag")
+    assert parameters_like(equations, (), [offset]) == ["level-error"]
+    assert parameters_like(equations, (), [drag]) == []
+    assert parameters_like(equations, (), [offset, drag]) == []
+    assert equations.nuisance.precision[0] == pytest.approx(4.0, rel=1e-6)
+
+
+def test_energy_apart_is_the_gain_at_the_size_worth_telling_apart() -> None:
+    """Tolerance times size squared times the readings' weights."""
+    equations = equations_of(problem_of(table()))
+    drag = term_of(equations, "drag")
+    size = 0.15 * equations.problem.mean_size
+    expected = equations.tolerance((), drag) * size**2 * equations.weights[0] * INSTANTS * AXES
+    assert energy_apart(equations, (), drag) == pytest.approx(expected)
+    assert energy_apart(equations, (), drag, 3.0) == pytest.approx(3 * expected)
+
+
+def test_a_named_effect_has_those_rivals_that_fit_as_well() -> None:
+    """A twin is one, a power of the speed is none; the rivals' shapes are optimised in new equations."""
+    equations = equations_of(problem_of(table(drag=0.3)), (Drag(), LikeDrag(), Power()))
+    named = equations.fit([term_of(equations, "drag")])
+    extended, (found,) = rivals(equations, named, THRESHOLD)
+    assert found.effects[:2] == ("drag", "like-drag")
+    assert "power" not in found.effects
+    assert extended.design.size >= equations.design.size
+    _, sets = indistinguishable(equations, named, named, THRESHOLD)
+    assert sum("drag" in one.effects for one in sets) == 1
+
+
+def test_a_clear_effect_has_no_rivals() -> None:
+    """Speeds of many sizes tell the drag from all others."""
+    equations = equations_of(problem_of(table(drag=0.3)), (Drag(), Power()))
+    assert rivals(equations, equations.fit([term_of(equations, "drag")]), THRESHOLD)[1] == ()
+
+
+@pytest.mark.parametrize(("lead", "apart", "rate"), [(0.0, 10.8241, 0.05), (0.0, 1e-6, 0.5), (8.0, 4.0, 0.00135)])
+def test_wrong_choices_are_as_frequent_as_a_normal_lead_says(lead: float, apart: float, rate: float) -> None:
+    """The lead is normal about μ with variance 4 μ."""
+    assert wrong_choice_rate(lead, apart) == pytest.approx(rate, rel=0.02)
+
+
+def test_the_smallest_detectable_drag_is_what_its_noise_allows() -> None:
+    """Its Δχ² passes the threshold nine times in ten."""
+    equations = equations_of(problem_of(table(noise=0.2)))
+    drag = term_of(equations, "drag")
+    found = smallest_detectable(equations, (), drag, THRESHOLD)
+    needed = (np.sqrt(THRESHOLD + 2) + 1.2816) ** 2
+    assert found == pytest.approx(
+        max(np.sqrt(needed / (equations.weights[0] * INSTANTS * AXES)), 0.02 * equations.problem.mean_size), rel=0.1
+    )
+    higher = smallest_detectable(equations, (), drag, 1000.0)
+    assert higher > 3 * found
+    one_axis = smallest_detectable(equations, (), term_of(equations, "drag", (0,)), 1000.0)
+    assert one_axis > 1.3 * higher
+
+
+def test_what_cannot_show_has_no_smallest_size() -> None:
+    """A candidate without columns, and one that is another's combination."""
+    equations = equations_of(problem_of(table()), (Drag(),))
+    found = {one.name: one for one in sensitivities(equations, equations.fit(()), CANDIDATES, THRESHOLD)}
+    assert list(found) == sorted(found)
+    assert found["power"].smallest_detectable == float("inf")
+    assert found["drag"].smallest_detectable < 1
+    assert found["drag"].unit == "V"
+    twice = term_of(equations, "drag")
+    assert smallest_detectable(equations, [twice], twice, THRESHOLD) == float("inf")
+    named = equations.fit([twice])
+    (again,) = sensitivities(equations, named, (Drag(),), THRESHOLD)
+    assert again.smallest_detectable == pytest.approx(found["drag"].smallest_detectable)
+
+
+def test_at_one_size_of_speed_powers_are_one_effect() -> None:
+    """Nothing tells a power from an offset there."""
+    equations = equations_of(problem_of(one_speed()), (Constant(), Drag(), Power()))
+    assert equations.tolerance([term_of(equations, "offset")], term_of(equations, "power")) < 1e-3
+    assert equations.tolerance((), term_of(equations, "drag")) > 0.5
+
+
+class Patient(Drag):
+    """A drag whose experiment lasts long."""
+
+    name = "patient"
+    experiment_minutes: ClassVar = (45, 90)
+    acts_unloaded: ClassVar = False
+
+
+def test_an_experiment_names_each_drive_once_and_its_length() -> None:
+    """Capitalised, joined, with minutes within the candidates' limits."""
+    equations = equations_of(problem_of(table()), (Drag(), Power(), Patient()))
+    members = [term_of(equations, name) for name in ("drag", "patient", "power")]
+    sentence = experiment_for(equations, (), members, THRESHOLD)
+    assert sentence == "Drive both ways; then drive fast and slowly; 45 minutes in all."
+    assert experiment_for(equations, (), members[:1], THRESHOLD) == "Drive both ways; 10 minutes in all."
+
+
+def test_more_noise_needs_a_longer_experiment() -> None:
+    """In steps of five minutes, in proportion to the variance."""
+    equations = equations_of(problem_of(table()))
+    noisy = equations.weighted(equations.weights / 400)
+    found = minutes_needed(noisy, THRESHOLD)
+    assert found % 5 == 0
+    assert found > 5
+    assert minutes_needed(noisy.weighted(equations.weights / 1600), THRESHOLD) == pytest.approx(4 * found, rel=0.2)
+
+
+def test_where_free_parameters_hide_a_member_the_load_is_taken_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    """If the machine says how to run without its load."""
+    equations = equations_of(problem_of(table()), (Constant(), Drag()))
+    monkeypatch.setattr(type(equations.problem.simulation), "unloaded_experiment", "lift it", raising=False)
+    assert "lift it" in experiment_for(equations, (), [term_of(equations, "offset")], THRESHOLD)
+    assert "lift it" not in experiment_for(equations, (), [term_of(equations, "drag")], THRESHOLD)
+    strict = replace(equations.problem, thresholds=replace(equations.thresholds, experiment_tolerance=1e-9))
+    patient = replace(equations, design=replace(equations.design, problem=strict))
+    assert "lift it" not in experiment_for(patient, (), [term_of(equations, "offset")], THRESHOLD)

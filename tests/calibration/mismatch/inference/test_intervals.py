@@ -1,0 +1,135 @@
+"""Intervals: sandwich covariance, sizes and onsets of effects whose truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from linear import NOISE, equations_of, problem_of, table, term_of
+
+from regolithd.calibration.mismatch.inference.intervals import interval, normal_draws, parameters_of, unit_of
+from regolithd.calibration.mismatch.inference.sandwich import block_sums, linearised, sandwich
+from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
+from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
+from regolithd.calibration.mismatch.signal.noise import NoiseModel
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+WHITE = NoiseModel(np.full(2, NOISE), 1.0)
+
+
+def exact_law(equations: NormalEquations) -> NormalEquations:
+    """Return equations whose laws are taken as exact: the intervals are then those of the noise."""
+    problem = replace(equations.problem, thresholds=replace(equations.thresholds, discrepancy_std=1e-4))
+    return replace(equations, design=replace(equations.design, problem=problem))
+
+
+def test_block_sums_keep_wheels_apart() -> None:
+    """One row for each block of each wheel."""
+    scores = np.arange(24.0).reshape(2, 6, 2)
+    blocks = np.array([0, 0, 0, 1, 1, 2])
+    sums = block_sums(scores, blocks)
+    assert sums.shape == (6, 2)
+    np.testing.assert_allclose(sums[0], scores[:, :3, 0].sum(axis=1))
+    np.testing.assert_allclose(sums[3], scores[:, 3:5, 1].sum(axis=1))
+
+
+def test_the_sandwich_of_white_noise_is_the_inverse_information() -> None:
+    """And the fit's own coefficients do not move."""
+    equations = exact_law(equations_of(problem_of(table(drag=0.3))))
+    fit = equations.fit([term_of(equations, "drag")])
+    blocks = blocks_of_time(equations.problem, WHITE)
+    linearisation = linearised(equations, fit)
+    step, covariance = sandwich(equations, fit, linearisation, blocks)
+    assert np.abs(step[:2]).max() < 1e-3
+    assert np.sqrt(covariance[1, 1]) == pytest.approx(np.sqrt(fit.covariance[1, 1]), rel=0.35)
+    assert linearisation.of_term(fit, 0) == [1, *range(2, len(linearisation.columns))]
+    np.testing.assert_allclose(linearisation.precision[2:], 1e8)
+
+
+def test_nine_in_ten_intervals_hold_the_truth() -> None:
+    """On simulated linear data, over forty seeds."""
+    held = 0
+    for seed in range(40):
+        equations = exact_law(equations_of(problem_of(table(drag=0.3, seed=seed))))
+        fit = equations.fit([term_of(equations, "drag")])
+        (found,) = parameters_of(equations, fit, blocks_of_time(equations.problem, WHITE))
+        held += found["drag"].low <= 0.3 <= found["drag"].high
+        assert found["drag"].low < found["drag"].value < found["drag"].high
+    assert 31 <= held <= 40
+
+
+def test_a_law_may_be_wrong_by_a_share_at_each_knot_and_on_each_axis() -> None:
+    """The fit is linearised with discrepancies whose prior has the stated deviation."""
+    equations = equations_of(problem_of(table(drag=0.3)))
+    fit = equations.fit([term_of(equations, "drag")])
+    linearisation = linearised(equations, fit)
+    assert linearisation.columns.shape == (2 + 6 + 2, *equations.problem.mask.shape)
+    np.testing.assert_allclose(linearisation.precision, [4.0, 0.0, *[0.15**-2] * 8], rtol=1e-5)
+    blocks = blocks_of_time(equations.problem, WHITE)
+    deviations = [
+        np.sqrt(sandwich(each, fit, linearised(each, fit), blocks)[1][1, 1])
+        for each in (exact_law(equations), equations)
+    ]
+    assert deviations[1] > 1.3 * deviations[0], "the coefficient and its discrepancies share what is known"
+
+
+def test_relative_size_is_the_effect_over_the_mean_reading() -> None:
+    """A drag of 0.3 at a mean of about 2."""
+    equations = equations_of(problem_of(table(drag=0.3)))
+    (found,) = parameters_of(
+        equations, equations.fit([term_of(equations, "drag")]), blocks_of_time(equations.problem, WHITE)
+    )
+    size = found["relative_size"]
+    assert size.value == pytest.approx(0.3 / float(np.mean(np.abs(equations.problem.measured))), rel=0.1)
+    assert size.low < size.value < size.high
+    assert (size.unit, found["drag"].unit) == ("1", "V")
+
+
+def test_a_shape_parameter_has_its_interval() -> None:
+    """The power of a curve of power 1.5."""
+    equations = equations_of(problem_of(table(factor=0.8, power=1.5)))
+    equations, term = optimised_shape(equations, (), term_of(equations, "power"))
+    (found,) = parameters_of(equations, equations.fit([term]), blocks_of_time(equations.problem, WHITE))
+    assert found["power"].low <= 1.5 <= found["power"].high
+    assert found["power"].high - found["power"].low < 0.6
+
+
+def test_an_onset_has_bounds_on_both_sides_within_the_recording() -> None:
+    """A step of half a volt at 231 s is known to a few seconds."""
+    columns = table()
+    columns["reading_V"] = columns["reading_V"] + 0.5 * (columns["t_s"] >= 231)
+    equations = equations_of(problem_of(columns))
+    equations, term = optimised_shape(equations, (), term_of(equations, "step", place=5))
+    (found,) = parameters_of(equations, equations.fit([term]), blocks_of_time(equations.problem, WHITE))
+    onset = found["onset_s"]
+    assert 0 <= onset.low <= 231 <= onset.high <= equations.problem.length_s
+    assert 0.1 < onset.high - onset.low < 10
+    assert onset.unit == "s"
+
+
+def test_draws_have_the_covariance_that_is_asked() -> None:
+    """And are the same every time."""
+    covariance = np.array([[2.0, 0.6], [0.6, 0.5]])
+    drawn = normal_draws(covariance, 4000)
+    np.testing.assert_allclose(np.cov(drawn.T), covariance, atol=0.15)
+    np.testing.assert_array_equal(drawn, normal_draws(covariance, 4000))
+
+
+def test_a_value_is_within_its_own_interval() -> None:
+    """Even where all draws are to one side."""
+    found = interval(1.0, [2.0, 3.0, 4.0], "V")
+    assert (found.low, found.value, found.unit) == (1.0, 1.0, "V")
+    assert found.high == pytest.approx(3.9)
+    assert interval(5.0, [2.0, 3.0, 4.0], "V").high == 5.0
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"), [("scale_K", "K"), ("onset_s", "s"), ("speed_rad_s", "rad/s"), ("end_degC", "degC"), ("p", "1")]
+)
+def test_a_shape_parameter_s_name_ends_in_its_unit(name: str, unit: str) -> None:
+    """Without an ending that is known it has none."""
+    assert unit_of(name) == unit

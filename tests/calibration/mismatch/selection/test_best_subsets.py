@@ -1,0 +1,132 @@
+"""Best subset selection on a machine of two axes whose truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from linear import equations_of, group_of, problem_of, table, term_of
+
+from regolithd.calibration.mismatch.regression.group import Term
+from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
+from regolithd.calibration.mismatch.selection.best_subsets import (
+    acceptable,
+    best_of_each_candidate,
+    best_of_each_smooth_term,
+    best_subsets,
+    optimised_shapes,
+    passes_entry_test,
+    wheels_of_faulty_sensors,
+)
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+
+@pytest.fixture(scope="module")
+def equations() -> NormalEquations:
+    """Return the equations of a recording with a drag, and with a square of the speed."""
+    return equations_of(problem_of(table(drag=0.3, factor=0.1, power=2.0)))
+
+
+def test_each_candidate_s_best_shape_and_wheels_come_by_score(equations: NormalEquations) -> None:
+    """The drag on both axes is first, and nothing is listed twice."""
+    found = best_of_each_candidate(equations, ())
+    assert next(term.name for _, term in found) == "drag"
+    assert found[0][1].wheels == (0, 1)
+    assert len({term.name for _, term in found}) == len(found)
+    assert [score for score, _ in found] == sorted((score for score, _ in found), reverse=True)
+    best = max(equations.further((), [g for g in equations.design.groups if g.name == "power"]), key=lambda p: p[0])
+    assert {term.name: score for score, term in found}["power"] == pytest.approx(best[0] - equations.penalty(best[1]))
+
+
+def test_what_is_given_is_not_offered_again(equations: NormalEquations) -> None:
+    """Nor the same candidate on a part of the same axes."""
+    beside = best_of_each_candidate(equations, [term_of(equations, "drag")])
+    assert "drag" not in {term.name for _, term in beside}
+    other_axis = best_of_each_candidate(equations, [term_of(equations, "drag", (0,))])
+    (drag,) = [term for _, term in other_axis if term.name == "drag"]
+    assert drag.wheels == (1,)
+
+
+def test_smooth_terms_are_offered_by_covariate_coupling_and_number_of_wheels(equations: NormalEquations) -> None:
+    """Only those that no candidate names."""
+    smooth = equations.over(with_smooth_terms(equations.design))
+    found = best_of_each_smooth_term(smooth, ())
+    assert all(not term.group.named for _, term in found)
+    kinds = [(term.name, term.group.coupling, len(term.wheels)) for _, term in found]
+    assert len(set(kinds)) == len(kinds)
+    taken = best_of_each_smooth_term(smooth, [found[0][1]])
+    assert (found[0][1].name, found[0][1].wheels) not in {(term.name, term.wheels) for _, term in taken}
+
+
+def test_a_free_shape_is_optimised_beyond_the_grid() -> None:
+    """A power of 1.5 lies between the grid's 1 and 2; the equations get its column."""
+    equations = equations_of(problem_of(table(factor=0.8, power=1.5)))
+    size = equations.design.size
+    extended, (term,) = optimised_shapes(equations, [term_of(equations, "power")])
+    assert float(term.group.shape["power"]) == pytest.approx(1.5, abs=0.1)
+    assert extended.design.size == size + 1
+    assert equations.design.size == size
+    best_on_grid = max(equations.fit([term_of(equations, "power", place=k)]).delta_chi2 for k in (0, 1))
+    assert extended.fit([term]).delta_chi2 > best_on_grid
+
+
+def test_the_best_sets_of_one_and_two_effects_are_the_true_ones(equations: NormalEquations) -> None:
+    """Each size once, from none upwards."""
+    extended, subsets = best_subsets(equations)
+    assert [len(fit.terms) for fit in subsets[:3]] == [0, 1, 2]
+    assert {term.name for term in subsets[2].terms} == {"drag", "power"}
+    assert passes_entry_test(extended, subsets[2], subsets[1], 8.0)
+    if len(subsets) > 3:
+        assert not passes_entry_test(extended, subsets[3], subsets[2], 8.0)
+
+
+def test_where_nothing_is_missing_no_effect_passes() -> None:
+    """Noise alone scores less than the threshold."""
+    extended, subsets = best_subsets(equations_of(problem_of(table(seed=3))))
+    for more in subsets[1:]:
+        assert not passes_entry_test(extended, more, subsets[0], 8.0)
+
+
+def test_an_effect_too_small_to_matter_is_not_acceptable(equations: NormalEquations) -> None:
+    """Below the smallest share of the mean reading, however significant."""
+    drag = term_of(equations, "drag")
+    assert acceptable(equations, equations.fit([drag]))
+    small = equations_of(problem_of(table(drag=0.02, noise=0.01)))
+    fit = small.fit([term_of(small, "drag")])
+    assert fit.delta_chi2 > 5
+    assert not acceptable(small, fit)
+
+
+def test_an_effect_with_the_wrong_sign_is_not_acceptable() -> None:
+    """A drag does not push."""
+    equations = equations_of(problem_of(table(drag=-0.3)))
+    assert not acceptable(equations, equations.fit([term_of(equations, "drag")]))
+
+
+@pytest.mark.parametrize(("own", "agrees"), [(0.3, True), (0.15, True), (0.1, False), (0.6, True), (0.9, False)])
+def test_a_fault_of_another_channel_is_as_large_there(equations: NormalEquations, own: float, *, agrees: bool) -> None:
+    """The drag is 0.3; the ratio to its size at home is between 0.4 and 2.5."""
+    group = group_of(equations, "drag")
+    fault = replace(group, own_channel=(np.full(2, 100.0), np.full(2, own)))
+    fit = equations.fit([Term(fault, (0, 1))])
+    assert acceptable(equations, fit) is agrees
+    assert wheels_of_faulty_sensors(fit) == {0, 1}
+    assert wheels_of_faulty_sensors(equations.fit([term_of(equations, "drag")])) == set()
+
+
+def test_a_further_effect_must_gain_a_share_of_what_the_others_gained(equations: NormalEquations) -> None:
+    """With a share of nearly all, no second effect passes; with the usual one it does."""
+    _, subsets = best_subsets(equations)
+    strict = equations_of(
+        replace(
+            equations.problem,
+            thresholds=replace(equations.thresholds, further_share=0.99, remaining_share=0.99),
+        )
+    )
+    one, both = subsets[1], subsets[2]
+    more, less = (strict.fit([term_of(strict, t.name, t.wheels) for t in fit.terms]) for fit in (both, one))
+    assert not passes_entry_test(strict, more, less, 8.0)

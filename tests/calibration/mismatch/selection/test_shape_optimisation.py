@@ -1,0 +1,106 @@
+"""Optimisation of a shape parameter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from linear import Drag, Power, equations_of, problem_of, table, term_of
+
+from regolithd.calibration.mismatch.regression.group import Term
+from regolithd.calibration.mismatch.selection.shape_optimisation import (
+    golden_section,
+    maximise,
+    optimised_shape,
+    shape_profile,
+)
+
+
+@pytest.mark.parametrize("top", [0.0, 0.31, 1.7, 4.0])
+def test_a_maximum_is_found_wherever_it_is(top: float) -> None:
+    """At the ends too."""
+    at, value = maximise(lambda x: 3 - (x - top) ** 2, 0.0, 4.0)
+    assert at == pytest.approx(top, abs=2e-3)
+    assert value == pytest.approx(3, abs=1e-5)
+
+
+def test_the_higher_of_two_maxima_is_found() -> None:
+    """The scan decides where to narrow."""
+    at, _ = maximise(lambda x: np.exp(-((x - 1) ** 2)) + 2 * np.exp(-((x - 5) ** 2)), 0.0, 6.0)
+    assert at == pytest.approx(5.0, abs=0.01)
+
+
+def test_golden_sections_close_in_on_the_maximum() -> None:
+    """Fourteen steps narrow to less than a thousandth; each asks for one new value."""
+    asked: list[float] = []
+
+    def function(x: float) -> float:
+        asked.append(x)
+        return -abs(x - 0.6)
+
+    (left, at_left), (right, at_right) = golden_section(function, 0.0, 1.0)
+    assert left < right
+    assert right - left < 1e-3
+    assert max(at_left, at_right) > -1e-3
+    assert len(asked) == 2 + 14
+
+
+def test_the_profile_is_the_gain_beside_the_other_terms() -> None:
+    """As the equations have it for a column of the grid, on one axis as on two."""
+    equations = equations_of(problem_of(table(drag=0.3, factor=0.2)))
+    others = [term_of(equations, "drag")]
+    for wheels in ((0, 1), (1,)):
+        profile = shape_profile(equations, others, Power(), wheels)
+        for place in (0, 1):
+            term = term_of(equations, "power", wheels, place)
+            gain = equations.fit([*others, term]).delta_chi2 - equations.fit(others).delta_chi2
+            assert profile(term.group.shape) == pytest.approx(gain, rel=5e-3, abs=0.05)
+            assert profile.along(term.group.shape, "power")(float(term.group.shape["power"])) == profile(
+                term.group.shape
+            )
+
+
+def test_the_profile_of_a_wrong_sign_is_zero() -> None:
+    """What pushes is no drag."""
+    equations = equations_of(problem_of(table(drag=-0.3)))
+    assert shape_profile(equations, (), Drag(), (0, 1))({}) == 0
+
+
+def test_what_has_no_free_shape_stays_as_it_is() -> None:
+    """No column is added."""
+    equations = equations_of(problem_of(table(drag=0.3)))
+    extended, term = optimised_shape(equations, (), term_of(equations, "drag"))
+    assert extended is equations
+    assert term == term_of(equations, "drag")
+
+
+class SelfConsistent(Drag):
+    """A drag whose shape holds its own coefficient, as a law does that is not linear in it."""
+
+    name = "self-consistent"
+
+    def shapes(self, problem: object) -> list[dict[str, float | str]]:  # noqa: ARG002
+        """Return no bend at first."""
+        return [{"bent": 0.0}]
+
+    def self_consistent_shape(self, problem: object, shape: object, values: object) -> dict[str, float | str]:  # noqa: ARG002
+        """Return the coefficient, rounded, so that it settles."""
+        return {"bent": round(values[0], 1)}  # type: ignore[index]
+
+
+def test_a_shape_is_made_to_agree_with_its_coefficients() -> None:
+    """The drag of 0.3 becomes a part of its shape."""
+    equations = equations_of(problem_of(table(drag=0.3)), (SelfConsistent(),))
+    extended, term = optimised_shape(equations, (), term_of(equations, "self-consistent"))
+    assert term.group.shape == {"bent": 0.3}
+    assert extended.design.size == equations.design.size + 1
+
+
+def test_an_onset_is_sought_near_its_place_in_the_grid() -> None:
+    """From the nearest of nine onsets to within two seconds of 231 s."""
+    columns = table(noise=0.1)
+    columns["reading_V"] = columns["reading_V"] + 0.5 * (columns["t_s"] >= 231)
+    equations = equations_of(problem_of(columns))
+    nearest = max(range(9), key=lambda k: equations.fit([term_of(equations, "step", place=k)]).delta_chi2)
+    _, term = optimised_shape(equations, (), term_of(equations, "step", place=nearest))
+    assert float(term.group.shape["onset_s"]) == pytest.approx(231, abs=2)
+    assert isinstance(term, Term)
