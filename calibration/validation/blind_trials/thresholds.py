@@ -15,7 +15,7 @@ import math
 import os
 import time
 import tomllib
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -64,7 +64,7 @@ def changed(name: str, factor: float, thresholds: Thresholds = THRESHOLDS) -> Th
     return replace(thresholds, **{name: after})
 
 
-def score_of(study: Study, name: str, factor: float, workers: ProcessPoolExecutor) -> dict[str, float]:
+def score_of(study: Study, name: str, factor: float, workers: Executor) -> dict[str, float]:
     """Return the scores of all trials with one threshold multiplied by a factor."""
     outcomes = workers.map(partial(_outcome, study, name, factor), study.plans())
     found = figures([judge(outcome) for outcome in outcomes])
@@ -97,7 +97,7 @@ def _answer(folder: Path, thresholds: Thresholds) -> dict[str, object]:
     return {"seconds": time.perf_counter() - started, "answer": found.answer.to_json()}
 
 
-def rows(study: Study, thresholds: Sequence[Threshold], workers: ProcessPoolExecutor) -> Iterator[str]:
+def rows(study: Study, thresholds: Sequence[Threshold], workers: Executor) -> Iterator[str]:
     """Yield the table's lines as they are found."""
     yield HEADER
     yield "|---" * HEADER.count(" | ") + "|---|"

@@ -1,0 +1,136 @@
+"""The problem: prediction, mask, covariates and tangents of a machine that is linear in everything."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from linear import AXES, INSTANTS, STEP_S, Level, problem_of, table
+
+from regolithd.calibration.mismatch import RecordingError, from_columns
+from regolithd.calibration.mismatch.problem.build import build_problem, outliers
+from regolithd.calibration.mismatch.problem.prior import own_name
+from regolithd.calibration.mismatch.thresholds import Thresholds
+
+
+def test_prediction_and_covariates_have_the_recording_s_shape() -> None:
+    """The contract's covariates are derived from the speed; the magnitude of the prediction is the torque."""
+    problem = problem_of(table())
+    assert problem.prediction.shape == (INSTANTS, AXES)
+    assert set(problem.covariates) == {
+        "wheel_speed", "time", "torque", "direction", "wheel_acceleration", "wheel_angle"
+    }  # fmt: skip
+    assert problem.length_s == (INSTANTS - 1) * STEP_S
+    assert problem.mean_size == pytest.approx(2.0, rel=0.02)
+    assert problem.has("direction", "time")
+    assert not problem.has("direction", "temperature")
+    speed = problem.covariates["wheel_speed"]
+    np.testing.assert_array_equal(problem.covariates["direction"], np.sign(speed))
+    np.testing.assert_allclose(problem.covariates["torque"], 2.0)
+
+
+def test_acceleration_and_angle_are_derivative_and_integral_of_the_speed() -> None:
+    """By central differences and by the trapezium rule."""
+    problem = problem_of(table())
+    speed = problem.covariates["wheel_speed"]
+    np.testing.assert_allclose(
+        problem.covariates["wheel_acceleration"][1:-1], (speed[2:] - speed[:-2]) / (2 * STEP_S), atol=1e-9
+    )
+    steps = np.diff(problem.covariates["wheel_angle"], axis=0)
+    np.testing.assert_allclose(steps, 0.5 * (speed[1:] + speed[:-1]) * STEP_S, atol=1e-9)
+    assert not problem.covariates["wheel_angle"][0].any()
+
+
+def test_nothing_is_differentiated_across_a_gap_or_between_runs() -> None:
+    """The time runs on from one run to the next, and stands still in no gap."""
+    columns = table(runs=2)
+    columns["t_s"] = columns["t_s"] + 60.0 * (columns["t_s"] >= 100)
+    problem = problem_of(columns)
+    time_s, acceleration = problem.time_s[:, 0], problem.covariates["wheel_acceleration"]
+    speed = problem.covariates["wheel_speed"]
+    gap = int(np.argmax(np.diff(time_s)))
+    assert np.diff(time_s)[gap] == pytest.approx(60.5)
+    one_sided = 0.5 * (speed[gap] - speed[gap - 1]) / STEP_S
+    np.testing.assert_allclose(acceleration[gap], one_sided)
+    assert np.all(np.diff(time_s) > 0)
+    between = INSTANTS // 2
+    assert np.diff(time_s)[between - 1] == pytest.approx(STEP_S)
+    assert np.diff(problem.covariates["wheel_angle"], axis=0)[between - 1] == pytest.approx(0.0)
+
+
+def test_what_never_varies_is_no_covariate() -> None:
+    """But for those that candidates need even so."""
+
+    class WithTemperature(Level):
+        """Has a temperature that stays the same, and a pressure that was never measured."""
+
+        def covariates(self, inputs: object) -> dict[str, np.ndarray]:
+            """Return them beside the speed."""
+            found = super().covariates(inputs)  # type: ignore[arg-type]
+            still = np.full_like(found["wheel_speed"], 20.0)
+            return {**found, "temperature": still, "pressure": still * np.nan, "voltage": np.sin(found["time"])}
+
+    problem = build_problem(from_columns(table(), unit="axis"), WithTemperature())
+    assert "voltage" in problem.covariates
+    assert not {"temperature", "pressure"} & set(problem.covariates)
+    assert "torque" in problem.covariates
+
+
+def test_single_readings_far_out_are_no_part_of_the_problem() -> None:
+    """Fifteen deviations by default."""
+    columns = table(noise=0.2)
+    columns["reading_V"][[100, 301]] = [2 + 0.2 * 20, 2 + 0.2 * 10]
+    problem = problem_of(columns)
+    assert not problem.mask[50, 0]
+    assert problem.mask.sum() == INSTANTS * AXES - 1
+    assert problem.filled[50, 0] == 0
+    assert problem_of(columns, Thresholds(outlier_deviations=8.0)).mask.sum() == INSTANTS * AXES - 2
+
+
+def test_outliers_are_counted_from_the_median() -> None:
+    """A constant residual has none, nor has one that was never measured."""
+    residual = np.r_[np.linspace(4, 6, 99), 60.0][:, None]
+    assert np.flatnonzero(outliers(residual, 15.0)).tolist() == [99]
+    assert not outliers(residual, 100.0).any()
+    assert not outliers(np.full((10, 1), 3.0), 1.0).any()
+    assert not outliers(np.full((10, 1), np.nan), 1.0).any()
+
+
+def test_tangents_and_secants_are_difference_quotients() -> None:
+    """Of the level: 1; they are computed once."""
+    problem = problem_of(table())
+    np.testing.assert_allclose(problem.tangent("level"), 1.0)
+    np.testing.assert_allclose(problem.secant("level", 0.5), 1.0)
+    assert problem.secant("level", 0.5) is problem.secant("level", 0.5)
+    np.testing.assert_allclose(problem.changed(level=5.0), 5.0)
+    np.testing.assert_allclose(problem.input_tangent("speed_rad_s"), 0.0)
+    np.testing.assert_allclose(problem.with_input("speed_rad_s", np.full((INSTANTS, AXES), np.nan)), 0.0)
+
+
+def test_variance_within_wheels_leaves_out_what_differs_between_them() -> None:
+    """A factor that is 1 on one axis and 3 on the other does not change on any."""
+    problem = problem_of(table())
+    apart = np.broadcast_to([1.0, 3.0], problem.mask.shape)
+    assert problem.variance_within(apart) == 0
+    assert not problem.changes_within(apart)
+    assert problem.changes_within(apart + 0.5 * np.sin(problem.time_s))
+    assert not problem.changes_within(apart + 0.05 * np.sin(problem.time_s))
+
+
+def test_what_cannot_be_compared_is_an_error() -> None:
+    """A missing column is named; too few readings are counted."""
+    columns = table()
+    del columns["speed_rad_s"]
+    with pytest.raises(RecordingError, match="needs speed_rad_s"):
+        problem_of(columns)
+    columns = table()
+    columns["reading_V"][60:] = np.nan
+    with pytest.raises(RecordingError, match=r"only 60 values of reading_V .* at least 100"):
+        problem_of(columns)
+
+
+def test_a_simulation_without_sides_has_no_sets_and_no_contrasts() -> None:
+    """A wheel's own deviation of a parameter has a name that says so."""
+    problem = problem_of(table())
+    assert problem.wheel_sets == ()
+    assert problem.contrasts("roll") == {}
+    assert own_name("gain", 4) == "gain of 4"
