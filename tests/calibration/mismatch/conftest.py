@@ -1,4 +1,4 @@
-"""The tests of this folder find `drives` beside them."""
+"""The tests of this folder find `servo` beside them."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from drives import TABLES, columns, recording, simulation
+from rover_drives import TABLES, columns, recording, simulation
 
 from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.candidates.library import library

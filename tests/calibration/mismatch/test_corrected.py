@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drives import TABLES, columns, simulation
+from rover_drives import TABLES, columns, simulation
 from servo import ServoAxis
 
 from regolithd.calibration.mismatch.answer import Contribution

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from drives import columns, simulation
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from rover_drives import columns, simulation
 
 from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.data.recording import from_columns

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from linear import AXES, INSTANTS, NOISE, Level, table
+from linear_machine import AXES, INSTANTS, NOISE, Level, table
 
 from regolithd.calibration.mismatch import compare, from_columns
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from linear import Level, table
+from linear_machine import Level, table
 
 from regolithd.calibration.mismatch import compare, from_columns
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds

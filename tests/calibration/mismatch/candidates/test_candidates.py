@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from drives import columns, recording, simulation
+from rover_drives import columns, recording, simulation
 
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.data.recording import from_columns

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from drives import TABLES, columns, simulation
+from rover_drives import TABLES, columns, simulation
 
 from regolithd.calibration.mismatch import candidates
 from regolithd.calibration.mismatch.candidates.library import library

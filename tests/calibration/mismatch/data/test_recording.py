@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from drives import columns
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rover_drives import columns
 
 from regolithd.calibration.mismatch.data.recording import from_columns, read_recording
 from regolithd.calibration.mismatch.errors import RecordingError

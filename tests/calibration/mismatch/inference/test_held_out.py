@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from linear import NOISE, equations_of, problem_of, table, term_of
+from linear_machine import NOISE, equations_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch.inference.held_out import chosen_effects, held_out_errors
 

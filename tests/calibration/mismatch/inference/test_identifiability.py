@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from linear import AXES, CANDIDATES, INSTANTS, Constant, Drag, Power, equations_of, problem_of, table, term_of
+from linear_machine import AXES, CANDIDATES, INSTANTS, Constant, Drag, Power, equations_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch.inference.collinearity import (
     collinear_sets,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from linear import NOISE, equations_of, problem_of, table, term_of
+from linear_machine import NOISE, equations_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch.inference.intervals import interval, normal_draws, parameters_of, unit_of
 from regolithd.calibration.mismatch.inference.sandwich import block_sums, linearised, sandwich

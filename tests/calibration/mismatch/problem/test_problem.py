@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from linear import AXES, INSTANTS, STEP_S, Level, problem_of, table
+from linear_machine import AXES, INSTANTS, STEP_S, Level, problem_of, table
 
 from regolithd.calibration.mismatch import RecordingError, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem, outliers

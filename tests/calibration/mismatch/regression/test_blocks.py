@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from linear import INSTANTS, STEP_S, problem_of, table
+from linear_machine import INSTANTS, STEP_S, problem_of, table
 
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time, folds_of_blocks
 from regolithd.calibration.mismatch.signal.noise import NoiseModel

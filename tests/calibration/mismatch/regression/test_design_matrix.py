@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from linear import AXES, INSTANTS, design_of, problem_of, table
+from linear_machine import AXES, INSTANTS, design_of, problem_of, table
 
 from regolithd.calibration.mismatch.regression import design_matrix
 

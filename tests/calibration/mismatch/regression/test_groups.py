@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from linear import CANDIDATES, INSTANTS, Drag, Level, Power, design_of, equations_of, problem_of, table, term_of
+from linear_machine import CANDIDATES, INSTANTS, Drag, Level, Power, design_of, equations_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch.regression.candidate_groups import coefficient_signs, with_candidate
 from regolithd.calibration.mismatch.regression.discrepancy_basis import discrepancy_basis

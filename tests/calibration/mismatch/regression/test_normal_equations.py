@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from linear import NOISE, equations_of, group_of, problem_of, table, term_of
+from linear_machine import NOISE, equations_of, group_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations, normal_equations

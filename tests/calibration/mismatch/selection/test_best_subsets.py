@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from linear import equations_of, group_of, problem_of, table, term_of
+from linear_machine import equations_of, group_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from drives import columns, simulation
 from numpy.typing import NDArray
+from rover_drives import columns, simulation
 
 from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.data.recording import from_columns

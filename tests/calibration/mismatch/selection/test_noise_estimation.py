@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from linear import NOISE, equations_of, problem_of, table
+from linear_machine import NOISE, equations_of, problem_of, table
 
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.selection.noise_estimation import noise_beside_terms

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from linear import Drag, Power, equations_of, problem_of, table, term_of
+from linear_machine import Drag, Power, equations_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.selection.shape_optimisation import (

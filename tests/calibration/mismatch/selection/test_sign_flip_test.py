@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from linear import AXES, INSTANTS, Power, design_of, equations_of, problem_of, table
+from linear_machine import AXES, INSTANTS, Power, design_of, equations_of, problem_of, table
 
 from regolithd.calibration.mismatch.selection.sign_flip_test import (
     block_scores,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from linear import NOISE, equations_of, problem_of, table, term_of
+from linear_machine import NOISE, equations_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.selection.cross_validation import (
