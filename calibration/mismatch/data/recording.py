@@ -1,4 +1,4 @@
-"""A recording as arrays (time × wheel), and everything that is wrong with it, said.
+"""Recordings as arrays (time × wheel), with notes of what was wrong with the table.
 
 The long table of the contract (one row per instant and wheel) becomes one array per channel. What is not measured is
 NaN. Order of rows, origin of time and names of wheels carry no meaning: rows are sorted by run, time and wheel.
@@ -25,6 +25,11 @@ TIME = "t_s"
 UNIT = "wheel"
 RUN = "run"
 MOST_CLOCK_JUMPS = 3
+"""Backward jumps of the clock up to which each begins a new run; more are rows out of order (a choice)."""
+GAP_STEPS = 5
+"""Steps of time longer than so many usual ones are noted as gaps (a choice)."""
+TIME_DECIMALS = 9
+"""Times that agree to a nanosecond are one instant: less is rounding of the text."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +68,7 @@ class Recording:
         return np.full(self.shape, np.nan) if found is None else found
 
     def with_notes(self, *notes: str) -> Recording:
-        """Return the recording with more said about it."""
+        """Return the recording with further notes."""
         return replace(self, notes=(*self.notes, *notes))
 
     def with_channels(self, **channels: Array) -> Recording:
@@ -161,15 +166,14 @@ def from_columns(columns: Mapping[str, Array], *, unit: str = UNIT) -> Recording
 
 def _places(table: Mapping[str, Array], unit: str) -> tuple[Array, Index, tuple[int, ...], Index]:
     """Return the instants in order (run, time), each row's instant, the wheels, and each row's wheel."""
-    # A nanosecond decides whether two rows are of one instant: less is rounding of the text, not time.
-    stamps = np.column_stack((table[RUN], np.round(table[TIME], 9)))
+    stamps = np.column_stack((table[RUN], np.round(table[TIME], TIME_DECIMALS)))
     keys, row = np.unique(stamps, axis=0, return_inverse=True)
     names, column = np.unique(table[unit], return_inverse=True)
     return keys, row.ravel().astype(np.int64), tuple(int(name) for name in names), column.ravel().astype(np.int64)
 
 
 def _arranged(values: Array, row: Index, column: Index, shape: tuple[int, int]) -> Array:
-    """Put values where they belong; rows that claim one place are averaged, so that their order cannot matter."""
+    """Return values as (time, wheel), NaN where there is none; rows of one instant and wheel are averaged."""
     place = row * shape[1] + column
     known = np.isfinite(values)
     total = np.bincount(place[known], values[known], minlength=shape[0] * shape[1])
@@ -178,7 +182,7 @@ def _arranged(values: Array, row: Index, column: Index, shape: tuple[int, int]) 
 
 
 def _split_where_the_clock_jumps_back(table: Mapping[str, Array], unit: str, notes: list[str]) -> Array:
-    """Return each row's run: a clock that jumps back once or twice begins a new one; more is no clock but disorder."""
+    """Return each row's run; a clock that jumps back a few times begins a new run each time."""
     run = table[RUN].copy()
     jumps, at = 0, 0.0
     shift = np.zeros(len(run))
@@ -208,7 +212,7 @@ def _note_duplicates(row: Index, column: Index, shape: tuple[int, int], notes: l
 def _note_gaps(time_s: Array, run: Index, notes: list[str]) -> None:
     steps = np.where(np.diff(run) == 0, np.diff(time_s), np.nan)
     usual = np.nanmedian(steps) if np.isfinite(steps).any() else np.nan
-    gaps = np.flatnonzero(steps > 5 * usual)
+    gaps = np.flatnonzero(steps > GAP_STEPS * usual)
     if gaps.size:
         lost = float(np.sum(steps[gaps]))
         notes.append(f"{gaps.size} gaps, {lost:.1f} s in all; nothing is assumed about what happened in them.")

@@ -1,10 +1,10 @@
-"""What the recorded inputs really were: their conditional expectation, given the recording and the sensors' errors.
+"""Errors in variables: noisy inputs replaced by their conditional expectation (regression calibration).
 
-A noisy input makes physics of its own: the residual follows the error, and so does every candidate built on the same
-reading. Replacing a reading by E[truth | recording] removes this (regression calibration; what error remains is
-Berkson's, uncorrelated with what is computed from it). The truth is taken as first-order autoregressive about its
-mean, with the correlation that the recording itself shows, so a signal that jumps is hardly smoothed, and one that
-creeps, well. With a stated error of 0 nothing is touched.
+The error of an input biases the prediction and every candidate that is computed from the same reading, in the same
+way: the residual correlates with candidates though no physics is missing. Replacing a reading by E[truth | recording]
+removes this; the error that remains is of Berkson's kind, uncorrelated with what is computed from it (Carroll et al.,
+2006, chapter 4). The truth is modelled as first-order autoregressive about its mean, with the correlation of the
+recording, so that a signal that jumps is hardly smoothed. With a stated error of 0 nothing changes.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def expected_inputs(recording: Recording, sensors: Mapping[str, SensorError]) ->
 
 
 def known_mean(values: Array, axis: int = 0) -> Array:
-    """Return the mean of what is known; 0 where nothing is."""
+    """Return the mean over the finite values along an axis; 0 where there are none."""
     known = np.isfinite(values)
     return np.asarray(np.sum(np.where(known, values, 0.0), axis=axis) / np.maximum(known.sum(axis=axis), 1))
 
@@ -52,7 +52,7 @@ def conditional_expectation(values: Array, error_variance: Array, starts: NDArra
     """Smooth columns of noisy readings, shape (time, column), by a Kalman filter run forwards and backwards.
 
     `error_variance` [per column] is the readings' error; `starts` are the instants where a run begins anew.
-    NaN stays NaN, and is bridged.
+    NaN stays NaN; the filter predicts across it.
     """
     known = np.isfinite(values)
     mean = np.array([np.mean(c[k]) if k.any() else 0.0 for c, k in zip(values.T, known.T, strict=True)])

@@ -1,8 +1,8 @@
-"""The bus voltage without what the motors themselves do to it.
+"""Open-circuit voltage: the bus voltage without the sag that the motors' currents cause.
 
-A supply with a resistance sags under the current that it delivers, and with it under that current's noise. Such a
-voltage lies downstream of the residual: offered as it is, it "explains" noise. What the currents did to it from one
-instant to the next is taken out; what remains – the open-circuit voltage – may explain something.
+A supply with an internal resistance sags under the current that it delivers, its noise included. As a covariate such a
+voltage would be an effect of the residual, not a cause. The sag is estimated from steps of current and voltage and
+added back.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 CERTAIN = 5.0
-"""Standard errors by which a sag must show; a voltage that wanders by itself stays as it was recorded."""
+"""Standard errors by which a resistance must differ from 0 (a choice); else the voltage stays as recorded."""
 
 FEWEST = 50
-"""Instants below which a resistance is not to be had."""
+"""Steps below which no resistance is estimated (a choice)."""
 
 
 def open_circuit_voltage(voltage_V: Array, current_A: Array) -> Array:

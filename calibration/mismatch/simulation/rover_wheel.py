@@ -27,14 +27,13 @@ Array = NDArray[np.float64]
 
 GRAVITY_M_S2 = 9.81
 SLOWEST_RAD_S = 0.05
-"""Below this speed at the wheel the model says nothing: slip is a quotient of two small numbers there."""
-
+"""Wheel speed below which nothing is predicted: slip is a quotient of two small numbers there (a choice)."""
 WHEELS = 6
 """Of the daemon's rover: `[drivetrain]` has a value for each."""
 POWER_TOLERANCE = 1e-9
 """Difference from 1 of a viscous friction's power that is rounding."""
 LIFTED_N = 1.0
-"""What a cell may read under a wheel that hangs in its suspension."""
+"""Largest reading of a load cell under a wheel that hangs in its suspension (a choice: a few percent of a load)."""
 
 
 class SimulationTable(Table):
@@ -93,7 +92,7 @@ class RoverWheel(Simulation):
 
     @classmethod
     def from_tables(cls, tables: Mapping[str, Any]) -> Self:
-        """Read the tables of the contract; every mistake is told at once."""
+        """Read SIM.toml's tables; one error names every mistake."""
         try:
             return cls(RoverWheelTables(**{name: table for name, table in tables.items() if name != "effects"}))
         except ValidationError as error:
@@ -154,7 +153,7 @@ class RoverWheel(Simulation):
         return motor_current(torque, inputs["motor_speed_rad_s"], tables.drivetrain)
 
     def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
-        """Return everything measured that a left-out effect may follow."""
+        """Return everything measured that a missing effect may depend on."""
         named = {
             "temperature": "motor_temperature_degC",
             "voltage": "bus_voltage_V",
@@ -186,11 +185,11 @@ class RoverWheel(Simulation):
         return {}
 
     def variants(self) -> Mapping[str, float]:
-        """Physics that the model has in it, switched off: candidates switch it on."""
+        """Return the model's optional physics with its neutral values; candidates change them."""
         return {"stiffness_factor": 1.0, "shear_factor": 1.0, "slip_sinkage": 0.0}
 
     def corrected_tables(self, values: Mapping[str, float]) -> dict[str, Any]:
-        """Return the tables with gain, cohesion and friction angle where the recording moved them."""
+        """Return the tables with the calibrated gain, cohesion and friction angle."""
         tables = self.tables.model_dump()
         drivetrain, soil = tables["drivetrain"], tables["soil"]
         drivetrain["gain_factor"] = [

@@ -1,4 +1,4 @@
-"""What a simulation must say about itself, so that a recording can be held against it.
+"""The interface of a simulation: what it predicts, how well its parameters are known, and its covariates.
 
 A simulation predicts one channel from others. Everything else is optional. The shortest one:
 
@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 
 
 class Simulation:
-    """One simulation: subclass it, and say what yours predicts."""
+    """A simulation: derive from it, and define `channel`, `parameters` and `predict`."""
 
     channel: ClassVar[str]
     """The recorded column that is predicted."""
@@ -48,11 +48,11 @@ class Simulation:
     inputs: ClassVar[tuple[str, ...]] = ()
     """Columns without which nothing can be predicted."""
     parameters: Mapping[str, Prior] = {}
-    """What the simulation knows, and how well."""
+    """Every parameter's prior, by name."""
     own_to_each_wheel: ClassVar[frozenset[str]] = frozenset()
-    """Parameters in which wheels differ: beside the common error each has one of its own, a third as large."""
+    """Parameters of which each wheel has a deviation of its own (`Thresholds.own_share`) beside the common one."""
     parameter_effects: ClassVar[Mapping[str, str]] = {}
-    """Names of parameters as effects, for saying what a wrong parameter could be mistaken for."""
+    """Names of parameters as effects, for sets of effects that cannot be told apart."""
     covariate_labels: ClassVar[Mapping[str, str]] = {}
     """Axis labels with units for the report, by covariate: {"wheel_speed": "carriage speed (m/s)"}."""
     unloaded_experiment: ClassVar[str] = ""

@@ -1,4 +1,4 @@
-"""What the tool says of short drives: nothing of nothing, the name of what was added, and the same always."""
+"""Comparisons of short recordings: the effect that was added is named, and nothing where nothing is missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The answer belongs to the rover, not to how it was written down: rows, time's origin, and which side is which."""
+"""The answer does not depend on the order of rows, on the origin of time, or on which side is which."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recording's order, origin and faults: what carries no meaning changes nothing, what is wrong is said."""
+"""Recordings: order and origin carry no meaning; faults of the table are noted or refused."""
 
 from __future__ import annotations
 
