@@ -79,6 +79,21 @@ def test_a_class_predicts_what_the_true_machine_does(machine: Machine, which: st
 
 
 @pytest.mark.usefixtures("contract")
+def test_the_tanks_begin_empty_in_every_run_whether_time_goes_on_or_begins_again(tmp_path: Path) -> None:
+    """The same two runs give the same weights with one clock for both and with a clock that begins again."""
+    tanks = MACHINES["two-tanks"]
+    simulation, _ = loaded(tanks, tanks.base_units, tmp_path)
+    world = world_of(tanks)
+    given = inputs_of(world, tanks.base_units)
+    assert world.drive.run is not None
+    second = world.drive.run == 2
+    restarted = {**given, "t_s": given["t_s"] - np.where(second, world.drive.t_s[second][0], 0.0)[:, None]}
+    first = simulation.predict(given, world.values)
+    np.testing.assert_allclose(simulation.predict(restarted, world.values), first)
+    assert not first[second][0].any()
+
+
+@pytest.mark.usefixtures("contract")
 @pytest.mark.parametrize("machine", CLASSES, ids=lambda machine: machine.name)
 def test_a_class_is_short_and_its_tables_agree_with_it(machine: Machine, tmp_path: Path) -> None:
     """Under 60 lines; channels, priors and covariates as the recording and SIM.toml have them."""
