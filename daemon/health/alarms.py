@@ -43,6 +43,8 @@ class AlarmInputs:
     kernel_drops: int = 0
     store_dropped: int = 0
     store_unstored: int = 0
+    store_damaged: int = 0
+    store_torn: int = 0
     recording_problem: str = ""
     control_problem: str = ""
     clock_jump_s: float = 0.0
@@ -95,14 +97,7 @@ def _bus_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
 
 
 def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
-    if inputs.store_dropped:
-        text = f"{inputs.store_dropped} messages were lost: the store was full, or could not be read"
-        yield Alarm(
-            "store", Severity.ERROR, text, "Restore the connection to the broker, or raise [mqtt] spool_limit_MB."
-        )
-    elif inputs.store_unstored:
-        text = f"the disk refused {inputs.store_unstored} messages; they are kept in memory only"
-        yield Alarm("store", Severity.WARNING, text, "Free space on the disk of [mqtt] spool_directory.")
+    yield from _store_alarms(inputs)
     if inputs.recording_problem:
         yield Alarm(
             "recording",
@@ -128,3 +123,21 @@ def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
     if inputs.clock_jump_s:
         text = f"the clock jumped by {inputs.clock_jump_s:+.3f} s: times before and after are not comparable"
         yield Alarm("clock", Severity.WARNING, text, "Synchronise it before the daemon starts (time-sync.target).")
+
+
+def _store_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
+    """Yield one alarm at most: the worst of what happened to the store of messages."""
+    if inputs.store_damaged:
+        text = f"{inputs.store_damaged} stored messages were damaged on the disk; {inputs.store_dropped} are lost"
+        yield Alarm("store", Severity.ERROR, text, "Check the disk of [mqtt] spool_directory; replace an old SD card.")
+    elif inputs.store_dropped:
+        text = f"{inputs.store_dropped} messages were lost: the store was full, or could not be read"
+        yield Alarm(
+            "store", Severity.ERROR, text, "Restore the connection to the broker, or raise [mqtt] spool_limit_MB."
+        )
+    elif inputs.store_unstored:
+        text = f"the disk refused {inputs.store_unstored} messages; they are kept in memory only"
+        yield Alarm("store", Severity.WARNING, text, "Free space on the disk of [mqtt] spool_directory.")
+    elif inputs.store_torn:
+        text = "the last message that was being stored when the daemon or the power failed is incomplete"
+        yield Alarm("store", Severity.WARNING, text, "None needed: at most that message is lost.")

@@ -90,6 +90,7 @@ _HEALTH = {
         "repeated": 0,
         "dropped": 0,
         "unstored": 0,
+        "damaged": 0,
         "torn": 0,
     },
     "recording": {"file": "/var/lib/regolithd/recordings/20130611T140312Z.mcap", "free_MB": 21000.0, "problem": None},

@@ -46,6 +46,8 @@ class PublishingReport(BaseModel):
     """Lost, because the store was full or could not be read."""
     unstored: int
     """Refused by the disk, and kept in memory only."""
+    damaged: int
+    """Stored records that failed their checksum; each also counts in `dropped` once a later message is acknowledged."""
     torn: int
     """Files of the store whose end could not be read."""
 

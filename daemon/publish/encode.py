@@ -29,10 +29,13 @@ def write(fields: dict[str, Any]) -> bytes:
 
 
 def as_late(payload: bytes) -> bytes:
-    """Return the same message marked as late. Its schema version stays: the store may hold messages of an older one."""
+    """Return the same message marked as late. Its schema version stays: the store may hold messages of an older one.
+
+    A payload that does not begin as these messages do, as another version may have stored it, is returned as it is.
+    """
     start = _START.match(payload)
     if start is None:
-        raise ValueError(f"not a message: {payload[:60]!r}")
+        return payload
     return start[1] + b"true," + payload[start.end() :]
 
 

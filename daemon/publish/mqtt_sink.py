@@ -153,6 +153,8 @@ class MqttSink:
             kernel_drops=network.bus.counters.kernel_drops if network is not None else 0,
             store_dropped=report.dropped,
             store_unstored=report.unstored,
+            store_damaged=report.damaged,
+            store_torn=report.torn,
             recording_problem=(recorder.problem or "") if recorder is not None else "",
             control_problem=self._control_problem(),
             clock_jump_s=self._jump_s,

@@ -22,7 +22,7 @@ from regolithd.daemon.publish.encode import as_late
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from regolithd.daemon.publish.segment import Record
+    from regolithd.daemon.publish.segment_record import Record
     from regolithd.daemon.publish.spool import Spool
 
 LIVE_WITHIN_NS = 1_000_000_000

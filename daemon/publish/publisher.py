@@ -128,6 +128,7 @@ class Publisher:
             repeated=self._outbox.repeated,
             dropped=counters.dropped,
             unstored=counters.unstored,
+            damaged=counters.damaged,
             torn=counters.torn,
         )
 

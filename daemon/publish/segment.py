@@ -1,75 +1,37 @@
-r"""One file of the store: a sequence of records, appended once and read in order.
+"""One file of the store: records are appended once and read in order. `segment_format` describes its bytes.
 
-    file    magic "regspl1\n", record, record, …
-    record  body length u32 · CRC-32 of the body u32 · topic length u16 · body (topic in UTF-8, then payload)
-
-All numbers little endian. The file's name is the index of its first record; the others follow. A process killed
-during a write, or a power cut, leaves a last record that is short or fails its checksum: reading ends before it.
+The file's name is the index of its first record.
 """
 
 from __future__ import annotations
 
 import errno
 import os
-import struct
-import zlib
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from regolithd.daemon.publish.segment_format import MAGIC, unpack
+
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
-MAGIC = b"regspl1\n"
+    from regolithd.daemon.publish.segment_record import Record
+
 SUFFIX = ".segment"
-_HEAD = struct.Struct("<IIH")
-
-
-@dataclass(frozen=True, slots=True)
-class Record:
-    """One stored message: its topic below `<prefix>/<rover>/`, and its payload.
-
-    `stored_ns` is when it was stored (CLOCK_MONOTONIC), or None where it was read back from disk.
-    """
-
-    index: int
-    topic: str
-    payload: bytes
-    stored_ns: int | None = None
-
-
-def pack(topic: str, payload: bytes) -> bytes:
-    """Return the bytes of a record."""
-    name = topic.encode()
-    body = name + payload
-    return _HEAD.pack(len(body), zlib.crc32(body), len(name)) + body
-
-
-def unpack(data: bytes, first: int) -> Iterator[tuple[Record, int]]:
-    """Yield the valid records in a segment's bytes, each with the offset of its end; stop at the first invalid one."""
-    offset = len(MAGIC)
-    if not data.startswith(MAGIC):
-        return
-    index = first
-    while offset + _HEAD.size <= len(data):
-        length, checksum, name_length = _HEAD.unpack_from(data, offset)
-        body = data[offset + _HEAD.size : offset + _HEAD.size + length]
-        if not 0 < name_length <= length or len(body) < length or zlib.crc32(body) != checksum:
-            return
-        offset += _HEAD.size + length
-        yield Record(index, body[:name_length].decode(), body[name_length:]), offset
-        index += 1
 
 
 class Segment:
-    """A file of the store, with its first index, number of records and size."""
+    """A file of the store, with its first index, number of records and size.
+
+    `damaged` counts the records that were found to fail their checksum, `torn` says that its end could not be read.
+    """
 
     def __init__(self, path: Path, first: int, count: int, size: int) -> None:
         self.path = path
         self.first = first
         self.count = count
         self.size = size
+        self.damaged = 0
         self.torn = False
         self._file: int | None = None
 
@@ -100,13 +62,15 @@ class Segment:
 
     @classmethod
     def found(cls, path: Path) -> Segment:
-        """Read a file that an earlier process left; `torn` is set where its end cannot be read."""
-        segment = cls(path, int(path.stem), 0, len(MAGIC))
+        """Read a file that an earlier process left, and cut off a torn end; `count` includes damaged records."""
         data = path.read_bytes()
-        for _, offset in unpack(data, segment.first):
-            segment.count += 1
-            segment.size = offset
-        segment.torn = len(data) > segment.size
+        first = int(path.stem)
+        contents = unpack(data, first)
+        segment = cls(path, first, contents.end - first, contents.size)
+        segment.damaged, segment.torn = contents.damaged, contents.torn
+        if segment.torn:
+            with suppress(OSError):  # if it stays, it is found torn again
+                os.truncate(path, contents.size)
         return segment
 
     def append(self, record: bytes) -> None:
@@ -124,8 +88,10 @@ class Segment:
         self.count += 1
 
     def read(self) -> list[Record]:
-        """Return all its valid records."""
-        return [record for record, _ in unpack(self.path.read_bytes(), self.first)]
+        """Return all its valid records, and count the damaged ones."""
+        contents = unpack(self.path.read_bytes(), self.first)
+        self.damaged = max(self.damaged, contents.damaged)
+        return [record for record in contents.records if record.index < self.end]
 
     def duplicate(self) -> int | None:
         """Return a duplicate file descriptor for a thread that syncs it to disk, or None where it is closed."""

@@ -15,6 +15,8 @@ acknowledged. The file `acknowledged` holds the first index that is not, with a 
 | messages wait | `begin_sync` once a second | messages of one second, by a power cut |
 | the store is full | the oldest file is deleted | its records, counted in `dropped` |
 | the disk is full, failing or read-only | messages are kept in memory, counted in `unstored` | these, by a restart |
+| a record is damaged | it is skipped, counted in `damaged`, and in `dropped` when one behind it is acknowledged | it |
+| the newest file cannot be read at the start | it is set aside (`.unreadable`), counted likewise | its records |
 
 Once the store is open, no failure of the disk raises an error here.
 """
@@ -32,7 +34,9 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 from typing import TYPE_CHECKING
 
-from regolithd.daemon.publish.segment import SUFFIX, Record, Segment, pack
+from regolithd.daemon.publish.segment import SUFFIX, Segment
+from regolithd.daemon.publish.segment_format import pack
+from regolithd.daemon.publish.segment_record import Record
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -56,6 +60,7 @@ class SpoolCounters:
     acknowledged: int = 0
     dropped: int = 0  # never acknowledged, deleted because the store was full, or unreadable
     unstored: int = 0  # refused by the disk, and kept in memory only
+    damaged: int = 0  # records that failed their checksum, and files that could not be read at the start
     torn: int = 0  # files with an end that could not be read
 
 
@@ -78,8 +83,8 @@ class Spool:
         self._recent: deque[Record] = deque(maxlen=RECENT)
         self._lock = self._lock_directory()
         self._cursor_file = os.open(directory / "acknowledged", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o640)
-        self._first = self._read_cursor()
         self._segments = self._found()
+        self._first = self._read_cursor(self._segments[0].first if self._segments else 0)
         self._next = max(self._first, self._segments[-1].end if self._segments else 0)
         self._active: Segment | None = None
         self._delete_acknowledged()
@@ -98,25 +103,37 @@ class Spool:
             raise SpoolError(f"{self.directory}: another regolithd uses it. Stop that process first.") from error
         return lock
 
-    def _read_cursor(self) -> int:
+    def _read_cursor(self, otherwise: int) -> int:
+        """Return the first index that is not acknowledged, or `otherwise` where the file does not hold it."""
         data = os.pread(self._cursor_file, _CURSOR.size, 0)
         if len(data) < _CURSOR.size:
-            return 0
+            return otherwise
         first, checksum = _CURSOR.unpack(data)
-        return int(first) if zlib.crc32(data[:8]) == checksum else 0
+        return int(first) if zlib.crc32(data[:8]) == checksum else otherwise
 
     def _found(self) -> list[Segment]:
         """Return the files of an earlier process; only the last may end in an incomplete record, so it is read."""
         paths = sorted(path for path in self.directory.glob(f"*{SUFFIX}") if path.stem.isdigit())
         segments = [Segment.complete(path, int(after.stem)) for path, after in pairwise(paths)]
-        if paths:
-            last = Segment.found(paths[-1])
+        last = self._last(paths[-1]) if paths else None
+        if last is not None:
             self.counters.torn += last.torn
+            self.counters.damaged += last.damaged
             if last.count:
                 segments.append(last)
             else:
                 last.remove()
         return segments
+
+    def _last(self, path: Path) -> Segment | None:
+        try:
+            return Segment.found(path)
+        except OSError:  # with this name it would be in the way of the next file
+            with suppress(OSError):
+                path.rename(path.with_suffix(f"{SUFFIX}.unreadable"))
+            self.counters.damaged += 1
+            self.counters.dropped += 1
+            return None
 
     @property
     def first(self) -> int:
@@ -140,8 +157,8 @@ class Spool:
 
     def append(self, topic: str, payload: bytes) -> int:
         """Store a message and return its index. If the disk refuses it, it stays in memory and is counted."""
-        data = pack(topic, payload)
         index = self._next
+        data = pack(index, topic, payload)
         self._next += 1
         try:
             self._segment_for(len(data), index).append(data)
@@ -176,9 +193,19 @@ class Spool:
         if self._recent and self._recent[0].index <= index:
             return list(islice(self._recent, index - self._recent[0].index, None))
         for segment in self._segments:
-            if index < segment.end and (left := _readable(segment, index)):
+            if index < segment.end and (left := self._readable(segment, index)):
                 return left
         return list(self._recent)
+
+    def _readable(self, segment: Segment, index: int) -> list[Record]:
+        """Return the readable records from `index` on; the others are dropped at the next acknowledgement."""
+        known = segment.damaged
+        try:
+            return [record for record in segment.read() if record.index >= index]
+        except OSError:
+            return []
+        finally:
+            self.counters.damaged += segment.damaged - known
 
     def acknowledge(self, end: int, records: int) -> None:
         """Delete everything before `end`; `records` were acknowledged, any others could not be read and are lost."""
@@ -223,11 +250,3 @@ class Spool:
             os.close(self._cursor_file)
             os.close(self._lock)
             self._lock = -1
-
-
-def _readable(segment: Segment, index: int) -> list[Record]:
-    """Return the readable records from `index` on; unreadable ones are counted at the next acknowledgement."""
-    try:
-        return [record for record in segment.read() if record.index >= index]
-    except OSError:
-        return []

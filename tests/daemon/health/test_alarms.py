@@ -24,6 +24,8 @@ TROUBLES = [
     ("kernel_drops", 3, "kernel", Severity.ERROR),
     ("store_dropped", 3, "store", Severity.ERROR),
     ("store_unstored", 3, "store", Severity.WARNING),
+    ("store_damaged", 1, "store", Severity.ERROR),
+    ("store_torn", 1, "store", Severity.WARNING),
     ("recording_problem", "no room", "recording", Severity.ERROR),
     ("control_problem", "no such group", "control", Severity.WARNING),
     ("clock_jump_s", -3.0, "clock", Severity.WARNING),

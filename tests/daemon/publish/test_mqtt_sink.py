@@ -18,7 +18,7 @@ from regolithd.daemon.publish.outbox import Outbox
 from regolithd.daemon.publish.spool import Spool
 
 NO_MESSAGES = PublishingReport(
-    connections=0, queued=0, queued_MB=0.0, acknowledged=0, repeated=0, dropped=0, unstored=0, torn=0
+    connections=0, queued=0, queued_MB=0.0, acknowledged=0, repeated=0, dropped=0, unstored=0, damaged=0, torn=0
 )
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from regolithd.daemon.publish.segment import pack
+from regolithd.daemon.publish.segment_format import pack
 from regolithd.daemon.publish.spool import RECENT, Spool, SpoolError
 
 
@@ -103,22 +103,76 @@ def test_zeros_at_the_end_are_no_records(tmp_path: Path) -> None:
     assert everything(Spool(tmp_path, 1_000_000)) == list(range(10))
 
 
-def test_a_corrupt_record_in_the_middle_costs_the_rest_of_its_file(tmp_path: Path) -> None:
-    """Reading continues with the next file, and the lost records are counted as dropped."""
+@pytest.mark.parametrize("which", [0, 1, -1], ids=["first", "middle", "newest"])
+def test_a_corrupt_record_costs_itself_alone_and_is_counted(tmp_path: Path, which: int) -> None:
+    """All other messages of the file are delivered, and the lost one is counted as damaged and as dropped."""
     spool = Spool(tmp_path, 1_000_000, segment_bytes=1000)
     fill(spool, 100)
     spool.close()
-    second = sorted(tmp_path.glob("*.segment"))[1]
-    data = bytearray(second.read_bytes())
+    path = sorted(tmp_path.glob("*.segment"))[which]
+    data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 0xFF
-    second.write_bytes(data)
+    path.write_bytes(data)
     again = Spool(tmp_path, 1_000_000)
     found = everything(again)
-    lost = sorted(set(range(100)) - set(found))
-    assert 0 < len(lost) < 30
-    assert lost == list(range(lost[0], lost[-1] + 1))
+    assert len(set(range(100)) - set(found)) == 1
+    assert again.counters.damaged == 1
     again.acknowledge(100, len(found))
-    assert again.counters.dropped == len(lost)
+    assert again.counters.dropped == again.counters.damaged == 1
+
+
+def test_a_damaged_last_record_is_not_forgotten(tmp_path: Path) -> None:
+    """Its index is not used again, so that it is counted as dropped when the next message is acknowledged."""
+    spool = Spool(tmp_path, 1_000_000)
+    fill(spool, 10)
+    spool.close()
+    (path,) = tmp_path.glob("*.segment")
+    data = bytearray(path.read_bytes())
+    data[-1] ^= 1
+    path.write_bytes(data)
+    again = Spool(tmp_path, 1_000_000)
+    fill(again, 1)
+    assert everything(again) == [*range(9), 10]
+    again.acknowledge(11, 10)
+    assert (again.counters.damaged, again.counters.dropped) == (1, 1)
+
+
+def test_a_newest_file_that_cannot_be_read_is_set_aside_and_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It may belong to another user; the messages before it and those that follow are delivered."""
+    spool = Spool(tmp_path, 1_000_000, segment_bytes=1000)
+    fill(spool, 100)
+    spool.close()
+    last = max(tmp_path.glob("*.segment"))
+    read_bytes = Path.read_bytes
+
+    def refuse(path: Path) -> bytes:
+        if path == last:
+            raise PermissionError(13, "Permission denied")
+        return read_bytes(path)
+
+    monkeypatch.setattr(Path, "read_bytes", refuse)
+    again = Spool(tmp_path, 1_000_000)
+    assert (again.counters.damaged, again.counters.dropped) == (1, 1)
+    assert last.with_suffix(".segment.unreadable").exists()
+    fill(again, 3)
+    assert everything(again) == list(range(int(last.stem) + 3))
+    assert again.counters.unstored == 0
+
+
+def test_a_corrupt_cursor_counts_nothing_as_lost(tmp_path: Path) -> None:
+    """Messages that were acknowledged and deleted long ago are not counted as dropped."""
+    spool = Spool(tmp_path, 1_000_000, segment_bytes=500)
+    fill(spool, 50)
+    spool.acknowledge(40, 40)
+    spool.close()
+    (tmp_path / "acknowledged").write_bytes(b"rotten")
+    again = Spool(tmp_path, 1_000_000)
+    left = everything(again)
+    assert again.queued == len(left)
+    again.acknowledge(50, len(left))
+    assert again.counters.dropped == 0
 
 
 @pytest.mark.parametrize("rotten", [b"", b"short", bytes(12), b"\xff" * 12])
@@ -258,7 +312,7 @@ def test_any_history_of_storing_acknowledging_and_killing_loses_nothing(
             spool.close()
             if files := sorted(folder.glob("*.segment")):
                 with files[-1].open("ab") as file:
-                    file.write(pack("snapshot", payload(end))[:number])
+                    file.write(pack(end, "snapshot", payload(end))[:number])
             spool = Spool(folder, 10_000_000, segment_bytes=700)
         assert (spool.first, spool.next) == (first, end)
     assert everything(spool) == list(range(first, end))
