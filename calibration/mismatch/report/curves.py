@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import Curve
+from regolithd.calibration.mismatch.signal.binning import binned_means, even_edges
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,15 +46,11 @@ def curve_of(evidence: Evidence, covariate: str, wheels: Sequence[int], *, along
     edges = _edges(values[known])
     if len(edges) < 3:
         return None
-    which = np.clip(np.searchsorted(edges, values[known], side="right") - 1, 0, len(edges) - 2)
-    count = np.maximum(np.bincount(which, minlength=len(edges) - 1), 1)
-    before, after = (
-        np.bincount(which, ((evidence.measured - fitted) * along)[known], len(edges) - 1) / count
-        for fitted in (evidence.before, evidence.after)
-    )
-    at = np.bincount(which, values[known], len(edges) - 1) / count
-    error = _noise(evidence, known) / np.sqrt(count)
-    return Curve(shown, "drag" if drag else "offset", at, before, after, error, tuple(wheels))
+    residuals = [((evidence.measured - fitted) * along)[known] for fitted in (evidence.before, evidence.after)]
+    binned = binned_means(values[known], edges, *residuals)
+    before, after = binned.means
+    error = _noise(evidence, known) / np.sqrt(binned.count)
+    return Curve(shown, "drag" if drag else "offset", binned.at, before, after, error, tuple(wheels))
 
 
 def _covariate(evidence: Evidence, name: str) -> Array | None:
@@ -71,7 +68,7 @@ def _edges(values: Array) -> Array:
     if len(distinct) <= BINS // 2:
         middles = (distinct[1:] + distinct[:-1]) / 2
         return np.concatenate([[-np.inf], middles, [np.inf]])
-    return np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
+    return even_edges(values, BINS)
 
 
 def _noise(evidence: Evidence, known: np.ndarray) -> float:
