@@ -50,6 +50,7 @@ class AlarmInputs:
     clock_jump_s: float = 0.0
     soil_change: str = ""
     stuck: tuple[tuple[Quantity, int], ...] = ()
+    summarised: tuple[str, ...] = ()
 
 
 def current_alarms(inputs: AlarmInputs) -> dict[str, Alarm]:
@@ -69,6 +70,7 @@ def alarm_names(node_ids: Iterable[int]) -> tuple[str, ...]:
         "clock",
         "sensor",
         "soil-change",
+        "event-rate",
         *(f"node-{number}" for number in node_ids),
     )
 
@@ -120,6 +122,10 @@ def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
     if inputs.soil_change:
         remedy = "Stop before the wheels dig in, and look: drive with less slip, another way, or back."
         yield Alarm("soil-change", Severity.WARNING, inputs.soil_change, remedy)
+    if inputs.summarised:
+        text = f"{', '.join(inputs.summarised)}: they come too often, and are summarised once a second (`suppressed`)"
+        remedy = "Look at what the node reports (`emcy`, `event`), and correct it, or switch the node off."
+        yield Alarm("event-rate", Severity.WARNING, text, remedy)
     if inputs.clock_jump_s:
         text = f"the clock jumped by {inputs.clock_jump_s:+.3f} s: times before and after are not comparable"
         yield Alarm("clock", Severity.WARNING, text, "Synchronise it before the daemon starts (time-sync.target).")

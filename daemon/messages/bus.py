@@ -66,6 +66,8 @@ class EmergencyMessage(Header):
     vendor_bytes: Annotated[str, Field(pattern="^[0-9a-f]{10}$")]
     cleared: bool
     text: str
+    suppressed: int = 0
+    """EMCY messages of this node since the preceding one here that were not published: they came too often."""
 
 
 class EventMessage(Header):
@@ -73,6 +75,8 @@ class EventMessage(Header):
 
     kind: str
     """`node-booted`, `node-boot-failed`, `node-lost`, `node-returned`, `drive-state-changed`, `motion-stopped`,
-    `bus-state-changed`, `soil-change`."""
+    `bus-state-changed`, `soil-change`, `node-emergency`."""
     node_id: NodeNumber | None
     text: str
+    suppressed: int = 0
+    """Events of this kind and node since the preceding one here that were not published: they came too often."""

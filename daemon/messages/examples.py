@@ -82,6 +82,7 @@ _HEALTH = {
     "bus": {"received": 9106, "echoed": 3010, "kernel_drops": 0},
     "sync": {"produced": 501, "skipped": 0, "failed": 0, "worst_late_ms": 0.4, "mean_late_ms": 0.1},
     "acquisition": {"snapshots": 500, "accepted": 6000, "late": 0, "duplicate": 0, "unexpected": 0, "missing": 0},
+    "events_withheld": 0,
     "publishing": {
         "connections": 1,
         "queued": 0,

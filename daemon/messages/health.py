@@ -74,6 +74,8 @@ class HealthMessage(Header):
     """Counts of the bus: frames, frames dropped by the kernel, error frames, …"""
     sync: SyncReport | None
     acquisition: AcquisitionReport | None
+    events_withheld: int
+    """Events and EMCY messages that came too often and were summarised (`suppressed`)."""
     publishing: PublishingReport
     recording: RecordingReport | None
     tasks: dict[str, float]

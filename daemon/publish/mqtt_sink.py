@@ -18,6 +18,7 @@ from regolithd.daemon.messages.header import iso_time
 from regolithd.daemon.messages.health import AcquisitionReport, HealthMessage, RecordingReport, SyncReport
 from regolithd.daemon.messages.posterior import PosteriorMessage
 from regolithd.daemon.pipeline.soil_change import soil_change_text
+from regolithd.daemon.publish.event_throttle import EventThrottle
 from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.canopen.emcy import register_bits
 from regolithd.drivers.master.events import NodeEmergency
@@ -52,23 +53,33 @@ class MqttSink:
         The publisher that delivers the messages.
     control_problem
         Returns why no commands can be taken, or an empty text.
+    monotonic_ns
+        The clock by which events are throttled and alarms end.
     """
 
     def __init__(
-        self, service: Service, publisher: Publisher, *, control_problem: Callable[[], str] = lambda: ""
+        self,
+        service: Service,
+        publisher: Publisher,
+        *,
+        control_problem: Callable[[], str] = lambda: "",
+        monotonic_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self.publisher = publisher
         self._service = service
         self._control_problem = control_problem
-        self._started_ns = time.monotonic_ns()
+        self._monotonic_ns = monotonic_ns
+        self._started_ns = monotonic_ns()
         self._published_nodes: dict[int, tuple[object, ...]] = {}
         self._published_alarms: dict[str, Alarm | None] = {}
-        self._offset_ns = time.time_ns() - time.monotonic_ns()
+        self._offset_ns = time.time_ns() - monotonic_ns()
         self._jump_s = 0.0
         self._jump_until_ns = 0
         self._soil_change = ""
         self._soil_change_until_ns = 0
         self._stuck_sensors = StuckSensorDetector()
+        self._throttle = EventThrottle()
+        self._changes_scheduled = False
 
     def estimate(self, estimate: Estimate) -> None:
         """Publish the estimate of one SYNC, with its posterior and soil-change event if it has any."""
@@ -76,7 +87,7 @@ class MqttSink:
         self.publisher.estimate(estimate)
         if estimate.soil_change is not None:
             self._soil_change = soil_change_text(estimate.soil_change)
-            self._soil_change_until_ns = time.monotonic_ns() + int(SOIL_CHANGE_ALARM_S * 1e9)
+            self._soil_change_until_ns = self._monotonic_ns() + int(SOIL_CHANGE_ALARM_S * 1e9)
             publish = self.publisher.publish
             time_ns = estimate.snapshot.time_ns
             publish("event", EventMessage, time_ns=time_ns, kind="soil-change", node_id=None, text=self._soil_change)
@@ -86,12 +97,27 @@ class MqttSink:
             )
 
     def event(self, event: NetworkEvent) -> None:
-        """Publish an event, and then, once the network has updated its state, the nodes and alarms that changed."""
+        """Publish an event, and then, once the network has updated its state, the nodes and alarms that changed.
+
+        Events that come too often are summarised once a second, with the nodes and alarms that they change.
+        """
+        if not self._throttle.admits(event, self._monotonic_ns()):
+            return
+        self._publish_event(event, 0)
+        if not self._changes_scheduled:
+            self._changes_scheduled = True
+            asyncio.get_running_loop().call_soon(self._publish_changes)
+
+    def _publish_event(self, event: NetworkEvent, suppressed: int) -> None:
         publish = self.publisher.publish
-        publish("event", EventMessage, time_ns=event.time_ns, **event_fields(event))
+        publish("event", EventMessage, time_ns=event.time_ns, **event_fields(event), suppressed=suppressed)
         if isinstance(event, NodeEmergency):
-            publish("emcy", EmergencyMessage, time_ns=event.time_ns, **self._emergency_fields(event))
-        asyncio.get_running_loop().call_soon(self._publish_changes)
+            fields = self._emergency_fields(event)
+            publish("emcy", EmergencyMessage, time_ns=event.time_ns, **fields, suppressed=suppressed)
+
+    def _publish_summaries(self) -> None:
+        for event, withheld in self._throttle.summaries():
+            self._publish_event(event, withheld - 1)
 
     async def run(self) -> None:
         """Deliver until cancelled, and publish health and alarms once a second."""
@@ -102,16 +128,19 @@ class MqttSink:
                 await self.publisher.run()
             finally:
                 reporting.cancel()
+                self._publish_summaries()
 
     async def _report_periodically(self) -> None:
         while True:
             self._detect_clock_jump()
+            self._publish_summaries()
             self._publish_changes()
             self.publisher.publish("health", HealthMessage, **self._health())
             await asyncio.sleep(HEALTH_PERIOD_S)
 
     def _publish_changes(self) -> None:
         """Publish each node and each alarm that differs from what was last published."""
+        self._changes_scheduled = False
         network = self._service.network
         for node_id, status in (network.status if network is not None else {}).items():
             fields = node_fields(status)
@@ -134,7 +163,7 @@ class MqttSink:
         self.publisher.publish(f"alarm/{name}", AlarmMessage, time_ns=now, **fields)
 
     def _detect_clock_jump(self) -> None:
-        now = time.monotonic_ns()
+        now = self._monotonic_ns()
         offset = time.time_ns() - now
         if abs(offset - self._offset_ns) > CLOCK_JUMP_NS:
             self._jump_s = (offset - self._offset_ns) / 1e9
@@ -158,21 +187,23 @@ class MqttSink:
             recording_problem=(recorder.problem or "") if recorder is not None else "",
             control_problem=self._control_problem(),
             clock_jump_s=self._jump_s,
-            soil_change=self._soil_change if time.monotonic_ns() < self._soil_change_until_ns else "",
+            soil_change=self._soil_change if self._monotonic_ns() < self._soil_change_until_ns else "",
             stuck=self._stuck_sensors.stuck,
+            summarised=tuple(_kind_and_node(*key) for key in self._throttle.summarised(self._monotonic_ns())),
         )
 
     def _health(self) -> dict[str, Any]:
         service = self._service
         network = service.network
         return {
-            "uptime_s": (time.monotonic_ns() - self._started_ns) / 1e9,
+            "uptime_s": (self._monotonic_ns() - self._started_ns) / 1e9,
             "cpu_s": time.process_time(),
             "memory_MB": _resident_MB(),
             "bus_state": service.bus_problem or (network.bus.state.value if network is not None else None),
             "bus": network.bus.counters.as_dict() if network is not None else {},
             "sync": _sync_report(service),
             "acquisition": AcquisitionReport(**asdict(service.chain.acquisition.counters)),
+            "events_withheld": self._throttle.withheld,
             "publishing": self.publisher.report,
             "recording": _recording_report(service),
             "tasks": service.liveness.ages_s(),
@@ -196,8 +227,15 @@ class MqttSink:
 
 def event_fields(event: NetworkEvent) -> dict[str, Any]:
     """Return the fields of an `event` message."""
-    kind = re.sub(r"(?<=[a-z])(?=[A-Z])", "-", type(event).__name__).lower()
-    return {"kind": kind, "node_id": getattr(event, "node_id", None) or None, "text": event.text}
+    return {"kind": _kind(type(event)), "node_id": getattr(event, "node_id", None) or None, "text": event.text}
+
+
+def _kind(event: type[NetworkEvent]) -> str:
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "-", event.__name__).lower()
+
+
+def _kind_and_node(event: type[NetworkEvent], node_id: int | None) -> str:
+    return f"{_kind(event)} of node {node_id}" if node_id else _kind(event)
 
 
 def node_fields(status: NodeStatus) -> dict[str, Any]:

@@ -1,21 +1,32 @@
 """Which messages the MQTT sink publishes, with a publisher that only records them."""
 
 import asyncio
+import json
+import time
+from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import count, islice
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from broker import Mosquitto
+from estimates import estimate
+from subscriber import until
 
-from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.config.configuration import Configuration, Mqtt
 from regolithd.daemon.health.alarms import alarm_names
 from regolithd.daemon.messages.header import iso_time
 from regolithd.daemon.messages.health import PublishingReport
+from regolithd.daemon.pipeline.snapshot import AcquisitionCounters
 from regolithd.daemon.publish.connection import WINDOW, Connection
 from regolithd.daemon.publish.mqtt_sink import MqttSink
 from regolithd.daemon.publish.outbox import Outbox
+from regolithd.daemon.publish.publisher import Publisher
 from regolithd.daemon.publish.spool import Spool
+from regolithd.drivers.canopen.emcy import Emergency
+from regolithd.drivers.master.events import NodeEmergency
 
 NO_MESSAGES = PublishingReport(
     connections=0, queued=0, queued_MB=0.0, acknowledged=0, repeated=0, dropped=0, unstored=0, damaged=0, torn=0
@@ -92,3 +103,88 @@ async def test_a_connection_takes_two_windows_of_publishes_without_a_warning(tmp
     assert client.pending_calls_threshold == 2 * WINDOW
     assert client.identifier == "regolithd-regolith-kapvik"
     outbox.spool.close()
+
+
+BABBLE_HZ = 1100
+"""EMCY messages a second of a node that babbles."""
+
+
+def emergency(number: int, node_id: int = 13) -> NodeEmergency:
+    """Return the event of an EMCY whose vendor bytes hold a number."""
+    emcy = Emergency(1_700_000_000_000_000_000 + number, node_id, 0x8130, 0x10, number.to_bytes(5, "big"), "heartbeat")
+    return NodeEmergency(emcy.time_ns, node_id, emcy, f"node {node_id}: error")
+
+
+async def test_a_babbling_node_delays_no_snapshot_and_is_summarised(service: Any, tmp_path: Path) -> None:
+    """1100 EMCY a second for 10 s: every snapshot is queued; EMCY are few, and all are counted; an alarm is active."""
+    spool = Spool(tmp_path, 100_000_000)
+    now_ns = 0
+    publisher = Publisher(service.configuration, spool)
+    sink = MqttSink(service, publisher, monotonic_ns=lambda: now_ns)
+    used = time.process_time()
+    for millisecond in range(10_000):
+        now_ns = millisecond * 1_000_000
+        for number in range(BABBLE_HZ * millisecond // 1000, BABBLE_HZ * (millisecond + 1) // 1000):
+            sink.event(emergency(number))
+        if millisecond % 25 == 0:
+            sink.publisher.estimate(estimate(millisecond // 25))
+        if millisecond % 1000 == 999:
+            sink._publish_summaries()
+            sink._publish_changes()
+    assert time.process_time() - used < 5.0  # half of the time that it has
+    records = [*stored(spool)]
+    snapshots = [json.loads(payload)["sequence"] for topic, payload in records if topic == "snapshot"]
+    emcy = [json.loads(payload) for topic, payload in records if topic == "emcy"]
+    assert snapshots == list(range(400))
+    assert 10 < len(emcy) < 100
+    assert len([topic for topic, _ in records if topic == "event"]) == len(emcy)
+    assert len(emcy) + sum(message["suppressed"] for message in emcy) == 10 * BABBLE_HZ
+    assert emcy[-1]["vendor_bytes"] == (10 * BABBLE_HZ - 1).to_bytes(5, "big").hex()
+    alarms = [json.loads(payload) for topic, payload in records if topic == "alarm/event-rate"]
+    assert [alarm["active"] for alarm in alarms] == [True]
+    assert "node-emergency of node 13" in alarms[0]["text"]
+    now_ns += 11_000_000_000
+    sink._publish_changes()
+    assert [json.loads(payload)["active"] for topic, payload in stored(spool) if topic == "alarm/event-rate"][
+        -1
+    ] is False
+    spool.close()
+
+
+def stored(spool: Spool) -> list[tuple[str, bytes]]:
+    """Return topic and payload of all stored messages."""
+    found: list[tuple[str, bytes]] = []
+    position = spool.first
+    while records := spool.read(position):
+        found += [(record.topic, record.payload) for record in records]
+        position = records[-1].index + 1
+    return found
+
+
+async def test_a_babbling_node_does_not_delay_the_end(service: Any, mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """While EMCY messages keep coming, the sink ends soon after its cancellation, with everything delivered."""
+    mqtt = Mqtt(spool_directory=tmp_path, host="127.0.0.1", port=mosquitto.port)
+    spool = Spool(tmp_path, 100_000_000)
+    publisher = Publisher(Configuration(mqtt=mqtt), spool)
+    service.liveness = SimpleNamespace(expect=lambda *_: None, ages_s=dict)
+    service.chain = SimpleNamespace(acquisition=SimpleNamespace(counters=AcquisitionCounters()))
+    sink = MqttSink(service, publisher)
+
+    async def babble() -> None:
+        numbers = count()
+        while True:
+            for number in islice(numbers, BABBLE_HZ // 100):
+                sink.event(emergency(number))
+            await asyncio.sleep(0.01)
+
+    babbling = asyncio.create_task(babble())
+    running = asyncio.create_task(sink.run())
+    await until(lambda: publisher.connected)
+    await asyncio.sleep(1.0)
+    running.cancel()
+    begun = time.monotonic()
+    with suppress(asyncio.CancelledError):
+        await running
+    assert time.monotonic() - begun < 3.0
+    babbling.cancel()
+    spool.close()
