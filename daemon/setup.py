@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NoReturn
 
 import typer
+from pydantic import ValidationError
 
 from regolithd.calibration.models.onnx_session import ModelError
 from regolithd.daemon.config.configuration import Configuration
@@ -34,11 +35,20 @@ def models_or_exit(configuration: Configuration) -> OnnxModels:
 
 
 def recorded_configuration(recording: Path) -> Configuration:
-    """Return the configuration that a recording was made with; the defaults where it holds none."""
-    from regolithd.daemon.recording.mcap_file import read_metadata  # noqa: PLC0415  # only few commands read recordings
+    """Return the configuration that a recording was made with; the defaults where it holds none.
 
-    content = read_metadata(recording).get("configuration") if recording.is_file() else None
-    return Configuration.model_validate_json(content) if content else Configuration()
+    Prints why and exits where it is damaged.
+    """
+    from regolithd.daemon.recording.mcap_file import (  # noqa: PLC0415  # only few commands read recordings
+        DamagedRecordingError,
+        read_metadata,
+    )
+
+    try:
+        content = read_metadata(recording).get("configuration") if recording.is_file() else None
+        return Configuration.model_validate_json(content) if content else Configuration()
+    except (DamagedRecordingError, ValidationError) as error:
+        _end([f"{recording}: its configuration cannot be read; give one with --config. {error}"])
 
 
 def _end(problems: list[str]) -> NoReturn:

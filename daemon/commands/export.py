@@ -21,15 +21,26 @@ def export(
 ) -> None:
     """Write a recording as one table, CSV or Parquet, with one row for each instant and wheel.
 
-    The columns are those that `regolithd mismatch` and `regolithd calibrate` read.
+    The columns are those that `regolithd mismatch` and `regolithd calibrate` read. What is damaged is left out and
+    named on the standard error; the exit status is 1 then, and if there is no row.
     """
     from regolithd.daemon.recording.export import ExportError
     from regolithd.daemon.recording.export import export as write
+    from regolithd.daemon.recording.mcap_file import is_closed
     from regolithd.daemon.recording.progress import open_binary
 
+    gaps: list[str] = []
     try:
-        count = write(recordings, to, open_binary)
+        count = write(recordings, to, open_binary, gaps.append)
     except (ExportError, OSError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error
+    finally:
+        for gap in gaps:
+            typer.echo(gap, err=True)
+    for recording in recordings:
+        if not is_closed(recording):
+            typer.echo(f"{recording}: was not closed; what was recorded last may be missing.", err=True)
     typer.echo(f"{to}: {count} rows")
+    if gaps:
+        raise typer.Exit(1)

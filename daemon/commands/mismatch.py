@@ -84,9 +84,14 @@ def _read(path: Path, unit: str) -> Recording:
         return read_recording(path, unit=unit)
     import numpy as np
 
+    from regolithd.calibration.mismatch.errors import RecordingError
     from regolithd.daemon.recording.export import HEADER, recorded_snapshots, rows
+    from regolithd.daemon.recording.mcap_file import DamagedRecordingError
 
-    table = np.array(list(rows(recorded_snapshots([path]))), np.float64).reshape(-1, len(HEADER))
+    try:
+        table = np.array(list(rows(recorded_snapshots([path]))), np.float64).reshape(-1, len(HEADER))
+    except DamagedRecordingError as error:
+        raise RecordingError(f"{error} `regolithd export` writes what can be read.") from error
     return from_columns(dict(zip(HEADER, table.T, strict=True)), unit=unit)
 
 

@@ -26,6 +26,7 @@ def replay(
 
     Prints counters and a digest of all numbers. Exit status 1 if a recorded message differs.
     """
+    from regolithd.daemon.recording.mcap_file import DamagedRecordingError
     from regolithd.daemon.recording.progress import open_text
     from regolithd.daemon.recording.replay import replay_logs
     from regolithd.daemon.setup import configuration_or_exit, models_or_exit, recorded_configuration
@@ -35,7 +36,12 @@ def replay(
     if model is not None:
         estimator = configuration.estimator.model_copy(update={"model": model})
         configuration = configuration.model_copy(update={"estimator": estimator})
-    result = replay_logs(logs, configuration, models_or_exit(configuration), open_text)
+    models = models_or_exit(configuration)
+    try:
+        result = replay_logs(logs, configuration, models, open_text)
+    except (DamagedRecordingError, OSError) as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(1) from error
     typer.echo(f"frames     {result.frames}")
     typer.echo(f"snapshots  {result.digest.count}")
     if result.counters:

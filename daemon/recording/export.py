@@ -28,11 +28,13 @@ class ExportError(Exception):
 
 
 def recorded_snapshots(
-    recordings: Iterable[Path], opening: Callable[[Path], AbstractContextManager[IO[bytes]]] = open_mcap
+    recordings: Iterable[Path],
+    opening: Callable[[Path], AbstractContextManager[IO[bytes]]] = open_mcap,
+    on_gap: Callable[[str], None] | None = None,
 ) -> Iterator[Snapshot]:
-    """Yield the snapshots of MCAP files, in their order."""
+    """Yield the snapshots of MCAP files, in their order; `on_gap` and errors are those of `read_messages`."""
     for recording in recordings:
-        for message in read_messages(recording, opening):
+        for message in read_messages(recording, opening, on_gap):
             if message.topic == SNAPSHOT:
                 yield snapshot_from_json(message.content)
 
@@ -53,20 +55,23 @@ def export(
     recordings: Iterable[Path],
     out: Path,
     opening: Callable[[Path], AbstractContextManager[IO[bytes]]] = open_mcap,
+    on_gap: Callable[[str], None] | None = None,
 ) -> int:
     """Write `out`, CSV or Parquet by its name; return the number of rows. `opening` may show progress.
 
     Raises
     ------
     ExportError
-        `out` has another suffix, or pyarrow is missing.
+        `out` has another suffix, pyarrow is missing, or the recordings hold no snapshot.
+    DamagedRecordingError
+        A recording is damaged, and there is no `on_gap`, which gets a text for everything that is left out.
     """
-    table = rows(recorded_snapshots(recordings, opening))
-    if out.suffix == ".csv":
-        return _write_csv(table, out)
-    if out.suffix == ".parquet":
-        return _write_parquet(table, out)
-    raise ExportError(f"{out}: the suffix {out.suffix!r} is not supported. Name it .csv or .parquet.")
+    write = {".csv": _write_csv, ".parquet": _write_parquet}.get(out.suffix)
+    if write is None:
+        raise ExportError(f"{out}: the suffix {out.suffix!r} is not supported. Name it .csv or .parquet.")
+    if not (count := write(rows(recorded_snapshots(recordings, opening, on_gap)), out)):
+        raise ExportError(f"{out}: 0 rows. The recordings hold no snapshot that can be read.")
+    return count
 
 
 def _write_csv(table: Iterator[Row], out: Path) -> int:

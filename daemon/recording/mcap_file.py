@@ -2,31 +2,34 @@
 
 MCAP writes a chunk when it is full and the index at the end, so a killed process leaves a file without its last chunk
 and without index. Here `flush` ends a chunk twice a second; `read_messages` reads all complete chunks, without the
-index.
+index, and checks them (`mcap_records`).
 """
 
 from __future__ import annotations
 
 import json
-import struct
+import zlib
 from dataclasses import dataclass
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, NoReturn
 
-import zstandard
-from mcap.exceptions import McapError
 from mcap.records import Channel, Message, Metadata
-from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
+
+from regolithd.daemon.recording.mcap_records import McapScan, closed_and_size, summary_channels
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from contextlib import AbstractContextManager
     from pathlib import Path
 
-_CUT_OFF = (McapError, ValueError, struct.error, zstandard.ZstdError)
-"""Errors of the reader where a file ends within a record."""
+_CHECKSUM = "crc32"
+"""Key of the metadata that holds a checksum of the others: MCAP has none for them."""
 
 _SCHEMA = json.dumps({"type": "object"}).encode()
+
+
+class DamagedRecordingError(Exception):
+    """A recording is damaged; the message says which file, and where."""
 
 
 class McapFile:
@@ -34,9 +37,9 @@ class McapFile:
 
     def __init__(self, stream: IO[bytes], metadata: Mapping[str, str]) -> None:
         self._stream = stream
-        self._writer = Writer(stream, compression=CompressionType.ZSTD)
+        self._writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
         self._writer.start(profile="regolithd")
-        self._writer.add_metadata("regolithd", dict(metadata))
+        self._writer.add_metadata("regolithd", {**metadata, _CHECKSUM: _checksum(metadata)})
         self._channels: dict[str, int] = {}
 
     def write(self, topic: str, time_ns: int, content: bytes, sequence: int = 0) -> None:
@@ -79,28 +82,71 @@ def open_mcap(path: Path) -> AbstractContextManager[IO[bytes]]:
 
 
 def read_messages(
-    path: Path, opening: Callable[[Path], AbstractContextManager[IO[bytes]]] = open_mcap
+    path: Path,
+    opening: Callable[[Path], AbstractContextManager[IO[bytes]]] = open_mcap,
+    on_gap: Callable[[str], None] | None = None,
 ) -> Iterator[Recorded]:
-    """Yield the messages of all complete chunks of a file, in their order."""
+    """Yield the messages of all complete chunks of a file, in their order.
+
+    `on_gap` is called with a text for everything damaged that is left out.
+
+    Raises
+    ------
+    DamagedRecordingError
+        Something is damaged, and there is no `on_gap`.
+    """
+    report = _reporter(path, on_gap)
     topics: dict[int, str] = {}
-    for record in _records(path, opening):
-        if isinstance(record, Channel):
-            topics[record.id] = record.topic
-        elif isinstance(record, Message):
-            yield Recorded(topics[record.channel_id], record.log_time, json.loads(record.data))
+    with opening(path) as stream:
+        for record in McapScan(stream, report).records():
+            if isinstance(record, Channel):
+                topics[record.id] = record.topic
+            elif isinstance(record, Message):
+                if record.channel_id not in topics:  # it was defined in a damaged chunk
+                    topics |= _channels(path)
+                if topic := topics.get(record.channel_id):
+                    yield Recorded(topic, record.log_time, json.loads(record.data))
+                else:
+                    topics[record.channel_id] = ""
+                    report(f"the messages of channel {record.channel_id} are left out: its definition is damaged")
 
 
 def read_metadata(path: Path) -> dict[str, str]:
-    """Return the metadata that were written at the start of the recording; empty where there are none."""
-    return next((record.metadata for record in _records(path, open_mcap) if isinstance(record, Metadata)), {})
+    """Return the metadata that were written at the start of the recording; empty where there are none.
+
+    Raises
+    ------
+    DamagedRecordingError
+        They, or the file's begin, are damaged.
+    """
+    report = _reporter(path, None)
+    with open_mcap(path) as stream:
+        records = McapScan(stream, report).records()
+        metadata = next((dict(record.metadata) for record in records if isinstance(record, Metadata)), {})
+    checksum = metadata.pop(_CHECKSUM, None)
+    if checksum not in {None, _checksum(metadata)}:
+        report("the metadata are damaged")
+    return metadata
 
 
-def _records(path: Path, opening: Callable[[Path], AbstractContextManager[IO[bytes]]]) -> Iterator[object]:
-    with opening(path) as stream:
-        records = StreamReader(stream, validate_crcs=False).records
-        while True:
-            try:
-                record = next(records)
-            except (StopIteration, *_CUT_OFF):
-                return  # the end of the file, or of its last complete record
-            yield record
+def is_closed(path: Path) -> bool:
+    """Return whether the file was closed: not where the daemon was killed, or still records."""
+    with open_mcap(path) as stream:
+        return closed_and_size(stream)[0]
+
+
+def _reporter(path: Path, on_gap: Callable[[str], None] | None) -> Callable[[str], None]:
+    def fail(text: str) -> NoReturn:
+        raise DamagedRecordingError(f"{path}: {text}.")
+
+    return fail if on_gap is None else lambda text: on_gap(f"{path}: {text}.")
+
+
+def _channels(path: Path) -> dict[int, str]:
+    with open_mcap(path) as stream:
+        return summary_channels(stream)
+
+
+def _checksum(metadata: Mapping[str, str]) -> str:
+    content = json.dumps(dict(metadata), sort_keys=True)
+    return f"{zlib.crc32(content.encode()):08x}"
