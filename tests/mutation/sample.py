@@ -44,13 +44,14 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 SURVIVORS = Path(__file__).with_name("survivors.toml")
 ROOMS = {"drivers": "tests/drivers", "daemon": "tests/daemon", "calibration/mismatch": "tests/calibration/mismatch"}
-ALSO = {
-    "daemon/demo": ("tests/system/test_demo.py",),
-    "daemon/closed_loop": ("tests/system/test_loop.py",),
-}
+ALSO = {"daemon/demo": ("tests/system/test_demo.py",)}
 """Fast tests outside the mirrored room that exercise a folder."""
-Executing = dict[str, dict[int, set[str]]]
-"""For each file and line: the tests that execute it."""
+Executing = dict[str, dict[int, list[str]]]
+"""For each file and line: the tests that execute it, the quickest first."""
+EQUAL = ("_Is_Eq", "_IsNot_NotEq")
+"""Left out: `is` compares enumeration members and None here, for which `==` gives the same."""
+NO_TESTS = 5
+"""pytest's exit status where every test is left out."""
 LONGEST_S = 300.0
 """A test run that takes longer has been made to hang: the mutant is killed."""
 
@@ -102,12 +103,12 @@ def skipped_lines(tree: ast.Module) -> set[tuple[int, int]]:
 
 
 def mutations(file: str) -> Iterator[Mutation]:
-    """Yield every mutation of a file, relative to the checkout."""
+    """Yield every mutation of a file, relative to the checkout, but those that make an equal program of this code."""
     source = (ROOT / file).read_text()
     skipped, tree = skipped_lines(ast.parse(source)), get_ast(source)
     for name in operator_names():
         kind = get_operator(name)
-        if kind.arguments() or name.endswith("NoOp"):
+        if kind.arguments() or name.endswith(("NoOp", *EQUAL)):
             continue
         operator = kind()
         places = [start for node in ast_nodes(tree) for start, _ in operator.mutation_positions(node)]
@@ -154,21 +155,16 @@ def copy_of_checkout(folder: Path) -> Path:
 
 def pytest(python: Path, folder: Path, arguments: Iterable[str], longest_s: float) -> tuple[bool, str]:
     """Run pytest in a copy; return whether all tests pass, and the output. A run that takes too long does not pass."""
-    command = [str(python), "-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", "not vcan and not systemd"]
+    command = [str(python), "-m", "pytest", "-p", "no:cacheprovider", "--durations-min=0.05"]
+    command += ["-m", "not vcan and not systemd", *arguments]
     quiet = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "OPENBLAS_NUM_THREADS": "1", "CI": "", "COLUMNS": "400"}
     try:
         done = subprocess.run(
-            [*command, *arguments],
-            cwd=folder,
-            env=quiet,
-            check=False,
-            capture_output=True,
-            text=True,
-            timeout=longest_s,
+            command, cwd=folder, env=quiet, check=False, capture_output=True, text=True, timeout=longest_s
         )
     except subprocess.TimeoutExpired:
         return False, ""
-    return done.returncode == 0, done.stdout
+    return done.returncode in {0, NO_TESTS}, done.stdout
 
 
 def failed_tests(output: str) -> list[str]:
@@ -188,19 +184,28 @@ def executing_tests(python: Path, folder: Path, files: Iterable[str]) -> Executi
     rooms = {room for room in ROOMS if any(file.startswith(room + "/") for file in files)}
     tests = [*(ROOMS[room] for room in rooms), *(test for file in files for test in mirrored_tests(file)[1:])]
     tests = list(dict.fromkeys(tests))
-    under_coverage = ["-p", "pytest_cov", "--cov=regolithd", "--cov-context=test", *tests]
+    under_coverage = ["-p", "pytest_cov", "--cov=regolithd", "--cov-context=test", "--durations=0", "-vv", *tests]
     passed, output = pytest(python, folder, under_coverage, 3600.0)
     failed = failed_tests(output)
     if not passed and not (failed and passes(python, folder, failed, LONGEST_S)):
         sys.exit(f"the tests do not pass without a mutation\n{output[-4000:]}")
     data = coverage.CoverageData(str(folder / ".coverage"))
     data.read()
+    durations_s = {name: float(took) for took, name in re.findall(r"^([\d.]+)s call +(.+)$", output, re.MULTILINE)}
     found: Executing = {}
     for measured in data.measured_files():
         file = str(Path(measured).resolve().relative_to(folder.resolve()))
         contexts = data.contexts_by_lineno(measured)
-        found[file] = {line: {each.split("|")[0] for each in names if each} for line, names in contexts.items()}
+        found[file] = {
+            line: sorted({each.split("|")[0] for each in names if each}, key=lambda name: durations_s.get(name, 0.0))
+            for line, names in contexts.items()
+        }
     return found
+
+
+def other_than(tests: Iterable[str]) -> list[str]:
+    """Return the arguments by which pytest leaves out these tests."""
+    return [argument for test in tests for argument in ("--deselect", test)]
 
 
 def run_mutant(mutation: Mutation, python: Path, folder: Path, executing: Executing) -> Result:
@@ -209,12 +214,14 @@ def run_mutant(mutation: Mutation, python: Path, folder: Path, executing: Execut
     mutated = mutate_code(original, get_operator(mutation.operator)(), mutation.occurrence)
     lines = difflib.unified_diff(original.splitlines(), mutated.splitlines(), lineterm="", n=0)
     diff = "\n".join(line for line in lines if line[:3] not in {"---", "+++"} and line[:2] != "@@")
-    tests = sorted(executing.get(mutation.file, {}).get(mutation.line, ()))
+    tests = executing.get(mutation.file, {}).get(mutation.line, [])
     started = time.monotonic()
     (folder / mutation.file).write_text(mutated)
     try:
         killed = bool(tests) and not passes(python, folder, ["-x", *tests], LONGEST_S)
-        killed = killed or not passes(python, folder, ["-x", *mirrored_tests(mutation.file)], LONGEST_S)
+        killed = killed or not passes(
+            python, folder, ["-x", *mirrored_tests(mutation.file), *other_than(tests)], LONGEST_S
+        )
     finally:
         (folder / mutation.file).write_text(original)
     return Result(mutation.file, mutation.line, mutation.operator, len(tests), killed, time.monotonic() - started, diff)

@@ -1,0 +1,420 @@
+"""The virtual nodes' communication profile, to the nanosecond of the simulated clock and to the bit."""
+
+from __future__ import annotations
+
+import struct
+from copy import copy
+from typing import TYPE_CHECKING
+
+import pytest
+from virtual_master import LOAD_CELL_TPDO, MASTER_ID, AbortedError, Master
+
+from regolithd.drivers.can.frame import Frame
+from regolithd.drivers.virtual.emcy import EmergencyProducer
+from regolithd.drivers.virtual.node import BOOT_NS, VirtualNmtState
+from regolithd.drivers.virtual.object_dictionary import Dictionary
+from regolithd.drivers.virtual.pdo import concerns_pdos, usable
+from regolithd.drivers.virtual.rover import IDLE_STEP_NS, KAPVIK, MOVING_STEP_NS, VirtualRover
+
+if TYPE_CHECKING:
+    from regolithd.drivers.virtual.node import VirtualNode
+
+MS = 1_000_000
+NODE = 11
+BOOT_UP = (0x700 + NODE, b"\0")
+
+
+class Alone:
+    """Load cell 11 alone; its frames with the time at which they are due."""
+
+    def __init__(self) -> None:
+        self.frames: list[tuple[int, int, bytes]] = []
+        self.rover = VirtualRover(_Nothing(), [each for each in KAPVIK if each.node_id == NODE])
+        self.node: VirtualNode = self.rover.nodes[NODE]
+        self.node._emit = lambda due, can_id, data: self.frames.append((due, can_id, data))
+        self.node.power_on(0)
+        self.node.tick(BOOT_NS)
+
+    def send(self, can_id: int, data: bytes, now: int) -> None:
+        """Let the node receive a frame."""
+        self.node.receive(Frame(0, can_id, data), now)
+
+    def write(self, index: int, sub: int, value: int, now: int) -> None:
+        """Write an object by SDO."""
+        bits = self.node.dictionary.entries[index, sub].bits
+        size = bits // 8
+        data = struct.pack("<BHB", 0x23 | (4 - size) << 2, index, sub) + value.to_bytes(4, "little")
+        self.send(0x600 + NODE, data, now)
+        assert self.frames.pop()[2][0] == 0x60
+
+    def take(self) -> list[tuple[int, bytes]]:
+        """Return identifiers and data of the frames since the last call."""
+        found = [(can_id, data) for _, can_id, data in self.frames]
+        self.frames.clear()
+        return found
+
+
+class _Nothing:
+    """A plant that is never measured."""
+
+
+@pytest.fixture
+def alone() -> Alone:
+    """A load cell that has just booted up."""
+    one = Alone()
+    assert one.take() == [BOOT_UP]
+    return one
+
+
+def test_a_node_boots_up_20_ms_after_power_on_and_not_before() -> None:
+    """Until then it is initialising, and neither hears nor sends."""
+    one = Alone()
+    one.take()
+    one.node.power_off()
+    one.node.power_on(1000)
+    one.node.power_on(5000)  # it is on already
+    assert one.node.due() == 1000 + BOOT_NS == 1000 + 20 * MS
+    one.send(0x000, b"\x01\x00", 1500)
+    one.node.tick(1000 + BOOT_NS - 1)
+    assert (one.node.state, one.take()) == (VirtualNmtState.INITIALISING, [])
+    one.node.tick(1000 + BOOT_NS)
+    assert (one.node.state, one.take()) == (VirtualNmtState.PRE_OPERATIONAL, [BOOT_UP])
+    assert one.node.due() is None
+
+
+@pytest.mark.parametrize(
+    ("data", "state"),
+    [
+        (b"\x01\x0b", VirtualNmtState.OPERATIONAL),
+        (b"\x01\x00", VirtualNmtState.OPERATIONAL),
+        (b"\x02\x0b", VirtualNmtState.STOPPED),
+        (b"\x80\x0b", VirtualNmtState.PRE_OPERATIONAL),
+        (b"\x81\x0b", VirtualNmtState.INITIALISING),
+        (b"\x82\x00", VirtualNmtState.INITIALISING),
+        (b"\x01\x0c", VirtualNmtState.PRE_OPERATIONAL),  # for another node
+        (b"\x01\x01", VirtualNmtState.PRE_OPERATIONAL),
+        (b"\x01", VirtualNmtState.PRE_OPERATIONAL),  # too short
+        (b"\x83\x0b", VirtualNmtState.PRE_OPERATIONAL),  # not defined
+    ],
+)
+def test_an_nmt_command_is_for_one_node_or_all(alone: Alone, data: bytes, state: VirtualNmtState) -> None:
+    """The second byte is the node-ID, 0 for all; other commands and lengths have no effect."""
+    alone.send(0x000, data, 30 * MS)
+    assert alone.node.state is state
+    assert alone.node.counts["nmt"] == (data[1:] in (b"\x0b", b"\x00"))
+
+
+@pytest.mark.parametrize(("command", "kept"), [(0x81, False), (0x82, True)])
+def test_resetting_communication_keeps_the_application_objects(alone: Alone, command: int, kept: bool) -> None:
+    """Objects from 0x2000 on keep their values; those of 0x1000 to 0x1FFF return to the EDS's in either case."""
+    alone.write(0x6112, 1, 0, 30 * MS)
+    alone.write(0x1017, 0, 100, 30 * MS)
+    before = alone.node.dictionary.entries[0x6112, 1].default
+    alone.send(0x000, bytes((command, NODE)), 40 * MS)
+    assert before != 0
+    assert alone.node.dictionary.get(0x6112, 1) == (0 if kept else before)
+    assert alone.node.dictionary.get(0x1017) == 0
+    alone.node.tick(40 * MS + BOOT_NS)
+    assert alone.take() == [BOOT_UP]
+
+
+def test_heartbeats_keep_their_phase_and_are_not_caught_up(alone: Alone) -> None:
+    """The period (0x1017) is in milliseconds; after a pause one heartbeat is sent, and the next a period later."""
+    alone.write(0x1017, 0, 100, 30 * MS)
+    sent = []
+    for now_ms in (129, 130, 131, 235, 329, 330, 700, 799, 800):
+        alone.node.tick(now_ms * MS)
+        sent += [now_ms for _ in alone.take()]
+    assert sent == [130, 235, 330, 700, 800]
+    assert alone.node.due() == 900 * MS
+    assert alone.node.counts["heartbeat"] == 5
+    alone.write(0x1017, 0, 0, 800 * MS)
+    assert alone.node.due() is None
+
+
+def test_a_heartbeat_reports_the_nmt_state(alone: Alone) -> None:
+    """0x7F pre-operational, 0x05 operational, 0x04 stopped."""
+    alone.write(0x1017, 0, 10, 30 * MS)
+    states = []
+    for number, command in enumerate((0x80, 0x01, 0x02), start=1):
+        now = 30 * MS + number * 10 * MS
+        alone.send(0x000, bytes((command, NODE)), now - 1)
+        alone.node.tick(now)
+        states += alone.take()
+    assert states == [(0x70B, b"\x7f"), (0x70B, b"\x05"), (0x70B, b"\x04")]
+
+
+@pytest.mark.parametrize(
+    ("behaviour", "state"),
+    [(0, VirtualNmtState.PRE_OPERATIONAL), (1, VirtualNmtState.OPERATIONAL), (2, VirtualNmtState.STOPPED)],
+)
+def test_the_masters_loss_has_the_reaction_of_object_0x1029(behaviour: int, state: VirtualNmtState) -> None:
+    """Monitoring begins with the first heartbeat, ends after the time of 0x1016, and the master's return ends it."""
+    master = Master([each for each in KAPVIK if each.node_id == 1])
+    node = master.node(1)
+    master.write(1, 0x1029, 1, behaviour, 1)
+    master.write(1, 0x1016, 1, MASTER_ID << 16 | 200, 4)
+    master.nmt(1)
+    master.wait(1.0)
+    assert node.state is VirtualNmtState.OPERATIONAL
+    master.heartbeat()
+    assert node.due() == master.now + 200 * MS
+    node.tick(master.now + 200 * MS - 1)
+    assert node.counts["master_lost"] == 0
+    node.tick(master.now + 200 * MS)
+    assert node.counts["master_lost"] == 1
+    assert node.state is state
+    assert node.due() is None
+
+
+def test_a_node_that_is_not_operational_stays_where_it_is_when_the_master_is_lost() -> None:
+    """Pre-operational is kept, and the heartbeat of another node is not the master's."""
+    master = Master()
+    master.write(1, 0x1016, 1, MASTER_ID << 16 | 200, 4)
+    master.send(0x700 + 126, b"\x05")
+    assert master.node(1)._master_due is None
+    master.heartbeat()
+    master.nmt(2, 1)
+    master.wait(0.3)
+    assert master.node(1).counts["master_lost"] == 1
+    assert master.node(1).state is VirtualNmtState.STOPPED
+
+
+def test_a_stopped_node_answers_no_sdo(alone: Alone) -> None:
+    """In pre-operational and operational it does."""
+    for command, answers in ((0x01, 1), (0x02, 0), (0x80, 1)):
+        alone.send(0x000, bytes((command, NODE)), 30 * MS)
+        alone.send(0x600 + NODE, bytes.fromhex("4000100000000000"), 30 * MS)
+        assert len(alone.take()) == answers
+
+
+@pytest.mark.parametrize("field", ["extended", "remote", "error"])
+def test_frames_of_other_kinds_are_ignored(alone: Alone, field: str) -> None:
+    """29-bit identifiers, remote frames and error frames are not for these nodes."""
+    alone.node.receive(Frame(0, 0x000, b"\x01\x0b")._replace(**{field: True}), 30 * MS)
+    assert alone.node.state is VirtualNmtState.PRE_OPERATIONAL
+
+
+def test_inhibit_and_event_times_have_their_units() -> None:
+    """0x1800:03 is in 0.1 ms, 0x1800:05 in ms; an event-driven PDO is sent when its value has changed."""
+    master = Master([each for each in KAPVIK if each.node_id == NODE])
+    master.write(NODE, 0x1800, 1, 0x8000_018B, 4)
+    master.write(NODE, 0x1800, 3, 300, 2)
+    master.configure(NODE, tpdo=LOAD_CELL_TPDO, kind=255)
+    master.write(NODE, 0x1800, 5, 50, 2)
+    (compiled,) = master.node(NODE)._transmit
+    assert (compiled.inhibit_ns, compiled.event_ns) == (30 * MS, 50 * MS)
+    master.nmt(1)
+    start = master.now
+    assert master.node(NODE).due() == start + 50 * MS
+    device_measures = master.node(NODE).measure
+    measurement = master.rover._plant.measure(0.0, [0.0] * 6)
+    device_measures(measurement, start + 30 * MS - 1)
+    assert master.rover.outgoing(start + 30 * MS) == []
+    device_measures(measurement, start + 30 * MS)
+    assert [frame.can_id for frame in master.rover.outgoing(start + 30 * MS)] == [0x18B]
+    device_measures(measurement, start + 90 * MS)  # it has not changed
+    assert master.rover.outgoing(start + 90 * MS) == []
+
+
+@pytest.mark.parametrize(
+    ("cob_id", "allowed"),
+    [
+        (0x000, False),
+        (0x080, False),
+        (0x081, True),
+        (0x100, True),
+        (0x101, False),
+        (0x180, False),
+        (0x181, True),
+        (0x580, True),
+        (0x581, False),
+        (0x5FF, False),
+        (0x600, True),
+        (0x601, False),
+        (0x67F, False),
+        (0x680, True),
+        (0x6DF, True),
+        (0x6E0, False),
+        (0x7FF, False),
+        (0x2000_0181, False),
+        (0x8000_0181, True),
+    ],
+)
+def test_no_pdo_uses_a_reserved_identifier(cob_id: int, allowed: bool) -> None:
+    """CiA 301, table 40: NMT, SYNC, TIME, SDO and error control are reserved; 29-bit identifiers are not supported."""
+    assert usable(cob_id) is allowed
+
+
+def test_the_objects_of_the_pdos() -> None:
+    """0x1400 to 0x1BFF describe PDOs, and nothing else does."""
+    assert [concerns_pdos(index) for index in (0x13FF, 0x1400, 0x1A00, 0x1BFF, 0x1C00)] == [
+        False,
+        True,
+        True,
+        True,
+        False,
+    ]
+
+
+def emergencies(codes: list[int]) -> tuple[list[str], Dictionary]:
+    """Raise errors on a load cell; return the data of the frames, and its objects."""
+    description = next(each for each in KAPVIK if each.node_id == NODE)
+    sent: list[str] = []
+    dictionary = Dictionary(description.device.eds, NODE)
+    producer = EmergencyProducer(dictionary, lambda can_id, data: sent.append(f"{can_id:03x} {data.hex()}"))
+    for code in codes:
+        producer.set(code)
+    return sent, dictionary
+
+
+@pytest.mark.parametrize(
+    ("code", "register"),
+    [(0x1000, 0x01), (0x2310, 0x03), (0x3220, 0x05), (0x4210, 0x09), (0x8130, 0x11), (0xFF01, 0x81), (0x5000, 0x01)],
+)
+def test_the_error_register_follows_the_class_of_the_error(code: int, register: int) -> None:
+    """Current, voltage, temperature, communication and manufacturer-specific have a bit each, besides bit 0."""
+    sent, dictionary = emergencies([code])
+    assert sent == [f"08b {code & 0xFF:02x}{code >> 8:02x}{register:02x}0000000000"]
+    assert dictionary.get(0x1001) == register
+
+
+def test_the_error_history_has_the_last_eight_errors_the_newest_first() -> None:
+    """0x1003:00 is their number; bits of all present errors are in the register."""
+    codes = [0x2300 + number for number in range(10)] + [0x3210]
+    sent, dictionary = emergencies([*codes, codes[0]])
+    assert len(sent) == 11  # an error that is present is not sent again
+    assert dictionary.get(0x1003) == 8
+    assert [dictionary.get(0x1003, sub) for sub in range(1, 9)] == codes[:2:-1]
+    assert dictionary.get(0x1001) == 0x07
+
+
+def test_an_emergency_with_its_cob_id_disabled_is_kept_but_not_sent() -> None:
+    """Bit 31 of 0x1014 disables the message; history and register are written."""
+    description = next(each for each in KAPVIK if each.node_id == NODE)
+    sent: list[int] = []
+    dictionary = Dictionary(description.device.eds, NODE)
+    producer = EmergencyProducer(dictionary, lambda can_id, _data: sent.append(can_id))
+    dictionary.put(0x1014, 0, 0x8000_008B)
+    producer.set(0x5000)
+    assert (sent, dictionary.get(0x1003, 1), dictionary.get(0x1001)) == ([], 0x5000, 1)
+    dictionary.put(0x1014, 0, 0x0000_0091)
+    producer.clear(0x6000)  # not present
+    assert sent == []
+    producer.clear(0x5000)
+    assert (sent, dictionary.get(0x1001), producer.active) == ([0x091], 0, [])
+
+
+@pytest.mark.parametrize(
+    ("index", "sub", "given", "kept"),
+    [
+        (0x6041, 0, 0x1_2345, 0xFFFF),
+        (0x6041, 0, -1, 0),
+        (0x606C, 0, 1 << 40, 0x7FFF_FFFF),
+        (0x606C, 0, -(1 << 40), -(1 << 31)),
+        (0x6078, 0, 32767, 32767),
+        (0x6078, 0, 32768, 32767),
+        (0x6078, 0, -32768, -32768),
+        (0x6078, 0, -32769, -32768),
+    ],
+)
+def test_a_value_outside_its_type_is_clipped(index: int, sub: int, given: int, kept: int) -> None:
+    """A device that measures more than its object can hold reports the largest value."""
+    dictionary = Dictionary(KAPVIK[0].device.eds, 1)
+    dictionary.put(index, sub, given)
+    assert dictionary.get(index, sub) == kept
+
+
+def test_a_string_is_no_number() -> None:
+    """Reading it as one is a bug, and raises."""
+    with pytest.raises(TypeError, match="0x1008:00 is a string"):
+        Dictionary(KAPVIK[0].device.eds, 1).get(0x1008)
+
+
+@pytest.mark.parametrize("value", [0x0000_0000, 0x2000_0080, 0x4000_0080, 0x0000_0800])
+def test_a_sync_of_another_kind_is_refused(value: int) -> None:
+    """A producer, a 29-bit identifier, and the identifier 0 are invalid values of 0x1005."""
+    master = Master()
+    with pytest.raises(AbortedError, match="0x06090030"):
+        master.write(1, 0x1005, 0, value, 4)
+
+
+@pytest.mark.parametrize(
+    ("line", "answer"),
+    [
+        ("", ""),
+        ("loud 3", "error: there is no command 'loud'; `help` lists them"),
+        ("off", "error: a number is expected, and none was given"),
+        ("off three", "error: a number is expected, not 'three'"),
+        ("emcy 3", "error: a number is expected, and none was given"),
+        ("slow 3 soon", "error: a number is expected, not 'soon'"),
+        ("off 99", "error: there is no node 99; there are 1, 2, 3, 4, 5, 6, 11, 12, 13, 14, 15, 16, 21, 22"),
+        ("fault 11 0x1000", "error: node 11 is not a drive"),
+        ("identity 3", "error: which entry of the identity? One of vendor, product, revision, serial"),
+        ("identity 3 colour 5", "error: which entry of the identity? One of vendor, product, revision, serial"),
+        ("identity 3 vendor", "error: a number is expected, and none was given"),
+    ],
+)
+def test_a_wrong_command_is_answered_by_what_is_expected(line: str, answer: str) -> None:
+    """An incomplete or unknown command changes nothing, and its answer names the part that is wrong."""
+    assert Master().rover.inject_fault(line) == answer
+
+
+@pytest.mark.parametrize(
+    ("line", "name", "value"),
+    [
+        ("slow 11 30", "delay_ns", 30_000_000),
+        ("short 11 2", "missing_bytes", 2),
+        ("status 11 0x4", "status", 4),
+        ("no-boot-up 11", "no_boot_up", True),
+        ("no-heartbeat 11", "no_heartbeat", True),
+        ("no-sdo 11", "no_sdo", True),
+        ("refuse 11 0x1A00", "refused", {0x1A00}),
+        ("forget 11 0x1800", "forgotten", {0x1800}),
+        ("identity 11 vendor 1", "identity", {1: 1}),
+        ("identity 11 serial 0x10", "identity", {4: 16}),
+    ],
+)
+def test_a_fault_has_its_unit_and_is_none_at_first(line: str, name: str, value: object) -> None:
+    """The command sets one fault of one node, `all` that of every node, and `clear` ends it."""
+    master = Master()
+    fresh = copy(getattr(master.node(12).faults, name))
+    assert not fresh
+    assert master.rover.inject_fault(line) == "ok"
+    assert getattr(master.node(11).faults, name) == value
+    assert getattr(master.node(12).faults, name) == fresh
+    assert master.rover.inject_fault(line.replace("11", "all", 1)) == "ok"
+    assert getattr(master.node(12).faults, name) == value
+    assert master.rover.inject_fault("clear all") == "ok"
+    assert getattr(master.node(11).faults, name) == fresh
+
+
+def test_the_rover_steps_often_only_while_a_drive_moves() -> None:
+    """Every 20 ms while a drive is enabled, else every 200 ms, and not for three SYNC intervals after a SYNC."""
+    assert (MOVING_STEP_NS, IDLE_STEP_NS) == (20 * MS, 200 * MS)
+    master = Master()
+    master.wait(0.5)
+    due = master.rover._step_due
+    assert due - master.now <= 200 * MS
+    master.rover.tick(due)
+    assert master.rover._step_due == due + 200 * MS
+    for controlword in (0x06, 0x07, 0x0F):
+        master.write(1, 0x6040, 0, controlword, 2)
+    master.rover.tick(due + 200 * MS)
+    assert master.rover._step_due == due + 220 * MS
+    master.sync()
+    assert master.rover._step_due == master.now + 200 * MS
+    master.now += 100 * MS
+    master.sync()
+    assert master.rover._step_due == master.now + 300 * MS
+
+
+def test_a_step_of_the_wall_clock_is_limited() -> None:
+    """A frame from a little before the last one changes nothing, and no step is longer than 5 s in either direction."""
+    second = 1_000_000_000
+    rover = VirtualRover(_Nothing(), ())
+    times = []
+    for wall_s in (100.0, 101.5, 101.5, 100.0, 110.0, 104.0, 104.5):
+        rover._advance(round(wall_s * second))
+        times.append(rover._time_s)
+    assert times == [0.0, 1.5, 1.5, 1.5, 6.5, 6.5, 7.0]
