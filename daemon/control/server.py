@@ -2,6 +2,9 @@
 
 Nothing else commands the wheels. There is one traverse at a time. The wheels are stopped when the connection that
 commanded it is closed, when a node is lost, when a drive faults, and when the daemon stops.
+
+At most `MAX_CLIENTS` are connected: another one replaces the oldest, first of those that have sent no whole request,
+but never the one that commanded the traverse. Hence `stop` gets through however many connections are opened.
 """
 
 from __future__ import annotations
@@ -48,6 +51,11 @@ if TYPE_CHECKING:
 _log = logging.getLogger(__name__)
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid: unix(7), SO_PEERCRED
 RETRY_S = 5.0
+MAX_CLIENTS = 64
+LINE_TIMEOUT_S = 5.0
+"""A client that has begun a line must finish it within this time."""
+_ACCEPTED_AT_A_TIME = 16  # a quarter of MAX_CLIENTS: a client's request is read before so many others could replace it
+_WAITING_IN_KERNEL = 128
 
 
 class Rover(Wheels, Protocol):
@@ -90,6 +98,7 @@ class ControlSink:
         self._tasks: asyncio.TaskGroup | None = None
         self._traverse: Traverse | None = None
         self._owner: asyncio.StreamWriter | None = None
+        self._clients: dict[asyncio.StreamWriter, bool] = {}  # oldest first; whether it has sent a whole request
         self._progress: Progress | None = None
         self._last: Snapshot | None = None
         self._snapshots = 0
@@ -136,7 +145,10 @@ class ControlSink:
             def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
                 tasks.create_task(self._serve_client(reader, writer))
 
-            server = await asyncio.start_unix_server(accept, sock=listener, limit=LINE_LIMIT)
+            server = await asyncio.start_unix_server(
+                accept, sock=listener, limit=LINE_LIMIT, backlog=_ACCEPTED_AT_A_TIME
+            )
+            listener.listen(_WAITING_IN_KERNEL)  # asyncio has set it to the number that it accepts at a time
             try:
                 while True:
                     self._beat()
@@ -145,17 +157,31 @@ class ControlSink:
                 server.close()
 
     async def _serve_client(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Answer one client until it closes the connection."""
+        """Answer one client until it closes the connection, or another one takes its place."""
+        self._make_room()
+        self._clients[writer] = False
         try:
-            while line := await reader.readline():
+            while line := await _read_line(reader):
+                if writer in self._clients:
+                    self._clients[writer] = True
                 _send(writer, await self._answer(line, writer))
                 await writer.drain()
-        except (ConnectionError, ValueError) as error:  # ValueError: a line over LINE_LIMIT
-            _log.info("a client of the control socket was disconnected: %s", error)
+        except (OSError, ValueError) as error:  # OSError: also a time-out; ValueError: a line over LINE_LIMIT
+            _log.info("a client of the control socket was disconnected: %s", error or type(error).__name__)
         finally:
+            self._clients.pop(writer, None)
             if self._owner is writer and self._traverse is not None:
                 self._traverse.stop("the client that commanded it disconnected", quick=True)
             writer.close()
+
+    def _make_room(self) -> None:
+        """Disconnect the oldest client if there are too many."""
+        if len(self._clients) < MAX_CLIENTS:
+            return
+        others = [writer for writer in self._clients if writer is not self._owner]
+        oldest = next((writer for writer in others if not self._clients[writer]), others[0])
+        del self._clients[oldest]
+        oldest.close()  # ends its task once its last request is answered
 
     async def _answer(self, line: bytes, writer: asyncio.StreamWriter) -> _Line:
         try:
@@ -257,6 +283,21 @@ class ControlSink:
             traverse=self._progress,
             nodes=tuple(_node_line(status) for status in nodes.values()),
         )
+
+
+async def _read_line(reader: asyncio.StreamReader) -> bytes:
+    """Return the next line, empty at the end; wait for its begin without a limit, for its end `LINE_TIMEOUT_S`.
+
+    Raises
+    ------
+    TimeoutError, ValueError
+        The line was not finished in time, or is too long.
+    """
+    begin = await reader.read(1)
+    if begin in {b"", b"\n"}:
+        return begin
+    async with asyncio.timeout(LINE_TIMEOUT_S):
+        return begin + await reader.readline()
 
 
 def _send(writer: asyncio.StreamWriter, reply: _Line) -> None:
