@@ -20,7 +20,7 @@ from regolithd.daemon.closed_loop.pdo_frames import FRAME_NS, frames
 from regolithd.daemon.closed_loop.run import DriveLengths, LoopResult, run_case
 from regolithd.daemon.closed_loop.simulated_drive import START_NS, estimates, record, simulate
 from regolithd.daemon.closed_loop.soil_estimates import SoilEstimates, figures, soil_estimates, with_posterior_enabled
-from regolithd.daemon.closed_loop.speed_profile import SpeedProfile, shuttle, traverse
+from regolithd.daemon.closed_loop.speed_profile import SpeedProfile, traverse
 from regolithd.daemon.config.configuration import Configuration
 from regolithd.daemon.config.reader import read_configuration
 from regolithd.daemon.pipeline.onnx_models import load_models
@@ -126,36 +126,6 @@ def test_the_files_of_a_case_state_what_is_known_and_nothing_else() -> None:
         },
     }
     assert tomllib.loads(rover_toml(COULOMB))["drivetrain"] == {"gain_relative_std": 0.03}
-
-
-def test_a_shuttle_has_both_directions_steps_and_stops() -> None:
-    """Speeds are between 0.10 and 0.45 rad/s, reached within 2 s; about one leg in twelve is a stop."""
-    profile = shuttle(3, 20_000.0, 10.0)
-    assert (len(profile.time_s), profile.time_s[0], profile.time_s[1]) == (200_000, 0.0, 0.1)
-    speed = profile.wheel_speed_rad_s
-    assert speed[0] == 0.0
-    held = np.isclose(np.diff(speed), 0.0)
-    constant = np.abs(speed[1:][held])
-    assert constant.max() <= 0.45
-    assert constant[constant > 1e-9].min() >= 0.10
-    assert 0.05 < np.mean(constant < 1e-9) < 0.12
-    assert 0.3 < np.mean(speed < 0) < 0.7
-    changes = np.flatnonzero(np.diff(held.astype(int)) == -1) / 10
-    assert np.diff(changes).min() + 0.2 >= 20.0
-    assert np.diff(changes).max() <= 100.2  # a leg may repeat a stop
-    assert np.median(np.diff(changes)) == pytest.approx(35, abs=3)
-    assert np.mean(held) == pytest.approx(1 - 2 / 35, abs=0.01)
-    assert np.abs(np.diff(speed)).max() <= 0.9 / 2.0 / 10 + 1e-9
-
-
-def test_a_traverse_only_goes_forward() -> None:
-    """No stop and no reversal; the seed alone decides, and it differs from the shuttle's."""
-    profile = traverse(3, 600.0, 2.0)
-    assert len(profile.time_s) == 1200
-    assert profile.wheel_speed_rad_s[4:].min() >= 0.10
-    assert np.array_equal(profile.wheel_speed_rad_s, traverse(3, 600.0, 2.0).wheel_speed_rad_s)
-    assert not np.array_equal(profile.wheel_speed_rad_s, traverse(4, 600.0, 2.0).wheel_speed_rad_s)
-    assert not np.allclose(np.abs(shuttle(3, 600.0, 2.0).wheel_speed_rad_s), profile.wheel_speed_rad_s)
 
 
 def test_the_frames_of_a_sync_hold_the_measurement(body: Configuration) -> None:
