@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING
 
 from regolithd.daemon.control.server import ControlSink
 from regolithd.daemon.publish.mqtt_sink import PUBLISHING, MqttSink
 from regolithd.daemon.publish.publisher import Publisher
-from regolithd.daemon.publish.spool import Spool
+from regolithd.daemon.publish.spool import Spool, SpoolUnusableError
 
 if TYPE_CHECKING:
+    from regolithd.daemon.config.configuration import Mqtt
     from regolithd.daemon.service import Service
 
 CONTROL = "control"
 CONTROL_TIMEOUT_S = 10.0
 """The control task counts as hung when it has not reported for this long."""
 _MEGABYTE = 1_000_000
+
+_log = logging.getLogger(__name__)
 
 
 def connect_sinks(service: Service) -> None:
@@ -24,12 +28,11 @@ def connect_sinks(service: Service) -> None:
     Raises
     ------
     SpoolError
-        The store of what is to be published cannot be used.
+        Another process uses the store of what is to be published.
     """
     configuration, liveness = service.configuration, service.liveness
     mqtt = configuration.mqtt
-    spool = Spool(mqtt.spool_directory, int(mqtt.spool_limit_MB * _MEGABYTE))
-    publisher = Publisher(configuration, spool, beat=lambda: liveness.beat(PUBLISHING))
+    publisher = Publisher(configuration, open_spool(mqtt), beat=lambda: liveness.beat(PUBLISHING))
     control = ControlSink(
         configuration,
         lambda: service.network,
@@ -38,3 +41,12 @@ def connect_sinks(service: Service) -> None:
     )
     liveness.expect(CONTROL, CONTROL_TIMEOUT_S)
     service.sinks += [MqttSink(service, publisher, control_problem=lambda: control.problem), control]
+
+
+def open_spool(mqtt: Mqtt) -> Spool:
+    """Return the store of `[mqtt] spool_directory`; where it cannot be used, log why and keep messages in memory."""
+    try:
+        return Spool(mqtt.spool_directory, int(mqtt.spool_limit_MB * _MEGABYTE))
+    except SpoolUnusableError as error:
+        _log.warning("%s Messages are kept in memory only.", error)
+        return Spool.memory_only(mqtt.spool_directory, str(error))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from aiomqtt import Client, MqttError
 
 from regolithd.daemon.check.finding import Finding, good, wrong
-from regolithd.daemon.publish.connection import tls_context
+from regolithd.daemon.publish.connection import password_of, tls_context
 from regolithd.daemon.publish.connection_errors import reason_of
 
 if TYPE_CHECKING:
@@ -23,12 +23,11 @@ async def check_broker(configuration: Configuration) -> list[Finding]:
     mqtt = configuration.mqtt
     began = time.monotonic()
     try:
-        password = mqtt.password_file.read_text().strip() if mqtt.password_file else None
         client = Client(
             mqtt.host,
             mqtt.port,
             username=mqtt.username,
-            password=password,
+            password=password_of(mqtt),
             identifier=f"regolithd-check-{time.time_ns():x}",
             timeout=TIMEOUT_S,
             tls_context=tls_context(mqtt),

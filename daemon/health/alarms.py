@@ -41,6 +41,7 @@ class AlarmInputs:
     bus_problem: str = ""
     bus_state: BusState = BusState.ACTIVE
     kernel_drops: int = 0
+    store_problem: str = ""
     store_dropped: int = 0
     store_unstored: int = 0
     store_damaged: int = 0
@@ -133,7 +134,10 @@ def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
 
 def _store_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
     """Yield one alarm at most: the worst of what happened to the store of messages."""
-    if inputs.store_damaged:
+    if inputs.store_problem:
+        remedy = "Until the daemon is restarted with a store, messages are in memory only, the newest 512."
+        yield Alarm("store", Severity.ERROR, inputs.store_problem, remedy)
+    elif inputs.store_damaged:
         text = f"{inputs.store_damaged} stored messages were damaged on the disk; {inputs.store_dropped} are lost"
         yield Alarm("store", Severity.ERROR, text, "Check the disk of [mqtt] spool_directory; replace an old SD card.")
     elif inputs.store_dropped:

@@ -86,12 +86,11 @@ class Connection:
 
     def _client(self) -> Client:
         settings = self._settings
-        password = settings.password_file.read_text().strip() if settings.password_file else None
         client = Client(
             settings.host,
             settings.port,
             username=settings.username,
-            password=password,
+            password=password_of(settings),
             identifier=f"regolithd-{self._root.replace('/', '-')}",
             will=Will(
                 f"{self._root}/state", self._state_messages.death("connection-lost"), qos=_AT_LEAST_ONCE, retain=True
@@ -158,6 +157,9 @@ class Connection:
         try:
             await self._publish(client, message.topic, message.payload, retain=message.retain)
             self._outbox.acknowledged(message)
+        except ValueError as error:  # the client refuses it, whatever is tried: it must not block those behind it
+            _log.error("a message on %s cannot be published and is discarded: %s", message.topic, error)
+            self._outbox.acknowledged(message)
         finally:
             self._window.release()
         if self._stop.is_set():
@@ -179,6 +181,22 @@ class Connection:
                 await self._publish(client, "state", self._state_messages.death(reason), retain=True)
 
 
+def password_of(settings: Mqtt) -> str | None:
+    """Return the content of `[mqtt] password_file`, or None where there is none.
+
+    Raises
+    ------
+    OSError
+        It cannot be read, or is not UTF-8.
+    """
+    if settings.password_file is None:
+        return None
+    try:
+        return settings.password_file.read_text(encoding="utf-8").strip()
+    except UnicodeDecodeError:
+        raise OSError(f"{settings.password_file} is not UTF-8. Write [mqtt] password_file again as text") from None
+
+
 def tls_context(settings: Mqtt) -> ssl.SSLContext | None:
     """Return the TLS context of `[mqtt] tls` and `ca_file`; without a file it trusts the system's authorities."""
     return ssl.create_default_context(cafile=settings.ca_file) if settings.tls else None
@@ -192,5 +210,6 @@ def _first(group: BaseExceptionGroup[MqttError]) -> MqttError:
     return error
 
 
+_log = logging.getLogger(__name__)
 _aiomqtt_log = logging.getLogger("regolithd.daemon.publish.aiomqtt")
 _aiomqtt_log.setLevel(logging.CRITICAL)  # the publisher logs each error once

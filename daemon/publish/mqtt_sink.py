@@ -180,6 +180,7 @@ class MqttSink:
             bus_problem=service.bus_problem,
             bus_state=network.bus.state if network is not None else BusState.ACTIVE,
             kernel_drops=network.bus.counters.kernel_drops if network is not None else 0,
+            store_problem=self.publisher.store_problem,
             store_dropped=report.dropped,
             store_unstored=report.unstored,
             store_damaged=report.damaged,

@@ -117,6 +117,11 @@ class Publisher:
         return "" if self.connected else self._problem
 
     @property
+    def store_problem(self) -> str:
+        """Why messages are kept in memory only; empty while they are stored."""
+        return self._spool.problem
+
+    @property
     def report(self) -> PublishingReport:
         """Counts of the stored messages, for the `health` message."""
         counters = self._spool.counters

@@ -16,6 +16,7 @@ acknowledged. The file `acknowledged` holds the first index that is not, with a 
 | the store is full | the oldest file is deleted | its records, counted in `dropped` |
 | the disk is full, failing or read-only | messages are kept in memory, counted in `unstored` | these, by a restart |
 | a record is damaged | it is skipped, counted in `damaged`, and in `dropped` when one behind it is acknowledged | it |
+| the folder cannot be used at the start | `Spool.memory_only`, an alarm | messages of earlier runs wait on the disk |
 | the newest file cannot be read at the start | it is set aside (`.unreadable`), counted likewise | its records |
 
 Once the store is open, no failure of the disk raises an error here.
@@ -23,6 +24,7 @@ Once the store is open, no failure of the disk raises an error here.
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import os
 import struct
@@ -46,10 +48,15 @@ RECENT = 512
 """Records that are kept in memory as well: while the broker acknowledges in time, nothing is read from the disk."""
 
 _CURSOR = struct.Struct("<QI")
+_CLOSED = -1
 
 
 class SpoolError(Exception):
     """The store cannot be used; the message says why, and what to do."""
+
+
+class SpoolUnusableError(SpoolError):
+    """The disk or its permissions are the reason; messages can be kept in memory (`Spool.memory_only`)."""
 
 
 @dataclass(slots=True)
@@ -73,29 +80,63 @@ class Spool:
         Its folder, created if missing. A second process is refused.
     limit_bytes
         Limit for the size of all files together.
+    problem
+        Why the folder is not to be used, as `Spool.memory_only` sets it; empty otherwise.
+
+    Raises
+    ------
+    SpoolUnusableError
+        The folder or its files cannot be opened.
+    SpoolError
+        Another process uses it.
     """
 
-    def __init__(self, directory: Path, limit_bytes: int, *, segment_bytes: int | None = None) -> None:
+    def __init__(
+        self, directory: Path, limit_bytes: int, *, segment_bytes: int | None = None, problem: str = ""
+    ) -> None:
         self.directory = directory
+        self.problem = problem
         self.limit_bytes = limit_bytes
         self.segment_bytes = segment_bytes or min(1_000_000, max(4096, limit_bytes // 16))
         self.counters = SpoolCounters()
         self._recent: deque[Record] = deque(maxlen=RECENT)
-        self._lock = self._lock_directory()
-        self._cursor_file = os.open(directory / "acknowledged", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o640)
-        self._segments = self._found()
-        self._first = self._read_cursor(self._segments[0].first if self._segments else 0)
-        self._next = max(self._first, self._segments[-1].end if self._segments else 0)
         self._active: Segment | None = None
+        self._segments: list[Segment] = []
+        self._first = 0
+        self._lock = self._cursor_file = _CLOSED
+        if not problem:
+            self._open()
+        self._next = max(self._first, self._segments[-1].end if self._segments else 0)
         self._delete_acknowledged()
+
+    @classmethod
+    def memory_only(cls, directory: Path, problem: str) -> Spool:
+        """Return a store that keeps the newest `RECENT` messages in memory, and counts all as `unstored`."""
+        return cls(directory, 0, problem=problem)
+
+    def _open(self) -> None:
+        self._lock = self._lock_directory()
+        try:
+            self._cursor_file = os.open(self.directory / "acknowledged", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o640)
+            self._segments = self._found()
+            self._first = self._read_cursor(self._segments[0].first if self._segments else 0)
+        except OSError as error:
+            self._segments.clear()
+            self.close()
+            raise self._unusable(error) from error
+
+    def _unusable(self, error: OSError) -> SpoolUnusableError:
+        remedy = "Make this folder writable for the daemon's user, or choose another: [mqtt] spool_directory."
+        return SpoolUnusableError(
+            f"{error.filename or self.directory}: cannot be written: {error.strerror or error}. {remedy}"
+        )
 
     def _lock_directory(self) -> int:
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             lock = os.open(self.directory / "lock", os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o640)
         except OSError as error:
-            remedy = "Make this folder writable for the daemon's user, or choose another: [mqtt] spool_directory."
-            raise SpoolError(f"{self.directory}: cannot be written: {error.strerror}. {remedy}") from error
+            raise self._unusable(error) from error
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
@@ -170,6 +211,8 @@ class Spool:
         return index
 
     def _segment_for(self, size: int, index: int) -> Segment:
+        if self.problem:
+            raise OSError(errno.EROFS, self.problem)
         active = self._active
         if active is None or active.size + size > self.segment_bytes:
             while self._segments and self.size_bytes + max(size, self.segment_bytes) > self.limit_bytes:
@@ -228,6 +271,8 @@ class Spool:
 
     def begin_sync(self) -> Callable[[], None]:
         """Return a function that syncs everything stored by now to the disk; call it in a thread."""
+        if self.problem:
+            return lambda: None
         files = [file for segment in self._segments if (file := segment.duplicate()) is not None]
         directory = os.open(self.directory, os.O_RDONLY | os.O_CLOEXEC)
         for segment in self._segments[:-1]:
@@ -246,7 +291,6 @@ class Spool:
         """Close the files and release the lock; waiting records stay on the disk."""
         for segment in self._segments:
             segment.close()
-        if self._lock >= 0:
-            os.close(self._cursor_file)
-            os.close(self._lock)
-            self._lock = -1
+        for file in {self._cursor_file, self._lock} - {_CLOSED}:
+            os.close(file)
+        self._lock = self._cursor_file = _CLOSED

@@ -22,6 +22,7 @@ TROUBLES = [
     ("bus_state", BusState.OFF, "bus", Severity.CRITICAL),
     ("bus_state", BusState.DOWN, "bus", Severity.CRITICAL),
     ("kernel_drops", 3, "kernel", Severity.ERROR),
+    ("store_problem", "no permission", "store", Severity.ERROR),
     ("store_dropped", 3, "store", Severity.ERROR),
     ("store_unstored", 3, "store", Severity.WARNING),
     ("store_damaged", 1, "store", Severity.ERROR),

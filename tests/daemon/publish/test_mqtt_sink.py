@@ -38,6 +38,7 @@ class Recorder:
     """A publisher that keeps topic and fields of each message."""
 
     report: PublishingReport = NO_MESSAGES
+    store_problem: str = ""
     published: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
 
     def publish(self, topic: str, message: type, *, time_ns: int, **fields: Any) -> None:

@@ -20,6 +20,7 @@ from regolithd.daemon.messages.bus import EventMessage, NodeMessage
 from regolithd.daemon.publish.backoff import Backoff
 from regolithd.daemon.publish.publisher import Publisher
 from regolithd.daemon.publish.spool import Spool
+from regolithd.daemon.wiring import open_spool
 
 QUICK = {"first": 0.05, "longest": 0.2}
 
@@ -239,6 +240,32 @@ async def test_a_broker_that_cannot_be_reached_is_reported_once(
     told = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
     assert len(told) == 1
     assert said in told[0]
+
+
+async def test_a_password_that_is_not_text_is_reported_and_tried_again(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """The daemon goes on, and connects once the file is corrected."""
+    password = tmp_path / "password"
+    password.write_bytes(b"\xff\xfe\x00")
+    publisher = new_publisher(tmp_path / "spool", mosquitto.port, username="me", password_file=password)
+    async with running(publisher):
+        await until(lambda: publisher.report.connections >= 2)
+        assert "is not UTF-8" in publisher.problem
+        password.write_text("secret")
+        await until(lambda: publisher.connected)
+
+
+async def test_messages_are_delivered_without_a_store(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """A folder that cannot be written ends nothing; the reason is given for the alarm."""
+    (tmp_path / "file").touch()
+    settings = configuration(tmp_path / "file" / "spool", mosquitto.port)
+    publisher = Publisher(settings, open_spool(settings.mqtt), backoff=Backoff(**QUICK))
+    assert "[mqtt] spool_directory" in publisher.store_problem
+    async with listening(Subscriber(mosquitto.port)) as subscriber, running(publisher):
+        for sequence in range(5):
+            publisher.estimate(estimate(sequence))
+        await until(lambda: publisher.report.queued == 0)
+        await until(lambda: len(subscriber.of("snapshot")) == 5)
+    assert publisher.report.unstored == 5
 
 
 async def test_a_refused_password_is_reported_and_tried_again_until_it_is_corrected(

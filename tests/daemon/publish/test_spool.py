@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from regolithd.daemon.publish.segment_format import pack
-from regolithd.daemon.publish.spool import RECENT, Spool, SpoolError
+from regolithd.daemon.publish.spool import RECENT, Spool, SpoolError, SpoolUnusableError
 
 
 def payload(index: int) -> bytes:
@@ -263,6 +263,28 @@ def test_a_folder_that_cannot_be_made_is_reported_with_the_key_to_correct(tmp_pa
     (tmp_path / "file").touch()
     with pytest.raises(SpoolError, match=r"\[mqtt\] spool_directory"):
         Spool(tmp_path / "file" / "spool", 1_000_000)
+
+
+@pytest.mark.parametrize("name", ["lock", "acknowledged"])
+def test_a_store_that_cannot_be_opened_says_which_file(tmp_path: Path, name: str) -> None:
+    """It is no other error, and the folder is not left locked."""
+    (tmp_path / name).mkdir()
+    with pytest.raises(SpoolUnusableError, match=name):
+        Spool(tmp_path, 1_000_000)
+    (tmp_path / name).rmdir()
+    Spool(tmp_path, 1_000_000).close()
+
+
+def test_without_a_disk_the_newest_messages_are_kept_in_memory(tmp_path: Path) -> None:
+    """They can be read, acknowledged and counted as with a disk, and nothing is written."""
+    spool = Spool.memory_only(tmp_path, "no permission")
+    fill(spool, RECENT + 10)
+    spool.begin_sync()()
+    assert everything(spool) == list(range(10, RECENT + 10))
+    spool.acknowledge(RECENT + 10, RECENT)
+    assert (spool.queued, spool.counters.unstored, spool.counters.dropped) == (0, RECENT + 10, 10)
+    spool.close()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_syncing_survives_what_happens_meanwhile(tmp_path: Path) -> None:
