@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import socket
 import time
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -101,6 +102,7 @@ async def test_a_connection_takes_two_windows_of_publishes_without_a_warning(tmp
     outbox = Outbox(Spool(tmp_path, 1_000_000))
     connection = Connection(Configuration().mqtt, "regolith/kapvik", outbox, NoMessages(), asyncio.Event())
     client = connection._client()
+    assert client._socket_options == ((socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),)
     assert client.pending_calls_threshold == 2 * WINDOW
     assert client.identifier == "regolithd-regolith-kapvik"
     outbox.spool.close()
