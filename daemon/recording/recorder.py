@@ -1,4 +1,4 @@
-"""Records frames, snapshots, estimates and events in pairs of files, `rover-TIME.log` and `rover-TIME.mcap`.
+"""Records frames, snapshots, estimates and events in pairs of files, `rover-TIME-NUMBER.log` and `.mcap`.
 
 | event | what the recorder does |
 |---|---|
@@ -6,10 +6,14 @@
 | `file_minutes` have passed | closes the pair, begins a new one |
 | all files together exceed `limit_MB`, or the disk has less than `RESERVE` of it left | deletes the oldest files |
 | the disk fails or is full | closes the pair, sets `problem`, tries a new pair every `RETRY_S`; nothing else stops |
+
+The wall clock may be set back at any time. It only names the files; pauses are measured by a monotonic clock, and
+NUMBER, which rises from pair to pair, says which files are the oldest.
 """
 
 from __future__ import annotations
 
+import re
 import shutil
 import time
 from dataclasses import dataclass
@@ -33,6 +37,7 @@ RETRY_S = 10.0
 MEGABYTE = 1_000_000
 RESERVE = 0.05
 """Share of the limit that must stay free on the disk; otherwise the oldest recordings are deleted."""
+_NUMBERED = re.compile(r"rover-\d{8}T\d{6}Z-(\d{6,})")
 
 
 @dataclass(slots=True)
@@ -69,6 +74,8 @@ class Recorder:
         Metadata of every file: configuration, version of the terrain network, start.
     now_ns
         The clock from which the files are named.
+    monotonic_ns
+        The clock by which pauses and the length of a file are measured.
     """
 
     def __init__(
@@ -77,11 +84,13 @@ class Recorder:
         interface: str,
         metadata: Mapping[str, str],
         now_ns: Callable[[], int] = time.time_ns,
+        monotonic_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self._settings = settings
         self._interface = interface
         self._metadata = metadata
         self._now_ns = now_ns
+        self._monotonic_ns = monotonic_ns
         self._pair: _Pair | None = None
         self._retry_ns = 0
         self.problem: str | None = None
@@ -117,7 +126,7 @@ class Recorder:
 
     def flush(self) -> None:
         """Write everything to the kernel; begin a new pair when it is due, or after a failure."""
-        now = self._now_ns()
+        now = self._monotonic_ns()
         if self._pair is None:
             if now >= self._retry_ns:
                 self._attempt(self._open)
@@ -140,21 +149,19 @@ class Recorder:
         folder = self._settings.directory
         folder.mkdir(parents=True, exist_ok=True)
         self._make_room()
-        begun = self._now_ns()
-        stem = _unused_stem(folder, begun)
+        stem = _next_stem(folder, self._now_ns())
         log = stem.with_suffix(".log").open("x", encoding="ascii")
         mcap = McapFile(stem.with_suffix(".mcap").open("xb"), self._metadata)
-        self._pair = _Pair(mcap, log, stem.with_suffix(".mcap"), stem.with_suffix(".log"), begun)
+        self._pair = _Pair(mcap, log, stem.with_suffix(".mcap"), stem.with_suffix(".log"), self._monotonic_ns())
         self.problem = None
 
     def _make_room(self) -> None:
         """Delete the oldest files until all of them are within the limit and the disk has its reserve."""
         folder = self._settings.directory
         limit = self._settings.limit_MB * MEGABYTE
-        ours = [path for path in folder.glob("rover-*") if path.suffix in {".mcap", ".log"}]
-        files = sorted((path.stat().st_mtime_ns, path.name, path.stat().st_size, path) for path in ours)
-        total = sum(size for _, _, size, _ in files)
-        for _, _, size, path in files:
+        files = [(path, path.stat().st_size) for path in _oldest_first(folder)]
+        total = sum(size for _, size in files)
+        for path, size in files:
             if total <= limit and shutil.disk_usage(folder).free >= RESERVE * limit:
                 return
             path.unlink()
@@ -166,7 +173,7 @@ class Recorder:
             action()
         except OSError as error:
             self.problem = f"{self._settings.directory}: {error.strerror or error}"
-            self._retry_ns = self._now_ns() + int(RETRY_S * 1e9)
+            self._retry_ns = self._monotonic_ns() + int(RETRY_S * 1e9)
             pair, self._pair = self._pair, None
             if pair:
                 _abandon(pair)
@@ -180,11 +187,18 @@ def _abandon(pair: _Pair) -> None:
             continue  # `problem` already holds the reason
 
 
-def _unused_stem(folder: Path, begun_ns: int) -> Path:
-    moment = datetime.fromtimestamp(begun_ns // 1_000_000_000, UTC)
-    name = f"rover-{moment:%Y%m%dT%H%M%SZ}"
-    stem, number = folder / name, 1
-    while stem.with_suffix(".log").exists() or stem.with_suffix(".mcap").exists():
-        number += 1
-        stem = folder / f"{name}-{number}"
-    return stem
+def _oldest_first(folder: Path) -> list[Path]:
+    """Return the files of all recordings by their numbers; first those of version 0.1, which have none, by name."""
+    ours = [path for path in folder.glob("rover-*") if path.suffix in {".mcap", ".log"}]
+    return sorted(ours, key=lambda path: (_number(path), path.name))
+
+
+def _number(path: Path) -> int:
+    match = _NUMBERED.fullmatch(path.stem)
+    return int(match[1]) if match else 0
+
+
+def _next_stem(folder: Path, now_ns: int) -> Path:
+    number = 1 + max(map(_number, _oldest_first(folder)), default=0)
+    moment = datetime.fromtimestamp(now_ns // 1_000_000_000, UTC)
+    return folder / f"rover-{moment:%Y%m%dT%H%M%SZ}-{number:06d}"

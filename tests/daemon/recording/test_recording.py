@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from regolithd.daemon.config.configuration import Configuration, Recording
@@ -19,7 +20,7 @@ from regolithd.daemon.recording.candump import frame_line, parse_line, read_log
 from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, snapshot_from_json
 from regolithd.daemon.recording.digest import Digest, _flattened
 from regolithd.daemon.recording.mcap_file import McapFile, read_messages, read_metadata
-from regolithd.daemon.recording.recorder import Recorder
+from regolithd.daemon.recording.recorder import Recorder, _oldest_first
 from regolithd.daemon.recording.replay import replay_logs
 from regolithd.drivers.can.frame import Frame
 
@@ -149,7 +150,7 @@ def test_the_oldest_files_go_when_the_limit_is_reached(tmp_path: Path, drive: Ca
     foreign.write_text("mine")
     clock = iter(range(10**18, 2 * 10**18, 60 * 10**9))
     settings = Recording(directory=tmp_path, limit_MB=1, file_minutes=0.1)
-    recorder = Recorder(settings, "can0", {}, now_ns=lambda: next(clock))
+    recorder = Recorder(settings, "can0", {}, monotonic_ns=lambda: next(clock))
     frames = list(drive(rate_Hz=100).frames(300))
     for _ in range(12):
         recorder.frames(frames)
@@ -189,10 +190,10 @@ def test_a_disk_that_others_fill_costs_old_recordings_first(
 
 def test_a_disk_that_fails_stops_the_recording_and_nothing_else(tmp_path: Path, drive: Callable) -> None:
     """`problem` has the reason, and recording begins again when the disk works."""
-    now = 10**18
+    now = 5 * 10**9
     place = tmp_path / "recordings"
     place.write_text("a file where a folder should be")
-    recorder = Recorder(Recording(directory=place), "can0", {}, now_ns=lambda: now)
+    recorder = Recorder(Recording(directory=place), "can0", {}, monotonic_ns=lambda: now)
     assert recorder.problem is not None
     assert str(place) in recorder.problem
     recorder.frames(list(drive().frames(1)))
@@ -205,6 +206,53 @@ def test_a_disk_that_fails_stops_the_recording_and_nothing_else(tmp_path: Path, 
     assert recorder.paths is not None
     assert recorder.problem is None
     recorder.close()
+
+
+def test_a_clock_that_is_set_back_pauses_nothing(tmp_path: Path) -> None:
+    """After an error of the disk, recording begins again after the same pause; a file does not become longer."""
+    wall, running = 10**18, 0
+    place = tmp_path / "recordings"
+    place.write_text("a file where a folder should be")
+    settings = Recording(directory=place, file_minutes=1)
+    recorder = Recorder(settings, "can0", {}, now_ns=lambda: wall, monotonic_ns=lambda: running)
+    place.unlink()
+    wall -= 3600 * 10**9
+    running += 11 * 10**9
+    recorder.flush()
+    first = recorder.paths
+    assert first is not None
+    wall -= 3600 * 10**9
+    running += 61 * 10**9
+    recorder.flush()
+    assert recorder.paths not in {first, None}
+    recorder.close()
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.integers(-7200, 7200), min_size=1, max_size=8))
+def test_the_oldest_files_go_first_whatever_the_clock_says(
+    tmp_path_factory: pytest.TempPathFactory, hours: list[int]
+) -> None:
+    """The newest recordings stay, files of version 0.1 go first, and no name is used twice."""
+    folder = tmp_path_factory.mktemp("recordings")
+    old = folder / "rover-20300101T000000Z.log"
+    old.touch()
+    written = [old]
+    for offset_s in hours:
+        now_ns = 10**18 + offset_s * 10**9
+        recorder = Recorder(Recording(directory=folder), "can0", {}, now_ns=lambda now_ns=now_ns: now_ns)
+        assert recorder.paths is not None
+        recorder.close()
+        mcap, log = recorder_paths(folder, written)
+        os.utime(mcap, ns=(now_ns, now_ns))
+        os.utime(log, ns=(now_ns, now_ns))
+        written += [log, mcap]
+    assert _oldest_first(folder) == written
+
+
+def recorder_paths(folder: Path, known: list[Path]) -> list[Path]:
+    """Return the two new files of a folder, the MCAP file first."""
+    return sorted(set(folder.iterdir()) - set(known), key=lambda path: path.suffix, reverse=True)
 
 
 def test_numbers_that_are_not_are_null(drive: Callable, configuration: Configuration, tmp_path: Path) -> None:
