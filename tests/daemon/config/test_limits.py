@@ -1,0 +1,166 @@
+"""The limits of each key of `rover.toml`, and the texts that say how to correct a mistake."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from regolithd.daemon.config.configuration import MASTER_NODE, Configuration
+from regolithd.daemon.config.reader import EXIT_STATUS, ConfigurationError, line_of, parse_configuration
+
+# Table, key, values that are just allowed, values that are just refused.
+LIMITS: list[tuple[str, str, tuple[Any, ...], tuple[Any, ...]]] = [
+    ("rover", "name", ("a", "A_z-9" * 12), ("", "a b", "a/b", "x" * 65)),
+    ("rover", "mass_kg", (0.001,), (0.0, -1.0)),
+    ("rover", "wheelbase_m", (0.001,), (0.0,)),
+    ("rover", "track_m", (0.001,), (0.0,)),
+    ("bus", "channel", ("c",), ("",)),
+    ("bus", "bitrate", (10_000, 20_000, 50_000, 125_000, 250_000, 500_000, 800_000, 1_000_000), (0, 9_999, 100_000)),
+    ("sync", "rate_Hz", (1, 200), (0.99, 200.1)),
+    ("nodes", "inclinometer", (1, 126), (0, 127)),
+    ("nodes", "motors", ([1, 2, 3, 4, 5, 6],), ([1, 2, 3, 4, 5], [1, 2, 3, 4, 5, 6, 7])),
+    ("nodes", "mirrored_wheels", ([], [1, 6]), ([0], [7])),
+    ("nodes", "heartbeat_ms", (20, 10_000), (19, 10_001)),
+    ("nodes", "heartbeat_timeout_ms", (50, 30_000), (49, 30_001)),
+    ("slip", "constant", (-0.99, 0.99), (-1, 1)),
+    ("slip", "standstill_rad_s", (0.001,), (0,)),
+    ("smoothing", "window_s", (0, 60), (-0.1, 60.1)),
+    ("smoothing", "threshold", (0, 10), (-0.1, 10.1)),
+    ("smoothing", "time_constant_s", (0, 60), (-0.1, 60.1)),
+    ("posterior", "window_s", (0.5, 20), (0.49, 20.1)),
+    ("posterior", "soil", ("lete-sand", "sandy-loam", "clayey-soil", "medium-soil"), ("sand",)),
+    ("change", "threshold", (3, 100), (2.9, 100.1)),
+    ("recording", "limit_MB", (1,), (0.9,)),
+    ("recording", "file_minutes", (0.1, 1440), (0.09, 1441)),
+    ("mqtt", "host", ("h",), ("",)),
+    ("mqtt", "port", (1, 65_535), (0, 65_536)),
+    ("mqtt", "prefix", ("a", "a/b"), ("", "a/", "a#", "+/a", "a b")),
+    ("mqtt", "keepalive_s", (2, 3600), (1, 3601)),
+    ("mqtt", "spool_limit_MB", (0.1,), (0,)),
+    ("control", "speed_limit_m_s", (0.001,), (0,)),
+    ("control", "distance_limit_m", (0.001,), (0,)),
+]
+
+
+@pytest.mark.parametrize(("table", "key", "allowed", "refused"), LIMITS, ids=[f"{row[0]}.{row[1]}" for row in LIMITS])
+def test_a_key_has_its_limits(table: str, key: str, allowed: tuple[Any, ...], refused: tuple[Any, ...]) -> None:
+    """The outermost allowed values are accepted, the next ones are not."""
+    for value in allowed:
+        Configuration.model_validate({table: {key: value}})
+    for value in refused:
+        with pytest.raises(ValidationError):
+            Configuration.model_validate({table: {key: value}})
+
+
+def test_the_default_nodes() -> None:
+    """Motors 1 to 6, load cells 11 to 16 on wheels 0 to 5; body sensors only where given; the master is 127."""
+    found = [(node.node_id, node.kind, node.wheel, node.required) for node in Configuration().nodes.described()]
+    assert found == [(1 + k, "motor", k, True) for k in range(6)] + [(11 + k, "load-cell", k, True) for k in range(6)]
+    nodes = Configuration.model_validate({"nodes": {"inclinometer": 30, "ground_speed": 31}}).nodes
+    body = [(node.node_id, node.kind, node.wheel, node.required) for node in nodes.described()[12:]]
+    assert sorted(body) == [(30, "inclinometer", None, False), (31, "ground-speed", None, False)]
+    assert [key for key, _ in nodes.by_key()][5:7] == ["motors[5]", "load_cells[0]"]
+    assert MASTER_NODE == 127
+
+
+def test_the_body_is_that_of_the_rover_table() -> None:
+    """Mass and dimensions go to the simulation unchanged."""
+    body = Configuration.model_validate({"rover": {"mass_kg": 11.0, "wheelbase_m": 0.5, "track_m": 0.4}}).rover.body
+    assert (body.mass_kg, body.wheelbase_m, body.track_m) == (11.0, 0.5, 0.4)
+
+
+def problems(text: str) -> list[str]:
+    """Return every problem of a configuration, as a line of text."""
+    with pytest.raises(ConfigurationError) as caught:
+        parse_configuration(text, Path("rover.toml"))
+    assert str(caught.value).splitlines() == [str(problem) for problem in caught.value.problems]
+    return [str(problem) for problem in caught.value.problems]
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        (
+            "[nodes]\nheartbeat_ms = 300\nheartbeat_timeout_ms = 599\n",
+            (
+                "rover.toml:3: nodes.heartbeat_timeout_ms: expected at least twice heartbeat_ms (600), found 599. "
+                "One late heartbeat would count as a lost node: raise it."
+            ),
+        ),
+        (
+            '[mqtt]\npassword_file = "x"\n',
+            (
+                "rover.toml:1: mqtt.username: expected a name beside password_file, found nothing. "
+                "Set it, or remove password_file."
+            ),
+        ),
+        (
+            "[nodes]\ninclinometer = 11\n",
+            (
+                "rover.toml:2: nodes.inclinometer: expected a node id of its own, found 11, which is load_cells[0]'s. "
+                "Give every node its own id."
+            ),
+        ),
+        (
+            "[mqtt]\nport = 0\n",
+            (
+                "rover.toml:2: mqtt.port: expected greater than or equal to 1, found 0. "
+                "Change it, or leave it out for 1883."
+            ),
+        ),
+        (
+            '[estimator]\nmodel = 3\n[mqtt]\n\n"username" = 4\n',
+            "rover.toml:5: mqtt.username: expected a valid string, found 4. Change it, or leave it out for none.",
+        ),
+        ("wheel = 3\n", "rover.toml:1: wheel: expected a valid dictionary or instance of Wheel, found 3. Change it."),
+        (
+            "[sync]\nzebra = 1\n",
+            "rover.toml:2: sync.zebra: expected a key that [sync] has (rate_Hz), found zebra. Remove it.",
+        ),
+    ],
+)
+def test_a_mistake_is_one_line_with_place_and_remedy(text: str, problem: str) -> None:
+    """File, line, key, the expected and the found value, and what to do."""
+    assert problem in problems(text)
+
+
+def test_a_timeout_of_twice_the_heartbeat_is_enough() -> None:
+    """Tables that are valid together are no problem, and a user name without a password file is none either."""
+    text = '[nodes]\nheartbeat_ms = 300\nheartbeat_timeout_ms = 600\n[mqtt]\nusername = "x"\n'
+    assert parse_configuration(text, Path("rover.toml")).nodes.heartbeat_timeout_ms == 600
+
+
+def test_a_file_that_is_not_text_is_one_problem(tmp_path: Path) -> None:
+    """Its encoding is named, and the exit status is EX_CONFIG."""
+    from regolithd.daemon.config.reader import read_configuration  # noqa: PLC0415  # beside its use
+
+    path = tmp_path / "rover.toml"
+    path.write_bytes(b"\xff\xfe")
+    with pytest.raises(ConfigurationError) as caught:
+        read_configuration(path)
+    (problem,) = caught.value.problems
+    assert (problem.line, problem.key, problem.found) == (None, "file", "not UTF-8")
+    assert str(problem) == f"{path}: file: expected a readable TOML file, found not UTF-8. Give its path with --config."
+    assert EXIT_STATUS == 78
+
+
+@pytest.mark.parametrize(
+    ("location", "line"),
+    [
+        (["sync"], 1),
+        (["sync", "rate_Hz"], 3),
+        (["sync", "absent"], 1),
+        (["nodes", "motors[3]"], 6),
+        (["nodes", "rate_Hz"], 4),
+        (["absent"], None),
+        (["absent", "key"], None),
+        ([], None),
+    ],
+)
+def test_the_line_of_a_key_is_its_own_or_its_table_s(location: list[str], line: int | None) -> None:
+    """Lines count from 1; a key of the same name in another table is not taken."""
+    text = '[sync]\n# rate_Hz = 1\nrate_Hz = 2\n[ nodes ]\n# here\n"motors" = [1]\n'
+    assert line_of(text, location) == line
