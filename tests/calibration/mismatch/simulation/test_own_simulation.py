@@ -12,7 +12,7 @@ from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
 from regolithd.calibration.mismatch.simulation.load import load_simulation
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[3] / "bench"
 TABLES = {"simulation": {"model": "servo:ServoAxis"}, "parameters": {"mass_kg": {"value": 96.0, "std": 1.0}}}
 
 
