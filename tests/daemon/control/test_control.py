@@ -1,22 +1,17 @@
 """The control socket: its permissions, its protocol, and what happens when a client disconnects."""
 
 import asyncio
-import grp
-import json
 import os
 import socket
 import stat
 import subprocess
 import tempfile
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
-from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, ClassVar
 
-import numpy as np
 import pytest
-from estimates import estimate
+from control_rig import GROUP, LONG, SHORT, Client, Rover, serving
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from subscriber import until
@@ -24,134 +19,10 @@ from subscriber import until
 from regolithd.daemon.config.configuration import Configuration, Control
 from regolithd.daemon.control.client import ControlError, control_connection
 from regolithd.daemon.control.protocol import LINE_LIMIT, REPLY, Accepted, Ended, Progress, Refused, StatusRequest
-from regolithd.daemon.control.server import MAX_CLIENTS, ControlSink
+from regolithd.daemon.control.server import ControlSink
 from regolithd.daemon.control.socket import ControlSocketError, open_control_socket
-from regolithd.daemon.pipeline.snapshot import Snapshot
-from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
-from regolithd.drivers.devices.node import NodeDescription
-from regolithd.drivers.errors import DriveError
 from regolithd.drivers.master.events import MotionStopped
-from regolithd.drivers.master.status import NodePhase, NodeStatus
-
-GROUP = grp.getgrgid(os.getgid()).gr_name
-
-
-@dataclass
-class Rover:
-    """Six drives that carry out each command and keep a list of them."""
-
-    told: list[str] = field(default_factory=list)
-    phase: NodePhase = NodePhase.OPERATIONAL
-    problem: str = ""
-
-    @property
-    def status(self) -> Mapping[int, NodeStatus]:
-        """State of each node; the third is in `phase`."""
-        return {
-            n: NodeStatus(
-                NodeDescription(n, MOTOR_CONTROLLER, n - 1),
-                self.phase if n == 3 else NodePhase.OPERATIONAL,
-                text="said",
-            )
-            for n in range(1, 7)
-        }
-
-    async def enable(self) -> None:
-        """Record the command to enable."""
-        self.told.append("enable")
-
-    async def set_speed(self, wheel_speed_rad_s: Sequence[float]) -> None:
-        """Record the speed."""
-        self.told.append(f"speed {wheel_speed_rad_s[0]:.3f}")
-
-    async def quick_stop(self) -> None:
-        """Record the quick stop."""
-        self.told.append("quick stop")
-
-    async def disable(self) -> None:
-        """Record the command to disable."""
-        self.told.append("disable")
-        if self.problem:
-            raise DriveError(self.problem, node_id=3)
-
-
-@asynccontextmanager
-async def serving(folder: Path, rover: Rover | None, **control: Any) -> AsyncIterator[tuple[ControlSink, Path]]:
-    """Serve a rover whose wheels stand still."""
-    path = folder / "control.sock"
-    configuration = Configuration(control=Control.model_validate({"socket": path, "group": GROUP} | control))
-    sink = ControlSink(configuration, lambda: rover)
-    task = asyncio.create_task(sink.run())
-
-    async def measure() -> None:
-        while True:
-            still = np.zeros((10, 6))
-            sink.estimate(estimate_of(Snapshot(0, 0, still)))
-            await asyncio.sleep(0.01)
-
-    measuring = asyncio.create_task(measure())
-    try:
-        await until(path.exists)
-        yield sink, path
-    finally:
-        for each in (measuring, task):
-            each.cancel()
-            with suppress(asyncio.CancelledError):
-                await each
-        while Client.opened:
-            writer = Client.opened.pop().writer
-            writer.close()
-            with suppress(ConnectionError):
-                await writer.wait_closed()
-
-
-def estimate_of(snapshot: Snapshot) -> Any:
-    """Return an estimate of this snapshot."""
-    whole = estimate()
-    object.__setattr__(whole, "snapshot", snapshot)
-    return whole
-
-
-class Client:
-    """Sends and reads lines; `serving` closes all clients at its end."""
-
-    opened: ClassVar[list["Client"]] = []
-
-    def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        self.reader = reader
-        self.writer = writer
-
-    @classmethod
-    async def to(cls, path: Path) -> "Client":
-        """Connect."""
-        client = cls(*await asyncio.open_unix_connection(path))
-        cls.opened.append(client)
-        return client
-
-    def say(self, request: object) -> None:
-        """Send a line."""
-        self.writer.write((request if isinstance(request, bytes) else json.dumps(request).encode()) + b"\n")
-
-    async def hear(self) -> Any:
-        """Return the next line, as one of the protocol's replies."""
-        async with asyncio.timeout(20):
-            return REPLY.validate_json(await self.reader.readline())
-
-    async def ask(self, request: object) -> Any:
-        """Send a line and return the reply."""
-        self.say(request)
-        return await self.hear()
-
-    async def hear_end(self) -> Ended:
-        """Return the end of a traverse; only progress may come before."""
-        while isinstance(reply := await self.hear(), Progress):
-            pass
-        assert isinstance(reply, Ended)
-        return reply
-
-
-SHORT = {"command": "traverse", "distance_m": 0.01, "speed_m_s": 0.05}
-LONG = {"command": "traverse", "distance_m": 10.0, "speed_m_s": 0.022}
+from regolithd.drivers.master.status import NodePhase
 
 
 async def test_only_the_group_may_open_it(tmp_path: Path) -> None:
@@ -382,52 +253,3 @@ async def test_clients_are_told_why_they_cannot_speak_to_the_daemon(
         daemon.send(StatusRequest())
         with pytest.raises(ControlError, match="it was stopped, or it failed"):
             await daemon.reply()
-
-
-async def test_stop_gets_through_a_thousand_half_sent_lines(tmp_path: Path) -> None:
-    """They replace each other, but neither the client that commanded the traverse nor one with a request."""
-    rover = Rover()
-    async with serving(tmp_path, rover) as (sink, path):
-        owner = await Client.to(path)
-        assert isinstance(await owner.ask(LONG), Accepted)
-        half_sent = [await connected(path) for _ in range(1000)]
-        for each in half_sent:
-            with suppress(OSError):
-                each.send(b'{"command": ')
-        stop = await Client.to(path)
-        assert (await stop.ask({"command": "stop", "quick": True})).text == "The traverse is being stopped."
-        assert (await owner.hear_end()).ending == "quick-stopped"
-        assert "quick stop" in rover.told
-        assert len(sink._clients) <= MAX_CLIENTS
-        for each in half_sent:
-            each.close()
-
-
-async def connected(path: Path) -> socket.socket:
-    """Return a connected socket."""
-    client = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-    client.setblocking(False)
-    while True:
-        try:
-            client.connect(str(path))
-        except BlockingIOError:  # the kernel's queue is full
-            await asyncio.sleep(0.001)
-        else:
-            return client
-
-
-async def test_a_line_that_is_not_finished_in_time_ends_its_connection(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Sending it byte by byte does not prolong the time; a client that sends nothing stays connected."""
-    monkeypatch.setattr("regolithd.daemon.control.server.LINE_TIMEOUT_S", 0.2)
-    async with serving(tmp_path, Rover()) as (_, path):
-        silent = await Client.to(path)
-        slow = await Client.to(path)
-        with suppress(ConnectionError):
-            for _ in range(12):
-                slow.writer.write(b" ")
-                await asyncio.sleep(0.05)
-            assert await slow.reader.read() == b""
-        assert slow.reader.at_eof() or slow.writer.is_closing()
-        assert (await silent.ask({"command": "status"})).rover == "kapvik"
