@@ -4,9 +4,9 @@ Cosmic Ray lists every mutation of `drivers/`, `daemon/` and `calibration/mismat
 of its mutations; annotations and `TYPE_CHECKING` blocks are left out, as they do not run.
 
 The rooms' fast tests run once under coverage, which says which tests execute which line. Each mutant then runs in a
-copy of the checkout: first the tests that execute its line, then, if it survives them, the tests that mirror its folder
-(`drivers/can/bus.py` → `tests/drivers/can`). A test that fails is repeated alone before it counts. Tests that need a
-guest kernel (`vcan`, `systemd`) are not run.
+copy of the checkout: first the tests that execute its line, then, where an import executes it, all tests that mirror
+its folder (`drivers/can/bus.py` → `tests/drivers/can`). A test that fails is repeated alone before it counts. Tests that
+need a guest kernel (`vcan`, `systemd`) are not run.
 
 Prints each survivor as a diff, with what `survivors.toml` says of it, and writes `build/figures/mutants.json`.
 """
@@ -49,9 +49,11 @@ ALSO = {"daemon/demo": ("tests/system/test_demo.py",)}
 EVERYWHERE = "tests/test_dataclasses.py"
 """Rules for every file of the rooms, which no line of them executes."""
 Executing = dict[str, dict[int, list[str]]]
-"""For each file and line: the tests that execute it, the quickest first."""
+"""For each file and line: the tests that execute it, the quickest first; "" first where an import executes it too."""
 EQUAL = ("_Is_Eq", "_IsNot_NotEq")
 """Left out: `is` compares enumeration members and None here, for which `==` gives the same."""
+OWN_PROCESS = ("daemon/commands/", "daemon/demo/")
+"""Folders that tests run in processes of their own, of which coverage knows nothing."""
 NO_TESTS = 5
 """pytest's exit status where every test is left out."""
 LONGEST_S = 300.0
@@ -199,7 +201,9 @@ def executing_tests(python: Path, folder: Path, files: Iterable[str]) -> Executi
         file = str(Path(measured).resolve().relative_to(folder.resolve()))
         contexts = data.contexts_by_lineno(measured)
         found[file] = {
-            line: sorted({each.split("|")[0] for each in names if each}, key=lambda name: durations_s.get(name, 0.0))
+            line: sorted(
+                {each.split("|")[0] for each in names}, key=lambda name: (bool(name), durations_s.get(name, 0.0))
+            )
             for line, names in contexts.items()
         }
     return found
@@ -216,14 +220,15 @@ def run_mutant(mutation: Mutation, python: Path, folder: Path, executing: Execut
     mutated = mutate_code(original, get_operator(mutation.operator)(), mutation.occurrence)
     lines = difflib.unified_diff(original.splitlines(), mutated.splitlines(), lineterm="", n=0)
     diff = "\n".join(line for line in lines if line[:3] not in {"---", "+++"} and line[:2] != "@@")
-    tests = executing.get(mutation.file, {}).get(mutation.line, [])
+    found = executing.get(mutation.file, {}).get(mutation.line, [""])
+    tests = [name for name in found if name]
     started = time.monotonic()
     (folder / mutation.file).write_text(mutated)
     try:
         killed = bool(tests) and not passes(python, folder, ["-x", *tests], LONGEST_S)
-        killed = killed or not passes(
-            python, folder, ["-x", *mirrored_tests(mutation.file), *other_than(tests)], LONGEST_S
-        )
+        if not killed and ("" in found or mutation.file.startswith(OWN_PROCESS)):
+            others = [*mirrored_tests(mutation.file), *other_than(tests)]
+            killed = not passes(python, folder, ["-x", *others], LONGEST_S)
     finally:
         (folder / mutation.file).write_text(original)
     return Result(mutation.file, mutation.line, mutation.operator, len(tests), killed, time.monotonic() - started, diff)
