@@ -5,8 +5,8 @@ of its mutations; annotations and `TYPE_CHECKING` blocks are left out, as they d
 
 The rooms' fast tests run once under coverage, which says which tests execute which line. Each mutant then runs in a
 copy of the checkout: first the tests that execute its line, then, where an import executes it, all tests that mirror
-its folder (`drivers/can/bus.py` → `tests/drivers/can`). A test that fails is repeated alone before it counts. Tests that
-need a guest kernel (`vcan`, `systemd`) are not run.
+its folder (`drivers/can/bus.py` → `tests/drivers/can`). A test that fails is repeated alone before it counts. Tests
+that need a guest kernel (`vcan`, `systemd`) are not run.
 
 Prints each survivor as a diff, with what `survivors.toml` says of it, and writes `build/figures/mutants.json`.
 """
