@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from golden import assert_golden
 from linear_machine import Level, table
 
 from regolithd.calibration.mismatch import compare, from_columns
@@ -24,6 +25,12 @@ def test_each_threshold_says_what_it_decides_and_how_it_was_found() -> None:
         assert row.meaning.endswith("."), row.name
         assert len(row.found) > 5, row.name
         assert row.value == getattr(THRESHOLDS, row.name)
+
+
+def test_a_changed_threshold_is_seen_in_review() -> None:
+    """Every value as it was when the blind trials were scored: after a change, repeat them (`make thresholds`)."""
+    values = "".join(f"{row.name} {row.value:.9g}\n" for row in THRESHOLDS.table())
+    assert_golden(values, Path(__file__).with_name("golden") / "thresholds.txt")
 
 
 def test_the_table_shows_changed_values() -> None:

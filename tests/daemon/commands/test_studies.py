@@ -1,0 +1,208 @@
+"""The commands that train, reproduce and draw: what they hand on and write, with the computation replaced."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import onnx
+import pytest
+from typer.testing import CliRunner
+
+from regolithd.daemon.cli import app
+from regolithd.daemon.closed_loop import run as loop_run
+from regolithd.daemon.closed_loop.run import DriveLengths
+
+
+def regolithd(*arguments: object) -> Any:
+    """Run a command and return its result: exit status, standard output and error."""
+    return CliRunner().invoke(app, [str(each) for each in arguments], catch_exceptions=False)
+
+
+def test_train_keeps_the_network_with_the_lowest_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each training has its own seed; drivetrain and wheel come from the file; the mean of all errors is printed."""
+    from regolithd.calibration.paper import (  # noqa: PLC0415  # laptop only
+        backpropagation,
+        onnx_export,
+        training_set,
+    )
+
+    errors, asked, sets = iter([0.05, 0.02, 0.08]), [], []
+
+    def trained(pairs: Any, neurons: int, random: np.random.Generator, epochs: int) -> Any:
+        asked.append((pairs, neurons, epochs, random.random()))
+        mse = next(errors)
+        return SimpleNamespace(mse=mse, epochs=round(1000 * mse), perceptron=f"perceptron {mse}")
+
+    def pairs(drivetrain: Any, wheel: Any, _random: Any) -> str:
+        sets.append((drivetrain.no_load_current_A[0], wheel.radius_m))
+        return "pairs"
+
+    monkeypatch.setattr(backpropagation, "train", trained)
+    monkeypatch.setattr(training_set, "training_set", pairs)
+    monkeypatch.setattr(onnx_export, "export_onnx", lambda perceptron, _pairs: perceptron)
+    monkeypatch.setattr(onnx_export, "model_card", lambda *_: SimpleNamespace(version="paper-3:5:2"))
+    monkeypatch.setattr(onnx, "save", lambda model, path: Path(path).write_text(model))
+    config = tmp_path / "rover.toml"
+    config.write_text("[wheel]\nradius_m = 0.08\n[drivetrain]\nno_load_current_A = 0.01\n")
+    out = tmp_path / "folder" / "terrain.onnx"
+    options = ("--neurons", 5, "--trainings", 3, "--epochs", 70, "--config", config, "--out", out)
+    done = regolithd("train", *options)
+    assert out.read_text() == "perceptron 0.02"
+    assert [each[:3] for each in asked] == [("pairs", 5, 70)] * 3
+    assert len({each[3] for each in asked}) == 3
+    assert sets == [(0.01, 0.08)]
+    assert "paper-3:5:2: MSE 0.0200 after 20 epochs\nmean MSE of 3: 0.0500 (the paper: 0.0251)." in done.stdout
+
+
+def test_train_posterior_hands_seed_and_numbers_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So many rovers are simulated, and so many steps fitted; the wheel's radius goes into the file."""
+    from regolithd.calibration.posterior import (  # noqa: PLC0415  # laptop only
+        onnx_export,
+        training,
+        training_examples,
+    )
+
+    asked: list[Any] = []
+
+    def simulate(count: int, _random: Any, tick: Any) -> str:
+        asked.append(count)
+        tick(count)
+        return "examples"
+
+    def fit(examples: Any, seed: int, steps: int, *, progress: Any) -> tuple[str, str]:
+        asked.append((examples, seed, steps))
+        progress(1.25)
+        return "parameters", "standardisation"
+
+    def export(*given: Any) -> str:
+        asked.append(given)
+        return "model"
+
+    monkeypatch.setattr(training_examples, "simulate_examples", simulate)
+    monkeypatch.setattr(training, "fit", fit)
+    monkeypatch.setattr(onnx_export, "export_onnx", export)
+    monkeypatch.setattr(onnx, "save", lambda model, path: Path(path).write_text(model))
+    out = tmp_path / "folder" / "posterior.onnx"
+    done = regolithd("train-posterior", "--rovers", 2000, "--steps", 60, "--seed", 9, "--out", out)
+    assert asked == [2000, ("examples", 9, 60), ("parameters", "standardisation", 0.075)]
+    assert out.read_text() == "model"
+    assert done.stdout.endswith(f"Wrote {out}.\n")
+
+
+@pytest.mark.parametrize(
+    ("options", "lengths", "names"),
+    [
+        (("--short",), DriveLengths(400.0, 180.0, 1.1), ["coulomb", "viscous", "nothing"]),
+        (("--case", "nothing", "--case", "coulomb"), DriveLengths(), ["coulomb", "nothing"]),
+    ],
+)
+def test_loop_runs_the_wanted_cases(
+    options: tuple[str, ...], lengths: DriveLengths, names: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each in its own folder; figures and picture are written for all, the picture into the folder by default."""
+    from regolithd.daemon.closed_loop import picture, summary  # noqa: PLC0415  # matplotlib is of the laptop
+
+    asked, drawn = [], []
+
+    def run_case(case: Any, seed: int, folder: Path, _network: Any, given: DriveLengths, progress: Any) -> str:
+        asked.append((case.name, seed, folder, given))
+        progress("a step")
+        return case.name
+
+    monkeypatch.setattr(loop_run, "run_case", run_case)
+    monkeypatch.setattr(summary, "sentence", lambda result: f"sentence of {result}")
+    monkeypatch.setattr(summary, "figures_of", lambda results: {"cases": len(results)})
+    monkeypatch.setattr(picture, "draw", lambda results, path: drawn.append((results, path)))
+    out, figures = tmp_path / "out", tmp_path / "folder" / "loop.json"
+    done = regolithd("loop", "--seed", 7, "--out", out, "--figures", figures, *options)
+    assert asked == [(name, 7, out / name, lengths) for name in names]
+    assert json.loads(figures.read_text()) == {"seed": 7, "cases": len(names)}
+    assert drawn == [(names, out / "loop.svg")]
+    assert done.stdout.splitlines()[: len(names)] == [f"sentence of {name}" for name in names]
+    regolithd("loop", "--out", out, "--figures", figures, "--picture", tmp_path / "mine.svg", *options)
+    assert drawn[1][1] == tmp_path / "mine.svg"
+
+
+def test_reproduce_writes_page_pictures_and_figures(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The best network drives the traverses; a quarter of the trainings, two at least, tries other constants."""
+    from regolithd.calibration.validation.reproduction import (  # noqa: PLC0415  # laptop only
+        page,
+        pictures,
+        published,
+        recomputation,
+        scalings,
+    )
+
+    asked: dict[str, Any] = {}
+    done = [SimpleNamespace(mse=mse, perceptron=lambda inputs, mse=mse: (mse, inputs)) for mse in (0.3, 0.1, 0.2)]
+
+    def trained(_drivetrain: Any, _wheel: Any, count: int, *, tick: Any) -> Any:
+        asked["trainings"] = count
+        tick()
+        return SimpleNamespace(inputs="inputs"), done
+
+    def unpublished(count: int, _tick: Any) -> str:
+        asked["unpublished"] = count
+        return "unpublished"
+
+    def traverse(perceptron: Any, ground: str, _random: Any) -> str:
+        asked.setdefault("best", perceptron(0)[0])
+        return f"traverse on {ground}"
+
+    record = SimpleNamespace(cohesion_Pa=3351.6, angle_deg=28.64)
+    monkeypatch.setattr(recomputation, "trained", trained)
+    monkeypatch.setattr(recomputation, "unpublished_constants", unpublished)
+    monkeypatch.setattr(recomputation, "traverse", traverse)
+    monkeypatch.setattr(recomputation, "record_500", lambda _done: record)
+    monkeypatch.setattr(recomputation, "current_sweep", lambda _network, _current: np.array([[3300.0, 28.0]]))
+    monkeypatch.setattr(recomputation, "load_ranges", lambda _pairs: "loads")
+    monkeypatch.setattr(scalings, "scalings", lambda _pairs, _predicted: "scalings")
+    results: list[Any] = []
+    monkeypatch.setattr(page, "page", lambda found: results.append(found) or "the page")
+    monkeypatch.setattr(page, "figures", lambda _found: {"figure": 1.5})
+    for name in ("training_set", "traverse", "sizing"):
+        monkeypatch.setattr(pictures, name, lambda _what, path, name=name: path.write_text(name))
+    docs, figures, sizing = tmp_path / "docs", tmp_path / "a" / "reproduce.json", tmp_path / "sizing.json"
+    options = ("--docs", docs, "--figures", figures, "--sizing", sizing)
+    printed = regolithd("reproduce", "--trainings", 20, *options)
+    assert asked == {"trainings": 20, "unpublished": 5, "best": 0.1}
+    assert "record 500: c 3352 Pa (paper 3352), φ 28.6° (28.6)" in printed.stdout
+    assert (docs / "reproduction.md").read_text() == "the page"
+    assert sorted(path.name for path in docs.iterdir()) == ["reproduction.md", "training-set.svg", "traverse.svg"]
+    assert json.loads(figures.read_text()) == {"figure": 1.5}
+    (found,) = results
+    assert (found.trainings, found.noise_free, found.sizing) == (20, (3300.0, 28.0), None)
+    assert found.traverses == [f"traverse on {ground}" for ground in published.COHESION_PA]
+    sizing.write_text('{"sizes": 3}')
+    regolithd("reproduce", "--trainings", 4, *options)
+    assert asked["unpublished"] == 2
+    assert results[1].sizing == {"sizes": 3}
+    assert (docs / "sizing.svg").read_text() == "sizing"
+
+
+def test_pictures_draws_five(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From figures and details of `regolithd evaluate`; the alarm's delays are those whose name says so."""
+    from regolithd.calibration.validation.estimators import pictures  # noqa: PLC0415  # laptop only
+
+    drawn: dict[str, Any] = {}
+    for name in ("errors", "calibration", "one_sample", "alarm", "drivetrain"):
+        monkeypatch.setattr(pictures, name, lambda *given, name=name: drawn.update({name: given}))
+    figures, details = tmp_path / "evaluate.json", tmp_path / "evaluate.npz"
+    figures.write_text('{"x": 1}')
+    np.savez_compressed(details, window_ranks=np.arange(2), alarm_cusum=np.ones(3))
+    done = regolithd("pictures", "--figures", figures, "--details", details, "--docs", tmp_path)
+    assert (done.exit_code, done.stdout) == (0, f"Wrote five pictures to {tmp_path}.\n")
+    assert [given[-1].name for given in drawn.values()] == [
+        "estimators.svg",
+        "coverage.svg",
+        "one-sample.png",
+        "alarm.svg",
+        "drivetrain.svg",
+    ]
+    assert drawn["errors"][0] == drawn["drivetrain"][0] == {"x": 1}
+    assert list(drawn["alarm"][0]) == ["alarm_cusum"]
+    assert drawn["calibration"][1].tolist() == [0, 1]
