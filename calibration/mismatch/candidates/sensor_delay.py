@@ -1,0 +1,80 @@
+"""One channel is late: it reports what was some time ago."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.simulation.problem import Problem
+
+READINGS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+"""Delays in the grid, in readings (a choice: a factor of two apart, since a fitted delay is refined from the nearest).
+A delay below about half a reading is not looked for: the acceleration's own lag covers it."""
+LONGEST_SHARE = 0.02
+"""The longest delay, as a share of the recording (a choice: a longer one is a wrong clock, which is seen at once)."""
+
+
+class SensorDelay(Candidate):
+    """The predicted channel, or one of the simulation's inputs, is late by a constant time.
+
+    The change of the prediction is exact for the shape's own delay (no Taylor series); per second of delay, so that the
+    coefficient is the delay. Fit and shape are alternated until they agree.
+    """
+
+    name = "sensor-delay"
+    covariate = "time"
+    equation = "y(t) = y_true(t − τ)"
+    words = "a channel that is late"
+    signature = "a residual proportional to the rate of change of one channel"
+    experiment = "change speed and load in steps, both ways, twenty times"
+    source = "filters, buses and polling: a first-order filter delays slow changes by its time constant"
+    along_motion = False
+    coefficients: ClassVar = (Coefficient("delay_s", "s", 1),)
+    free: ClassVar = {}
+
+    def shapes(self, problem: Problem) -> Sequence[Shape]:
+        """Return the predicted channel and each input, late by 1 to 32 readings."""
+        step, longest = problem.recording.step_s, LONGEST_SHARE * problem.length_s
+        delays = [count * step for count in READINGS if count * step <= longest]
+        simulation = problem.simulation
+        return [{"late": name, "secant_s": delay} for name in (simulation.channel, *simulation.inputs) for delay in delays]
+
+    def columns(self, problem: Problem, shape: Shape) -> Array:
+        """Return the prediction's change for this delay of this channel, over the delay."""
+        late, delay = str(shape["late"]), float(shape["secant_s"])
+        key = (f"{late} late", delay)
+        if key not in problem.made:
+            if late == problem.simulation.channel:
+                moved = shifted(problem.recording, problem.filled, -delay)
+            else:
+                moved = problem.with_input(late, shifted(problem.recording, problem.recording.channels[late], delay))
+            problem.made[key] = (moved - problem.filled) / delay
+        return problem.made[key][None]
+
+    def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
+        """Return the shape at the fitted delay."""
+        longest = LONGEST_SHARE * problem.length_s
+        delay = float(np.clip(values[0], 0.1 * problem.recording.step_s, longest))
+        before = float(shape["secant_s"])
+        return shape if abs(delay - before) < 0.02 * before else {**shape, "secant_s": delay}
+
+
+def shifted(recording: Recording, values: Array, by_s: float) -> Array:
+    """Return values (time, wheel) as they are `by_s` later in the same run, on straight lines; ends are held."""
+    moved = np.array(values, np.float64)
+    for run in np.unique(recording.run):
+        here = recording.run == run
+        at = recording.time_s[here]
+        for k in range(values.shape[1]):
+            column = values[here, k]
+            known = np.isfinite(column)
+            if known.sum() > 1:
+                moved[here, k] = np.where(known, np.interp(at + by_s, at[known], column[known]), np.nan)
+    return moved
