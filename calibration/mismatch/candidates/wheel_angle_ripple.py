@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 BINS_PER_TURN = 256
 """Angle bins in a turn for the spectrum: four in a cycle of the highest order."""
-HIGHEST_ORDER = 64
+LOWEST_ORDER, HIGHEST_ORDER = 0.9, 64
 """Cycles per turn (a choice: above any number of grousers; ripples of single teeth are faster than the readings)."""
 LAGS = (0.0, -0.5, 0.5)
 """Lags of the angle in readings: a speed may be of the instant, or a mean before or after it."""
@@ -26,6 +26,8 @@ largest of these sums exceeds the 2 ln of their number that is charged."""
 SIDE_BAND = (0.1, 1.5)
 """Distance in orders of the neighbours that tell the noise around a line (a choice: beyond its width, before the next
 order)."""
+LEAST_CYCLES = 4.0
+"""Cycles within the range of angles that were met: of fewer, a sine is a curve over position (a choice)."""
 READINGS_PER_CYCLE = 2.5
 """Least readings in a cycle (Nyquist: 2): with fewer, a constant drag is an alias of a ripple of high order."""
 
@@ -43,7 +45,7 @@ class WheelAngleRipple(Candidate):
     requires = ("wheel_angle",)
     coefficients: ClassVar = (Coefficient("amplitude", "{unit}", 0),)
     sharing: ClassVar = ("all", "one")
-    free: ClassVar = {"order": (0.9, HIGHEST_ORDER)}
+    free: ClassVar = {"order": (LOWEST_ORDER, HIGHEST_ORDER)}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
         """Return none: a spectrum of the residual finds the order among thousands at once."""
@@ -61,6 +63,8 @@ class WheelAngleRipple(Candidate):
         """
         kinds = ("drag", "torque", "load") if "direction" in problem.covariates else ("torque",)
         found: list[Shape] = []
+        if _lowest(problem) >= _resolved(problem):
+            return found
         for kind in kinds:
             weighted = residual * self._base(problem, kind)
             order = self._strongest(problem, weighted)
@@ -84,7 +88,7 @@ class WheelAngleRipple(Candidate):
         """Return the width of a spectral line around the order."""
         width = np.pi / max(float(np.ptp(problem.covariates["wheel_angle"])), 1.0)
         order = float(shape["order"])
-        return {"order": (order - width, order + width)}
+        return {"order": (max(order - width, _lowest(problem)), min(order + width, HIGHEST_ORDER))}
 
     def parameters(self, shape: Shape, values: Sequence[float]) -> dict[str, float]:
         """Return the fundamental's amplitude (root mean square over the wheels that have it) and the order."""
@@ -122,7 +126,7 @@ class WheelAngleRipple(Candidate):
 
     def _strongest(self, problem: Problem, weighted: Array) -> float:
         order, power = self._spectrum(problem, weighted)
-        sought = (order >= self.free["order"][0]) & (order <= _resolved(problem))
+        sought = (order >= _lowest(problem)) & (order <= _resolved(problem))
         return float(order[np.argmax(np.where(sought, power, 0.0))])
 
     def _lag(self, problem: Problem, weighted: Array, order: float) -> float:
@@ -143,6 +147,12 @@ class WheelAngleRipple(Candidate):
             power += summed / max(float(np.sum(weighted[here, k] ** 2)), 1e-300)
         order = np.arange(len(power)) * BINS_PER_TURN / length
         return order, power
+
+
+def _lowest(problem: Problem) -> float:
+    """Return the lowest order of which the machine met enough cycles, of any wheel."""
+    turns = float(np.max(np.ptp(problem.covariates["wheel_angle"], axis=0))) / (2 * np.pi)
+    return max(LOWEST_ORDER, LEAST_CYCLES / max(turns, 1e-9))
 
 
 def _resolved(problem: Problem) -> float:
