@@ -42,7 +42,7 @@ class Effect:
 
     name: str
     channel: str
-    wheels: tuple[int, ...]
+    wheels: tuple[int | str, ...]
     covariate: str
     onset_s: float | None
     equation: str
@@ -57,7 +57,7 @@ class Unexplained:
     """A structure in the residual that no candidate explains: its covariate, wheels, time and share of the power."""
 
     channel: str
-    wheels: tuple[int, ...]
+    wheels: tuple[int | str, ...]
     covariate: str
     from_s: float
     to_s: float
@@ -137,7 +137,7 @@ class Contribution:
     name: str
     shape: Shape
     coefficients: tuple[float, ...]
-    wheels: tuple[int, ...]
+    wheels: tuple[int | str, ...]
     relative_std: float = 0.0
 
 
@@ -161,7 +161,7 @@ class Curve:
     before: Array
     after: Array
     standard_error: Array
-    wheels: tuple[int, ...]
+    wheels: tuple[int | str, ...]
 
 
 @dataclass(frozen=True)
@@ -187,7 +187,7 @@ class Evidence:
     channel: str
     unit: str
     time_s: Array
-    wheels: tuple[int, ...]
+    wheels: tuple[int | str, ...]
     measured: Array
     before: Array
     after: Array

@@ -109,7 +109,7 @@ def stated_effects(tables: Mapping[str, Any]) -> tuple[Contribution, ...]:
                     str(effect["name"]),
                     dict(effect["shape"]),
                     tuple(float(c) for c in effect["coefficients"]),
-                    tuple(int(w) for w in effect["wheels"]),
+                    tuple(w if isinstance(w, str) else int(w) for w in effect["wheels"]),
                     float(effect.get("relative_std", 0.0)),
                 )
             )

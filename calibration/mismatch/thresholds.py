@@ -54,6 +54,16 @@ class Thresholds:
         "is an outlier and left out.",
         f"{CHOICE}: a normal residual has none beyond 6 in a million readings; effects reach a few deviations",
     )
+    most_outliers_share: float = _threshold(
+        0.005,
+        "Share of a wheel's readings of which more outliers are no faults of the recording but physics.",
+        f"{CHOICE}: a bus or a sensor that drops one reading in 200 is repaired, not compared",
+    )
+    least_known_share: float = _threshold(
+        0.5,
+        "Share of the compared readings at which a covariate must be known; else it is left out, not the readings.",
+        f"{CHOICE}: half of the recording is the most that one covariate may cost",
+    )
     fewest_readings: int = _threshold(
         100, "Readings below which nothing is compared.", f"{CHOICE}: ten for each of about ten free parameters"
     )

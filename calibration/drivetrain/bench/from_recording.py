@@ -163,6 +163,6 @@ def _wheels(recording: Path, *names: str) -> Iterator[tuple[int, tuple[Array, ..
         rows = np.all([np.isfinite(channel[:, column]) for channel in channels], axis=0)
         if rows.sum() > 2:
             any_wheel = True
-            yield wheel, tuple(channel[rows, column] for channel in channels)
+            yield int(wheel), tuple(channel[rows, column] for channel in channels)
     if not any_wheel:
         raise BenchError(f"{recording} has no wheel with {' and '.join(names)}")

@@ -9,7 +9,7 @@ import numpy as np
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.simulation.problem import Problem
+    from regolithd.calibration.mismatch.problem.problem import Problem
 
 
 class QuadraticDrag(Candidate):

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.data.recording import Recording
-    from regolithd.calibration.mismatch.simulation.problem import Problem
+    from regolithd.calibration.mismatch.problem.problem import Problem
 
 READINGS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 """Delays in the grid, in readings (a choice: a factor of two apart, since a fitted delay is refined from the nearest).
@@ -44,7 +44,9 @@ class SensorDelay(Candidate):
         step, longest = problem.recording.step_s, LONGEST_SHARE * problem.length_s
         delays = [count * step for count in READINGS if count * step <= longest]
         simulation = problem.simulation
-        return [{"late": name, "secant_s": delay} for name in (simulation.channel, *simulation.inputs) for delay in delays]
+        return [
+            {"late": name, "secant_s": delay} for name in (simulation.channel, *simulation.inputs) for delay in delays
+        ]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the prediction's change for this delay of this channel, over the delay."""

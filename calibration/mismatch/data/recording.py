@@ -7,7 +7,7 @@ NaN. Order of rows, origin of time and names of wheels carry no meaning: rows ar
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.errors import RecordingError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Column = NDArray[Any]
+"""Numbers; text in the column that tells wheels apart."""
 
 TIME = "t_s"
 UNIT = "wheel"
@@ -40,14 +42,14 @@ class Recording:
     ----------
     time_s: seconds since the run's first instant, shape (time,)
     run: number of the run that each instant belongs to, shape (time,)
-    wheels: the wheels' (axes', bodies') names as recorded, in ascending order
+    wheels: the wheels' (axes', bodies') names as recorded, numbers or text, in ascending order
     channels: one array (time × wheel) for each column
     notes: what was wrong with the table and what was done about it
     """
 
     time_s: Array
     run: NDArray[np.int64]
-    wheels: tuple[int, ...]
+    wheels: tuple[int | str, ...]
     channels: Mapping[str, Array]
     notes: tuple[str, ...] = ()
 
@@ -84,11 +86,11 @@ def read_recording(path: Path, *, unit: str = UNIT) -> Recording:
     RecordingError
         When the file is none of these, or has no time.
     """
-    columns = _read_parquet(path) if path.suffix == ".parquet" else _read_csv(path)
+    columns = _read_parquet(path, unit) if path.suffix == ".parquet" else _read_csv(path, unit)
     return from_columns(columns, unit=unit)
 
 
-def _read_csv(path: Path) -> dict[str, Array]:
+def _read_csv(path: Path, unit: str) -> dict[str, Column]:
     import pyarrow.csv  # noqa: PLC0415  # only files need it; arrays do not
     from pyarrow import ArrowException  # noqa: PLC0415
 
@@ -96,10 +98,10 @@ def _read_csv(path: Path) -> dict[str, Array]:
         table = pyarrow.csv.read_csv(path)
     except (ArrowException, OSError) as error:
         raise RecordingError(f"{path} is not a table that can be read: {error}") from error
-    return _as_columns(table, path)
+    return _as_columns(table, path, unit)
 
 
-def _read_parquet(path: Path) -> dict[str, Array]:
+def _read_parquet(path: Path, unit: str) -> dict[str, Column]:
     import pyarrow.parquet  # noqa: PLC0415
     from pyarrow import ArrowException  # noqa: PLC0415
 
@@ -107,27 +109,53 @@ def _read_parquet(path: Path) -> dict[str, Array]:
         table = pyarrow.parquet.read_table(path)
     except (ArrowException, OSError) as error:
         raise RecordingError(f"{path} is not a Parquet file that can be read: {error}") from error
-    return _as_columns(table, path)
+    return _as_columns(table, path, unit)
 
 
-def _as_columns(table: object, path: Path) -> dict[str, Array]:
+def _as_columns(table: object, path: Path, unit: str) -> dict[str, Column]:
+    """Return the columns that are numbers, and the one that tells the machine's parts apart, which may be text.
+
+    A column of text that is mostly numbers is a column with a cell gone wrong: that is said, with the first such cell.
+    """
     import pyarrow as pa  # noqa: PLC0415
 
-    columns = {}
+    columns: dict[str, Column] = {}
     for name in table.column_names:  # type: ignore[attr-defined]
         column = table.column(name)  # type: ignore[attr-defined]
-        if pa.types.is_null(column.type):
+        kind = column.type
+        if pa.types.is_null(kind):
             columns[name] = np.full(len(column), np.nan)
-        elif pa.types.is_integer(column.type) or pa.types.is_floating(column.type) or pa.types.is_decimal(column.type):
+        elif pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind):
             columns[name] = column.cast(pa.float64()).to_numpy(zero_copy_only=False).astype(np.float64)
-        elif name in {TIME, UNIT, RUN}:
-            text = next((v for v in column.to_pylist() if not isinstance(v, float | int)), "")
-            raise RecordingError(f"{path}: column {name} must be numbers, but holds {text!r}")
+        elif name == unit and (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
+            columns[name] = np.array([value or "" for value in column.to_pylist()])
+        elif (wrong := _cell_gone_wrong(column.to_pylist(), everywhere=name in {TIME, RUN})) is not None:
+            row, text = wrong
+            raise RecordingError(
+                f"{path}: column {name}, row {row + 2}: {text!r} is not a number. Leave a cell empty where nothing was "
+                "measured."
+            )
     return columns
 
 
-def from_columns(columns: Mapping[str, Array], *, unit: str = UNIT) -> Recording:
-    """Arrange a long table's columns as arrays (time × wheel).
+def _cell_gone_wrong(cells: Sequence[object], *, everywhere: bool) -> tuple[int, object] | None:
+    """Return place and text of the first cell that is not a number in a column of which at least half are numbers."""
+    wrong = [(row, cell) for row, cell in enumerate(cells) if cell is not None and not _is_number(cell)]
+    if not wrong or not (everywhere or len(wrong) <= len(cells) / 2):
+        return None
+    return wrong[0]
+
+
+def _is_number(cell: object) -> bool:
+    try:
+        float(str(cell))
+    except ValueError:
+        return False
+    return True
+
+
+def from_columns(columns: Mapping[str, Column], *, unit: str = UNIT) -> Recording:
+    """Arrange a long table's columns (a mapping of arrays, or a data frame) as arrays (time × wheel).
 
     Raises
     ------
@@ -137,9 +165,10 @@ def from_columns(columns: Mapping[str, Array], *, unit: str = UNIT) -> Recording
     if TIME not in columns:
         raise RecordingError(f"there is no column {TIME}; found {', '.join(columns) or 'nothing'}")
     notes: list[str] = []
-    table = {name: np.asarray(values, np.float64) for name, values in columns.items()}
+    given = {name: np.asarray(values) for name, values in columns.items()}
+    names, place = _parts(given.pop(unit, np.ones(len(given[TIME]))))
+    table = {name: _numbers(name, values) for name, values in given.items()} | {unit: place}
     rows = len(table[TIME])
-    table.setdefault(unit, np.ones(rows))
     table.setdefault(RUN, np.zeros(rows))
     table[RUN] = _split_where_the_clock_jumps_back(table, unit, notes)
     known = np.isfinite(table[TIME]) & np.isfinite(table[unit]) & np.isfinite(table[RUN])
@@ -148,7 +177,8 @@ def from_columns(columns: Mapping[str, Array], *, unit: str = UNIT) -> Recording
         table = {name: values[known] for name, values in table.items()}
     if not len(table[TIME]):
         raise RecordingError("the recording has no rows")
-    keys, row, wheels, column = _places(table, unit)
+    keys, row, column = _places(table, unit)
+    wheels = tuple(names[int(k)] for k in np.unique(table[unit]))
     shape = (len(keys), len(wheels))
     if shape[0] < 2:
         raise RecordingError("the recording has only one instant")
@@ -164,12 +194,35 @@ def from_columns(columns: Mapping[str, Array], *, unit: str = UNIT) -> Recording
     return Recording(time_s, run, wheels, channels, tuple(notes))
 
 
-def _places(table: Mapping[str, Array], unit: str) -> tuple[Array, Index, tuple[int, ...], Index]:
-    """Return the instants in order (run, time), each row's instant, the wheels, and each row's wheel."""
+def _parts(values: NDArray[Any]) -> tuple[tuple[int | str, ...], Array]:
+    """Return the names of wheels (axes, bodies) in ascending order, and each row's place among them; NaN: no name."""
+    if values.dtype.kind in "iuf":
+        known = np.isfinite(values.astype(np.float64))
+        found, place = np.unique(values[known].astype(np.float64), return_inverse=True)
+        names: tuple[int | str, ...] = tuple(int(name) if name == int(name) else str(name) for name in found)
+    else:
+        text = np.array(["" if value is None else str(value) for value in values])
+        known = text != ""
+        found, place = np.unique(text[known], return_inverse=True)
+        names = tuple(str(name) for name in found)
+    places = np.full(len(values), np.nan)
+    places[known] = place
+    return names, places
+
+
+def _numbers(name: str, values: NDArray[Any]) -> Array:
+    try:
+        return values.astype(np.float64)
+    except (TypeError, ValueError) as error:
+        raise RecordingError(f"column {name} must hold numbers: {error}") from error
+
+
+def _places(table: Mapping[str, Array], unit: str) -> tuple[Array, Index, Index]:
+    """Return the instants in order (run, time), each row's instant, and each row's wheel."""
     stamps = np.column_stack((table[RUN], np.round(table[TIME], TIME_DECIMALS)))
     keys, row = np.unique(stamps, axis=0, return_inverse=True)
-    names, column = np.unique(table[unit], return_inverse=True)
-    return keys, row.ravel().astype(np.int64), tuple(int(name) for name in names), column.ravel().astype(np.int64)
+    _, column = np.unique(table[unit], return_inverse=True)
+    return keys, row.ravel().astype(np.int64), column.ravel().astype(np.int64)
 
 
 def _arranged(values: Array, row: Index, column: Index, shape: tuple[int, int]) -> Array:
@@ -218,7 +271,7 @@ def _note_gaps(time_s: Array, run: Index, notes: list[str]) -> None:
         notes.append(f"{gaps.size} gaps, {lost:.1f} s in all; nothing is assumed about what happened in them.")
 
 
-def _note_channels(channels: Mapping[str, Array], wheels: tuple[int, ...], unit: str, notes: list[str]) -> None:
+def _note_channels(channels: Mapping[str, Array], wheels: tuple[int | str, ...], unit: str, notes: list[str]) -> None:
     for name, values in channels.items():
         known = np.isfinite(values)
         if not known.any():

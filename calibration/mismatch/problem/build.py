@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.data.slow_channels import filled_between
 from regolithd.calibration.mismatch.errors import RecordingError
+from regolithd.calibration.mismatch.problem.compared import blanks_of, isolated_outliers, left_out
 from regolithd.calibration.mismatch.problem.covariates import covariates_of
 from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
@@ -19,11 +20,6 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.predictor import Predictor
-
-Array = NDArray[np.float64]
-
-MAD_TO_STD = 1.4826
-"""Standard deviation of a normal density over its median absolute deviation."""
 
 
 def build_problem(
@@ -45,8 +41,12 @@ def build_problem(
     inputs = complete_inputs(prepared)
     prediction = simulation.predict(inputs, {**simulation.variants(), **chosen})
     measured = prepared.channel(simulation.channel)
-    mask = np.isfinite(prediction) & np.isfinite(measured)
-    mask &= ~outliers(np.where(mask, measured - prediction, np.nan), thresholds.outlier_deviations)
+    compared = np.isfinite(prediction) & np.isfinite(measured)
+    residual = np.where(compared, measured - prediction, np.nan)
+    outliers = isolated_outliers(residual, recording.run, thresholds)
+    found = covariates_of(prepared, simulation, inputs, prediction)
+    covariates, blanks = blanks_of(found, simulation.undefined_at_times, compared, thresholds)
+    mask = compared & ~outliers & ~np.any(list(blanks.values()), axis=0, initial=False)
     if mask.sum() < thresholds.fewest_readings:
         raise RecordingError(
             f"only {mask.sum()} values of {simulation.channel} can be compared; "
@@ -59,26 +59,18 @@ def build_problem(
         measured=measured,
         prediction=prediction,
         mask=mask,
-        covariates=covariates_of(prepared, simulation, inputs, prediction),
+        covariates=covariates,
         side=simulation.side(recording.wheels),
         row=simulation.row(recording.wheels),
+        left_out=left_out(simulation.channel, measured, prediction, outliers, blanks),
         thresholds=thresholds,
     )
 
 
 def _prepared(recording: Recording, simulation: Predictor) -> Recording:
     """Return the recording with derived channels, and inputs replaced by their conditional expectation."""
-    derived = simulation.prepare(recording)
+    derived = simulation.prepare(filled_between(recording, simulation.channel, simulation.between_readings))
     needed = (simulation.channel, *simulation.inputs)
     if missing := [name for name in needed if not np.isfinite(derived.channel(name)).any()]:
         raise RecordingError(f"the simulation needs {', '.join(missing)}, which the recording does not have")
     return expected_inputs(derived, simulation.sensors)
-
-
-def outliers(residual: Array, deviations: float) -> NDArray[np.bool_]:
-    """Return where a residual is so many standard deviations from its median, estimated robustly."""
-    if not np.isfinite(residual).any():
-        return np.zeros(residual.shape, np.bool_)
-    middle = float(np.nanmedian(residual))
-    deviation = MAD_TO_STD * float(np.nanmedian(np.abs(residual - middle)))
-    return (np.abs(residual - middle) > deviations * deviation) & (deviation > 0)

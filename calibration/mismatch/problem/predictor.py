@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.data.slow_channels import Between
     from regolithd.calibration.mismatch.problem.prior import Prior, SensorError
 
 Array = NDArray[np.float64]
@@ -52,6 +53,14 @@ class Predictor(Protocol):
         """The errors of the recorded inputs, by column."""
 
     @property
+    def between_readings(self) -> Mapping[str, Between]:
+        """What to do between the readings of a channel that is sampled less often than the rows."""
+
+    @property
+    def undefined_at_times(self) -> frozenset[str]:
+        """Covariates whose NaN means that they do not apply, not that they were not measured."""
+
+    @property
     def unloaded_experiment(self) -> str:
         """How to run the machine without its load, as an instruction; empty where that cannot be done."""
 
@@ -64,10 +73,10 @@ class Predictor(Protocol):
     def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
         """Return what a residual may be ordered by, each of shape (time, wheel)."""
 
-    def side(self, wheels: Sequence[int]) -> Array | None:
+    def side(self, wheels: Sequence[int | str]) -> Array | None:
         """Return −1 for wheels on the left, +1 on the right."""
 
-    def row(self, wheels: Sequence[int]) -> Array | None:
+    def row(self, wheels: Sequence[int | str]) -> Array | None:
         """Return each wheel's place along the machine, front 0."""
 
     def wheel_sets(self, wheels: Sequence[int]) -> Sequence[tuple[int, ...]]:
@@ -81,6 +90,7 @@ class Predictor(Protocol):
 
 
 def complete_inputs(recording: Recording) -> dict[str, Array]:
-    """Return every channel and `t_s`, all of shape (time, wheel)."""
+    """Return every channel, `t_s` and the number of the `run`, all of shape (time, wheel)."""
     time_s = np.broadcast_to(recording.time_s[:, None], recording.shape)
-    return {**recording.channels, "t_s": time_s}
+    run = np.broadcast_to(recording.run[:, None].astype(np.float64), recording.shape)
+    return {**recording.channels, "t_s": time_s, "run": run}

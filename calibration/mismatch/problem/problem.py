@@ -21,6 +21,15 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class LeftOut:
+    """Readings of a channel that are not compared, and why."""
+
+    channel: str
+    readings: int
+    reason: str
+
+
+@dataclass(frozen=True)
 class Problem:
     """A recording, and the simulation of it with its parameters as stated.
 
@@ -31,7 +40,8 @@ class Problem:
     values: the simulation's parameters
     measured: the channel that is predicted, shape (time, wheel)
     prediction: the simulation's, NaN where it predicts nothing
-    mask: where both are known, outliers left out
+    mask: where readings are compared
+    left_out: what was measured and is not compared
     covariates: by the contract's names, each of shape (time, wheel)
     side, row: each wheel's place on the machine, or None
     thresholds: the numbers that decide
@@ -47,6 +57,7 @@ class Problem:
     covariates: Mapping[str, Array]
     side: Array | None
     row: Array | None
+    left_out: tuple[LeftOut, ...] = ()
     thresholds: Thresholds = THRESHOLDS
     made: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)
 

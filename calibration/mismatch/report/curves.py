@@ -24,7 +24,9 @@ SUBSTITUTES = {"direction": "wheel_speed", "none": "time"}
 """Covariates with too few values for a curve, and the one that shows the effect in their place."""
 
 
-def curve_of(evidence: Evidence, covariate: str, wheels: Sequence[int], *, along_motion: bool = True) -> Curve | None:
+def curve_of(
+    evidence: Evidence, covariate: str, wheels: Sequence[int | str], *, along_motion: bool = True
+) -> Curve | None:
     """Return the mean residual of these wheels in bins of a covariate, before and after the effects.
 
     Bins hold equal numbers of values; a covariate with few distinct values (a row of wheels) has one bin for each.

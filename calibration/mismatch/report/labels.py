@@ -102,7 +102,7 @@ class Labels:
         own = candidate.parameter_labels.get(name) if candidate else None
         return own or PARAMETERS.get(name) or self.effect(name)
 
-    def wheels(self, wheels: Sequence[int], everything: Sequence[int]) -> str:
+    def wheels(self, wheels: Sequence[int | str], everything: Sequence[int | str]) -> str:
         """Return 'all 6 wheels', 'wheel 4' or 'wheels 1, 3'; nothing where the machine has one alone."""
         if len(wheels) == len(everything):
             return f"all {len(wheels)} {plural(self.wheel)}" if len(wheels) > 1 else ""

@@ -119,14 +119,14 @@ def curves(answer: Answer, evidence: Evidence, labels: Labels) -> tuple[Figure, 
     return tuple(_curve(curve, answer, evidence, labels) for curve in drawn[:MOST_CURVES])
 
 
-def _effect_place(found: Effect, labels: Labels) -> tuple[str, tuple[int, ...], bool]:
+def _effect_place(found: Effect, labels: Labels) -> tuple[str, tuple[int | str, ...], bool]:
     """Return the covariate, the wheels, and whether the residual is to be multiplied by the sign of the speed."""
     candidate = labels.candidates.get(found.name)
     along = (candidate is None or candidate.along_motion) and found.covariate != "direction"
     return found.covariate, found.wheels, along
 
 
-def _unexplained_place(place: Unexplained, evidence: Evidence) -> tuple[str, tuple[int, ...], bool]:
+def _unexplained_place(place: Unexplained, evidence: Evidence) -> tuple[str, tuple[int | str, ...], bool]:
     """Return the same of a structure that no candidate explains: as its clearest curve has it."""
     couplings = (curve.coupling for curve in evidence.curves if curve.covariate == place.covariate)
     return place.covariate, place.wheels, next(couplings, "drag") == "drag"

@@ -25,7 +25,7 @@ def plural(noun: str) -> str:
     return noun + "s"
 
 
-def wheels_in_words(wheels: Sequence[int], of: int, kind: str = "wheel") -> str:
+def wheels_in_words(wheels: Sequence[int | str], of: int, kind: str = "wheel") -> str:
     """Return 'all 6 wheels', 'wheel 4', 'wheels 1, 3 and 5'; `kind` is the singular."""
     if len(wheels) == of:
         return f"all {of} {plural(kind)}"
@@ -34,7 +34,7 @@ def wheels_in_words(wheels: Sequence[int], of: int, kind: str = "wheel") -> str:
 
 def statement(
     candidate: Candidate,
-    wheels: Sequence[int],
+    wheels: Sequence[int | str],
     of: int,
     parameters: Mapping[str, Parameter],
     errors: tuple[float, float],

@@ -67,6 +67,7 @@ class RoverWheel(Simulation):
         "friction_angle_deg": "soil-friction-angle",
     }
 
+    undefined_at_times: ClassVar = frozenset({"slip", "load", "place"})  # a wheel that stands, or hangs in the air
     unloaded_experiment = "lift the wheels and spin all six at several speeds, both ways"
     covariate_labels: ClassVar = {
         "wheel_speed": "wheel speed (rad/s)",
@@ -167,13 +168,13 @@ class RoverWheel(Simulation):
         speed = self._wheel_speed(inputs)
         return {**found, "wheel_speed": speed, "time": inputs["t_s"], "place": self._place_m(inputs, speed)}
 
-    def side(self, wheels: Sequence[int]) -> Array:
+    def side(self, wheels: Sequence[int | str]) -> Array:
         """Odd wheels are on the left."""
-        return np.array([-1.0 if wheel % 2 else 1.0 for wheel in wheels])
+        return np.array([-1.0 if int(wheel) % 2 else 1.0 for wheel in wheels])
 
-    def row(self, wheels: Sequence[int]) -> Array:
+    def row(self, wheels: Sequence[int | str]) -> Array:
         """1, 2 in front; 3, 4 in the middle; 5, 6 behind."""
-        return np.array([(wheel - 1) // 2 for wheel in wheels], np.float64)
+        return np.array([(int(wheel) - 1) // 2 for wheel in wheels], np.float64)
 
     def contrasts(self, covariate: str, wheels: Sequence[int]) -> Mapping[str, Array]:
         """Roll and yaw rate act oppositely on the two sides, pitch on front and rear."""

@@ -18,13 +18,12 @@ tables of SIM.toml arrive in `from_tables`, whose default lets `[parameters]` re
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.simulation.stated_priors import stated_priors
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Contribution
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.data.slow_channels import Between
     from regolithd.calibration.mismatch.problem.prior import Prior, SensorError
 
 Array = NDArray[np.float64]
@@ -57,20 +57,33 @@ class Simulation:
     """Axis labels with units for the report, by covariate: {"wheel_speed": "carriage speed (m/s)"}."""
     unloaded_experiment: ClassVar[str] = ""
     """How to run the machine without its load, as an instruction: what free parameters of the load hide shows there."""
+    between_readings: ClassVar[Mapping[str, Between]] = {}
+    """What to do between the readings of a column that is sampled less often than the rows: `linear` (the default),
+    `hold` or `blank`."""
+    undefined_at_times: ClassVar[frozenset[str]] = frozenset()
+    """Covariates whose NaN means that they do not apply (the slip of a wheel that stands), not that they are blank."""
+    own_tables: ClassVar[tuple[str, ...]] = ()
+    """Tables of SIM.toml that the simulation reads itself, from `self.stated`."""
+    stated: Mapping[str, Any] = {}
+    """SIM.toml's tables, as read."""
     sensors: Mapping[str, SensorError] = {}
     """The errors of the recorded inputs, by column."""
 
     @classmethod
     def from_tables(cls, tables: Mapping[str, Any]) -> Self:
-        """Build from SIM.toml's tables. `[parameters.NAME] value, std` replaces a prior; nothing else is known."""
+        """Build from SIM.toml's tables.
+
+        `[parameters.NAME] value, std` replaces a prior. So does a key of any other table that has a parameter's name:
+        `area_m2 = 0.5`, with `area_m2_std` or `area_m2_relative_std` beside it.
+
+        Raises
+        ------
+        SimulationError
+            For a table or key that is no parameter of this class, or a value that is no number.
+        """
         made = cls()
-        unknown = sorted(set(tables) - {"simulation", "parameters", "effects"})
-        if unknown:
-            raise SimulationError(f"{cls.__name__} knows no table [{unknown[0]}]")
-        stated = tables.get("parameters", {})
-        if strange := sorted(set(stated) - set(cls.parameters)):
-            raise SimulationError(f"{cls.__name__} has no parameter {strange[0]}; it has {', '.join(cls.parameters)}")
-        made.parameters = {name: replace(prior, **stated.get(name, {})) for name, prior in cls.parameters.items()}
+        made.stated = tables
+        made.parameters = stated_priors(tables, cls.parameters, cls.own_tables)
         return made
 
     def prepare(self, recording: Recording) -> Recording:
@@ -88,11 +101,11 @@ class Simulation:
         """Return what a residual may be ordered by, by the contract's names (`wheel_speed`, `temperature`, …)."""
         return {"time": inputs["t_s"]}
 
-    def side(self, wheels: Sequence[int]) -> Array | None:  # noqa: ARG002  # subclasses look
+    def side(self, wheels: Sequence[int | str]) -> Array | None:  # noqa: ARG002  # subclasses look
         """Return −1 for wheels on the left, +1 on the right; None where the machine has no sides."""
         return None
 
-    def row(self, wheels: Sequence[int]) -> Array | None:  # noqa: ARG002
+    def row(self, wheels: Sequence[int | str]) -> Array | None:  # noqa: ARG002
         """Return each wheel's place along the machine, front 0; None where it has no rows."""
         return None
 

@@ -1,0 +1,67 @@
+"""Channels that are sampled less often than the recording's rows: held or interpolated, as the simulation says.
+
+A blank is "not measured", never zero. A sensor that reports once a second beside a current at 100 Hz leaves 99 blanks of
+100; between two of its own readings the value is known to the accuracy of a straight line. Blanks of a sensor that
+usually reports at every row stay blank, and so does a gap much longer than the sensor's own period.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from regolithd.calibration.mismatch.data.recording import Recording
+
+Array = NDArray[np.float64]
+Between = Literal["linear", "hold", "blank"]
+
+SLOWER = 2.0
+"""Rows from one reading to the next (median) from which a channel counts as slower (a choice: every other row)."""
+LONGEST_GAP = 3.0
+"""Periods of the slow sensor across which its value is still taken as known (a choice: two readings missing)."""
+
+
+def filled_between(recording: Recording, predicted: str, between: Mapping[str, Between]) -> Recording:
+    """Return the recording with slower channels filled in between their own readings.
+
+    The predicted channel is left as it is. `between` says for single channels what to do; others are interpolated.
+    """
+    filled, told = {}, []
+    for name, values in recording.channels.items():
+        how = between.get(name, "linear")
+        if name == predicted or how == "blank":
+            continue
+        columns = [_filled(recording, values[:, k], how) for k in range(values.shape[1])]
+        if any(column is not None for column in columns):
+            kept = [values[:, k] if column is None else column for k, column in enumerate(columns)]
+            filled[name] = np.stack(kept, axis=1)
+            word = "held" if how == "hold" else "interpolated on straight lines"
+            told.append(f"{name} is measured less often than the other channels; between its readings it is {word}.")
+    return recording.with_channels(**filled).with_notes(*told) if filled else recording
+
+
+def _filled(recording: Recording, column: Array, how: Between) -> Array | None:
+    """Return one wheel's readings filled in, or None where this is no slower channel."""
+    known = np.flatnonzero(np.isfinite(column))
+    if known.size < 2 or known.size == column.size:
+        return None
+    apart = np.diff(known)
+    usual = float(np.median(apart))
+    if usual < SLOWER:
+        return None
+    found = column.copy()
+    time_s = recording.time_s
+    for first, last in zip(known[:-1], known[1:], strict=True):
+        if last - first > LONGEST_GAP * usual or recording.run[first] != recording.run[last]:
+            continue
+        inside = slice(first + 1, last)
+        if how == "hold":
+            found[inside] = column[first]
+        else:
+            found[inside] = np.interp(time_s[inside], time_s[[first, last]], column[[first, last]])
+    return found

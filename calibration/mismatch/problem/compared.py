@@ -1,0 +1,75 @@
+"""Which readings are compared: blanks and single, isolated faults are left out, counted, and told with their reason."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.problem.problem import LeftOut
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from regolithd.calibration.mismatch.thresholds import Thresholds
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MAD_TO_STD = 1.4826
+"""Standard deviation of a normal density over its median absolute deviation."""
+
+
+def isolated_outliers(residual: Array, run: NDArray[np.int64], thresholds: Thresholds) -> Mask:
+    """Return where single readings lie far outside of what the others of their wheel do, shape (time, wheel).
+
+    Only a reading whose neighbours are not outliers is a fault of the recording, and only where such are few. What lasts
+    longer, or comes often, is physics that the simulation leaves out.
+    """
+    found = np.zeros(residual.shape, np.bool_)
+    same_run = np.concatenate(([False], np.diff(run) == 0, [False]))
+    for k in range(residual.shape[1]):
+        known = np.isfinite(residual[:, k])
+        if not known.any():
+            continue
+        middle = float(np.median(residual[known, k]))
+        deviation = MAD_TO_STD * float(np.median(np.abs(residual[known, k] - middle)))
+        far = np.zeros(len(known), np.bool_)
+        far[known] = (np.abs(residual[known, k] - middle) > thresholds.outlier_deviations * deviation) & (deviation > 0)
+        before = np.concatenate(([False], far[:-1])) & same_run[:-1]
+        after = np.concatenate((far[1:], [False])) & same_run[1:]
+        alone = far & ~before & ~after
+        if alone.sum() <= thresholds.most_outliers_share * known.sum():
+            found[:, k] = alone
+    return found
+
+
+def blanks_of(
+    covariates: Mapping[str, Array], undefined_at_times: frozenset[str], compared: Mask, thresholds: Thresholds
+) -> tuple[dict[str, Array], dict[str, Mask]]:
+    """Return the covariates that are known well enough, and where each of them is blank.
+
+    A covariate that is never known at a wheel says nothing there, and costs no reading. One that is blank too often is
+    left out as a whole, rather than the readings.
+    """
+    kept, blanks = {}, {}
+    for name, values in covariates.items():
+        blank = compared & ~np.isfinite(values)
+        partly = blank & (compared & np.isfinite(values)).any(axis=0)
+        if name in undefined_at_times or not partly.any():
+            kept[name] = values
+        elif partly.sum() <= (1 - thresholds.least_known_share) * compared[:, partly.any(axis=0)].sum():
+            kept[name], blanks[name] = values, partly
+    return kept, blanks
+
+
+def left_out(channel: str, measured: Array, prediction: Array, outliers: Mask, blanks: Mapping[str, Mask]) -> tuple[LeftOut, ...]:
+    """Return what was measured and is not compared, each with its reason."""
+    silent = np.isfinite(measured) & ~np.isfinite(prediction)
+    reasons = [
+        (silent, "the simulation predicts nothing there"),
+        (outliers, "single, isolated readings far outside all others"),
+        *((blank, f"{name} was not measured there") for name, blank in blanks.items()),
+    ]
+    return tuple(LeftOut(channel, int(where.sum()), reason) for where, reason in reasons if where.any())
