@@ -1,12 +1,13 @@
 """Channels that are sampled less often than the recording's rows: held or interpolated, as the simulation says.
 
-A blank is "not measured", never zero. A sensor that reports once a second beside a current at 100 Hz leaves 99 blanks of
-100; between two of its own readings the value is known to the accuracy of a straight line. Blanks of a sensor that
+A blank is "not measured", never zero. A sensor that reports once a second beside a current at 100 Hz leaves 99 blanks
+of 100; between two of its own readings the value is known to the accuracy of a straight line. Blanks of a sensor that
 usually reports at every row stay blank, and so does a gap much longer than the sensor's own period.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -56,7 +57,7 @@ def _filled(recording: Recording, column: Array, how: Between) -> Array | None:
         return None
     found = column.copy()
     time_s = recording.time_s
-    for first, last in zip(known[:-1], known[1:], strict=True):
+    for first, last in pairwise(known):
         if last - first > LONGEST_GAP * usual or recording.run[first] != recording.run[last]:
             continue
         inside = slice(first + 1, last)
