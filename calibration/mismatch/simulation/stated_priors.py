@@ -32,7 +32,8 @@ def stated_priors(
         For a key that is no parameter, or a value that is no finite number.
     """
     stated: dict[str, dict[str, Any]] = {}
-    for name, table in tables.items():
+    # `[parameters]` comes last: a corrected file has the calibrated values there, beside the user's own tables.
+    for name, table in sorted(tables.items(), key=lambda item: item[0] == "parameters"):
         if name in ENGINE_TABLES or name in own_tables:
             continue
         if not isinstance(table, dict):
