@@ -1,0 +1,61 @@
+"""Channels sampled less often than the rows are known between their readings, and nothing else is filled in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.data.slow_channels import filled_between
+
+TIME_S = 0.01 * np.arange(1000)
+
+
+def recorded(**channels: np.ndarray) -> Recording:
+    """Return a recording at 100 Hz with these channels."""
+    return from_columns({"t_s": TIME_S, **channels})
+
+
+def every(step: int, values: np.ndarray) -> np.ndarray:
+    """Return the values at every n-th row, blank elsewhere."""
+    return np.where(np.arange(len(values)) % step == 0, values, np.nan)
+
+
+def test_a_sensor_at_one_hertz_is_interpolated_between_its_readings() -> None:
+    """A straight line is recovered exactly up to the last reading."""
+    line = 20 + 3 * TIME_S
+    found = filled_between(recorded(temperature_degC=every(100, line), current_A=np.sin(TIME_S)), "current_A", {})
+    np.testing.assert_allclose(found.channels["temperature_degC"][:901, 0], line[:901])
+    assert np.isnan(found.channels["temperature_degC"][901:]).all()
+    assert any("temperature_degC" in note for note in found.notes)
+
+
+def test_a_held_channel_keeps_its_last_reading() -> None:
+    """Between two readings the value is that of the first."""
+    found = filled_between(recorded(mode=every(100, np.floor(TIME_S)), y=TIME_S), "y", {"mode": "hold"})
+    np.testing.assert_array_equal(found.channels["mode"][:901, 0], np.floor(TIME_S[:901] + 1e-9))
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3])
+def test_blanks_of_a_channel_that_usually_reports_stay_blank(share: float) -> None:
+    """Random blanks are not measured, and nothing is invented for them."""
+    values = np.where(np.random.default_rng(1).random(1000) < share, np.nan, 1.0 + TIME_S)
+    found = filled_between(recorded(yaw_rate_rad_s=values, y=TIME_S), "y", {})
+    np.testing.assert_array_equal(np.isnan(found.channels["yaw_rate_rad_s"][:, 0]), np.isnan(values))
+
+
+def test_a_long_gap_of_a_slow_channel_stays_blank() -> None:
+    """Beyond three of its own periods a value is not known."""
+    slow = every(10, TIME_S)
+    slow[200:500] = np.nan
+    found = filled_between(recorded(slow=slow, y=TIME_S), "y", {}).channels["slow"][:, 0]
+    assert np.isnan(found[200:495]).all()
+    assert np.isfinite(found[:190]).all()
+
+
+def test_the_predicted_channel_and_a_channel_declared_blank_are_left_alone() -> None:
+    """What is compared is what was measured."""
+    slow = every(10, TIME_S)
+    found = filled_between(recorded(y=slow, x=slow), "y", {"x": "blank"})
+    np.testing.assert_array_equal(found.channels["y"][:, 0], slow)
+    np.testing.assert_array_equal(found.channels["x"][:, 0], slow)
