@@ -1,0 +1,83 @@
+"""A late channel and drag with the square of speed are found by name and size on a servo axis."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch.candidates.sensor_delay import shifted
+from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from regolithd.calibration.mismatch.answer import Answer
+
+Array = np.ndarray
+STEP_S = 0.02
+
+
+class Axis(Simulation):
+    """Current of a joint: inertia and viscous drag."""
+
+    channel, unit, wheel_column = "motor_current_A", "A", "axis"
+    inputs = ("acceleration_rad_s2", "speed_rad_s")
+    parameters: ClassVar = {"inertia": Prior(0.5, 0.01, "A s²/rad"), "drag": Prior(0.2, 0.004, "A s/rad")}
+
+    def predict(self, inputs: Mapping[str, NDArray[np.float64]], values: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return the current of inertia and drag."""
+        return values["inertia"] * inputs["acceleration_rad_s2"] + values["drag"] * inputs["speed_rad_s"]
+
+    def covariates(self, inputs: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+        """Return speed and time."""
+        return {"wheel_speed": inputs["speed_rad_s"], "time": inputs["t_s"]}
+
+
+def swinging(seed: int, quadratic: float = 0.0, delay_s: float = 0.0) -> Recording:
+    """Return four minutes of a joint that swings, under autocorrelated noise of a tenth of the mean current."""
+    generator = np.random.default_rng(seed)
+    time_s = STEP_S * np.arange(12000)
+    waves = [(generator.uniform(0.05, 0.8), generator.uniform(0.2, 1), generator.uniform(0, 6)) for _ in range(6)]
+    angle = sum(size * np.sin(2 * np.pi * f * time_s + phase) / (1 + 2 * f) for f, size, phase in waves)
+    speed = np.gradient(angle, STEP_S)
+    acceleration = np.gradient(speed, STEP_S)
+    current = 0.5 * acceleration + 0.2 * speed + quadratic * speed * np.abs(speed)
+    late = np.interp(time_s - delay_s, time_s, current)
+    noise = np.convolve(generator.normal(0, 1, len(time_s) + 7), np.ones(8) / np.sqrt(8), "valid")
+    measured = late + 0.1 * np.mean(np.abs(current)) * noise
+    channels = {"acceleration_rad_s2": acceleration, "speed_rad_s": speed}
+    return from_columns({"t_s": time_s, "motor_current_A": measured, **channels})
+
+
+def answer_to(recording: Recording) -> Answer:
+    """Return what the tool says."""
+    return compare(recording, Axis()).answer
+
+
+@pytest.mark.parametrize("delay_s", [0.04, 0.3])
+def test_a_late_current_is_named_with_its_delay(delay_s: float) -> None:
+    """Two readings late and fifteen readings late are told with the delay inside the interval or within a reading."""
+    found = answer_to(swinging(1, delay_s=delay_s))
+    assert [effect.name for effect in found.effects] == ["sensor-delay"]
+    assert found.effects[0].parameters["delay_s"].value == pytest.approx(delay_s, abs=STEP_S)
+
+
+def test_drag_with_the_square_of_speed_is_not_called_viscous() -> None:
+    """Its coefficient lies in the 90 % interval."""
+    found = answer_to(swinging(2, quadratic=0.12))
+    assert [effect.name for effect in found.effects] == ["quadratic-drag"]
+    size = found.effects[0].parameters["quadratic_coefficient"]
+    assert size.low < 0.12 < size.high
+
+
+def test_a_shift_stays_within_its_run() -> None:
+    """The first run's end is not mixed with the second run's start."""
+    time_s = np.tile(np.arange(5.0), 2)
+    recording = from_columns({"t_s": time_s, "run": np.repeat([0.0, 1.0], 5), "y": np.arange(10.0)})
+    moved = shifted(recording, recording.channels["y"], 1.0)[:, 0]
+    np.testing.assert_array_equal(moved, [1, 2, 3, 4, 4, 6, 7, 8, 9, 9])
