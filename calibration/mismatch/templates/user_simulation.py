@@ -1,0 +1,38 @@
+"""A simulation to start from: the torque of a joint from its acceleration and speed. Change names, inputs and law."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from regolithd.calibration.mismatch import Prior, Simulation
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+
+class Joint(Simulation):
+    """Inertia and viscous friction of one joint."""
+
+    channel, unit = "torque_Nm", "N·m"  # the recorded column that is predicted
+    wheel_column = "axis"  # the column that tells several axes apart; a recording without it has one
+    inputs = ("acceleration_rad_s2", "speed_rad_s")  # columns without which nothing can be predicted
+    parameters: ClassVar = {
+        "inertia_kg_m2": Prior(0.50, 0.01, "kg·m²"),
+        "viscous_Nm_s_per_rad": Prior(0.20, 0.01, "N·m·s/rad"),
+    }
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the channel, shape (time, axis); NaN where the simulation says nothing."""
+        return (
+            values["inertia_kg_m2"] * inputs["acceleration_rad_s2"]
+            + values["viscous_Nm_s_per_rad"] * inputs["speed_rad_s"]
+        )
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return what left-out physics may depend on; `wheel_speed` is the speed that friction opposes."""
+        return {"time": inputs["t_s"], "wheel_speed": inputs["speed_rad_s"]}
