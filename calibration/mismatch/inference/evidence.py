@@ -56,7 +56,7 @@ def evidence_of(decision: Decision) -> Evidence:
     )
 
 
-def wheel_names(problem: Problem, wheels: Sequence[int]) -> tuple[int, ...]:
+def wheel_names(problem: Problem, wheels: Sequence[int]) -> tuple[int | str, ...]:
     """Return the names of those wheels of which something is known."""
     return tuple(problem.recording.wheels[w] for w in wheels if problem.mask[:, w].any())
 

@@ -46,7 +46,9 @@ def build_problem(
     outliers = isolated_outliers(residual, recording.run, thresholds)
     found = covariates_of(prepared, simulation, inputs, prediction)
     covariates, blanks = blanks_of(found, simulation.undefined_at_times, compared, thresholds)
-    mask = compared & ~outliers & ~np.any(list(blanks.values()), axis=0, initial=False)
+    mask = compared & ~outliers
+    for blank in blanks.values():
+        mask &= ~blank
     if mask.sum() < thresholds.fewest_readings:
         raise RecordingError(
             f"only {mask.sum()} values of {simulation.channel} can be compared; "

@@ -24,8 +24,8 @@ MAD_TO_STD = 1.4826
 def isolated_outliers(residual: Array, run: NDArray[np.int64], thresholds: Thresholds) -> Mask:
     """Return where single readings lie far outside of what the others of their wheel do, shape (time, wheel).
 
-    Only a reading whose neighbours are not outliers is a fault of the recording, and only where such are few. What lasts
-    longer, or comes often, is physics that the simulation leaves out.
+    Only a reading whose neighbours are not outliers is a fault of the recording, and only where such are few. What
+    lasts longer, or comes often, is physics that the simulation leaves out.
     """
     found = np.zeros(residual.shape, np.bool_)
     same_run = np.concatenate(([False], np.diff(run) == 0, [False]))
@@ -64,7 +64,9 @@ def blanks_of(
     return kept, blanks
 
 
-def left_out(channel: str, measured: Array, prediction: Array, outliers: Mask, blanks: Mapping[str, Mask]) -> tuple[LeftOut, ...]:
+def left_out(
+    channel: str, measured: Array, prediction: Array, outliers: Mask, blanks: Mapping[str, Mask]
+) -> tuple[LeftOut, ...]:
     """Return what was measured and is not compared, each with its reason."""
     silent = np.isfinite(measured) & ~np.isfinite(prediction)
     reasons = [

@@ -79,10 +79,10 @@ class Predictor(Protocol):
     def row(self, wheels: Sequence[int | str]) -> Array | None:
         """Return each wheel's place along the machine, front 0."""
 
-    def wheel_sets(self, wheels: Sequence[int]) -> Sequence[tuple[int, ...]]:
+    def wheel_sets(self, wheels: Sequence[int | str]) -> Sequence[tuple[int, ...]]:
         """Return sets of wheels, by their indices, that may share an effect beside all and each."""
 
-    def contrasts(self, covariate: str, wheels: Sequence[int]) -> Mapping[str, Array]:
+    def contrasts(self, covariate: str, wheels: Sequence[int | str]) -> Mapping[str, Array]:
         """Return factors by which a covariate acts oppositely on two parts of the machine, by name."""
 
     def variants(self) -> Mapping[str, float]:

@@ -176,7 +176,7 @@ class RoverWheel(Simulation):
         """1, 2 in front; 3, 4 in the middle; 5, 6 behind."""
         return np.array([(int(wheel) - 1) // 2 for wheel in wheels], np.float64)
 
-    def contrasts(self, covariate: str, wheels: Sequence[int]) -> Mapping[str, Array]:
+    def contrasts(self, covariate: str, wheels: Sequence[int | str]) -> Mapping[str, Array]:
         """Roll and yaw rate act oppositely on the two sides, pitch on front and rear."""
         side, row = self.side(wheels), self.row(wheels)
         if covariate in {"roll", "yaw_rate"}:

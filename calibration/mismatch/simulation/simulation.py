@@ -109,12 +109,12 @@ class Simulation:
         """Return each wheel's place along the machine, front 0; None where it has no rows."""
         return None
 
-    def wheel_sets(self, wheels: Sequence[int]) -> Sequence[tuple[int, ...]]:
+    def wheel_sets(self, wheels: Sequence[int | str]) -> Sequence[tuple[int, ...]]:
         """Return sets of wheels, by their indices, that may share an effect; by default each side and each row."""
         places = [place for place in (self.side(wheels), self.row(wheels)) if place is not None]
         return [tuple(int(w) for w in np.flatnonzero(place == value)) for place in places for value in np.unique(place)]
 
-    def contrasts(self, covariate: str, wheels: Sequence[int]) -> Mapping[str, Array]:  # noqa: ARG002
+    def contrasts(self, covariate: str, wheels: Sequence[int | str]) -> Mapping[str, Array]:  # noqa: ARG002
         """Return factors, shape (wheel,), by which a covariate acts oppositely on two parts of the machine.
 
         Such as {"opposite sides": −1 on the left, +1 on the right} for a roll angle; by default none.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch import Prior, Simulation
 
@@ -21,7 +21,7 @@ class Joint(Simulation):
     channel, unit = "torque_Nm", "N·m"  # the recorded column that is predicted
     wheel_column = "axis"  # the column that tells several axes apart; a recording without it has one
     inputs = ("acceleration_rad_s2", "speed_rad_s")  # columns without which nothing can be predicted
-    parameters: ClassVar = {
+    parameters = {
         "inertia_kg_m2": Prior(0.50, 0.01, "kg·m²"),
         "viscous_Nm_s_per_rad": Prior(0.20, 0.01, "N·m·s/rad"),
     }
