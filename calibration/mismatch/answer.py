@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
-    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.problem.problem import LeftOut, Problem
 
 Array = NDArray[np.float64]
 Verdict = Literal["consistent", "missing-physics", "unexplained"]
@@ -92,6 +92,31 @@ class FitImprovement:
 
 
 @dataclass(frozen=True)
+class CalibratedParameter:
+    """A parameter of the simulation: its prior, and where the recording moved it, with a 90 % interval."""
+
+    name: str
+    unit: str
+    prior: float
+    prior_std: float
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Change:
+    """What differs from an effect that a corrected simulation brought, with a 90 % interval of what it is now."""
+
+    name: str
+    parameter: str
+    corrected: float
+    now: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
 class Answer:
     """The result of `regolithd mismatch`."""
 
@@ -101,15 +126,18 @@ class Answer:
     indistinguishable: tuple[Indistinguishable, ...]
     sensitivity: tuple[Sensitivity, ...]
     fit: FitImprovement
+    parameters: tuple[CalibratedParameter, ...] = ()
+    changes: tuple[Change, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
     notes: tuple[str, ...] = ()
     """What was wrong with the recording, and which candidates could not be looked for."""
-    version: int = 1
+    version: int = 2
 
     def to_json(self) -> dict[str, Any]:
         """Return the JSON object: tuples as lists, and null for numbers that are not finite."""
         plain: dict[str, Any] = _plain(asdict(self))
-        order = ("version", "verdict", "effects", "unexplained", "indistinguishable", "sensitivity", "fit", "notes")
-        return {name: plain[name] for name in order}
+        findings = ("effects", "unexplained", "indistinguishable", "sensitivity", "fit", "parameters", "changes")
+        return {name: plain[name] for name in ("version", "verdict", *findings, "left_out", "notes")}
 
 
 def _plain(value: object) -> Any:  # noqa: ANN401  # JSON has no narrower type

@@ -12,8 +12,15 @@ import numpy as np
 
 from regolithd.calibration.mismatch.answer import Answer, FitImprovement
 from regolithd.calibration.mismatch.candidates.library import library
-from regolithd.calibration.mismatch.corrected import effect_of
-from regolithd.calibration.mismatch.findings import named_effects, noise_floor, unexplained, verdict_of
+from regolithd.calibration.mismatch.changes import change_in_words, corrected_problem, stated_in, with_changes
+from regolithd.calibration.mismatch.findings import (
+    beyond_prior,
+    calibrated_parameters,
+    named_effects,
+    noise_floor,
+    unexplained,
+    verdict_of,
+)
 from regolithd.calibration.mismatch.inference.evidence import evidence_of
 from regolithd.calibration.mismatch.inference.held_out import held_out_errors
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
@@ -32,7 +39,7 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from regolithd.calibration.mismatch.answer import Contribution, Evidence
+    from regolithd.calibration.mismatch.answer import CalibratedParameter, Contribution, Evidence
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.problem import Problem
@@ -74,8 +81,9 @@ def compare(
     progress("simulating")
     candidates = simulation.candidates(library())
     problem = build_problem(recording, simulation, thresholds=thresholds)
-    if effects:
-        problem = replace(problem, prediction=problem.prediction + effect_of(problem, candidates, effects))
+    stated = stated_in(candidates, effects, simulation.stated_effects())
+    problem = corrected_problem(problem, stated)
+    candidates = with_changes(problem, candidates, stated)
     progress("computing the columns of all candidates")
     equations, applicable = equations_of(problem, candidates)
     progress("searching")
@@ -112,17 +120,24 @@ def _answer(
     problem, kept = equations.problem, set(map(id, grid))
     choice = [group for group in equations.design.groups if id(group) in kept or _only_proposed(problem, group)]
     held_out = held_out_errors(equations, decision.named, choice, threshold)
-    effects = named_effects(decision, held_out)
+    effects, changes = named_effects(decision, held_out)
+    parameters = calibrated_parameters(decision)
+    moved = beyond_prior(parameters, equations.thresholds)
     extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold)
     channel, floor = problem.simulation.channel, noise_floor(decision)
     return Answer(
-        verdict=verdict_of(decision),
+        verdict=verdict_of(decision, moved),
         effects=effects,
         unexplained=tuple(unexplained(decision, term) for term in decision.unnamed),
         indistinguishable=sets,
         sensitivity=sensitivities(extended, decision.whole, candidates, threshold),
         fit=FitImprovement(channel, held_out.before, held_out.after, floor),
+        parameters=parameters,
+        changes=changes,
+        left_out=problem.left_out,
         notes=(
+            *map(_beyond_prior_in_words, moved),
+            *map(change_in_words, changes),
             *problem.recording.notes,
             *_about_the_mask(problem),
             *_not_looked_for(problem, candidates, [candidate.name for candidate in applicable]),
@@ -144,12 +159,18 @@ def _about_the_mask(problem: Problem) -> list[str]:
         notes.append(
             f"There is nothing to compare at {kind} {', '.join(map(str, silent))}: it never turns, or is not measured."
         )
-    outliers = int(np.sum(np.isfinite(problem.prediction) & np.isfinite(problem.measured) & ~problem.mask))
-    if outliers:
-        notes.append(
-            f"{outliers} readings of {problem.simulation.channel} are far outside all others; they are left out."
-        )
+    notes += [
+        f"{each.readings} readings of {each.channel} are not compared: {each.reason}." for each in problem.left_out
+    ]
     return notes
+
+
+def _beyond_prior_in_words(parameter: CalibratedParameter) -> str:
+    away = abs(parameter.value - parameter.prior) / parameter.prior_std
+    return (
+        f"{parameter.name} had to leave its prior: {parameter.value:.4g} {parameter.unit}, "
+        f"{away:.1f} standard deviations from {parameter.prior:.4g}. Check the stated value and its standard deviation."
+    )
 
 
 def _not_looked_for(problem: Problem, candidates: Sequence[Candidate], applicable: Sequence[str]) -> list[str]:

@@ -47,9 +47,10 @@ def corrected_tables(
     contributions: the effects' terms
     effects: the same, with their intervals, in the same order; left out, the terms have no standard deviation
     """
-    if effects:
-        pairs = zip(contributions, effects, strict=True)
-        contributions = [replace(term, relative_std=_relative_std(effect)) for term, effect in pairs]
+    # Changes of effects that the simulation had already follow the named effects.
+    named, changes = contributions[: len(effects)], contributions[len(effects) :]
+    pairs = zip(named, effects, strict=True)
+    contributions = [*(replace(term, relative_std=_relative_std(effect)) for term, effect in pairs), *changes]
     calibrated = {**tables, **simulation.corrected_tables(_within_three_std(simulation, values))}
     corrected, rest = simulation.absorb_effects(calibrated, contributions)
     before = list(tables.get("effects", []))

@@ -6,31 +6,35 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.answer import Effect, Parameter, Unexplained
-from regolithd.calibration.mismatch.inference.evidence import wheel_names
+from regolithd.calibration.mismatch.answer import CalibratedParameter, Effect, Parameter, Unexplained
+from regolithd.calibration.mismatch.changes import ChangedSize, changes_of
+from regolithd.calibration.mismatch.inference.evidence import calibrated_values, wheel_names
 from regolithd.calibration.mismatch.inference.intervals import parameters_of
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.report.statements import statement
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
-    from regolithd.calibration.mismatch.answer import Verdict
+    from regolithd.calibration.mismatch.answer import Change, Verdict
     from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
+    from regolithd.calibration.mismatch.thresholds import Thresholds
 
+NINETY_PERCENT_STDS = 1.645
+"""Half the width of a 90 % interval of a normal density, in standard deviations."""
 BEGINNING, END = 0.01, 0.99
 """Shares of a curve's power before and after which it counts as not there."""
 
 
-def verdict_of(decision: Decision) -> Verdict:
-    """Return the verdict: what is unexplained goes before what was named."""
+def verdict_of(decision: Decision, moved: Sequence[CalibratedParameter]) -> Verdict:
+    """Return the verdict: unexplained goes before named; `moved` are parameters that left their priors."""
     if decision.unnamed:
         return "unexplained"
-    return "missing-physics" if decision.named.terms else "consistent"
+    return "missing-physics" if decision.named.terms or moved else "consistent"
 
 
 def noise_floor(decision: Decision) -> float:
@@ -39,16 +43,48 @@ def noise_floor(decision: Decision) -> float:
     return float(np.sqrt(np.sum(decision.noise.deviation**2 * counts) / counts.sum()))
 
 
-def named_effects(decision: Decision, held_out: HeldOutErrors) -> tuple[Effect, ...]:
-    """Return each named effect with its parameters, its sentence and its held-out errors."""
+def named_effects(decision: Decision, held_out: HeldOutErrors) -> tuple[tuple[Effect, ...], tuple[Change, ...]]:
+    """Return the named effects with parameters and held-out errors, and what changed of corrected ones."""
     named, equations = decision.named, decision.equations
     if not named.terms:
-        return ()
+        return (), ()
     parameters = parameters_of(equations, named, blocks_of_time(equations.problem, decision.noise))
-    errors = zip(held_out.without, held_out.with_it, strict=True)
+    effects: list[Effect] = []
+    changes: list[Change] = []
+    for index, (term, of_term) in enumerate(zip(named.terms, parameters, strict=True)):
+        if isinstance(term.group.candidate, ChangedSize):
+            changes += changes_of(term.group.candidate, of_term)
+        else:
+            errors = held_out.without[index], held_out.with_it[index]
+            effects.append(_effect(equations.problem, term, of_term, errors))
+    return tuple(effects), tuple(changes)
+
+
+def calibrated_parameters(decision: Decision) -> tuple[CalibratedParameter, ...]:
+    """Return where the recording moved each parameter of the simulation, beside all that was found."""
+    equations, fit = decision.equations, decision.whole
+    problem, nuisance = equations.problem, equations.nuisance
+    values = calibrated_values(equations, fit)
+    places = {name: place for place, name in enumerate(nuisance.names)}
+    found = []
+    for name, prior in problem.simulation.parameters.items():
+        std = 0.0
+        if name in places:
+            place = places[name]
+            variance = fit.covariance[place, place]
+            std = float(np.sqrt(max(variance, 0.0)) / equations.design.scale[nuisance.columns[place]])
+        value = float(values[name])
+        low, high = value - NINETY_PERCENT_STDS * std, value + NINETY_PERCENT_STDS * std
+        found.append(CalibratedParameter(name, prior.unit, prior.value, prior.std, value, low, high))
+    return tuple(found)
+
+
+def beyond_prior(parameters: Iterable[CalibratedParameter], thresholds: Thresholds) -> tuple[CalibratedParameter, ...]:
+    """Return the parameters that had to leave their priors: a finding, whatever else was found."""
     return tuple(
-        _effect(equations.problem, term, of_term, before_and_after)
-        for term, of_term, before_and_after in zip(named.terms, parameters, errors, strict=True)
+        each
+        for each in parameters
+        if each.prior_std > 0 and abs(each.value - each.prior) > thresholds.furthest_prior_stds * each.prior_std
     )
 
 

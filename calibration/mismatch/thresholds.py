@@ -64,6 +64,11 @@ class Thresholds:
         "Share of the compared readings at which a covariate must be known; else it is left out, not the readings.",
         f"{CHOICE}: half of the recording is the most that one covariate may cost",
     )
+    furthest_prior_stds: float = _threshold(
+        3.0,
+        "Standard deviations of its prior beyond which a calibrated parameter is a finding of its own.",
+        "standard: a normal density has one in 370 beyond three standard deviations",
+    )
     fewest_readings: int = _threshold(
         100, "Readings below which nothing is compared.", f"{CHOICE}: ten for each of about ten free parameters"
     )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Contribution, Curve, Evidence
+from regolithd.calibration.mismatch.changes import ChangedSize, contribution_of_change
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import WITHOUT_SMOOTH_TERM
@@ -66,21 +67,22 @@ def calibrated_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:
     problem, nuisance = equations.problem, equations.nuisance
     shift = fit.coefficients[: len(nuisance.names)] / equations.design.scale[list(nuisance.columns)]
     moved = dict(zip(nuisance.names, shift.tolist(), strict=True))
-    return {name: problem.values.get(name, 0.0) + moved.get(name, 0.0) for name in {**problem.values, **moved}}
+    known = {name: shift for name, shift in moved.items() if name not in nuisance.stated}
+    return {name: problem.values.get(name, 0.0) + known.get(name, 0.0) for name in {**problem.values, **known}}
 
 
 def _contributions(equations: NormalEquations, fit: Fit) -> tuple[Contribution, ...]:
-    """Return the named terms as a corrected simulation holds them."""
+    """Return the named terms as a corrected simulation holds them, changes of what it has already last."""
     scale = equations.design.scale
-    return tuple(
-        Contribution(
-            name=term.name,
-            shape=term.group.shape,
-            coefficients=tuple((fit.coefficients[fit.of_term(i)] / scale[list(term.group.columns)]).tolist()),
-            wheels=wheel_names(equations.problem, term.wheels),
-        )
-        for i, term in enumerate(fit.terms)
-    )
+    named, changed = [], []
+    for i, term in enumerate(fit.terms):
+        coefficients = (fit.coefficients[fit.of_term(i)] / scale[list(term.group.columns)]).tolist()
+        if isinstance(term.group.candidate, ChangedSize):
+            changed.append(contribution_of_change(term.group.candidate, coefficients[0]))
+        else:
+            wheels = wheel_names(equations.problem, term.wheels)
+            named.append(Contribution(term.name, term.group.shape, tuple(coefficients), wheels))
+    return (*named, *changed)
 
 
 def _block_centres(problem: Problem, blocks: Index) -> Array:

@@ -29,6 +29,26 @@ class LeftOut:
     reason: str
 
 
+@dataclass(frozen=True, eq=False)
+class StatedEffect:
+    """An effect that a corrected simulation has already.
+
+    Attributes
+    ----------
+    name: the candidate's
+    wheels: the names of the wheels that have it
+    column: what it adds to the prediction, shape (time, wheel)
+    relative_std: relative standard deviation of its size, from the comparison that found it
+    in_simulation: whether the simulation's own prediction has it; else it is added on the output
+    """
+
+    name: str
+    wheels: tuple[int | str, ...]
+    column: Array
+    relative_std: float
+    in_simulation: bool = False
+
+
 @dataclass(frozen=True)
 class Problem:
     """A recording, and the simulation of it with its parameters as stated.
@@ -42,6 +62,7 @@ class Problem:
     prediction: the simulation's, NaN where it predicts nothing
     mask: where readings are compared
     left_out: what was measured and is not compared
+    stated: the effects that the simulation was corrected by; `prediction` has them
     covariates: by the contract's names, each of shape (time, wheel)
     side, row: each wheel's place on the machine, or None
     thresholds: the numbers that decide
@@ -58,6 +79,7 @@ class Problem:
     side: Array | None
     row: Array | None
     left_out: tuple[LeftOut, ...] = ()
+    stated: tuple[StatedEffect, ...] = ()
     thresholds: Thresholds = THRESHOLDS
     made: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)
 
@@ -80,6 +102,12 @@ class Problem:
     def filled(self) -> Array:
         """The prediction, 0 where there is none."""
         return np.where(self.mask, self.prediction, 0.0)
+
+    @property
+    def added(self) -> Array:
+        """What stated effects add on the output of the simulation, shape (time, wheel)."""
+        columns = [effect.column for effect in self.stated if not effect.in_simulation]
+        return sum(columns, np.zeros(self.mask.shape))
 
     @property
     def wheel_sets(self) -> tuple[tuple[int, ...], ...]:
@@ -108,7 +136,8 @@ class Problem:
     def changed(self, **changes: float) -> Array:
         """Return the prediction with parameters (or variants) set otherwise, 0 outside the mask."""
         values = {**self._all_values, **changes}
-        return np.where(self.mask, self.simulation.predict(complete_inputs(self.recording), values), 0.0)
+        predicted = self.simulation.predict(complete_inputs(self.recording), values) + self.added
+        return np.where(self.mask, predicted, 0.0)
 
     def secant(self, name: str, step: float) -> Array:
         """Return the prediction's change per unit of a parameter, over a step from its value."""
@@ -133,7 +162,7 @@ class Problem:
     def with_input(self, column: str, values: Array) -> Array:
         """Return the prediction for another reading of one input, 0 where there is none."""
         inputs = {**complete_inputs(self.recording), column: values}
-        moved = self.simulation.predict(inputs, self._all_values)
+        moved = self.simulation.predict(inputs, self._all_values) + self.added
         return np.where(self.mask & np.isfinite(moved), moved, 0.0)
 
     @property

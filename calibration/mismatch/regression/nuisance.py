@@ -26,11 +26,13 @@ class Nuisance:
     names: of the parameters; a wheel's own deviation is named by `own_name`
     columns: indices in the design matrix
     precision: one over the prior variance of each scaled coefficient, shape (parameter,)
+    stated: those of the names that are sizes of effects which the simulation was corrected by
     """
 
     names: tuple[str, ...]
     columns: tuple[int, ...]
     precision: Array
+    stated: frozenset[str] = frozenset()
 
     def with_precision(self, place: int, value: float) -> Nuisance:
         """Return the same parameters with another precision of one of them."""
@@ -45,7 +47,8 @@ def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:
     design, places = design.extended(tangents)
     # The coefficient of a column that was divided by its scale is the parameter's shift times that scale.
     precision = 1 / (np.array(stds) * design.scale[list(places)]) ** 2 if places else np.zeros(0)
-    return design, Nuisance(tuple(names), places, precision)
+    stated = frozenset(stated_name(effect.name) for effect in design.problem.stated)
+    return design, Nuisance(tuple(names), places, precision, stated)
 
 
 def _tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
@@ -58,4 +61,12 @@ def _tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
             names += [own_name(name, wheel) for wheel in wheels]
             stds += [problem.thresholds.own_share * free[name]] * len(wheels)
             tangents += [np.where(np.array(wheels) == wheel, problem.tangent(name), 0.0) for wheel in wheels]
-    return names, stds, tangents
+    uncertain = [effect for effect in problem.stated if effect.relative_std > 0]
+    names += [stated_name(effect.name) for effect in uncertain]
+    stds += [effect.relative_std for effect in uncertain]
+    return names, stds, tangents + [effect.column for effect in uncertain]
+
+
+def stated_name(effect: str) -> str:
+    """Return the nuisance parameter's name of the relative size of an effect that the simulation was corrected by."""
+    return f"{effect} as corrected"

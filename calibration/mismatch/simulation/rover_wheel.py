@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
 from regolithd.calibration.drivetrain.torque import motor_current
+from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.problem.prior import Prior, SensorError, own_name
@@ -20,7 +21,7 @@ from regolithd.calibration.terrain.wheel_soil import LARGEST_CONTACT_ANGLE_RAD, 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.answer import Contribution
+    from regolithd.calibration.mismatch.candidates.candidate import Shape
     from regolithd.calibration.mismatch.data.recording import Recording
 
 Array = NDArray[np.float64]
@@ -209,6 +210,19 @@ class RoverWheel(Simulation):
         left = tuple(effect for effect in effects if not _absorb(drivetrain, self.tables.drivetrain.ratio, effect))
         return {**tables, "drivetrain": drivetrain}, left
 
+    def stated_effects(self) -> Sequence[Contribution]:
+        """Return the friction that `[drivetrain]` has, one for each group of wheels with the same value."""
+        drivetrain = self.tables.drivetrain
+        coulomb = _stated("coulomb-friction", {}, drivetrain.no_load_current_A, drivetrain.no_load_current_std_A, 1.0)
+        viscous = _stated(
+            "viscous-friction",
+            {"power": 1.0},
+            drivetrain.viscous_current_A_s_per_rad,
+            drivetrain.viscous_current_std_A_s_per_rad,
+            drivetrain.ratio,
+        )
+        return (*coulomb, *viscous)
+
     def _place_m(self, inputs: Mapping[str, Array], speed: Array) -> Array:
         """Return how far along the way each wheel is [m]: what the middle has driven, and where the axle stands.
 
@@ -246,6 +260,20 @@ def _add_friction(drivetrain: dict[str, Any], names: tuple[str, str], value: flo
     before, std = (np.broadcast_to(np.asarray(drivetrain[name], np.float64), (WHEELS,)) for name in names)
     drivetrain[names[0]] = (before + value * on).tolist()
     drivetrain[names[1]] = np.hypot(std, effect.relative_std * value * on).tolist()
+
+
+def _stated(
+    name: str, shape: Shape, values: Sequence[float], stds: Sequence[float], per_wheel_speed: float
+) -> tuple[Contribution, ...]:
+    """Return the effects of a friction that is stated for each wheel; wheels without it have none."""
+    groups: dict[tuple[float, float], list[int]] = {}
+    for wheel, pair in enumerate(zip(values, stds, strict=True), 1):
+        if pair[0] > 0:
+            groups.setdefault(pair, []).append(wheel)
+    return tuple(
+        Contribution(name, dict(shape), (value * per_wheel_speed,), tuple(wheels), std / value)
+        for (value, std), wheels in groups.items()
+    )
 
 
 def slip_sunk(contact_angle_rad: Array, slip: Array, strength: float) -> Array:

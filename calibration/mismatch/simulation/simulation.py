@@ -125,6 +125,10 @@ class Simulation:
         """Return parameters outside the priors that candidates may move, with their neutral values."""
         return {}
 
+    def stated_effects(self) -> Sequence[Contribution]:
+        """Return effects of the library that `predict` has already, so that a change of them is called by its name."""
+        return ()
+
     def candidates(self, library: Sequence[Candidate]) -> Sequence[Candidate]:
         """Return the physics to look for: by default the whole library, of which what fits the covariates is used.
 

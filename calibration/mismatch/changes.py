@@ -1,0 +1,177 @@
+"""Effects that a corrected simulation has already: in its prediction, with a prior, and what changed of them.
+
+The size of each is a free parameter held by its own standard deviation, so that a recording which agrees is consistent.
+What lies further away than that is named as a change of this effect: more, less or gone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.answer import Change, Contribution
+from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.problem.problem import StatedEffect
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from regolithd.calibration.mismatch.answer import Parameter
+    from regolithd.calibration.mismatch.problem.problem import Problem
+
+Array = NDArray[np.float64]
+
+RELATIVE_CHANGE = "relative_change"
+"""The change's coefficient: 0 is unchanged, 1 twice as large, −1 gone."""
+GONE_WITHIN = 0.1
+"""Share of its size below which an effect whose interval holds 0 is called gone in words (a choice)."""
+
+
+@dataclass(frozen=True)
+class Stated:
+    """An effect as it was corrected, and the candidate that it is of."""
+
+    candidate: Candidate
+    contribution: Contribution
+    in_simulation: bool
+
+    def column(self, problem: Problem) -> Array:
+        """Return what it adds to the prediction, shape (time, wheel)."""
+        columns = np.where(problem.mask, self.candidate.columns(problem, self.contribution.shape), 0.0)
+        on = np.isin(np.array(problem.recording.wheels, dtype=object), list(self.contribution.wheels))
+        coefficients = np.array(self.contribution.coefficients, np.float64)
+        if len(coefficients) != len(columns):
+            raise SimulationError(
+                f"[[effects]] {self.contribution.name}: {len(columns)} coefficients are needed, not {len(coefficients)}"
+            )
+        return np.einsum("c,ctw,w->tw", coefficients, columns, on)
+
+
+class ChangedSize(Candidate):
+    """A relative change of an effect that the simulation was corrected by."""
+
+    coefficients: ClassVar = (Coefficient(RELATIVE_CHANGE, "1", 0),)
+
+    def __init__(self, stated: Stated) -> None:
+        of = stated.candidate
+        self.stated = stated
+        for name in ("name", "covariate", "equation", "signature", "experiment", "source", "label", "along_motion"):
+            setattr(self, name, getattr(of, name))
+        self.words = f"a change of a corrected effect: {of.words}"  # type: ignore[misc]
+        self.sharing, self.channel = of.sharing, of.channel  # type: ignore[misc]
+        self.acts_unloaded = of.acts_unloaded  # type: ignore[misc]
+
+    def applies(self, problem: Problem) -> bool:
+        """Return whether the effect can act in this recording at all."""
+        return bool(np.any(self.stated.column(problem)))
+
+    def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
+        """Return the shape that was corrected, alone."""
+        return [dict(self.stated.contribution.shape)]
+
+    def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002
+        """Return the effect as it was corrected."""
+        return self.stated.column(problem)[None]
+
+
+def stated_in(
+    candidates: Sequence[Candidate], effects: Sequence[Contribution], in_simulation: Sequence[Contribution]
+) -> tuple[Stated, ...]:
+    """Return the effects that a simulation has: those to add on its output, and those that it predicts itself.
+
+    Raises
+    ------
+    SimulationError
+        When there is no candidate of an effect's name.
+    """
+    known = {candidate.name: candidate for candidate in candidates}
+    found = []
+    for inside, listed in ((False, _merged(effects)), (True, _merged(in_simulation))):
+        for effect in listed:
+            if effect.name not in known:
+                raise SimulationError(f"there is no effect {effect.name!r}; known are {', '.join(sorted(known))}")
+            found.append(Stated(known[effect.name], effect, inside))
+    return tuple(found)
+
+
+def _merged(effects: Sequence[Contribution]) -> list[Contribution]:
+    """Return the effects with those of one name, shape and wheels summed: a correction of a correction."""
+    found: dict[tuple[str, str, tuple[int | str, ...]], Contribution] = {}
+    for effect in effects:
+        key = (effect.name, repr(sorted(effect.shape.items(), key=str)), effect.wheels)
+        if key not in found:
+            found[key] = effect
+            continue
+        before = found[key]
+        total = np.add(before.coefficients, effect.coefficients)
+        sizes = [float(np.linalg.norm(each.coefficients)) for each in (before, effect)]
+        spread = float(np.hypot(before.relative_std * sizes[0], effect.relative_std * sizes[1]))
+        relative = spread / max(float(np.linalg.norm(total)), 1e-300)
+        found[key] = replace(before, coefficients=tuple(total.tolist()), relative_std=relative)
+    return list(found.values())
+
+
+def corrected_problem(problem: Problem, stated: Sequence[Stated]) -> Problem:
+    """Return the problem whose prediction has the effects, with how well the size of each is known."""
+    effects = tuple(
+        StatedEffect(
+            name=each.contribution.name,
+            wheels=each.contribution.wheels,
+            column=each.column(problem),
+            relative_std=each.contribution.relative_std,
+            in_simulation=each.in_simulation,
+        )
+        for each in stated
+    )
+    added = replace(problem, stated=effects).added
+    return replace(problem, stated=effects, prediction=problem.prediction + added)
+
+
+def with_changes(problem: Problem, candidates: Sequence[Candidate], stated: Sequence[Stated]) -> tuple[Candidate, ...]:
+    """Return the candidates, with a change of each stated effect in the place of the effect itself.
+
+    Where an effect is on some wheels alone, it is still looked for on the others.
+    """
+    measured = {name for k, name in enumerate(problem.recording.wheels) if problem.mask[:, k].any()}
+    covered = {each.candidate.name for each in stated if measured <= set(each.contribution.wheels)}
+    kept = [candidate for candidate in candidates if candidate.name not in covered]
+    return (*kept, *(ChangedSize(each) for each in stated))
+
+
+def contribution_of_change(change: ChangedSize, relative_change: float) -> Contribution:
+    """Return what a corrected simulation has to add for the change."""
+    of = change.stated.contribution
+    coefficients = tuple(relative_change * value for value in of.coefficients)
+    return replace(of, coefficients=coefficients, relative_std=0.0)
+
+
+def changes_of(change: ChangedSize, parameters: Mapping[str, Parameter]) -> tuple[Change, ...]:
+    """Return, for each coefficient of the effect, what was corrected and what it is now."""
+    of, candidate = change.stated.contribution, change.stated.candidate
+    relative = parameters[RELATIVE_CHANGE]
+    named = candidate.parameters(of.shape, list(of.coefficients))
+    found = []
+    for coefficient in candidate.coefficients[: len(of.coefficients)]:
+        if coefficient.name not in named:
+            continue
+        value = named[coefficient.name]
+        low, high = sorted((value * (1 + relative.low), value * (1 + relative.high)))
+        found.append(Change(of.name, coefficient.name, value, value * (1 + relative.value), low, high))
+    return tuple(found)
+
+
+def change_in_words(change: Change) -> str:
+    """Return one sentence about a change."""
+    ratio = change.now / change.corrected if change.corrected else float("inf")
+    if min(change.low, change.high) <= 0 <= max(change.low, change.high) and abs(ratio) < GONE_WITHIN:
+        told = "is gone"
+    else:
+        told = f"is {'larger' if abs(ratio) > 1 else 'smaller'} than the corrected simulation has it"
+    return (
+        f"{change.name} {told}: {change.parameter} {change.now:.4g} "
+        f"(90 % sure: {change.low:.4g} to {change.high:.4g}), corrected {change.corrected:.4g}."
+    )
