@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import Answer, FitImprovement
+from regolithd.calibration.mismatch.calibration import bent, linearised_where_it_fits, moved_values
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import change_in_words, corrected_problem, stated_in, with_changes
 from regolithd.calibration.mismatch.findings import (
@@ -37,7 +38,7 @@ from regolithd.calibration.mismatch.signal.noise import estimate_noise
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from regolithd.calibration.mismatch.answer import CalibratedParameter, Contribution, Evidence
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
@@ -47,6 +48,10 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.selection.decision import Decision
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
+
+
+SEARCHES = 2
+"""Searches at most (a choice): the second where the effects that were found move the parameters far."""
 
 
 @dataclass(frozen=True)
@@ -80,14 +85,22 @@ def compare(
     """
     progress("simulating")
     candidates = simulation.candidates(library())
-    problem = build_problem(recording, simulation, thresholds=thresholds)
     stated = stated_in(candidates, effects, simulation.stated_effects())
-    problem = corrected_problem(problem, stated)
+
+    def pose(values: Mapping[str, float] | None) -> Problem:
+        return corrected_problem(build_problem(recording, simulation, values, thresholds=thresholds), stated)
+
+    problem = linearised_where_it_fits(pose)
     candidates = with_changes(problem, candidates, stated)
-    progress("computing the columns of all candidates")
-    equations, applicable = equations_of(problem, candidates)
-    progress("searching")
-    decision = decide(equations, applicable)
+    for _ in range(SEARCHES):
+        progress("computing the columns of all candidates")
+        equations, applicable = equations_of(problem, candidates)
+        progress("searching")
+        decision = decide(equations, applicable)
+        values = moved_values(decision.equations, decision.whole)
+        if not bent(problem, values):
+            break
+        problem = pose(values)
     progress("measuring on held-out blocks and comparing with rivals")
     answer = _answer(decision, candidates, applicable, grid=equations.design.groups)
     evidence = replace(

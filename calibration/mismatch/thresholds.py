@@ -69,6 +69,17 @@ class Thresholds:
         "Standard deviations of its prior beyond which a calibrated parameter is a finding of its own.",
         "standard: a normal density has one in 370 beyond three standard deviations",
     )
+    furthest_linearisation_stds: float = _threshold(
+        8.0,
+        "Standard deviations of its prior beyond which no parameter is moved to linearise the simulation there.",
+        f"{CHOICE}: further away a simulation may leave the range in which it can be run",
+    )
+    linearisation_share: float = _threshold(
+        0.03,
+        "Difference between the simulation and its tangents, as a share of the residual's root mean square, from which "
+        "the simulation is linearised anew.",
+        f"{CHOICE}: it adds a thousandth to the residual's power",
+    )
     fewest_readings: int = _threshold(
         100, "Readings below which nothing is compared.", f"{CHOICE}: ten for each of about ten free parameters"
     )

@@ -36,7 +36,7 @@ class TorqueConstantTemperature(Candidate):
     signature = "a residual along the predicted current that grows with temperature, through zero at T_0"
     experiment = "start cold, warm up, stop until cold again and repeat, so that temperature does not follow time"
     source = "magnet data sheets: NdFeB −0.1 %/K, ferrite −0.2 %/K, T_0 20 to 25 °C"
-    requires = ("temperature",)
+    requires = ("temperature", "torque")
     coefficients: ClassVar = (Coefficient("temperature_coefficient", "1/K"),)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:

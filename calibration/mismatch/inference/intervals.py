@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,8 @@ Index = NDArray[np.int64]
 
 NINE_TENTHS = (0.05, 0.95)
 """Quantiles of a 90 % interval."""
+LEAST_MARGIN = 0.05
+"""Share of the interval's width by which it reaches beyond its value (a choice: a value is never its own bound)."""
 UNIT_OF_ENDING = {"_rad_s": "rad/s", "_degC": "degC", "_K": "K", "_s": "s"}
 
 
@@ -66,7 +69,11 @@ def _of_term(
             drawn[name].append(value)
     units = {c.name: c.unit.format(unit=equations.problem.simulation.unit) for c in candidate.coefficients}
     units |= {name: unit_of(name) for name in candidate.free}
-    found = {name: interval(value, drawn[name], units.get(name, "1")) for name, value in central.items()}
+    limits = candidate.bounds(equations.problem, shape)
+    found = {
+        name: within(interval(value, drawn[name], units.get(name, "1")), limits.get(name))
+        for name, value in central.items()
+    }
     onset = candidate.change_point
     if onset in shape and onset in candidate.free:
         found[onset] = Parameter(float(shape[onset]), *onset_bounds(equations, fit, index), unit_of(onset))
@@ -74,9 +81,17 @@ def _of_term(
 
 
 def interval(value: float, drawn: list[float] | Array, unit: str) -> Parameter:
-    """Return a value with the bounds of its draws; the value itself is always within."""
-    low, high = np.quantile(drawn, NINE_TENTHS)
-    return Parameter(value, float(min(low, value)), float(max(high, value)), unit)
+    """Return a value with the bounds of its draws; a value outside of them widens the interval beyond itself."""
+    low, high = (float(bound) for bound in np.quantile(drawn, NINE_TENTHS))
+    margin = LEAST_MARGIN * (high - low)
+    return Parameter(value, min(low, value - margin), max(high, value + margin), unit)
+
+
+def within(parameter: Parameter, bounds: tuple[float, float] | None) -> Parameter:
+    """Return a parameter whose interval stays within the declared bounds."""
+    if bounds is None:
+        return parameter
+    return replace(parameter, low=max(parameter.low, bounds[0]), high=min(parameter.high, bounds[1]))
 
 
 def unit_of(name: str) -> str:

@@ -27,7 +27,8 @@ def covariates_of(
     """Return what was measured, and what follows from it; what was never measured or never varies is left out."""
     found = dict(simulation.covariates(inputs))
     found["time"] = np.broadcast_to(_elapsed(recording)[:, None], recording.shape)
-    found.setdefault("torque", np.abs(prediction))
+    if not simulation.arbitrary_zero:
+        found.setdefault("torque", np.abs(prediction))
     if "wheel_speed" in found:
         speed = found["wheel_speed"]
         found["direction"] = np.sign(speed)

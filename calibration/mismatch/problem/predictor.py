@@ -57,6 +57,10 @@ class Predictor(Protocol):
         """What to do between the readings of a channel that is sampled less often than the rows."""
 
     @property
+    def arbitrary_zero(self) -> bool:
+        """Whether the predicted channel's zero means nothing: then nothing is in proportion to it."""
+
+    @property
     def undefined_at_times(self) -> frozenset[str]:
         """Covariates whose NaN means that they do not apply, not that they were not measured."""
 

@@ -95,8 +95,13 @@ class Problem:
 
     @property
     def mean_size(self) -> float:
-        """The predicted channel's mean magnitude: what effects are measured against."""
-        return float(np.mean(np.abs(self.measured[self.mask])))
+        """The predicted channel's mean magnitude: what effects are measured against.
+
+        Of a channel with an arbitrary zero, a temperature in °C or K, it is the mean magnitude about each wheel's mean.
+        """
+        known = np.where(self.mask, self.measured, np.nan)[:, self.mask.any(axis=0)]
+        centre = np.nanmean(known, axis=0) if self.simulation.arbitrary_zero else 0.0
+        return float(np.nanmean(np.abs(known - centre)))
 
     @property
     def filled(self) -> Array:

@@ -212,7 +212,9 @@ class NormalEquations:
             matrix += np.outer(share[:, w], share[:, w]) * self.gram[w][np.ix_(index, index)]
         base = len(self.nuisance.columns)
         matrix[range(base), range(base)] += self.nuisance.precision
-        return matrix, np.einsum("cw,wc->c", share, self.moment[:, index])
+        moment = np.einsum("cw,wc->c", share, self.moment[:, index])
+        moment[:base] += self.nuisance.precision * self.nuisance.centre
+        return matrix, moment
 
 
 def normal_equations(

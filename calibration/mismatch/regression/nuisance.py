@@ -26,12 +26,14 @@ class Nuisance:
     names: of the parameters; a wheel's own deviation is named by `own_name`
     columns: indices in the design matrix
     precision: one over the prior variance of each scaled coefficient, shape (parameter,)
+    centre: the prior's mean of each scaled coefficient: 0 at the stated values, shape (parameter,)
     stated: those of the names that are sizes of effects which the simulation was corrected by
     """
 
     names: tuple[str, ...]
     columns: tuple[int, ...]
     precision: Array
+    centre: Array
     stated: frozenset[str] = frozenset()
 
     def with_precision(self, place: int, value: float) -> Nuisance:
@@ -44,11 +46,19 @@ class Nuisance:
 def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:
     """Add ∂prediction/∂parameter of every parameter whose prior has a spread, and of each wheel's own deviation."""
     names, stds, tangents = _tangents(design.problem)
+    away = np.array([_from_prior(design.problem, name) for name in names])
     design, places = design.extended(tangents)
     # The coefficient of a column that was divided by its scale is the parameter's shift times that scale.
     precision = 1 / (np.array(stds) * design.scale[list(places)]) ** 2 if places else np.zeros(0)
+    centre = away * design.scale[list(places)] if places else np.zeros(0)
     stated = frozenset(stated_name(effect.name) for effect in design.problem.stated)
-    return design, Nuisance(tuple(names), places, precision, stated)
+    return design, Nuisance(tuple(names), places, precision, centre, stated)
+
+
+def _from_prior(problem: Problem, name: str) -> float:
+    """Return how far the prior's mean is from where the problem is linearised; 0 for a wheel's own deviation."""
+    prior = problem.simulation.parameters.get(name)
+    return 0.0 if prior is None else prior.value - problem.values[name]
 
 
 def _tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:

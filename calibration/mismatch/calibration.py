@@ -1,0 +1,85 @@
+"""Calibration of a simulation that is not linear in its parameters: it is linearised anew where the fit leads.
+
+The engine fits the parameters by the tangents of the prediction. Where those, over the distance that a parameter moves,
+differ from what the simulation itself predicts, the problem is posed again at the new values, with the priors as stated
+(Gauss and Newton's method), until the two agree: what the answer calls calibrated has been run.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from regolithd.calibration.mismatch.regression.blocks import blocks_of_time, folds_of_blocks
+from regolithd.calibration.mismatch.regression.design_matrix import empty_design
+from regolithd.calibration.mismatch.regression.normal_equations import normal_equations
+from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
+from regolithd.calibration.mismatch.signal.noise import estimate_noise
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+STEPS = 6
+"""Linearisations at most (a choice: a smooth simulation needs two or three)."""
+
+
+def linearised_where_it_fits(pose: Callable[[Mapping[str, float] | None], Problem]) -> Problem:
+    """Return the problem, linearised where its parameters alone fit the recording best.
+
+    `pose` builds the problem at given values, or at the stated ones.
+    """
+    problem = pose(None)
+    for _ in range(STEPS):
+        equations = free_parameters(problem)
+        values = moved_values(equations, equations.fit(()))
+        if not bent(problem, values):
+            break
+        problem = pose(values)
+    return problem
+
+
+def free_parameters(problem: Problem) -> NormalEquations:
+    """Return the normal equations of the simulation's free parameters alone."""
+    residual = np.where(problem.mask, problem.measured - problem.filled, 0.0)
+    noise = estimate_noise(residual, problem.mask, problem.thresholds)
+    folds = folds_of_blocks(problem, blocks_of_time(problem, noise))
+    design, nuisance = with_nuisance(empty_design(problem, folds))
+    return normal_equations(design, nuisance, noise.weights)
+
+
+def moved_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:
+    """Return the parameters' values in a fit, without the wheels' own deviations."""
+    problem, nuisance = equations.problem, equations.nuisance
+    values = dict(problem.values)
+    limits = problem.thresholds.furthest_linearisation_stds
+    for place, name in enumerate(nuisance.names):
+        prior = problem.simulation.parameters.get(name)
+        if prior is not None:
+            shift = float(fit.coefficients[place] / equations.design.scale[nuisance.columns[place]])
+            reach = limits * prior.std
+            values[name] = float(np.clip(values[name] + shift, prior.value - reach, prior.value + reach))
+    return values
+
+
+def bent(problem: Problem, values: Mapping[str, float]) -> bool:
+    """Return whether the prediction at other values differs from its tangents by more than the noise lets pass."""
+    shifts = {name: values[name] - problem.values[name] for name in values if values[name] != problem.values[name]}
+    if not shifts:
+        return False
+    along = problem.filled + sum(shift * problem.tangent(name) for name, shift in shifts.items())
+    run = problem.changed(**shifts_to_values(problem, shifts))
+    apart = (run - along)[problem.mask]
+    residual = (problem.measured - run)[problem.mask]
+    if not np.isfinite(apart).all():
+        return False
+    return float(np.mean(apart**2)) > problem.thresholds.linearisation_share**2 * float(np.mean(residual**2))
+
+
+def shifts_to_values(problem: Problem, shifts: Mapping[str, float]) -> dict[str, float]:
+    """Return the values that the shifts lead to."""
+    return {name: problem.values[name] + shift for name, shift in shifts.items()}
