@@ -160,6 +160,7 @@ class Contribution:
     coefficients: one for each of its columns
     wheels: the names of the wheels that have it
     relative_std: relative standard deviation of its size
+    channel: the predicted channel that it acts on; empty where there is one alone
     """
 
     name: str
@@ -167,6 +168,7 @@ class Contribution:
     coefficients: tuple[float, ...]
     wheels: tuple[int | str, ...]
     relative_std: float = 0.0
+    channel: str = ""
 
 
 @dataclass(frozen=True)

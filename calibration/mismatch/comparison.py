@@ -26,6 +26,7 @@ from regolithd.calibration.mismatch.inference.evidence import evidence_of
 from regolithd.calibration.mismatch.inference.held_out import held_out_errors
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
+from regolithd.calibration.mismatch.inference.several_channels import merged_answers
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time, folds_of_blocks
 from regolithd.calibration.mismatch.regression.candidate_groups import with_candidates
@@ -35,6 +36,7 @@ from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection.decision import decide
 from regolithd.calibration.mismatch.signal.noise import estimate_noise
+from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
@@ -83,6 +85,21 @@ def compare(
     MismatchError
         When there is nothing to compare.
     """
+    if simulation.channels:
+        found = [
+            _labelled(
+                compare(
+                    recording,
+                    OneChannel(simulation, channel),
+                    effects=[e for e in effects if e.channel == channel],
+                    thresholds=thresholds,
+                    progress=progress,
+                ),
+                channel,
+            )
+            for channel in simulation.channels
+        ]
+        return merged(found)
     progress("simulating")
     candidates = simulation.candidates(library())
     stated = stated_in(candidates, effects, simulation.stated_effects())
@@ -110,6 +127,21 @@ def compare(
         wheel_column=simulation.wheel_column,
     )
     return Comparison(answer, evidence)
+
+
+def _labelled(comparison: Comparison, channel: str) -> Comparison:
+    """Return a comparison whose terms say which channel they are of."""
+    terms = tuple(replace(term, channel=channel) for term in comparison.evidence.contributions)
+    return replace(comparison, evidence=replace(comparison.evidence, contributions=terms))
+
+
+def merged(comparisons: Sequence[Comparison]) -> Comparison:
+    """Return one comparison of several channels: every finding, and the pictures of the channel with most of them."""
+    answer = merged_answers([each.answer for each in comparisons])
+    shown = max(comparisons, key=lambda each: len(each.answer.effects) + len(each.answer.unexplained))
+    terms = tuple(term for each in comparisons for term in each.evidence.contributions)
+    values = {parameter.name: parameter.value for parameter in answer.parameters}
+    return Comparison(answer, replace(shown.evidence, contributions=terms, values=values))
 
 
 def equations_of(problem: Problem, candidates: Sequence[Candidate]) -> tuple[NormalEquations, tuple[Candidate, ...]]:

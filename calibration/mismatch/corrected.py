@@ -112,6 +112,7 @@ def stated_effects(tables: Mapping[str, Any]) -> tuple[Contribution, ...]:
                     tuple(float(c) for c in effect["coefficients"]),
                     tuple(w if isinstance(w, str) else int(w) for w in effect["wheels"]),
                     float(effect.get("relative_std", 0.0)),
+                    str(effect.get("channel", "")),
                 )
             )
         except (KeyError, TypeError, ValueError) as error:

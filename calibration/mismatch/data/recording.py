@@ -24,6 +24,8 @@ Column = NDArray[Any]
 """Numbers; text in the column that tells wheels apart."""
 
 TIME = "t_s"
+TIME_UNITS_S = {"t_s": 1.0, "t_ms": 1e-3, "t_us": 1e-6, "t_ns": 1e-9, "t_min": 60.0, "t_h": 3600.0}
+"""Names that the column of time may have, and their unit in seconds."""
 UNIT = "wheel"
 RUN = "run"
 MOST_CLOCK_JUMPS = 3
@@ -129,7 +131,7 @@ def _as_columns(table: object, path: Path, unit: str) -> dict[str, Column]:
             columns[name] = column.cast(pa.float64()).to_numpy(zero_copy_only=False).astype(np.float64)
         elif name == unit and (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
             columns[name] = np.array([value or "" for value in column.to_pylist()])
-        elif (wrong := _cell_gone_wrong(column.to_pylist(), everywhere=name in {TIME, RUN})) is not None:
+        elif (wrong := _cell_gone_wrong(column.to_pylist(), everywhere=name in {*TIME_UNITS_S, RUN})) is not None:
             row, text = wrong
             raise RecordingError(
                 f"{path}: column {name}, row {row + 2}: {text!r} is not a number. Leave a cell empty where nothing was "
@@ -162,10 +164,15 @@ def from_columns(columns: Mapping[str, Column], *, unit: str = UNIT) -> Recordin
     RecordingError
         When there is no time, or fewer than two instants.
     """
-    if TIME not in columns:
-        raise RecordingError(f"there is no column {TIME}; found {', '.join(columns) or 'nothing'}")
+    given = {str(name): np.asarray(values) for name, values in columns.items()}
+    clock = next((name for name in TIME_UNITS_S if name in given), None)
+    if clock is None:
+        raise RecordingError(
+            f"there is no column of time ({', '.join(TIME_UNITS_S)}); found {', '.join(given) or 'nothing'}"
+        )
     notes: list[str] = []
-    given = {name: np.asarray(values) for name, values in columns.items()}
+    if clock != TIME:
+        given[TIME] = TIME_UNITS_S[clock] * _numbers(clock, given.pop(clock))
     names, place = _parts(given.pop(unit, np.ones(len(given[TIME]))))
     table = {name: _numbers(name, values) for name, values in given.items()} | {unit: place}
     rows = len(table[TIME])
@@ -191,6 +198,8 @@ def from_columns(columns: Mapping[str, Column], *, unit: str = UNIT) -> Recordin
         time_s[run == number] -= time_s[run == number][0]
     _note_gaps(time_s, run, notes)
     _note_channels(channels, wheels, unit, notes)
+    if clock != TIME:
+        channels[clock] = np.repeat(time_s[:, None] / TIME_UNITS_S[clock], len(wheels), axis=1)
     return Recording(time_s, run, wheels, channels, tuple(notes))
 
 

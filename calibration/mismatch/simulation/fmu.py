@@ -1,26 +1,21 @@
 """A simulation that is an FMU (FMI 2 or 3, co-simulation or model exchange), through FMPy; no Python is written.
 
     [simulation]
-    model = "tank.fmu"                 # beside SIM.toml, or a path
+    model = "tank.fmu"                       # beside SIM.toml, or with its path
 
-    [fmu]
-    channel = "level_m"                # the recorded column that is predicted
-    unit = "m"
+    [variables]                              # the FMU's variable = the recorded column
+    voltage = "pump_voltage_V"               # an input
+    level = "level_m"                        # an output: a channel that is predicted
 
-    [fmu.variables]                    # recorded column = variable of the FMU
-    level_m = "tank.h"                 # an output: what is predicted
-    pump_voltage_V = "u"               # inputs
-
-    [fmu.covariates]                   # what a residual may depend on = recorded column
+    [covariates]                             # what left-out physics may depend on = the recorded column
     wheel_speed = "pump_speed_rad_s"
 
-    [parameters.area_m2]               # a parameter; `variable` where the FMU calls it otherwise
-    variable = "tank.A"
+    [parameters.area_m2]                     # a parameter of the FMU that is known with an error
     value = 0.5
     std = 0.01
-    unit = "m2"
 
-Each run of the recording is simulated by itself, from its first instant. Results are cached by inputs and values.
+Which variables are inputs, which outputs, and their units, the FMU says. Every mapped output that the recording has is
+compared. Each run of the recording is simulated by itself, from its first instant.
 """
 
 from __future__ import annotations
@@ -29,6 +24,7 @@ import hashlib
 import shutil
 import tempfile
 import weakref
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -53,26 +49,25 @@ class FmuSimulation(Simulation):
 
     def __init__(self, path: Path, tables: Mapping[str, Any]) -> None:
         fmpy = _fmpy()
-        table = _table(tables)
-        self.channel, self.unit = str(table["channel"]), str(table.get("unit", "1"))  # type: ignore[misc]
-        self.wheel_column = str(table.get("wheel_column", "wheel"))  # type: ignore[misc]
         self.stated = tables
         self._description = _described(fmpy, path)
         known = {variable.name: variable for variable in self._description.modelVariables}
-        variables = {str(column): str(name) for column, name in table["variables"].items()}
-        self._covariates = {str(name): str(column) for name, column in table.get("covariates", {}).items()}
-        for column, name in variables.items():
-            _variable(known, name, path, f"[fmu.variables] {column}")
-        if self.channel not in variables:
-            raise SimulationError(f"[fmu.variables] needs {self.channel}, the predicted channel, and its variable")
-        self._output = variables.pop(self.channel)
-        self._inputs = variables
-        self.inputs = tuple(variables)  # type: ignore[misc]
-        self.parameters, self._start = _parameters(tables.get("parameters", {}), known, path)
+        mapped = _mapped(tables, known, path)
+        self._inputs = {column: name for name, column in mapped.items() if known[name].causality == "input"}
+        self._outputs = {column: name for name, column in mapped.items() if known[name].causality == "output"}
+        if not self._outputs:
+            raise SimulationError(f"[variables] maps no output of {path.name} to a column: there is nothing to compare")
+        units = {column: str(known[name].unit or "1") for column, name in self._outputs.items()}
+        self.channel, self.unit = next(iter(units.items()))  # type: ignore[misc]
+        self.channels = units if len(units) > 1 else {}  # type: ignore[misc]
+        self.inputs = tuple(self._inputs)  # type: ignore[misc]
+        self.wheel_column = str(tables.get("simulation", {}).get("wheel_column", "wheel"))  # type: ignore[misc]
+        self._covariates = {str(name): str(column) for name, column in tables.get("covariates", {}).items()}
+        self.parameters = _parameters(tables.get("parameters", {}), known, path)
         self._unpacked = Path(tempfile.mkdtemp(prefix="fmu-"))
         weakref.finalize(self, shutil.rmtree, self._unpacked, ignore_errors=True)
         fmpy.extract(str(path), str(self._unpacked))
-        self._results: dict[bytes, Array] = {}
+        self._results: dict[bytes, dict[str, Array]] = {}
 
     @classmethod
     def from_file(cls, path: Path, tables: Mapping[str, Any]) -> Self:
@@ -85,42 +80,42 @@ class FmuSimulation(Simulation):
         """
         return cls(path, tables)
 
-    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
-        """Simulate every run and every column, shape (time, wheel)."""
-        found: Array = np.full(inputs["t_s"].shape, np.nan)
-        for wheel in range(found.shape[1]):
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Any:  # noqa: ANN401  # one or several
+        """Simulate every run and every column: the channel, shape (time, wheel), or a mapping of several."""
+        found: dict[str, Array] = {column: np.full(inputs["t_s"].shape, np.nan) for column in self._outputs}
+        for wheel in range(inputs["t_s"].shape[1]):
             for run in np.unique(inputs["run"][:, 0]):
                 rows = inputs["run"][:, 0] == run
                 columns = {column: inputs[column][rows, wheel] for column in self._inputs}
-                found[rows, wheel] = self._result(inputs["t_s"][rows, 0], columns, values)
-        return found
+                for column, result in self._result(inputs["t_s"][rows, 0], columns, values).items():
+                    found[column][rows, wheel] = result
+        return found if self.channels else found[self.channel]
 
     def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
-        """Return the columns that `[fmu.covariates]` names."""
+        """Return what `[covariates]` names, and every input by the name of its column."""
         named = {name: inputs[column] for name, column in self._covariates.items() if column in inputs}
-        return {"time": inputs["t_s"], **named}
+        plain = {column: inputs[column] for column in self._inputs if column not in self._covariates.values()}
+        return {"time": inputs["t_s"], **plain, **named}
 
     def corrected_tables(self, values: Mapping[str, float]) -> dict[str, Any]:
         """Return `[parameters]` with the values that the recording gave them."""
         stated = self.stated.get("parameters", {})
         return {"parameters": {name: {**stated[name], "value": float(values[name])} for name in self.parameters}}
 
-    def _result(self, time_s: Array, columns: Mapping[str, Array], values: Mapping[str, float]) -> Array:
-        stated = [values[name] for name in self._start]
-        key = hashlib.blake2b(
-            b"".join(part.tobytes() for part in (time_s, *columns.values(), np.array(stated, np.float64)))
-        ).digest()
+    def _result(self, time_s: Array, columns: Mapping[str, Array], values: Mapping[str, float]) -> dict[str, Array]:
+        stated = [values[name] for name in self.parameters]
+        parts = (time_s, *columns.values(), np.array(stated, np.float64))
+        key = hashlib.blake2b(b"".join(part.tobytes() for part in parts)).digest()
         if key not in self._results:
             if len(self._results) >= KEPT_RESULTS:
                 self._results.pop(next(iter(self._results)))
             self._results[key] = self._simulate(time_s, columns, values)
         return self._results[key]
 
-    def _simulate(self, time_s: Array, columns: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+    def _simulate(self, time_s: Array, columns: Mapping[str, Array], values: Mapping[str, float]) -> dict[str, Array]:
         known = np.all([np.isfinite(column) for column in columns.values()], axis=0) if columns else time_s >= 0
         if known.sum() < 2:
-            return np.full(len(time_s), np.nan)
-        step_s = float(np.median(np.diff(time_s)))
+            return {column: np.full(len(time_s), np.nan) for column in self._outputs}
         names = ["time", *(self._inputs[column] for column in columns)]
         signal = np.zeros(int(known.sum()), [(name, np.float64) for name in names])
         for name, column in zip(names, (time_s, *columns.values()), strict=True):
@@ -131,14 +126,14 @@ class FmuSimulation(Simulation):
                 model_description=self._description,
                 start_time=float(time_s[0]),
                 stop_time=float(time_s[-1]),
-                output_interval=step_s,
-                start_values={variable: values[name] for name, variable in self._start.items()},
+                output_interval=float(np.median(np.diff(time_s))),
+                start_values={name: values[name] for name in self.parameters},
                 input=signal if columns else None,
-                output=[self._output],
+                output=list(self._outputs.values()),
             )
         except Exception as error:  # FMPy raises plain Exception for whatever a model does
             raise SimulationError(f"the FMU could not be simulated: {error}") from error
-        return np.interp(time_s, result["time"], result[self._output])
+        return {column: np.interp(time_s, result["time"], result[name]) for column, name in self._outputs.items()}
 
 
 def _fmpy() -> Any:  # noqa: ANN401  # a module without types
@@ -156,32 +151,39 @@ def _described(fmpy: Any, path: Path) -> Any:  # noqa: ANN401  # FMPy's own type
         raise SimulationError(f"{path} is not an FMU that can be read: {error}") from error
 
 
-def _table(tables: Mapping[str, Any]) -> Mapping[str, Any]:
-    table = tables.get("fmu")
-    if not isinstance(table, dict) or "channel" not in table or not isinstance(table.get("variables"), dict):
-        raise SimulationError("an FMU needs [fmu] channel, and [fmu.variables] with a variable for each column")
-    return table
+def _mapped(tables: Mapping[str, Any], known: Mapping[str, Any], path: Path) -> dict[str, str]:
+    """Return the FMU's variables and the recorded columns that they are."""
+    stated = tables.get("variables")
+    if not isinstance(stated, dict) or not stated:
+        raise SimulationError(
+            'an FMU needs [variables]: the FMU\'s variable = "recorded column", for inputs and outputs'
+        )
+    for name, column in stated.items():
+        _variable(known, name, path, "[variables]")
+        if not isinstance(column, str):
+            raise SimulationError(f"[variables] {name}: the name of a recorded column is needed, not {column!r}")
+    return dict(stated)
 
 
-def _variable(known: Mapping[str, Any], name: str, path: Path, where: str) -> str:
+def _variable(known: Mapping[str, Any], name: str, path: Path, where: str) -> None:
     if name not in known:
-        raise SimulationError(f"{where}: {path.name} has no variable {name!r}; it has {', '.join(sorted(known)[:20])}")
-    return name
+        near = get_close_matches(name, known, 1)
+        meant = f"did you mean {near[0]}?" if near else f"it has {', '.join(sorted(known)[:20])}"
+        raise SimulationError(f"{where} {name}: {path.name} has no such variable; {meant}")
 
 
-def _parameters(stated: object, known: Mapping[str, Any], path: Path) -> tuple[dict[str, Prior], dict[str, str]]:
-    """Return the priors, and the FMU's variable of each."""
+def _parameters(stated: object, known: Mapping[str, Any], path: Path) -> dict[str, Prior]:
+    """Return the priors of the FMU's parameters; without a value, the FMU's own start value."""
     if not isinstance(stated, dict):
         raise SimulationError("[parameters] must be a table of tables: [parameters.NAME] value = …, std = …")
-    priors, variables = {}, {}
+    priors = {}
     for name, fields in stated.items():
-        if not isinstance(fields, dict) or set(fields) - {"variable", "value", "std", "unit"}:
-            raise SimulationError(f"[parameters.{name}] takes variable, value, std and unit, not {fields!r}")
-        variable = _variable(known, str(fields.get("variable", name)), path, f"[parameters.{name}]")
-        start = fields.get("value", known[variable].start)
+        _variable(known, name, path, "[parameters]")
+        if not isinstance(fields, dict) or set(fields) - {"value", "std", "unit"}:
+            raise SimulationError(f"[parameters.{name}] takes value, std and unit, not {fields!r}")
+        unit = str(fields.get("unit", known[name].unit or "1"))
         try:
-            priors[name] = Prior(float(start), float(fields.get("std", 0.0)), str(fields.get("unit", "1")))
+            priors[name] = Prior(float(fields.get("value", known[name].start)), float(fields.get("std", 0.0)), unit)
         except (TypeError, ValueError) as error:
             raise SimulationError(f"[parameters.{name}] value and std must be numbers: {error}") from error
-        variables[name] = variable
-    return priors, variables
+    return priors

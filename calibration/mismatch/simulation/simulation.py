@@ -46,6 +46,9 @@ class Simulation:
     channel: ClassVar[str]
     """The recorded column that is predicted."""
     unit: ClassVar[str] = "1"
+    channels: ClassVar[Mapping[str, str]] = {}
+    """Several predicted columns with their units: {"thrust_N": "N", "torque_Nm": "N·m"}. Then `predict` returns a
+    mapping of arrays by these names, and `channel` and `unit` are not needed."""
     wheel_column: ClassVar[str] = "wheel"
     """The column that tells wheels (axes, sides, bodies) apart. A recording without it has one."""
     inputs: ClassVar[tuple[str, ...]] = ()

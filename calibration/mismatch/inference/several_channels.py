@@ -1,0 +1,54 @@
+"""One answer from the comparisons of several predicted channels that share the simulation's parameters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.answer import Answer, CalibratedParameter, Verdict
+
+NINETY_PERCENT_STDS = 1.645
+"""Half the width of a 90 % interval of a normal density, in standard deviations."""
+WORST_FIRST: tuple[Verdict, ...] = ("unexplained", "missing-physics", "consistent")
+
+
+def merged_answers(answers: Sequence[Answer]) -> Answer:
+    """Return the findings of all channels; the fit is of the channel that gains most."""
+    told = {answer.verdict for answer in answers}
+    best = max(
+        answers, key=lambda answer: answer.fit.held_out_rmse_before / max(answer.fit.held_out_rmse_after, 1e-300)
+    )
+    return replace(
+        best,
+        verdict=next(verdict for verdict in WORST_FIRST if verdict in told),
+        effects=tuple(each for answer in answers for each in answer.effects),
+        unexplained=tuple(each for answer in answers for each in answer.unexplained),
+        indistinguishable=tuple(dict.fromkeys(each for answer in answers for each in answer.indistinguishable)),
+        sensitivity=tuple(each for answer in answers for each in answer.sensitivity),
+        parameters=tuple(map(combined, *(answer.parameters for answer in answers))),
+        changes=tuple(each for answer in answers for each in answer.changes),
+        left_out=tuple(each for answer in answers for each in answer.left_out),
+        notes=tuple(dict.fromkeys(note for answer in answers for note in answer.notes)),
+    )
+
+
+def combined(*found: CalibratedParameter) -> CalibratedParameter:
+    """Return a parameter's posterior from independent channels: precisions add, the prior's counted once."""
+    prior_std = found[0].prior_std
+    stds = [(each.high - each.low) / (2 * NINETY_PERCENT_STDS) for each in found]
+    if prior_std == 0 or min(stds) == 0:
+        return found[0]
+    prior = 1 / prior_std**2
+    data = [max(1 / std**2 - prior, 0.0) for std in stds]
+    # Each channel's posterior is the prior's and its own data's mean, weighted by precision.
+    means = [
+        each.value + (each.value - each.prior) * prior / weight if weight > 0 else each.prior
+        for each, weight in zip(found, data, strict=True)
+    ]
+    total = prior + sum(data)
+    value = (prior * found[0].prior + sum(w * mean for w, mean in zip(data, means, strict=True))) / total
+    reach = NINETY_PERCENT_STDS / total**0.5
+    return replace(found[0], value=value, low=value - reach, high=value + reach)
