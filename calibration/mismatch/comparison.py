@@ -23,7 +23,7 @@ from regolithd.calibration.mismatch.findings import (
     verdict_of,
 )
 from regolithd.calibration.mismatch.inference.evidence import evidence_of
-from regolithd.calibration.mismatch.inference.held_out import held_out_errors
+from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, held_out_errors
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
 from regolithd.calibration.mismatch.inference.several_channels import merged_answers
@@ -34,7 +34,7 @@ from regolithd.calibration.mismatch.regression.design_matrix import empty_design
 from regolithd.calibration.mismatch.regression.normal_equations import normal_equations
 from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
-from regolithd.calibration.mismatch.selection.decision import decide
+from regolithd.calibration.mismatch.selection.decision import decide, without_name
 from regolithd.calibration.mismatch.signal.noise import estimate_noise
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
@@ -119,7 +119,8 @@ def compare(
             break
         problem = pose(values)
     progress("measuring on held-out blocks and comparing with rivals")
-    answer = _answer(decision, candidates, applicable, grid=equations.design.groups)
+    decision, held_out = earned(decision, equations.design.groups)
+    answer = _answer(decision, held_out, candidates, applicable)
     evidence = replace(
         evidence_of(decision),
         candidates=tuple(candidates),
@@ -157,14 +158,27 @@ def equations_of(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Nor
     return normal_equations(with_smooth_terms(design), nuisance, noise.weights), applicable
 
 
-def _answer(
-    decision: Decision, candidates: Sequence[Candidate], applicable: Sequence[Candidate], *, grid: Sequence[Group]
-) -> Answer:
-    """Return the answer; `grid` are the groups before any data optimised their shapes."""
+def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOutErrors]:
+    """Return the decision without names that lower no held-out error, the worst dropped first; and those errors.
+
+    `grid` are the groups before any data optimised their shapes.
+    """
     equations, threshold = decision.equations, decision.entry_threshold
     problem, kept = equations.problem, set(map(id, grid))
     choice = [group for group in equations.design.groups if id(group) in kept or _only_proposed(problem, group)]
     held_out = held_out_errors(equations, decision.named, choice, threshold)
+    while (idle := held_out.without_gain()) is not None:
+        decision = without_name(decision, idle)
+        held_out = held_out_errors(equations, decision.named, choice, threshold)
+    return decision, held_out
+
+
+def _answer(
+    decision: Decision, held_out: HeldOutErrors, candidates: Sequence[Candidate], applicable: Sequence[Candidate]
+) -> Answer:
+    """Return the answer."""
+    equations, threshold = decision.equations, decision.entry_threshold
+    problem, named = equations.problem, decision.named
     effects, changes = named_effects(decision, held_out)
     parameters = calibrated_parameters(decision)
     moved = beyond_prior(parameters, equations.thresholds)
@@ -176,7 +190,7 @@ def _answer(
         unexplained=tuple(unexplained(decision, term) for term in decision.unnamed),
         indistinguishable=sets,
         sensitivity=sensitivities(extended, decision.whole, candidates, threshold),
-        fit=FitImprovement(channel, held_out.before, held_out.after, floor),
+        fit=FitImprovement(channel, held_out.before, held_out.after if named.terms else held_out.before, floor),
         parameters=parameters,
         changes=changes,
         left_out=problem.left_out,

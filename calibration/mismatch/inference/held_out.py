@@ -45,6 +45,13 @@ class HeldOutErrors:
     without: tuple[float, ...]
     with_it: tuple[float, ...]
 
+    def without_gain(self) -> int | None:
+        """Return the index of the term that lowers the held-out error least, if it does not lower it at all."""
+        gains = [before - after for before, after in zip(self.without, self.with_it, strict=True)]
+        if not gains or min(gains) > 0:
+            return None
+        return gains.index(min(gains))
+
 
 def held_out_errors(
     equations: NormalEquations, named: Fit, groups: Sequence[Group], entry_threshold: float

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -74,6 +74,15 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
         unnamed=unnamed,
         whole=equations.fit((*named.terms, *unnamed)),
     )
+
+
+def without_name(decision: Decision, index: int) -> Decision:
+    """Return the decision without one of its named effects; what it leaves is held against the smooth terms again."""
+    equations, threshold = decision.equations, decision.entry_threshold
+    kept = equations.fit(decision.named.without(index))
+    named, unnamed = weigh_against_smooth_terms(equations, kept, (), threshold)
+    whole = equations.fit((*named.terms, *unnamed))
+    return replace(decision, named=named, unnamed=unnamed, whole=whole)
 
 
 def _largest_that_passes(equations: NormalEquations, subsets: Sequence[Fit], threshold: float) -> Fit:
