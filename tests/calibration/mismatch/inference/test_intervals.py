@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from linear_machine import NOISE, equations_of, problem_of, table, term_of
 
-from regolithd.calibration.mismatch.inference.intervals import interval, normal_draws, parameters_of, unit_of
+from regolithd.calibration.mismatch.inference.intervals import interval, normal_draws, parameters_of, unit_of, within
 from regolithd.calibration.mismatch.inference.sandwich import block_sums, linearised, sandwich
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
@@ -120,11 +120,19 @@ def test_draws_have_the_covariance_that_is_asked() -> None:
 
 
 def test_a_value_is_within_its_own_interval() -> None:
-    """Even where all draws are to one side."""
+    """Even where all draws are to one side, and never on its edge."""
     found = interval(1.0, [2.0, 3.0, 4.0], "V")
-    assert (found.low, found.value, found.unit) == (1.0, 1.0, "V")
+    assert (found.value, found.unit) == (1.0, "V")
+    assert found.low == pytest.approx(1.0 - 0.05 * 1.8)
     assert found.high == pytest.approx(3.9)
-    assert interval(5.0, [2.0, 3.0, 4.0], "V").high == 5.0
+    assert interval(5.0, [2.0, 3.0, 4.0], "V").high == pytest.approx(5.0 + 0.05 * 1.8)
+
+
+def test_an_interval_stays_within_the_declared_bounds() -> None:
+    """A power that may be at most 1.4 is not said to be 1.5."""
+    found = within(interval(1.35, [1.2, 1.3, 1.5], "1"), (0.7, 1.4))
+    assert found.high == 1.4
+    assert found.low == interval(1.35, [1.2, 1.3, 1.5], "1").low
 
 
 @pytest.mark.parametrize(

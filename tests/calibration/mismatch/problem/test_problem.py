@@ -7,7 +7,7 @@ import pytest
 from linear_machine import AXES, INSTANTS, STEP_S, Level, problem_of, table
 
 from regolithd.calibration.mismatch import RecordingError, from_columns
-from regolithd.calibration.mismatch.problem.build import build_problem, outliers
+from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.prior import own_name
 from regolithd.calibration.mismatch.thresholds import Thresholds
 
@@ -84,15 +84,6 @@ def test_single_readings_far_out_are_no_part_of_the_problem() -> None:
     assert problem.mask.sum() == INSTANTS * AXES - 1
     assert problem.filled[50, 0] == 0
     assert problem_of(columns, Thresholds(outlier_deviations=8.0)).mask.sum() == INSTANTS * AXES - 2
-
-
-def test_outliers_are_counted_from_the_median() -> None:
-    """A constant residual has none, nor has one that was never measured."""
-    residual = np.r_[np.linspace(4, 6, 99), 60.0][:, None]
-    assert np.flatnonzero(outliers(residual, 15.0)).tolist() == [99]
-    assert not outliers(residual, 100.0).any()
-    assert not outliers(np.full((10, 1), 3.0), 1.0).any()
-    assert not outliers(np.full((10, 1), np.nan), 1.0).any()
 
 
 def test_tangents_and_secants_are_difference_quotients() -> None:

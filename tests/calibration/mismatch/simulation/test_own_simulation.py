@@ -43,7 +43,7 @@ def test_a_recording_without_what_is_predicted_is_refused() -> None:
         {"simulation": {"model": "no-such-model"}},
         {"simulation": {"model": "no.such.module:Class"}},
         {"simulation": {"model": "servo:Absent"}},
-        {"simulation": {"model": "servo:ServoAxis"}, "soil": {}},
+        {"simulation": {"model": "servo:ServoAxis"}, "soil": {"weight": 1.0}},
         {"simulation": {"model": "servo:ServoAxis"}, "parameters": {"weight": {"value": 1.0}}},
         {"simulation": {"model": "rover-wheel"}, "soil": {"cohesion_Pa": -1}},
     ],
