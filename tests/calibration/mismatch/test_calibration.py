@@ -1,0 +1,68 @@
+"""A simulation that is stateful and not linear in its parameters is calibrated where it has been run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+
+class Tank(Simulation):
+    """A tank that drains through an orifice (Torricelli): level from inflow."""
+
+    channel, unit = "level_m", "m"
+    inputs = ("inflow_m3_s",)
+    parameters: ClassVar = {"area_m2": Prior(0.5, 0.02, "m²"), "outlet": Prior(0.010, 0.0004, "m²·⁵/s")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Integrate the level by Euler steps of one second."""
+        inflow, level = inputs["inflow_m3_s"], np.empty_like(inputs["inflow_m3_s"])
+        now = np.ones(inflow.shape[1])
+        for row, flow in enumerate(inflow):
+            level[row] = now
+            now = np.maximum(now + (flow - values["outlet"] * np.sqrt(now)) / values["area_m2"], 0.0)
+        return level
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return inflow and time."""
+        return {"inflow": inputs["inflow_m3_s"], "time": inputs["t_s"]}
+
+
+def filled(off: tuple[float, float]) -> Recording:
+    """Return an hour of a tank whose parameters are off by so many standard deviations of their priors."""
+    generator, time_s = np.random.default_rng(7), np.arange(3600.0)
+    inflow = 0.010 + 0.004 * np.sign(np.sin(time_s / 170)) + 0.003 * np.sin(time_s / 61)
+    values = {"area_m2": 0.5 + 0.02 * off[0], "outlet": 0.010 + 0.0004 * off[1]}
+    level = Tank().predict({"inflow_m3_s": inflow[:, None]}, values)[:, 0]
+    noise = np.convolve(generator.normal(0, 0.02, len(time_s) + 4), np.ones(5) / np.sqrt(5), "valid")
+    return from_columns({"t_s": time_s, "level_m": level + noise, "inflow_m3_s": inflow})
+
+
+@pytest.mark.parametrize("off", [(0.0, 0.0), (1.5, -1.5), (2.0, 2.0)])
+def test_parameters_within_their_priors_are_no_missing_physics(off: tuple[float, float]) -> None:
+    """Linearised once, a tank at 1.5 standard deviations is given a false name."""
+    answer = compare(filled(off), Tank()).answer
+    assert answer.verdict == "consistent"
+    for parameter, away in zip(answer.parameters, off, strict=True):
+        assert (parameter.value - parameter.prior) / parameter.prior_std == pytest.approx(away, abs=0.5)
+
+
+def test_what_is_called_calibrated_has_been_run() -> None:
+    """The simulation at the reported values has the error that the answer reports."""
+    recording = filled((1.5, -1.5))
+    answer = compare(recording, Tank()).answer
+    values = {parameter.name: parameter.value for parameter in answer.parameters}
+    level = Tank().predict({"inflow_m3_s": recording.channels["inflow_m3_s"]}, values)
+    rmse = float(np.sqrt(np.mean((recording.channels["level_m"] - level) ** 2)))
+    assert rmse == pytest.approx(answer.fit.held_out_rmse_after, rel=0.02)

@@ -1,0 +1,113 @@
+"""A corrected simulation against later recordings: unchanged, more, gone; and parameters far from their priors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch.answer import Contribution
+from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.changes import stated_in
+from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.errors import SimulationError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+STEP_S = 0.05
+COULOMB = Contribution("coulomb-friction", {}, (0.5,), (1,), relative_std=0.04)
+
+
+class Axis(Simulation):
+    """Force of inertia and viscous drag."""
+
+    channel, unit, wheel_column = "force_N", "N", "axis"
+    inputs = ("acceleration_m_s2", "speed_m_s")
+    parameters: ClassVar = {"mass_kg": Prior(2.0, 0.04, "kg"), "drag_N_s_m": Prior(1.0, 0.02, "N·s/m")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return mass times acceleration and drag times speed."""
+        return values["mass_kg"] * inputs["acceleration_m_s2"] + values["drag_N_s_m"] * inputs["speed_m_s"]
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return speed and time."""
+        return {"wheel_speed": inputs["speed_m_s"], "time": inputs["t_s"]}
+
+
+def moving(seed: int, coulomb_N: float, mass_kg: float = 2.0) -> Recording:
+    """Return two minutes of an axis that moves to and fro under white noise."""
+    generator = np.random.default_rng(seed)
+    time_s = STEP_S * np.arange(2400)
+    speed = np.sin(0.9 * time_s + generator.uniform(0, 6)) + 0.7 * np.sin(2.3 * time_s)
+    acceleration = np.gradient(speed, STEP_S)
+    force = mass_kg * acceleration + speed + coulomb_N * np.sign(speed) + generator.normal(0, 0.2, len(time_s))
+    columns = {"t_s": time_s, "force_N": force, "acceleration_m_s2": acceleration, "speed_m_s": speed}
+    return from_columns(columns)
+
+
+def test_a_recording_that_agrees_with_the_correction_is_consistent() -> None:
+    """Within the corrected effect's own standard deviation nothing has changed."""
+    answer = compare(moving(1, 0.5), Axis(), effects=[COULOMB]).answer
+    assert answer.verdict == "consistent"
+    assert not answer.changes
+
+
+@pytest.mark.parametrize("now_N", [0.8, 0.25])
+def test_more_or_less_of_a_corrected_effect_is_told_with_its_size(now_N: float) -> None:
+    """The change has the effect's name and holds the true size in its interval."""
+    answer = compare(moving(2, now_N), Axis(), effects=[COULOMB]).answer
+    assert answer.verdict == "missing-physics"
+    (change,) = answer.changes
+    assert (change.name, change.parameter, change.corrected) == ("coulomb-friction", "coulomb_current", 0.5)
+    assert change.low < now_N < change.high
+    assert not answer.effects
+
+
+def test_a_corrected_effect_that_is_gone_is_called_gone() -> None:
+    """Its interval holds zero, and the note says it in words."""
+    answer = compare(moving(3, 0.0), Axis(), effects=[COULOMB]).answer
+    (change,) = answer.changes
+    assert change.low < 0 < change.high
+    assert any("coulomb-friction is gone" in note for note in answer.notes)
+
+
+def test_a_correction_of_a_correction_is_one_effect() -> None:
+    """Entries of one name, shape and wheels are summed, their spreads in quadrature."""
+    known = [candidate for candidate in library() if candidate.name == "coulomb-friction"]
+    more = Contribution("coulomb-friction", {}, (0.3,), (1,), relative_std=0.1)
+    (stated,) = stated_in(known, [COULOMB, more], [])
+    assert stated.contribution.coefficients == (0.8,)
+    assert stated.contribution.relative_std == pytest.approx(np.hypot(0.02, 0.03) / 0.8)
+
+
+def test_an_effect_that_no_candidate_has_is_refused_by_name() -> None:
+    """The message lists what is known."""
+    with pytest.raises(SimulationError, match="no effect 'stiction'"):
+        stated_in([], [Contribution("stiction", {}, (1.0,), (1,))], [])
+
+
+def test_a_parameter_that_had_to_leave_its_prior_is_a_finding() -> None:
+    """A mass that is six standard deviations off is told, with its value, and is not called consistent."""
+    answer = compare(moving(4, 0.0, mass_kg=2.24), Axis()).answer
+    assert answer.verdict == "missing-physics"
+    (mass,) = (each for each in answer.parameters if each.name == "mass_kg")
+    assert mass.low < 2.24 < mass.high
+    assert any("mass_kg had to leave its prior" in note for note in answer.notes)
+
+
+def test_the_answer_tells_where_each_parameter_is() -> None:
+    """Prior, value and interval, for those that the priors hold too."""
+    answer = compare(moving(5, 0.0), Axis()).answer
+    assert [each.name for each in answer.parameters] == ["mass_kg", "drag_N_s_m"]
+    assert all(each.low < each.value < each.high for each in answer.parameters)
+    written = answer.to_json()
+    assert written["version"] == 2
+    assert written["parameters"][0]["prior"] == 2.0
+    assert written["changes"] == []

@@ -1,0 +1,89 @@
+"""Thrust and torque of a propeller, predicted at once: each with its own unit, noise and findings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch.answer import CalibratedParameter
+from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.inference.several_channels import combined
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+class Propeller(Simulation):
+    """Thrust and torque with the square of the speed."""
+
+    channels: ClassVar = {"thrust_N": "N", "torque_Nm": "N·m"}
+    inputs = ("speed_rad_s",)
+    parameters: ClassVar = {"thrust": Prior(1.2e-5, 5e-7), "torque": Prior(2.0e-7, 8e-9)}
+
+    def predict(self, inputs: Mapping[str, Any], values: Mapping[str, float]) -> Any:
+        """Return both channels by name."""
+        square = inputs["speed_rad_s"] * np.abs(inputs["speed_rad_s"])
+        return {"thrust_N": values["thrust"] * square, "torque_Nm": values["torque"] * square}
+
+    def covariates(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """Return speed and time."""
+        return {"wheel_speed": inputs["speed_rad_s"], "time": inputs["t_s"]}
+
+
+def spun(drag_Nm: float = 0.0) -> Recording:
+    """Return four minutes of a propeller that reverses, with a drag of its bearing in the torque alone."""
+    generator, time_s = np.random.default_rng(5), 0.1 * np.arange(2400)
+    speed = 900 * np.sin(time_s / 9) + 300 * np.sin(time_s / 2.3)
+    square = speed * np.abs(speed)
+    thrust = 1.22e-5 * square + generator.normal(0, 0.5, len(time_s))
+    torque = 2.02e-7 * square + drag_Nm * np.sign(speed) + generator.normal(0, 0.008, len(time_s))
+    return from_columns({"t_s": time_s, "thrust_N": thrust, "torque_Nm": torque, "speed_rad_s": speed})
+
+
+def test_nothing_is_missing_in_either_channel() -> None:
+    """Newtons of thrust are no outliers of newton metres of torque: nothing is left out."""
+    answer = compare(spun(), Propeller()).answer
+    assert answer.verdict == "consistent"
+    assert not answer.left_out
+
+
+def test_an_effect_is_told_in_its_channel_and_unit() -> None:
+    """Friction of the bearing is in the torque, in newton metres."""
+    answer = compare(spun(drag_Nm=0.01), Propeller()).answer
+    (effect,) = answer.effects
+    assert (effect.name, effect.channel) == ("coulomb-friction", "torque_Nm")
+    size = effect.parameters["coulomb_current"]
+    assert size.unit == "N·m"
+    assert size.low < 0.01 < size.high
+
+
+def test_a_prediction_without_one_of_its_channels_is_refused() -> None:
+    """The message names the class and the channel."""
+
+    class Half(Propeller):
+        def predict(self, inputs: Mapping[str, Any], values: Mapping[str, float]) -> Any:
+            return {"thrust_N": super().predict(inputs, values)["thrust_N"]}
+
+    with pytest.raises(SimulationError, match="Half must return a mapping with torque_Nm"):
+        compare(spun(), Half())
+
+
+def test_two_channels_that_say_the_same_of_a_parameter_say_it_more_surely() -> None:
+    """Precisions add, and the prior's is counted once."""
+
+    def posterior(value: float, std: float) -> CalibratedParameter:
+        return CalibratedParameter("mass_kg", "kg", 2.0, 0.5, value, value - 1.645 * std, value + 1.645 * std)
+
+    once = posterior(2.2, 0.3)
+    both = combined(once, once)
+    data = 1 / 0.3**2 - 1 / 0.5**2
+    mean = 2.2 + (2.2 - 2.0) / 0.5**2 / data
+    total = 1 / 0.5**2 + 2 * data
+    assert both.value == pytest.approx((2.0 / 0.5**2 + 2 * data * mean) / total)
+    assert (both.high - both.low) / 2 == pytest.approx(1.645 / total**0.5)
+    untold = posterior(2.0, 0.5)
+    assert combined(once, untold).value == pytest.approx(2.2)
