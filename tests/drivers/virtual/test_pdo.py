@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from virtual_master import LOAD_CELL_TPDO, MOTOR_TPDO, DriveUnderTest, Master
+from virtual_master import LOAD_CELL_TPDO, MOTOR_TPDO, AbortedError, DriveUnderTest, Master
 
 from regolithd.drivers.virtual import Bench, Measurement
 from regolithd.drivers.virtual.pdo import EnabledPdo
@@ -154,3 +154,18 @@ def test_transmission_types_up_to_240_are_synchronous() -> None:
         kind for kind in (0, 1, 240, 254, 255) if EnabledPdo(0x181, kind, (), struct.Struct("<")).synchronous
     ]
     assert synchronous == [0, 1, 240]
+
+
+def test_an_enabled_pdo_may_be_written_again_and_a_disabled_one_moved() -> None:
+    """Only another identifier for an enabled PDO is refused; its transmission type and event time may change."""
+    master = Master()
+    master.configure(11, tpdo=LOAD_CELL_TPDO)
+    master.write(11, 0x1800, 1, 0x18B, 4)
+    master.write(11, 0x1800, 2, 1, 1)
+    master.write(11, 0x1800, 5, 100, 2)
+    with pytest.raises(AbortedError, match="0x06090030"):
+        master.write(11, 0x1800, 3, 100, 2)  # CiA 301: the inhibit time, while it is enabled
+    master.write(11, 0x1800, 1, 0x8000_018B, 4)
+    master.write(11, 0x1800, 3, 100, 2)
+    master.write(11, 0x1800, 1, 0x20B, 4)
+    assert master.read(11, 0x1800, 1) == 0x20B
