@@ -2,7 +2,7 @@
 
     from regolithd.calibration.mismatch import compare, load_simulation, read_recording
 
-    answer = compare(read_recording(path), load_simulation(tables)).answer
+    answer = compare(read_recording(Path("drive.csv")), load_simulation(Path("SIM.toml"))).answer
 
 The public names are below; each is imported when it is first used, so that reading a recording loads no solver.
 """
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
     from regolithd.calibration.mismatch.candidates.library import library
     from regolithd.calibration.mismatch.comparison import compare
-    from regolithd.calibration.mismatch.data.recording import Recording, from_columns, read_recording
+    from regolithd.calibration.mismatch.data.recording import Recording, as_recording, from_columns, read_recording
     from regolithd.calibration.mismatch.errors import MismatchError, RecordingError, SimulationError
     from regolithd.calibration.mismatch.problem.prior import Prior, SensorError
     from regolithd.calibration.mismatch.problem.problem import Problem
@@ -36,6 +36,7 @@ __all__ = [
     "Shape",
     "Simulation",
     "SimulationError",
+    "as_recording",
     "compare",
     "from_columns",
     "library",
@@ -47,7 +48,7 @@ _HOME = {
     "candidates.candidate": ("Candidate", "Coefficient", "Shape"),
     "candidates.library": ("library",),
     "comparison": ("compare",),
-    "data.recording": ("Recording", "from_columns", "read_recording"),
+    "data.recording": ("Recording", "as_recording", "from_columns", "read_recording"),
     "errors": ("MismatchError", "RecordingError", "SimulationError"),
     "problem.prior": ("Prior", "SensorError"),
     "problem.problem": ("Problem",),

@@ -12,17 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.errors import RecordingError
+from regolithd.calibration.mismatch.data.columns import Column, Columns, file_columns, frame_columns
+from regolithd.calibration.mismatch.errors import RecordingError, listed
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
     from pathlib import Path
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-Column = NDArray[Any]
-"""Numbers; text in the column that tells wheels apart."""
-
 TIME = "t_s"
 TIME_UNITS_S = {"t_s": 1.0, "t_ms": 1e-3, "t_us": 1e-6, "t_ns": 1e-9, "t_min": 60.0, "t_h": 3600.0}
 """Names that the column of time may have, and their unit in seconds."""
@@ -34,6 +32,20 @@ GAP_STEPS = 5
 """Steps of time longer than so many usual ones are noted as gaps (a choice)."""
 TIME_DECIMALS = 9
 """Times that agree to a nanosecond are one instant: less is rounding of the text."""
+LONGEST_STEP_S, SHORTEST_STEP_S = 100.0, 1e-6
+"""Usual steps of time beyond which `t_s` may be in another unit (a choice: a tank is logged each minute, a current at
+some ten kHz)."""
+LONGEST_SPAN_S, LATEST_S = 1e10, 1e20
+"""Three hundred years, and Unix time in nanoseconds times 50: what is longer or later is not in seconds."""
+GREATEST_READING, LEAST_READING = 1e30, 1e-100
+"""Readings beyond the first are codes for "not measured" (netCDF fills blanks with 9.97e36); those below the second
+are 0: the square of a smaller one has no digits."""
+MOST_ROWS_PER_INSTANT = 1.5
+"""Rows for each instant beyond which they are of several wheels, not repetitions (a choice: half of them)."""
+MOST_RUNS = 2**31
+"""Greatest number of a run that is kept as it is."""
+MOST_PLACES_PER_ROW = 100
+"""Instants times wheels for each row, beyond which the column of wheels holds something else (a choice)."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +59,7 @@ class Recording:
     wheels: the wheels' (axes', bodies') names as recorded, numbers or text, in ascending order
     channels: one array (time × wheel) for each column
     notes: what was wrong with the table and what was done about it
+    unread: the columns that hold no numbers, as "column surface holds text …"
     """
 
     time_s: Array
@@ -54,6 +67,7 @@ class Recording:
     wheels: tuple[int | str, ...]
     channels: Mapping[str, Array]
     notes: tuple[str, ...] = ()
+    unread: tuple[str, ...] = ()
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -86,109 +100,49 @@ def read_recording(path: Path, *, unit: str = UNIT) -> Recording:
     Raises
     ------
     RecordingError
-        When the file is none of these, or has no time.
+        When the file is none of these, has no time, or a cell is no number; the message names line and column.
     """
-    columns = _read_parquet(path, unit) if path.suffix == ".parquet" else _read_csv(path, unit)
-    return from_columns(columns, unit=unit)
-
-
-def _read_csv(path: Path, unit: str) -> dict[str, Column]:
-    import pyarrow.csv  # noqa: PLC0415  # only files need it; arrays do not
-    from pyarrow import ArrowException  # noqa: PLC0415
-
     try:
-        table = pyarrow.csv.read_csv(path)
-    except (ArrowException, OSError) as error:
-        raise RecordingError(f"{path} is not a table that can be read: {error}") from error
-    return _as_columns(table, path, unit)
+        return _arrange(file_columns(path, unit), unit)
+    except RecordingError as error:
+        raise error if str(path) in str(error) else RecordingError(f"{path}: {error}") from error
 
 
-def _read_parquet(path: Path, unit: str) -> dict[str, Column]:
-    import pyarrow.parquet  # noqa: PLC0415
-    from pyarrow import ArrowException  # noqa: PLC0415
+def as_recording(data: object, *, unit: str = UNIT) -> Recording:
+    """Return a recording as it is, or make one of a data frame (pandas, polars, pyarrow) or a mapping of arrays.
 
-    try:
-        table = pyarrow.parquet.read_table(path)
-    except (ArrowException, OSError) as error:
-        raise RecordingError(f"{path} is not a Parquet file that can be read: {error}") from error
-    return _as_columns(table, path, unit)
-
-
-def _as_columns(table: object, path: Path, unit: str) -> dict[str, Column]:
-    """Return the columns that are numbers, and the one that tells the machine's parts apart, which may be text.
-
-    A column of text that is mostly numbers is a column with a cell gone wrong: that is said, with the first such cell.
-    """
-    import pyarrow as pa  # noqa: PLC0415
-
-    columns: dict[str, Column] = {}
-    for name in table.column_names:  # type: ignore[attr-defined]
-        column = table.column(name)  # type: ignore[attr-defined]
-        kind = column.type
-        if pa.types.is_null(kind):
-            columns[name] = np.full(len(column), np.nan)
-        elif pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind):
-            columns[name] = column.cast(pa.float64()).to_numpy(zero_copy_only=False).astype(np.float64)
-        elif name == unit and (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
-            columns[name] = np.array([value or "" for value in column.to_pylist()])
-        elif (wrong := _cell_gone_wrong(column.to_pylist(), everywhere=name in {*TIME_UNITS_S, RUN})) is not None:
-            row, text = wrong
-            raise RecordingError(
-                f"{path}: column {name}, row {row + 2}: {text!r} is not a number. Leave a cell empty where nothing was "
-                "measured."
-            )
-    return columns
-
-
-def _cell_gone_wrong(cells: Sequence[object], *, everywhere: bool) -> tuple[int, object] | None:
-    """Return place and text of the first cell that is not a number in a column of which at least half are numbers."""
-    wrong = [(row, cell) for row, cell in enumerate(cells) if cell is not None and not _is_number(cell)]
-    if not wrong or not (everywhere or len(wrong) <= len(cells) / 2):
-        return None
-    return wrong[0]
-
-
-def _is_number(cell: object) -> bool:
-    try:
-        float(str(cell))
-    except ValueError:
-        return False
-    return True
-
-
-def from_columns(columns: Mapping[str, Column], *, unit: str = UNIT) -> Recording:
-    """Arrange a long table's columns (a mapping of arrays, or a data frame) as arrays (time × wheel).
+    Columns and rows are those of a recording's file: one row for each instant and wheel, `t_s` in seconds, NaN or null
+    where nothing was measured, and the column `unit` where there is more than one wheel.
 
     Raises
     ------
     RecordingError
-        When there is no time, or fewer than two instants.
+        When it is no table, has no time, or a cell is no number.
     """
-    given = {str(name): np.asarray(values) for name, values in columns.items()}
-    clock = next((name for name in TIME_UNITS_S if name in given), None)
-    if clock is None:
-        raise RecordingError(
-            f"there is no column of time ({', '.join(TIME_UNITS_S)}); found {', '.join(given) or 'nothing'}"
-        )
+    return data if isinstance(data, Recording) else _arrange(frame_columns(data, unit), unit)
+
+
+def _arrange(found: Columns, unit: str) -> Recording:
+    if unit in found.unread:
+        raise RecordingError(f"{found.unread[unit]} or text; it has to name the wheels")
+    return replace(from_columns(found.numbers, unit=unit), unread=tuple(found.unread.values()))
+
+
+def from_columns(columns: Mapping[str, Column], *, unit: str = UNIT) -> Recording:
+    """Arrange a long table's columns (a mapping of arrays) as arrays (time × wheel).
+
+    Raises
+    ------
+    RecordingError
+        When there is no time or fewer than two instants, or a column is no row of numbers.
+    """
     notes: list[str] = []
-    if clock != TIME:
-        given[TIME] = TIME_UNITS_S[clock] * _numbers(clock, given.pop(clock))
-    names, place = _parts(given.pop(unit, np.ones(len(given[TIME]))))
-    table = {name: _numbers(name, values) for name, values in given.items()} | {unit: place}
-    rows = len(table[TIME])
-    table.setdefault(RUN, np.zeros(rows))
-    table[RUN] = _split_where_the_clock_jumps_back(table, unit, notes)
-    known = np.isfinite(table[TIME]) & np.isfinite(table[unit]) & np.isfinite(table[RUN])
-    if not known.all():
-        notes.append(f"{np.sum(~known)} rows have no time or no {unit}; they are left out.")
-        table = {name: values[known] for name, values in table.items()}
-    if not len(table[TIME]):
-        raise RecordingError("the recording has no rows")
+    clock = next((name for name in TIME_UNITS_S if name in columns), TIME)
+    names, table = _table(columns, clock, unit, notes)
     keys, row, column = _places(table, unit)
     wheels = tuple(names[int(k)] for k in np.unique(table[unit]))
     shape = (len(keys), len(wheels))
-    if shape[0] < 2:
-        raise RecordingError("the recording has only one instant")
+    _check_shape(shape, len(row), unit, named=unit in columns)
     channels = {
         name: _arranged(values, row, column, shape) for name, values in table.items() if name not in {TIME, unit, RUN}
     }
@@ -196,11 +150,103 @@ def from_columns(columns: Mapping[str, Column], *, unit: str = UNIT) -> Recordin
     run, time_s = keys[:, 0].astype(np.int64), keys[:, 1]
     for number in np.unique(run):
         time_s[run == number] -= time_s[run == number][0]
+    _check_step(time_s, run, notes)
     _note_gaps(time_s, run, notes)
     _note_channels(channels, wheels, unit, notes)
     if clock != TIME:
         channels[clock] = np.repeat(time_s[:, None] / TIME_UNITS_S[clock], len(wheels), axis=1)
     return Recording(time_s, run, wheels, channels, tuple(notes))
+
+
+def _table(
+    columns: Mapping[str, Column], clock: str, unit: str, notes: list[str]
+) -> tuple[tuple[int | str, ...], dict[str, Array]]:
+    """Return the wheels' names, and the rows that have time and wheel as numbers, each with its run."""
+    given = {str(name): np.asarray(values) for name, values in columns.items()}
+    if clock not in given:
+        raise RecordingError(f"there is no column of time ({', '.join(TIME_UNITS_S)}); the table has {listed(given)}")
+    rows = given[clock].shape[0] if given[clock].ndim else 0
+    for name, values in given.items():
+        if values.shape != (rows,):
+            raise RecordingError(f"column {name} has shape {values.shape}; one value for each row is needed, ({rows},)")
+    if clock != TIME:
+        given[TIME] = TIME_UNITS_S[clock] * _numbers(clock, given.pop(clock))
+    names, place = _parts(given.pop(unit, np.ones(rows)))
+    table = {name: _numbers(name, values) for name, values in given.items()} | {unit: place}
+    table[RUN] = _numbered(table[RUN]) if RUN in table else np.zeros(rows)
+    table[TIME] = np.where(np.isfinite(table[TIME]), table[TIME], np.nan)
+    _check_span(table[TIME])
+    table[RUN] = _split_where_the_clock_jumps_back(table, unit, notes)
+    known = np.isfinite(table[TIME]) & np.isfinite(table[unit]) & np.isfinite(table[RUN])
+    if not known.any():
+        raise RecordingError(f"no row has both {TIME} and {unit}" if rows else "the recording has no rows")
+    if not known.all():
+        notes.append(f"{np.sum(~known)} rows have no time or no {unit}; they are left out.")
+        table = {name: values[known] for name, values in table.items()}
+    for name in table.keys() - {TIME, RUN, unit}:
+        table[name] = _without_codes(name, table[name], notes)
+    return names, table
+
+
+def _numbered(run: Array) -> Array:
+    """Return runs as whole numbers, NaN where there is none: as given, or counted where the column holds others."""
+    known = np.isfinite(run)
+    if np.all(run[known] == np.round(run[known])) and np.all(np.abs(run[known]) < MOST_RUNS):
+        return run
+    numbers = np.full(len(run), np.nan)
+    numbers[known] = np.unique(run[known], return_inverse=True)[1]
+    return numbers
+
+
+def _check_span(time_s: Array) -> None:
+    known = time_s[np.isfinite(time_s)]
+    if not known.size:
+        return
+    if np.max(known) / 2 - np.min(known) / 2 > LONGEST_SPAN_S / 2 or np.max(np.abs(known)) > LATEST_S:
+        latest = int(np.flatnonzero(time_s == np.max(known))[0])
+        raise RecordingError(
+            f"the time reaches from {np.min(known):g} to {np.max(known):g} s (row {latest + 1}): these are no "
+            f"seconds. Name the column after its unit ({', '.join(TIME_UNITS_S)}), and correct single wrong times."
+        )
+
+
+def _check_shape(shape: tuple[int, int], rows: int, unit: str, *, named: bool) -> None:
+    if shape[0] < 2:
+        raise RecordingError(f"the recording has only one instant: all its times {TIME} are the same")
+    if not named and rows > MOST_ROWS_PER_INSTANT * shape[0]:
+        raise RecordingError(
+            f"there are {rows} rows at {shape[0]} instants and no column {unit} that tells them apart; name the column "
+            "that does, as `wheel_column` of the simulation"
+        )
+    if shape[0] * shape[1] > MOST_PLACES_PER_ROW * rows:
+        raise RecordingError(
+            f"column {unit} has {shape[1]} different values in {rows} rows at {shape[0]} instants; it must name the "
+            "wheel (axis, body) that a row belongs to"
+        )
+
+
+def _check_step(time_s: Array, run: Index, notes: list[str]) -> None:
+    steps = np.diff(time_s)[np.diff(run) == 0]
+    usual = float(np.median(steps)) if steps.size else 1.0
+    if usual < SHORTEST_STEP_S:
+        raise RecordingError(
+            f"the time advances by {usual:g} s from one instant to the next. Name the column after its unit: "
+            f"{', '.join(TIME_UNITS_S)}."
+        )
+    if usual > LONGEST_STEP_S:
+        notes.append(
+            f"The time advances by {usual:g} s from one instant to the next. If it is in milliseconds, call it t_ms."
+        )
+
+
+def _without_codes(name: str, values: Array, notes: list[str]) -> Array:
+    """Return readings with NaN for what no sensor measures, and 0 for what is too small to compute with."""
+    values = np.where(np.abs(values) < LEAST_READING, 0.0, values)
+    code = np.abs(values) > GREATEST_READING
+    if not code.any():
+        return values
+    notes.append(f"{int(code.sum())} readings of {name} are infinite or beyond {GREATEST_READING:g}: not measured.")
+    return np.where(code, np.nan, values)
 
 
 def _parts(values: NDArray[Any]) -> tuple[tuple[int | str, ...], Array]:
