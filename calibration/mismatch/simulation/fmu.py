@@ -24,16 +24,16 @@ import hashlib
 import shutil
 import tempfile
 import weakref
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
 from regolithd.calibration.mismatch.problem.prior import Prior
 from regolithd.calibration.mismatch.simulation.simulation import Simulation
+from regolithd.calibration.mismatch.simulation.stated_priors import finite_number
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -62,7 +62,7 @@ class FmuSimulation(Simulation):
         self.channels = units if len(units) > 1 else {}  # type: ignore[misc]
         self.inputs = tuple(self._inputs)  # type: ignore[misc]
         self.wheel_column = str(tables.get("simulation", {}).get("wheel_column", "wheel"))  # type: ignore[misc]
-        self._covariates = {str(name): str(column) for name, column in tables.get("covariates", {}).items()}
+        self._covariates = _covariates(tables.get("covariates", {}))
         self.parameters = _parameters(tables.get("parameters", {}), known, path)
         self._unpacked = Path(tempfile.mkdtemp(prefix="fmu-"))
         weakref.finalize(self, shutil.rmtree, self._unpacked, ignore_errors=True)
@@ -155,35 +155,48 @@ def _mapped(tables: Mapping[str, Any], known: Mapping[str, Any], path: Path) -> 
     """Return the FMU's variables and the recorded columns that they are."""
     stated = tables.get("variables")
     if not isinstance(stated, dict) or not stated:
-        raise SimulationError(
-            'an FMU needs [variables]: the FMU\'s variable = "recorded column", for inputs and outputs'
-        )
+        told = 'an FMU needs [variables]: the FMU\'s variable = "recorded column", for inputs and outputs'
+        raise SimulationError(told, ("variables",))
     for name, column in stated.items():
-        _variable(known, name, path, "[variables]")
+        _check_variable(known, name, path, ("variables", name))
         if not isinstance(column, str):
-            raise SimulationError(f"[variables] {name}: the name of a recorded column is needed, not {column!r}")
+            told = f"[variables] {name}: the name of a recorded column is needed, not {column!r}"
+            raise SimulationError(told, ("variables", name))
     return dict(stated)
 
 
-def _variable(known: Mapping[str, Any], name: str, path: Path, where: str) -> None:
+def _covariates(table: object) -> dict[str, str]:
+    if not isinstance(table, dict):
+        raise SimulationError(f'[covariates] takes name = "recorded column", not {table!r}', ("covariates",))
+    return {str(name): str(column) for name, column in table.items()}
+
+
+def _check_variable(known: Mapping[str, Any], name: str, path: Path, keys: tuple[str, ...]) -> None:
     if name not in known:
-        near = get_close_matches(name, known, 1)
-        meant = f"did you mean {near[0]}?" if near else f"it has {', '.join(sorted(known)[:20])}"
-        raise SimulationError(f"{where} {name}: {path.name} has no such variable; {meant}")
+        told = f"[{keys[0]}] {name}: {path.name} has no such variable; {did_you_mean(name, sorted(known))}"
+        raise SimulationError(told, keys)
 
 
 def _parameters(stated: object, known: Mapping[str, Any], path: Path) -> dict[str, Prior]:
     """Return the priors of the FMU's parameters; without a value, the FMU's own start value."""
     if not isinstance(stated, dict):
-        raise SimulationError("[parameters] must be a table of tables: [parameters.NAME] value = …, std = …")
+        told = "[parameters] must be a table of tables: [parameters.NAME] value = …, std = …"
+        raise SimulationError(told, ("parameters",))
     priors = {}
     for name, fields in stated.items():
-        _variable(known, name, path, "[parameters]")
+        keys = ("parameters", name)
+        _check_variable(known, name, path, keys)
         if not isinstance(fields, dict) or set(fields) - {"value", "std", "unit"}:
-            raise SimulationError(f"[parameters.{name}] takes value, std and unit, not {fields!r}")
-        unit = str(fields.get("unit", known[name].unit or "1"))
-        try:
-            priors[name] = Prior(float(fields.get("value", known[name].start)), float(fields.get("std", 0.0)), unit)
-        except (TypeError, ValueError) as error:
-            raise SimulationError(f"[parameters.{name}] value and std must be numbers: {error}") from error
+            raise SimulationError(f"[parameters.{name}] takes value, std and unit, not {fields!r}", keys)
+        value = finite_number(fields.get("value", _start(known[name])), (*keys, "value"))
+        std = finite_number(fields.get("std", 0.0), (*keys, "std"))
+        priors[name] = Prior(value, std, str(fields.get("unit", known[name].unit or "1")))
     return priors
+
+
+def _start(variable: Any) -> float | None:  # noqa: ANN401  # FMPy's own type
+    """Return a variable's start value, None where it has none that is a number."""
+    try:
+        return float(variable.start)
+    except (TypeError, ValueError):
+        return None

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import importlib
 import sys
-import traceback
+import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.simulation.checked import checked
 from regolithd.calibration.mismatch.simulation.simulation import Simulation
+from regolithd.calibration.mismatch.simulation.toml_place import line_of
+from regolithd.calibration.mismatch.simulation.user_code import defined_at, user_line
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,57 +20,132 @@ if TYPE_CHECKING:
 MODELS = 'model must be "rover-wheel", "package.module:ClassName" or "machine.fmu"'
 
 
-def load_simulation(tables: Mapping[str, Any], *, beside: Path | None = None) -> Simulation:
-    """Return the simulation that SIM.toml's tables name.
-
-    A module or an FMU is looked for beside SIM.toml, or in `[simulation] path`, which is relative to SIM.toml.
+def read_tables(path: Path) -> dict[str, Any]:
+    """Return the tables of a SIM.toml.
 
     Raises
     ------
     SimulationError
-        When the model is unknown, cannot be loaded, or its tables are wrong.
+        When the file is not there or is no TOML; with line and column.
     """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise SimulationError(f"{path} cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise SimulationError(f"{path} is not UTF-8 (byte {error.start}): save it as UTF-8") from error
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        cure = " Text needs quotes, a number a point, and a key stands once." if "line" in str(error) else ""
+        raise SimulationError(f"{path} is not TOML: {error}.{cure}") from error
+
+
+def load_simulation(source: Path | Mapping[str, Any], *, beside: Path | None = None) -> Simulation:
+    """Return the simulation that a SIM.toml, or its tables, name.
+
+    A module or an FMU is looked for beside SIM.toml, or in `[simulation] path`, which is relative to SIM.toml.
+
+    Parameters
+    ----------
+    source: path of SIM.toml, or its tables
+    beside: the folder that `[simulation] path` is relative to; by default SIM.toml's own, or the current one
+
+    Raises
+    ------
+    SimulationError
+        When the model is unknown, cannot be loaded, or its tables are wrong; with file and line.
+    """
+    if not isinstance(source, Path):
+        return _loaded(source, beside or Path.cwd())
+    try:
+        return _loaded(read_tables(source), beside or source.resolve().parent)
+    except SimulationError as error:
+        if str(source) in str(error):
+            raise
+        line = line_of(source.read_text(encoding="utf-8-sig"), error.keys)
+        place = f"{source}, line {line}" if line else str(source)
+        raise SimulationError(f"{place}: {error}", error.keys) from error
+
+
+def model_folder(tables: Mapping[str, Any], beside: Path) -> Path:
+    """Return the folder in which a module or FMU is looked for first."""
+    path = tables["simulation"].get("path", ".")
+    if not isinstance(path, str):
+        raise SimulationError(f"[simulation] path must be a folder's name, not {path!r}", ("simulation", "path"))
+    return beside / path
+
+
+def _loaded(tables: Mapping[str, Any], beside: Path) -> Simulation:
     table = tables.get("simulation", {})
     model = table.get("model") if isinstance(table, dict) else None
     if not isinstance(model, str):
-        raise SimulationError(f"[simulation] {MODELS}, not {model!r}")
-    folder = (beside or Path.cwd()) / str(table.get("path", "."))
+        raise SimulationError(f"[simulation] {MODELS}, not {model!r}", ("simulation", "model"))
+    _check_effects(tables.get("effects", []))
+    folder = model_folder(tables, beside)
     if model == "rover-wheel":
         from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel  # noqa: PLC0415  # soil physics
 
-        return RoverWheel.from_tables(tables)
+        return checked(RoverWheel.from_tables(tables))
     if model.endswith(".fmu"):
         from regolithd.calibration.mismatch.simulation.fmu import FmuSimulation  # noqa: PLC0415  # needs FMPy
 
-        return FmuSimulation.from_file(folder / model, tables)
-    if ":" not in model:
-        raise SimulationError(f"[simulation] {MODELS}, not {model!r}")
-    return _imported(model, folder).from_tables(tables)
+        return checked(FmuSimulation.from_file(folder / model, tables))
+    if model.count(":") != 1:
+        raise SimulationError(f"[simulation] {MODELS}, not {model!r}", ("simulation", "model"))
+    return checked(_made(_imported(model, folder), tables))
+
+
+def _check_effects(effects: object) -> None:
+    if not isinstance(effects, list) or not all(isinstance(effect, dict) for effect in effects):
+        raise SimulationError("effects are tables, [[effects]], as --corrected writes them", ("effects",))
+
+
+def _made(kind: type[Simulation], tables: Mapping[str, Any]) -> Simulation:
+    """Make the user's simulation; what its constructor raises is told with file and line."""
+    try:
+        made = kind.from_tables(tables)
+    except SimulationError:
+        raise
+    except Exception as error:  # a user's constructor may raise anything
+        told = f"{kind.__name__} cannot be made{user_line(error) or defined_at(kind)}: {type(error).__name__}: {error}"
+        raise SimulationError(told, ("simulation", "model")) from error
+    if not isinstance(made, Simulation):
+        raise SimulationError(f"{kind.__name__}.from_tables must return a {kind.__name__}, not {type(made).__name__}")
+    return made
 
 
 def _imported(model: str, folder: Path) -> type[Simulation]:
     """Import a user's class; what its module raises is told with file and line."""
-    module_name, class_name = model.split(":", 1)
-    if str(folder) not in sys.path:
-        sys.path.insert(0, str(folder))
+    module_name, class_name = model.split(":")
+    keys = ("simulation", "model")
+    _make_room(module_name, folder)
+    place = str(folder.resolve())
+    sys.path[:] = [place, *(each for each in sys.path if each != place)]
     try:
-        found = getattr(importlib.import_module(module_name), class_name)
-    except ModuleNotFoundError as error:
-        raise SimulationError(
-            f"the simulation {model} cannot be imported: {error}. It is looked for in {folder}; say where it is with "
-            "[simulation] path"
-        ) from error
-    except Exception as error:  # a user's module may raise anything
-        raise SimulationError(f"the simulation {model} cannot be imported: {where_raised(error)}") from error
+        found = getattr(importlib.import_module(module_name), class_name, None)
+    except (Exception, SystemExit) as error:  # a user's module may raise anything
+        told = f"the simulation {model} cannot be imported{user_line(error)}: {type(error).__name__}: {error}"
+        if not user_line(error):
+            told += f". It is looked for in {folder}; say where it is with [simulation] path"
+        raise SimulationError(told, keys) from error
     if not (isinstance(found, type) and issubclass(found, Simulation)):
-        raise SimulationError(f"{model} is not a subclass of regolithd.calibration.mismatch.Simulation")
+        raise SimulationError(
+            f"{model}: {class_name} in {module_name} must be a subclass of regolithd.calibration.mismatch.Simulation",
+            keys,
+        )
     return found
 
 
-def where_raised(error: Exception) -> str:
-    """Return what an exception says, with the file and line of the user's code that raised it."""
-    if isinstance(error, SyntaxError):
-        return f"{error.filename}, line {error.lineno}: {error.msg}"
-    frames = traceback.extract_tb(error.__traceback__)
-    place = f"{frames[-1].filename}, line {frames[-1].lineno}: " if frames else ""
-    return f"{place}{type(error).__name__}: {error}"
+def _make_room(module_name: str, folder: Path) -> None:
+    """Forget a module of the same name from another folder, as an earlier SIM.toml of this process had it."""
+    first = module_name.split(".", maxsplit=1)[0]
+    found = [path for path in (folder / f"{first}.py", folder / first / "__init__.py") if path.is_file()]
+    if not found or first not in sys.modules:
+        return
+    if first in sys.stdlib_module_names:
+        raise SimulationError(
+            f"rename {found[0].name}: Python has a module {first} of its own", ("simulation", "model")
+        )
+    if Path(getattr(sys.modules[first], "__file__", None) or folder) != found[0].resolve():
+        for name in [name for name in sys.modules if name == first or name.startswith(f"{first}.")]:
+            del sys.modules[name]
+        importlib.invalidate_caches()

@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError
 
 from regolithd.calibration.drivetrain.torque import motor_current
 from regolithd.calibration.mismatch.answer import Contribution
-from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.errors import RecordingError, SimulationError, did_you_mean
 from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.problem.prior import Prior, SensorError, own_name
 from regolithd.calibration.mismatch.simulation.open_circuit_voltage import open_circuit_voltage
@@ -98,11 +98,14 @@ class RoverWheel(Simulation):
         try:
             return cls(RoverWheelTables(**{name: table for name, table in tables.items() if name != "effects"}))
         except ValidationError as error:
-            told = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
-            raise SimulationError(f"the simulation's tables are wrong: {told}") from error
+            raise _mistakes(error) from error
 
     def prepare(self, recording: Recording) -> Recording:
         """Add `slip`, and the load where no cell measured it; take the motors' sag out of the voltage."""
+        if wrong := [wheel for wheel in recording.wheels if wheel not in range(1, WHEELS + 1)]:
+            raise RecordingError(
+                f"column wheel holds {wrong[0]}; it has to number the wheels 1 to {WHEELS}, odd left, 1 and 2 in front"
+            )
         speed = self._wheel_speed(recording.channels)
         turning = np.abs(speed) > SLOWEST_RAD_S
         rim = np.where(turning, self.tables.wheel.radius_m * speed, np.nan)
@@ -290,6 +293,26 @@ def _lifted(load_N: Array) -> NDArray[np.bool_]:
     """Return the instants in which no wheel carries anything, shape (time, 1): the rover stands on a block."""
     known = np.isfinite(load_N)
     return np.asarray(known.any(axis=1) & ~np.any(known & (np.abs(load_N) >= LIFTED_N), axis=1))[:, None]
+
+
+def _mistakes(error: ValidationError) -> SimulationError:
+    """Return one error with every mistake; its place is the first one's."""
+    places = [tuple(map(str, each["loc"])) for each in error.errors()]
+    told = "; ".join(
+        f"{'.'.join(place)}: {each['msg']}{_cure(place, each['type'])}"
+        for place, each in zip(places, error.errors(), strict=True)
+    )
+    return SimulationError(f"the simulation's tables are wrong: {told}", places[0])
+
+
+def _cure(place: tuple[str, ...], kind: str) -> str:
+    """Return what a misspelt key or table may have meant."""
+    if kind != "extra_forbidden":
+        return ""
+    fields: Mapping[str, Any] = RoverWheelTables.model_fields
+    for name in place[:-1]:
+        fields = getattr(fields[name].annotation, "model_fields", {}) if name in fields else {}
+    return f"; {did_you_mean(place[-1], fields)}"
 
 
 def _priors(tables: RoverWheelTables) -> dict[str, Prior]:

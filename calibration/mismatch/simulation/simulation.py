@@ -91,7 +91,7 @@ class Simulation:
         """
         made = cls()
         made.stated = tables
-        made.parameters = stated_priors(tables, cls.parameters, cls.own_tables)
+        made.parameters = stated_priors(tables, made.parameters, made.own_tables)
         return made
 
     def prepare(self, recording: Recording) -> Recording:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
-from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
+from regolithd.calibration.mismatch.problem.prior import Prior
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.problem.prior import Prior
-
 ENGINE_TABLES = ("simulation", "effects")
 """Tables that are no parameters."""
+FIELDS = ("value", "std", "unit")
+"""Keys of `[parameters.NAME]`."""
 
 
 def stated_priors(
@@ -31,6 +31,8 @@ def stated_priors(
     SimulationError
         For a key that is no parameter, or a value that is no finite number.
     """
+    if not all(isinstance(prior, Prior) for prior in parameters.values()):
+        return dict(parameters)  # the check of the class tells which is none, and where
     stated: dict[str, dict[str, Any]] = {}
     # `[parameters]` comes last: a corrected file has the calibrated values there, beside the user's own tables.
     for name, table in sorted(tables.items(), key=lambda item: item[0] == "parameters"):
@@ -38,56 +40,76 @@ def stated_priors(
             continue
         if not isinstance(table, dict):
             raise SimulationError(
-                f"{name} = {table!r}: a parameter stands in a table, as [parameters.{name}] value = …"
+                f"{name} = {table!r}: a parameter stands in a table, as [parameters.{name}] value = …", (name,)
             )
+        if not table and name != "parameters":
+            raise SimulationError(f"[{name}] is empty: remove it, or state a parameter in it", (name,))
         for key, given in table.items():
             if name == "parameters":
-                stated.setdefault(_known(key, parameters, "[parameters]"), {}).update(_fields(key, given))
+                stated.setdefault(_known(key, parameters, "[parameters]", (name, key)), {}).update(_fields(key, given))
             else:
-                _take(key, given, f"[{name}] {key}", parameters, table, stated)
-    return {name: replace(prior, **stated.get(name, {})) for name, prior in parameters.items()}
+                _take((name, key), given, parameters, table, stated)
+    return {name: replace(prior, **stated[name]) if name in stated else prior for name, prior in parameters.items()}
 
 
 def _fields(parameter: str, given: object) -> dict[str, Any]:
     """Return what `[parameters.NAME]` says."""
-    if not isinstance(given, dict) or set(given) - {"value", "std", "unit"}:
-        raise SimulationError(f"[parameters.{parameter}] takes value, std and unit, not {given!r}")
-    for name in ("value", "std"):
-        _number(given.get(name, 0.0), f"[parameters.{parameter}] {name}")
-    return given
+    keys = ("parameters", parameter)
+    if not isinstance(given, dict):
+        raise SimulationError(f"[parameters.{parameter}] takes value, std and unit, not {given!r}", keys)
+    for name in given:
+        if name not in FIELDS:
+            told = f"[parameters.{parameter}] takes value, std and unit, not {name}; {did_you_mean(name, FIELDS)}"
+            raise SimulationError(told, (*keys, name))
+    numbers = {name: finite_number(given[name], (*keys, name)) for name in ("value", "std") if name in given}
+    return numbers | ({"unit": str(given["unit"])} if "unit" in given else {})
 
 
 def _take(
-    key: str,
+    keys: tuple[str, str],
     given: object,
-    where: str,
     parameters: Mapping[str, Prior],
     table: Mapping[str, Any],
     stated: dict[str, dict[str, Any]],
 ) -> None:
     """Take one key of a table of the user's own."""
+    key = keys[1]
     for ending, field in (("_relative_std", "std"), ("_std", "std"), ("", "value")):
         name = key.removesuffix(ending) if ending else key
         if (key in parameters and ending) or name not in parameters or (ending and name == key):
             continue
-        value = _number(given, where)
+        value = finite_number(given, keys)
         if ending == "_relative_std":
-            value *= abs(_number(table.get(name, parameters[name].value), where))
+            value *= abs(finite_number(table.get(name, parameters[name].value), (keys[0], name)))
         stated.setdefault(name, {})[field] = value
         return
-    _known(key, parameters, where)
+    _known(key, parameters, _shown(keys), keys)
 
 
-def _known(parameter: str, parameters: Mapping[str, Prior], where: str) -> str:
+def _known(parameter: str, parameters: Mapping[str, Prior], where: str, keys: tuple[str, ...]) -> str:
     """Return a parameter's name, if the simulation has it."""
     if parameter not in parameters:
-        near = get_close_matches(parameter, parameters, 1)
-        meant = f"did you mean {near[0]}?" if near else f"its parameters are {', '.join(parameters) or 'none'}"
-        raise SimulationError(f"{where}: the simulation has no parameter {parameter}; {meant}")
+        told = f"{where}: the simulation has no parameter {parameter}; {did_you_mean(parameter, parameters)}"
+        raise SimulationError(told, keys)
     return parameter
 
 
-def _number(value: object, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise SimulationError(f"{where}: a finite number is needed, not {value!r}")
+def finite_number(value: object, keys: tuple[str, ...]) -> float:
+    """Return a number; a standard deviation is not negative."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not _is_finite(value):
+        raise SimulationError(f"{_shown(keys)}: a finite number is needed, not {value!r}", keys)
+    if value < 0 and (keys[-1] == "std" or keys[-1].endswith("_std")):
+        raise SimulationError(f"{_shown(keys)}: a standard deviation is 0 (exact) or more, not {value!r}", keys)
     return float(value)
+
+
+def _is_finite(value: float) -> bool:
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer beyond the greatest float
+        return False
+
+
+def _shown(keys: tuple[str, ...]) -> str:
+    """Return ("parameters", "mass_kg", "value") as "[parameters.mass_kg] value"."""
+    return f"[{'.'.join(keys[:-1])}] {keys[-1]}"
