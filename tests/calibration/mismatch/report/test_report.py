@@ -27,6 +27,7 @@ from regolithd.calibration.mismatch.candidates.coulomb_friction import CoulombFr
 from regolithd.calibration.mismatch.report.axes import number, ticks
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.labels import Labels, verdict_sentence
+from regolithd.calibration.mismatch.report.notebook import notebook_html
 from regolithd.calibration.mismatch.report.page import Provenance, equation, render_report
 from regolithd.calibration.mismatch.report.statements import plural, statement
 
@@ -141,6 +142,14 @@ def test_the_same_answer_gives_the_same_bytes(evidence: Evidence) -> None:
     assert render_report(ANSWERS["missing-physics"], evidence, FROM) == render_report(
         ANSWERS["missing-physics"], evidence, FROM
     )
+
+
+def test_a_notebook_shows_the_whole_page_in_a_frame(evidence: Evidence) -> None:
+    """The page is an attribute of one frame, escaped, and names no file that there is none of."""
+    found = notebook_html(ANSWERS["missing-physics"], evidence)
+    assert found.startswith('<iframe srcdoc="&lt;!DOCTYPE html&gt;')
+    assert found.count("<") == 2
+    assert "sha256" not in found
 
 
 def test_an_effect_is_told_with_its_interval_and_its_words_are_escaped(evidence: Evidence) -> None:
