@@ -1,0 +1,41 @@
+"""The answer as text on the terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich.markup import escape
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from regolithd.calibration.mismatch.answer import Answer
+
+
+def print_answer(console: Console, answer: Answer) -> None:
+    """Print verdict, effects, what is unexplained or indistinguishable, the held-out error and the notes."""
+    console.print(f"[bold]{answer.verdict}[/bold]")
+    for line in _lines(answer):
+        console.print(f"  {escape(line)}")
+
+
+def _lines(answer: Answer) -> list[str]:
+    fit = answer.fit
+    error = (
+        f"held-out error of {fit.channel}: {fit.held_out_rmse_before:.5g} before, "
+        f"{fit.held_out_rmse_after:.5g} after, noise floor {fit.noise_floor_rmse:.5g}"
+    )
+    return [
+        *(f"{effect.name}: {effect.statement}" for effect in answer.effects),
+        *(
+            f"unexplained: {100 * rest.share_of_residual:.0f} % of the residual follows {rest.covariate} on wheels "
+            f"{', '.join(map(str, rest.wheels))}, {rest.from_s:.0f} to {rest.to_s:.0f} s"
+            for rest in answer.unexplained
+        ),
+        *(
+            f"{' or '.join(pair.effects)}: this recording does not distinguish them. {pair.experiment}"
+            for pair in answer.indistinguishable
+        ),
+        error,
+        *(f"note: {note}" for note in answer.notes),
+    ]

@@ -1,0 +1,111 @@
+"""`regolithd mismatch`: files to start from, several recordings, a corrected file in another folder, wrong calls."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv
+import pytest
+from typer.testing import CliRunner
+
+from regolithd.calibration.mismatch.simulation.load import load_simulation
+from regolithd.daemon.cli import app
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from click.testing import Result
+
+
+def call(*words: object) -> Result:
+    """Run `regolithd mismatch`."""
+    return CliRunner().invoke(app, ["mismatch", *map(str, words)])
+
+
+def joint(path: Path, seed: int, friction_Nm: float = 0.2) -> Path:
+    """Write a recording of the template's joint, with a friction that the template lacks."""
+    time_s = 0.02 * np.arange(1500)
+    speed = np.sin((0.7 + 0.1 * seed) * time_s) + 0.6 * np.sin(1.9 * time_s)
+    acceleration = np.gradient(speed, 0.02)
+    noise = np.random.default_rng(seed).normal(0, 0.05, len(time_s))
+    torque = 0.5 * acceleration + 0.2 * speed + friction_Nm * np.sign(speed) + noise
+    columns = {"t_s": time_s, "torque_Nm": torque, "acceleration_rad_s2": acceleration, "speed_rad_s": speed}
+    pyarrow.csv.write_csv(pa.table(columns), path)
+    return path
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Path:
+    """Return a folder with what `--init class` writes."""
+    folder = tmp_path / "start"
+    done = call("--init", "class", folder)
+    assert done.exit_code == 0, done.output
+    assert str(folder / "SIM.toml") in done.output.replace("\n", "")
+    return folder
+
+
+@pytest.mark.parametrize(("kind", "files"), [("rover-wheel", 1), ("class", 2), ("fmu", 1)])
+def test_files_to_start_from_are_written(kind: str, files: int, tmp_path: Path) -> None:
+    """No recording and no simulation are needed for that."""
+    assert call("--init", kind, tmp_path / "new").exit_code == 0
+    assert len(list((tmp_path / "new").iterdir())) == files
+
+
+def test_files_to_start_from_replace_nothing(start: Path) -> None:
+    """A second call, and an unknown kind, end with one message."""
+    done = call("--init", "class", start)
+    assert (done.exit_code, done.stderr.count("\n")) == (65, 1)
+    assert "exists already" in done.stderr
+    assert "--init takes rover-wheel, class, fmu" in call("--init", "matlab", start).stderr
+
+
+def test_a_call_without_recording_or_simulation_is_told_what_is_missing() -> None:
+    """Click's status for a wrong call is 2."""
+    done = call("drive.csv")
+    assert done.exit_code == 2
+    assert "--simulation" in done.stderr
+
+
+def test_recordings_are_compared_together(start: Path, tmp_path: Path) -> None:
+    """Each is a run, its name is in the notes, and what is common to both is named."""
+    recordings = [joint(tmp_path / f"{name}.csv", seed) for seed, name in enumerate("ab")]
+    out = tmp_path / "out.json"
+    done = call(*recordings, "--simulation", start / "SIM.toml", "--json", out, "--report", tmp_path / "r.html")
+    assert done.exit_code == 0, done.output
+    answer = json.loads(out.read_text())
+    assert [effect["name"] for effect in answer["effects"]] == ["coulomb-friction"]
+    assert {"a.csv: run 1.", "b.csv: run 2."} <= set(answer["notes"])
+    assert "a.csv, b.csv" in (tmp_path / "r.html").read_text()
+
+
+def test_a_corrected_file_in_another_folder_finds_the_class(start: Path, tmp_path: Path) -> None:
+    """It says where the class is, relative to itself, and loads from there."""
+    new = tmp_path / "results" / "june" / "NEW.toml"
+    new.parent.mkdir(parents=True)
+    done = call(joint(tmp_path / "a.csv", 0), "--simulation", start / "SIM.toml", "--corrected", new)
+    assert done.exit_code == 0, done.output
+    assert tomllib.loads(new.read_text())["simulation"] == {"model": "my_simulation:Joint", "path": "../../start"}
+    assert load_simulation(new).channel == "torque_Nm"
+
+
+def test_an_output_that_cannot_be_written_is_told_before_anything_is_computed(start: Path, tmp_path: Path) -> None:
+    """The message names the folder."""
+    done = call(tmp_path / "absent.csv", "--simulation", start / "SIM.toml", "--json", tmp_path / "no" / "out.json")
+    assert done.exit_code == 65
+    assert "there is no folder" in done.stderr
+
+
+def test_a_missing_column_is_told_with_the_recording(start: Path, tmp_path: Path) -> None:
+    """One message names the file and the column that was perhaps meant."""
+    path = joint(tmp_path / "a.csv", 0)
+    path.write_text(path.read_text().replace("torque_Nm", "torqe_Nm", 1))
+    done = call(path, "--simulation", start / "SIM.toml")
+    assert done.exit_code == 65
+    assert done.stderr == (
+        f"regolithd mismatch: {path}: the simulation needs column torque_Nm, which the recording does not have; did "
+        "you mean torqe_Nm?\n"
+    )
