@@ -47,3 +47,22 @@ def test_disabling_a_pdo_keeps_its_identifier() -> None:
     """CiA 301 forbids to change identifier and bit 31 at once."""
     off = boot_writes(NodeDescription(3, LOAD_CELL, 2), heartbeat_s=0.2, master_id=127, master_lost_after_s=0.5)[2]
     assert off.data(present=0x40000183) == (0xC0000183).to_bytes(4, "little")
+
+
+def test_what_is_read_back_is_compared_in_all_bits_of_the_object() -> None:
+    """Size and mask are those of the data type; a PDO's COB-ID is compared but for the bit that a device may set."""
+    writes = boot_writes(
+        NodeDescription(3, MOTOR_CONTROLLER, 2), heartbeat_s=0.2, master_id=127, master_lost_after_s=0.5
+    )
+    found = {(write.index, write.subindex): (write.size, write.mask, write.signed) for write in writes}
+    assert found[0x6060, 0] == (1, 0xFF, True)
+    assert found[0x605A, 0] == (2, 0xFFFF, True)
+    assert found[0x1017, 0] == (2, 0xFFFF, False)
+    assert found[0x1A00, 1] == (4, 0xFFFF_FFFF, False)
+    assert found[0x1016, 1] == (4, 0xFFFF_FFFF, False)
+    assert found[0x1800, 1] == (4, 0xBFFF_FFFF, False)
+    assert found[0x1801, 1] == (4, 0x8000_0000, False)
+    values = {(write.index, write.subindex): write.value for write in writes}
+    assert (values[0x1017, 0], values[0x1005, 0], values[0x1014, 0]) == (200, 0x80, 0x83)
+    masks = {write.index: write.mask for write in writes if write.index in (0x1005, 0x1014)}
+    assert masks == {0x1005: 0x4000_07FF, 0x1014: 0x8000_07FF}
