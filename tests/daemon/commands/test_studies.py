@@ -206,3 +206,51 @@ def test_pictures_draws_five(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert drawn["errors"][0] == drawn["drivetrain"][0] == {"x": 1}
     assert list(drawn["alarm"][0]) == ["alarm_cusum"]
     assert drawn["calibration"][1].tolist() == [0, 1]
+
+
+def test_sizing_continues_from_its_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Outcomes of the log are not trained again; the figures have what this run added."""
+    from regolithd.calibration.paper import sizing, sizing_speed, training_set  # noqa: PLC0415  # laptop only
+
+    asked: dict[str, Any] = {}
+    old, new = SimpleNamespace(neurons=8), SimpleNamespace(neurons=16)
+    best = SimpleNamespace(neurons=64, mean_mse=0.02512, standard_error=0.0003)
+
+    def run(study: Any, pairs: Any, outcomes: Any, log: Path, _cores: int) -> Any:
+        asked.update(study=(study.trainings, study.epochs), pairs=pairs, resumed=list(outcomes), log=log)
+        yield from (new, new)
+
+    def compare(pairs: Any, folder: Path, epochs: int) -> Any:
+        asked["timing"] = (pairs, folder, epochs)
+        return SimpleNamespace(ratio=12.4, ratio_one_core=7.6)
+
+    monkeypatch.setattr(training_set, "training_set", lambda *_: "pairs")
+    monkeypatch.setattr(sizing, "resume", lambda _log, _study: [old])
+    monkeypatch.setattr(sizing, "run", run)
+    monkeypatch.setattr(sizing, "best_size", lambda outcomes: best if len(outcomes) == 3 else None)
+    monkeypatch.setattr(sizing_speed, "compare_speed", compare)
+    monkeypatch.setattr(sizing_speed, "figures", lambda _study, outcomes, _speed: {"outcomes": len(outcomes)})
+    out, log = tmp_path / "a" / "sizing.json", tmp_path / "b" / "log.jsonl"
+    options = ("--out", out, "--log", log, "--trainings", 3, "--epochs", 20, "--timing-epochs", 7)
+    done = regolithd("sizing", *options)
+    assert asked["study"] == (3, 20)
+    assert asked["resumed"] == [old]
+    assert asked["timing"] == ("pairs", log.parent, 7)
+    found = json.loads(out.read_text())
+    assert (found["outcomes"], found["trainings_this_run"]) == (3, 2)
+    assert 0.0 <= found["seconds_this_run"] < 60.0
+    assert "lowest mean MSE: 0.0251 ± 0.0003 at 64 neurons" in done.stdout
+    assert "scikit-learn takes 12 times as long (8 on one core)." in done.stdout
+
+    def interrupted(*_arguments: Any) -> Any:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sizing, "run", interrupted)
+    done = regolithd("sizing", *options)
+    assert (done.exit_code, "Interrupted; finished trainings are in" in done.stderr) == (130, True)
+
+    def different(*_arguments: Any) -> Any:
+        raise sizing.DifferentStudyError("another study")
+
+    monkeypatch.setattr(sizing, "resume", different)
+    assert regolithd("sizing", *options).exit_code == 1

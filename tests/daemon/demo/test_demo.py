@@ -339,3 +339,23 @@ async def test_the_subscriber_fills_the_table_from_the_embedded_broker() -> None
     assert table.messages == 1
     with socket.socket() as probe:
         assert probe.connect_ex(("127.0.0.1", port)) != 0
+
+
+def test_the_screenshot_is_the_first_screen_after_20_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """84 columns, without web fonts, with the elapsed time of that screen."""
+    from regolithd.daemon.demo import screenshot  # noqa: PLC0415  # only here
+
+    async def run_demo(_folder: Path, seconds: float, show: Any) -> None:
+        assert seconds == 30.0
+        for elapsed in (0.0, 19.9, 20.4, 25.0, 30.0):
+            show(filled(), elapsed)
+
+    monkeypatch.setattr(screenshot, "run_demo", run_demo)
+    screenshot.screenshot(tmp_path / "demo.svg")
+    svg = (tmp_path / "demo.svg").read_text()
+    text = svg.replace("&#160;", " ")
+    assert "20 of 30 s" in text
+    assert "25 of 30 s" not in text
+    assert "make demo" in text
+    assert "@font-face" not in svg
+    assert screenshot.COLUMNS == 84
