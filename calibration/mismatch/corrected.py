@@ -55,8 +55,16 @@ def corrected_tables(
     corrected, rest = simulation.absorb_effects(calibrated, contributions)
     before = list(tables.get("effects", []))
     if before or rest:
-        corrected["effects"] = before + [_plain(asdict(effect)) for effect in rest]
+        corrected["effects"] = before + [_entry(effect) for effect in rest]
     return corrected
+
+
+def _entry(effect: Contribution) -> dict[str, Any]:
+    """Return an entry of `[[effects]]`; it names its channel where the simulation predicts several."""
+    entry: dict[str, Any] = _plain(asdict(effect))
+    if not effect.channel:
+        del entry["channel"]
+    return entry
 
 
 def _within_three_std(simulation: Simulation, values: Mapping[str, float]) -> dict[str, float]:
