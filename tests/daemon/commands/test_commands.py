@@ -19,6 +19,7 @@ from regolithd.calibration.drivetrain.bench.line_fit import BenchError
 from regolithd.daemon.check.finding import Finding
 from regolithd.daemon.cli import app
 from regolithd.daemon.commands import bench, check, mismatch, prove
+from regolithd.daemon.mismatch.terminal import print_answer
 
 if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
@@ -196,7 +197,7 @@ def test_mismatch_prints_the_answer() -> None:
         notes=["short"],
     )
     console = Console(record=True, width=200, quiet=False)
-    mismatch._print_answer(console, answer)
+    print_answer(console, answer)
     assert console.export_text().splitlines() == [
         "effects",
         "  coulomb-friction: 37 mA",

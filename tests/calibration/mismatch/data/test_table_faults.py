@@ -134,11 +134,14 @@ def test_channels_that_cannot_show_anything_are_noted() -> None:
 @pytest.mark.parametrize(
     ("columns", "message"),
     [
-        ({}, "there is no column t_s; found nothing"),
-        ({"x": [1.0], "y": [1.0]}, "there is no column t_s; found x, y"),
-        ({"t_s": []}, "the recording has no rows"),
-        ({"t_s": [np.nan]}, "the recording has no rows"),
-        ({"t_s": [1.0, 1.0]}, "the recording has only one instant"),
+        ({}, "there is no column of time (t_s, t_ms, t_us, t_ns, t_min, t_h); the table has nothing"),
+        (
+            {"x": [1.0], "y": [1.0]},
+            "there is no column of time (t_s, t_ms, t_us, t_ns, t_min, t_h); the table has x, y",
+        ),
+        ({"t_s": []}, "no row has both t_s and wheel"),
+        ({"t_s": [np.nan]}, "no row has both t_s and wheel"),
+        ({"t_s": [1.0, 1.0]}, "the recording has only one instant: all its times t_s are the same"),
     ],
 )
 def test_a_table_without_two_instants_is_refused(columns: dict[str, list[float]], message: str) -> None:
@@ -177,7 +180,7 @@ def test_parquet_and_csv_have_numbers_and_skip_texts(tmp_path: Path) -> None:
     (tmp_path / "drive.csv").write_text("t_s,axis,value\n0,1,3\n1,1,4\n")
     assert read_recording(tmp_path / "drive.csv", unit="axis").channels["value"][:, 0].tolist() == [3.0, 4.0]
     (tmp_path / "bad.csv").write_text("t_s,wheel,value\nnoon,1,3\n1,1,4\n")
-    with pytest.raises(RecordingError, match="column t_s must be numbers, but holds 'noon'"):
+    with pytest.raises(RecordingError, match="line 2, column t_s: 'noon' is not a number"):
         read_recording(tmp_path / "bad.csv")
     reasons = {"bad.parquet": "is not a Parquet file that can be read", "none.csv": "is not a table that can be read"}
     for name, what in reasons.items():
