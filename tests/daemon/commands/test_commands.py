@@ -19,7 +19,6 @@ from regolithd.calibration.drivetrain.bench.line_fit import BenchError
 from regolithd.daemon.check.finding import Finding
 from regolithd.daemon.cli import app
 from regolithd.daemon.commands import bench, check, mismatch, prove
-from regolithd.daemon.mismatch.terminal import print_answer
 
 if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
@@ -180,32 +179,6 @@ def test_calibrate_prints_the_procedure_or_writes_the_fit(
     monkeypatch.setattr(from_recording, function, fails)
     done = regolithd("calibrate", name, "recording.csv", "--config", rover)
     assert (done.exit_code, done.stderr) == (1, "no weights\n")
-
-
-def test_mismatch_prints_the_answer() -> None:
-    """Verdict, effects, what is unexplained, effects that cannot be distinguished, held-out error and notes."""
-    answer = SimpleNamespace(
-        verdict="effects",
-        effects=[SimpleNamespace(name="coulomb-friction", statement="37 mA")],
-        unexplained=[
-            SimpleNamespace(share_of_residual=0.123, covariate="time", wheels=(1, 4), from_s=3.4, to_s=99.6),
-        ],
-        indistinguishable=[SimpleNamespace(effects=("one", "other"), experiment="Drive backwards.")],
-        fit=SimpleNamespace(
-            channel="current", held_out_rmse_before=0.00412345, held_out_rmse_after=0.001, noise_floor_rmse=0.0009
-        ),
-        notes=["short"],
-    )
-    console = Console(record=True, width=200, quiet=False)
-    print_answer(console, answer)
-    assert console.export_text().splitlines() == [
-        "effects",
-        "  coulomb-friction: 37 mA",
-        "  unexplained: 12 % of the residual follows time on wheels 1, 4, 3 to 100 s",
-        "  one or other: this recording does not distinguish them. Drive backwards.",
-        "  held-out error of current: 0.0041234 before, 0.001 after, noise floor 0.0009",
-        "  note: short",
-    ]
 
 
 def test_mismatch_ends_with_65_where_its_files_cannot_be_used(tmp_path: Path) -> None:
