@@ -94,8 +94,9 @@ CONSISTENT = Answer("consistent", (), (), (), ANSWER.sensitivity, NO_CHANGE)
 
 
 def one_tag_a_line(page: str) -> str:
-    """Return a page without its style sheet, each tag on a line of its own, for a readable difference."""
+    """Return a page without style sheet and versions, each tag on a line of its own, for a readable difference."""
     page = re.sub(r"<style>.*?</style>", "", page, flags=re.DOTALL)
+    page = re.sub(r"Python [\d.]+, regolithd [^<]*", "VERSIONS", page)
     return re.sub(r">\s*<", ">\n<", page) + "\n"
 
 
