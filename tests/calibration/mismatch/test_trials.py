@@ -27,4 +27,4 @@ def test_trial_is_answered_as_its_truth(shared_folder: Path, name: str) -> None:
     assert [(e.name, list(e.wheels)) for e in answer.effects] == [(t["name"], t["wheels"]) for t in truth]
     for effect, true in zip(answer.effects, truth, strict=True):
         assert effect.onset_s == pytest.approx(true["time_s"], abs=180)
-    assert json.loads(json.dumps(answer.to_json(), allow_nan=False))["version"] == 1
+    assert json.loads(json.dumps(answer.to_json(), allow_nan=False))["version"] == 2
