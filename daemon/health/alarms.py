@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from regolithd.daemon.messages.alarm import Severity
+from regolithd.daemon.messages.alarm import Severity, SoilChangeEvidence
+from regolithd.daemon.messages.header import iso_time
+from regolithd.daemon.pipeline.soil_change import soil_change_text, wheels_of
 from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.master.status import NodePhase
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    from regolithd.daemon.pipeline.snapshot import SoilChange
     from regolithd.drivers.devices.device import Quantity
     from regolithd.drivers.master.status import NodeStatus
 
@@ -31,6 +34,8 @@ class Alarm:
     severity: Severity
     text: str
     remedy: str
+    latching: bool = False
+    evidence: SoilChangeEvidence | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +54,7 @@ class AlarmInputs:
     recording_problem: str = ""
     control_problem: str = ""
     clock_jump_s: float = 0.0
-    soil_change: str = ""
+    soil_change: SoilChange | None = None
     stuck: tuple[tuple[Quantity, int], ...] = ()
     summarised: tuple[str, ...] = ()
 
@@ -120,16 +125,33 @@ def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
         text = f"{which}: the reading has been exactly constant for seconds, while other wheels' readings change"
         remedy = "Do not use it: switch the node off and on, check its connector, replace it."
         yield Alarm("sensor", Severity.ERROR, text, remedy)
-    if inputs.soil_change:
-        remedy = "Stop before the wheels dig in, and look: drive with less slip, another way, or back."
-        yield Alarm("soil-change", Severity.WARNING, inputs.soil_change, remedy)
+    if inputs.soil_change is not None:
+        yield _soil_change(inputs.soil_change)
     if inputs.summarised:
         text = f"{', '.join(inputs.summarised)}: they come too often, and are summarised once a second (`suppressed`)"
         remedy = "Look at what the node reports (`emcy`, `event`), and correct it, or switch the node off."
         yield Alarm("event-rate", Severity.WARNING, text, remedy)
     if inputs.clock_jump_s:
         text = f"the clock jumped by {inputs.clock_jump_s:+.3f} s: times before and after are not comparable"
-        yield Alarm("clock", Severity.WARNING, text, "Synchronise it before the daemon starts (time-sync.target).")
+        remedy = "Synchronise it before the daemon starts (time-sync.target)."
+        yield Alarm("clock", Severity.WARNING, text, remedy, latching=True)
+
+
+def _soil_change(changed: SoilChange) -> Alarm:
+    alarm, fall = changed.alarm, changed.fall
+    evidence = SoilChangeEvidence(
+        onset=iso_time(alarm.onset_ns),
+        direction="fall" if alarm.direction == "fall" else "rise",
+        wheels=wheels_of(alarm.group),
+        torque_ratio=alarm.torque_ratio,
+        statistic=alarm.statistic,
+        threshold=alarm.threshold,
+        cohesion_fell=fall and fall.cohesion,
+        friction_angle_fell=fall and fall.friction_angle,
+        drawbar_margin_fell=fall and fall.drawbar_margin,
+    )
+    remedy = "Stop before the wheels dig in, and look: drive with less slip, another way, or back."
+    return Alarm("soil-change", Severity.WARNING, soil_change_text(changed), remedy, latching=True, evidence=evidence)
 
 
 def _store_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:

@@ -14,6 +14,7 @@ from regolithd.daemon.messages.alarm import AlarmMessage
 from regolithd.daemon.messages.bus import EmergencyMessage, EventMessage, NodeMessage
 from regolithd.daemon.messages.health import HealthMessage
 from regolithd.daemon.messages.measurements import SnapshotMessage, WheelMessage
+from regolithd.daemon.messages.odometry import OdometryMessage
 from regolithd.daemon.messages.posterior import PosteriorMessage
 from regolithd.daemon.messages.state import StateMessage
 
@@ -64,6 +65,7 @@ CHANNELS = (
     Channel("snapshot", "snapshot", SnapshotMessage, _ACKNOWLEDGED, False, True, "at each SYNC, in order"),
     Channel("wheel", "wheel/{wheel}", WheelMessage, _ONCE, False, False, "at each SYNC, while connected"),
     Channel("posterior", "posterior", PosteriorMessage, _ACKNOWLEDGED, False, True, "twice a second while wheels turn"),
+    Channel("odometry", "odometry", OdometryMessage, _ACKNOWLEDGED, False, True, "twice a second while wheels turn"),
     Channel("node", "node/{node_id}", NodeMessage, _ACKNOWLEDGED, True, True, "when the node's state changes"),
     Channel("emcy", "emcy", EmergencyMessage, _ACKNOWLEDGED, False, True, "when a node sends one"),
     Channel("event", "event", EventMessage, _ACKNOWLEDGED, False, True, "when it happens"),

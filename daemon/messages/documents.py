@@ -143,8 +143,9 @@ AsyncAPI 3 document: [asyncapi.json](asyncapi.json).
 
 {table()}
 
-Every message is one JSON object and begins with `schema_version`, `late`, `session`, `sequence` and `time`. Names of
-numbers end in their unit; `null` means not measured, or no estimate. Lists of six belong to wheels 1 to 6.
+Every message is one JSON object and begins with `schema_version`, `late`, `session`, `sequence`, `time` and
+`time_ms`. Names of numbers end in their unit; `null` means not measured, or no estimate. Lists of six belong to
+wheels 1 to 6.
 
 - `session` identifies one run of the daemon; `(session, sequence)` is unique on a topic. A message with `late: true`
   comes from the store, because the broker could not be reached when it was created. It may repeat one that was

@@ -14,6 +14,7 @@ _HEADER = {
     "session": "20130611T140312Z-5f1c",
     "sequence": 500,
     "time": "2013-06-11T14:07:22.018291000Z",
+    "time_ms": 1370959642018,
 }
 _WHEEL: dict[str, Any] = {each.name: None for each in WHEEL_QUANTITIES} | {
     "measured": True,
@@ -74,6 +75,16 @@ _ALARM = {
     "text": "node 13 (load-cell) lost: its heartbeat stopped 0.7 s ago",
     "remedy": "Check its power and its connection. It is booted again as soon as its heartbeat returns.",
 }
+_ODOMETRY = {
+    "x_m": 5.318,
+    "y_m": -0.041,
+    "heading_rad": -0.011,
+    "distance_m": 5.321,
+    "speed_m_s": 0.0214,
+    "speed_source": "ground-speed",
+    "heading_source": "yaw-rate",
+    "gap_s": 0.0,
+}
 _HEALTH = {
     "uptime_s": 250.0,
     "cpu_s": 4.1,
@@ -110,6 +121,7 @@ _FIELDS: dict[str, dict[str, Any]] = {
     "snapshot": _SNAPSHOT,
     "wheel": {"model_version": "paper-3:64:2", "wheel": 5, **_WHEEL},
     "posterior": {"sequence": 480, **_POSTERIOR},
+    "odometry": {"sequence": 480, **_ODOMETRY},
     "node": {"sequence": 2, **_NODE},
     "emcy": {"sequence": 0, **_EMERGENCY},
     "event": {"sequence": 12, "kind": "node-lost", "node_id": 13, "text": _NODE["text"]},

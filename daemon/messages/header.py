@@ -7,7 +7,8 @@ A list of six belongs to wheels 1 to 6: odd left, even right; 1, 2 front, 3, 4 m
 For example, `regolith/kapvik/wheel/5`:
 
     {"schema_version": 2, "late": false, "session": "20130611T140312Z-5f1c", "sequence": 500,
-     "time": "2013-06-11T14:07:22.018291000Z", "wheel": 5, "measured": true, "valid": true, "motor_current_A": 0.08,
+     "time": "2013-06-11T14:07:22.018291000Z", "time_ms": 1370959642018, "wheel": 5,
+     "measured": true, "valid": true, "motor_current_A": 0.08,
      "load_N": 31.6, "slip": 0.025, "slip_source": "configured", "cohesion_Pa": 3352.0, "friction_angle_rad": 0.499, …}
 """
 
@@ -23,6 +24,7 @@ SCHEMA_VERSION = 2
 """Rises when a field or topic is removed or changes its meaning; new fields alone do not raise it."""
 
 _PER_SECOND = 1_000_000_000
+_PER_MILLISECOND = 1_000_000
 
 Time = Annotated[
     str,
@@ -47,6 +49,11 @@ def iso_time(time_ns: int) -> str:
     return f"{_second(seconds)}{rest:09d}Z"
 
 
+def time_fields(time_ns: int) -> dict[str, str | int]:
+    """Return the fields `time` and `time_ms` of a message [ns since 1970]."""
+    return {"time": iso_time(time_ns), "time_ms": time_ns // _PER_MILLISECOND}
+
+
 class Header(BaseModel):
     """The fields that every message begins with."""
 
@@ -64,3 +71,5 @@ class Header(BaseModel):
     sequence: Annotated[int, Field(ge=0)]
     """Counts within a session and topic; on `snapshot` and `wheel` the number of the SYNC."""
     time: Time
+    time_ms: Annotated[int, Field(ge=0)]
+    """The same time in milliseconds since 1970, for programs that read numbers only."""

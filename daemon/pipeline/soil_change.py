@@ -35,6 +35,12 @@ class SoilChangeDetector:
         return alarm
 
 
+def wheels_of(group: str) -> tuple[int, ...]:
+    """Return the numbers (1–6) of the wheels of a group of the detector."""
+    members = change.WHEEL_GROUPS[change.GROUP_NAMES.index(group)]
+    return tuple(wheel + 1 for wheel, member in enumerate(members) if member)
+
+
 def soil_change_text(changed: SoilChange) -> str:
     """Return an alarm and its evidence as one sentence."""
     alarm = changed.alarm

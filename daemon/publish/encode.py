@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydantic_core import to_json
 
-from regolithd.daemon.messages.header import SCHEMA_VERSION, iso_time
+from regolithd.daemon.messages.header import SCHEMA_VERSION, time_fields
 from regolithd.daemon.pipeline.snapshot import BODY_QUANTITIES, ROW, WHEEL_QUANTITIES, WHEELS
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def _header(estimate: Estimate, session: str) -> dict[str, Any]:
         "late": False,
         "session": session,
         "sequence": estimate.snapshot.sequence,
-        "time": iso_time(estimate.snapshot.time_ns),
+        **time_fields(estimate.snapshot.time_ns),
         "model_version": estimate.model_version,
     }
 

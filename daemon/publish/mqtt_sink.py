@@ -16,7 +16,9 @@ from regolithd.daemon.messages.alarm import AlarmMessage, Severity
 from regolithd.daemon.messages.bus import EmergencyMessage, EventMessage, IdentityReport, NodeMessage
 from regolithd.daemon.messages.header import iso_time
 from regolithd.daemon.messages.health import AcquisitionReport, HealthMessage, RecordingReport, SyncReport
+from regolithd.daemon.messages.odometry import OdometryMessage
 from regolithd.daemon.messages.posterior import PosteriorMessage
+from regolithd.daemon.pipeline.dead_reckoning import DeadReckoning
 from regolithd.daemon.pipeline.soil_change import soil_change_text
 from regolithd.daemon.publish.event_throttle import EventThrottle
 from regolithd.drivers.can.bus import BusState
@@ -26,7 +28,7 @@ from regolithd.drivers.master.events import NodeEmergency
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from regolithd.daemon.pipeline.snapshot import Estimate
+    from regolithd.daemon.pipeline.snapshot import Estimate, SoilChange
     from regolithd.daemon.publish.publisher import Publisher
     from regolithd.daemon.service import Service
     from regolithd.drivers.master.events import NetworkEvent
@@ -75,7 +77,9 @@ class MqttSink:
         self._offset_ns = time.time_ns() - monotonic_ns()
         self._jump_s = 0.0
         self._jump_until_ns = 0
-        self._soil_change = ""
+        self._soil_change: SoilChange | None = None
+        self._dead_reckoning = DeadReckoning(service.configuration)
+        self._last_alarms: dict[str, Alarm] = {}
         self._soil_change_until_ns = 0
         self._stuck_sensors = StuckSensorDetector()
         self._throttle = EventThrottle()
@@ -85,16 +89,16 @@ class MqttSink:
         """Publish the estimate of one SYNC, with its posterior and soil-change event if it has any."""
         self._stuck_sensors.step(estimate.snapshot)
         self.publisher.estimate(estimate)
+        publish, time_ns = self.publisher.publish, estimate.snapshot.time_ns
         if estimate.soil_change is not None:
-            self._soil_change = soil_change_text(estimate.soil_change)
+            self._soil_change = estimate.soil_change
             self._soil_change_until_ns = self._monotonic_ns() + int(SOIL_CHANGE_ALARM_S * 1e9)
-            publish = self.publisher.publish
-            time_ns = estimate.snapshot.time_ns
-            publish("event", EventMessage, time_ns=time_ns, kind="soil-change", node_id=None, text=self._soil_change)
+            text = soil_change_text(estimate.soil_change)
+            publish("event", EventMessage, time_ns=time_ns, kind="soil-change", node_id=None, text=text)
         if estimate.posterior is not None:
-            self.publisher.publish(
-                "posterior", PosteriorMessage, time_ns=estimate.snapshot.time_ns, **asdict(estimate.posterior)
-            )
+            publish("posterior", PosteriorMessage, time_ns=time_ns, **asdict(estimate.posterior))
+        if (pose := self._dead_reckoning.step(estimate)) is not None:
+            publish("odometry", OdometryMessage, time_ns=time_ns, **asdict(pose))
 
     def event(self, event: NetworkEvent) -> None:
         """Publish an event, and then, once the network has updated its state, the nodes and alarms that changed.
@@ -155,10 +159,15 @@ class MqttSink:
                 self._publish_alarm(name, alarm)
 
     def _publish_alarm(self, name: str, alarm: Alarm | None) -> None:
-        """Publish an alarm, or that it is not active: the broker may have retained an active one of an earlier run."""
+        """Publish an alarm, or that it is not active: the broker may have retained an active one of an earlier run.
+
+        The message of an alarm's end keeps its last text and evidence.
+        """
+        if alarm is not None:
+            self._last_alarms[name] = alarm
         self._published_alarms[name] = alarm
         now = time.time_ns()
-        fields = asdict(alarm or Alarm(name, Severity.WARNING, "", ""))
+        fields = asdict(self._last_alarms.get(name) or Alarm(name, Severity.WARNING, "", ""))
         fields |= {"active": alarm is not None, "since": iso_time(now)}
         self.publisher.publish(f"alarm/{name}", AlarmMessage, time_ns=now, **fields)
 
@@ -188,7 +197,7 @@ class MqttSink:
             recording_problem=(recorder.problem or "") if recorder is not None else "",
             control_problem=self._control_problem(),
             clock_jump_s=self._jump_s,
-            soil_change=self._soil_change if self._monotonic_ns() < self._soil_change_until_ns else "",
+            soil_change=self._soil_change if self._monotonic_ns() < self._soil_change_until_ns else None,
             stuck=self._stuck_sensors.stuck,
             summarised=tuple(_kind_and_node(*key) for key in self._throttle.summarised(self._monotonic_ns())),
         )

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 from aiomqtt import MqttError
 
 from regolithd.daemon.messages.channels import CHANNELS
-from regolithd.daemon.messages.header import Header, iso_time
+from regolithd.daemon.messages.header import Header, iso_time, time_fields
 from regolithd.daemon.messages.health import PublishingReport
 from regolithd.daemon.messages.state import Presence, StateMessage
 from regolithd.daemon.publish.backoff import Backoff
@@ -155,8 +155,8 @@ class Publisher:
     def _write(self, topic: str, message: type[Header], time_ns: int | None, fields: dict[str, Any]) -> bytes:
         sequence = self._sequences[topic]
         self._sequences[topic] += 1
-        moment = iso_time(self._clock_ns() if time_ns is None else time_ns)
-        written = message.model_validate({"session": self.session, "sequence": sequence, "time": moment, **fields})
+        moment = time_fields(self._clock_ns() if time_ns is None else time_ns)
+        written = message.model_validate({"session": self.session, "sequence": sequence, **moment, **fields})
         return written.model_dump_json().encode()
 
     def birth(self) -> bytes:
@@ -172,7 +172,7 @@ class Publisher:
             {
                 "session": self.session,
                 "sequence": self._connections,
-                "time": iso_time(self._clock_ns()),
+                **time_fields(self._clock_ns()),
                 "state": state,
                 "reason": reason,
                 "software_version": self._version,

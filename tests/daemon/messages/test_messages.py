@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from regolithd.daemon.messages.channels import CHANNELS
 from regolithd.daemon.messages.documents import documents
 from regolithd.daemon.messages.examples import example
-from regolithd.daemon.messages.header import iso_time
+from regolithd.daemon.messages.header import iso_time, time_fields
 from regolithd.daemon.messages.measurements import SnapshotMessage, WheelMessage
 from regolithd.daemon.messages.state import StateMessage
 from regolithd.daemon.publish.encode import as_late, encode, write
@@ -84,7 +84,7 @@ def test_a_stored_message_of_an_older_schema_keeps_its_version_when_it_is_marked
 def test_every_model_written_live_can_be_marked_late() -> None:
     """`late` is at the same place in every message, however it was written."""
     state = StateMessage(
-        session=SESSION, sequence=1, time=iso_time(0), state="online", reason="connected", software_version="0"
+        session=SESSION, sequence=1, **time_fields(0), state="online", reason="connected", software_version="0"
     )
     assert json.loads(as_late(write(state.model_dump())))["late"] is True
     assert as_late(state.model_dump_json().encode()) == as_late(write(state.model_dump()))

@@ -5,7 +5,7 @@ import json
 import socket
 import time
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count, islice
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,11 +16,13 @@ from broker import Mosquitto
 from estimates import estimate
 from subscriber import until
 
+from regolithd.calibration.posterior.change_detection import Alarm as Change
+from regolithd.calibration.posterior.estimator import FallProbability
 from regolithd.daemon.config.configuration import Configuration, Mqtt
 from regolithd.daemon.health.alarms import alarm_names
-from regolithd.daemon.messages.header import iso_time
+from regolithd.daemon.messages.header import iso_time, time_fields
 from regolithd.daemon.messages.health import PublishingReport
-from regolithd.daemon.pipeline.snapshot import AcquisitionCounters
+from regolithd.daemon.pipeline.snapshot import AcquisitionCounters, SoilChange
 from regolithd.daemon.publish.connection import WINDOW, Connection
 from regolithd.daemon.publish.mqtt_sink import MqttSink
 from regolithd.daemon.publish.outbox import Outbox
@@ -44,7 +46,7 @@ class Recorder:
 
     def publish(self, topic: str, message: type, *, time_ns: int, **fields: Any) -> None:
         """Keep a message that its model accepts."""
-        message.model_validate({"session": "s", "sequence": 0, "time": iso_time(time_ns), **fields})
+        message.model_validate({"session": "s", "sequence": 0, **time_fields(time_ns), **fields})
         self.published.append((topic, fields))
 
     def taken(self) -> list[tuple[str, dict[str, Any]]]:
@@ -85,8 +87,49 @@ def test_an_alarm_is_published_when_it_begins_changes_and_ends_and_not_between(s
     assert published == [
         ("alarm/bus", True, "no such device"),
         ("alarm/bus", True, "permission denied"),
-        ("alarm/bus", False, ""),
+        ("alarm/bus", False, "permission denied"),
     ]
+
+
+def test_a_soil_change_has_its_evidence_as_numbers_also_after_its_end(service: Any) -> None:
+    """Onset, wheels, ratio, statistic and probabilities are fields; the alarm latches, and keeps them at its end."""
+    publisher = Recorder()
+    now_ns = 0
+    sink = MqttSink(service, publisher, monotonic_ns=lambda: now_ns)  # type: ignore[arg-type]
+    change = Change(1_700_000_030_000_000_000, 1_700_000_012_000_000_000, "fall", "front", 11.2, 10.8, 0.71)
+    publisher.estimate = lambda _: None  # type: ignore[attr-defined]
+    sink.estimate(replace(estimate(), soil_change=SoilChange(change, FallProbability(0.97, 0.6, 0.9))))
+    publisher.taken()
+    sink._publish_changes()
+    now_ns = 121_000_000_000
+    sink._publish_changes()
+    published = [fields for topic, fields in publisher.taken() if topic == "alarm/soil-change"]
+    assert [fields["active"] for fields in published] == [True, False]
+    for fields in published:
+        assert fields["text"].startswith("the soil is weaker")
+        assert fields["latching"]
+        assert fields["evidence"].model_dump() == {
+            "onset": iso_time(change.onset_ns),
+            "direction": "fall",
+            "wheels": (1, 2),
+            "torque_ratio": 0.71,
+            "statistic": 11.2,
+            "threshold": 10.8,
+            "cohesion_fell": 0.97,
+            "friction_angle_fell": 0.6,
+            "drawbar_margin_fell": 0.9,
+        }
+
+
+async def test_a_moving_rover_sends_its_odometry(service: Any) -> None:
+    """The dead-reckoned position is a message of its own, with the time of its snapshot."""
+    publisher = Recorder()
+    publisher.estimate = lambda _: None  # type: ignore[attr-defined]
+    sink = MqttSink(service, publisher)  # type: ignore[arg-type]
+    sink.estimate(estimate())
+    ((topic, fields),) = publisher.taken()
+    assert topic == "odometry"
+    assert fields["speed_source"] == "ground-speed"
 
 
 async def test_a_connection_takes_two_windows_of_publishes_without_a_warning(tmp_path: Path) -> None:

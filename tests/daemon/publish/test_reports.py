@@ -12,7 +12,7 @@ import pytest
 
 from regolithd.daemon.config.configuration import Configuration
 from regolithd.daemon.health.liveness import TaskLiveness
-from regolithd.daemon.messages.header import iso_time
+from regolithd.daemon.messages.header import iso_time, time_fields
 from regolithd.daemon.messages.health import PublishingReport
 from regolithd.daemon.pipeline.snapshot import AcquisitionCounters
 from regolithd.daemon.publish import mqtt_sink
@@ -46,7 +46,7 @@ class Publisher:
 
     def publish(self, topic: str, message: type, *, time_ns: int = T_NS, **fields: Any) -> None:
         """Keep a message that its model accepts."""
-        message.model_validate({"session": "s", "sequence": 0, "time": iso_time(time_ns), **fields})
+        message.model_validate({"session": "s", "sequence": 0, **time_fields(time_ns), **fields})
         self.published.append((topic, fields))
 
 
