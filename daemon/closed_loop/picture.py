@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from regolithd.calibration.drivetrain.torque import no_load_current
 from regolithd.calibration.parameters import SOILS, Drivetrain
+from regolithd.calibration.validation.reproduction.pictures import save
 from regolithd.daemon.closed_loop.case import OTHER_SOILS
 from regolithd.daemon.closed_loop.soil_estimates import UNITS, figures
 from regolithd.daemon.closed_loop.summary import found_effect, hidden_effect
@@ -65,8 +66,7 @@ def draw(runs: Sequence[LoopResult], path: Path) -> None:
             panels[1].legend(fontsize=8.5, loc="upper left", ncols=3)
         rows[0].axes[3].legend(fontsize=8.5, loc="upper right")
         made.supxlabel(CAPTION, x=0.008, ha="left", fontsize=9, color="#555555")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        made.savefig(path, dpi=130, metadata={"Date": None} if path.suffix == ".svg" else {})
+        save(made, path, dpi=130)
 
 
 def _headline(result: LoopResult) -> str:

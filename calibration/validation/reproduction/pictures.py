@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from regolithd.calibration.paper.sizing import PAPER_MSE, PAPER_SIZE
 from regolithd.calibration.parameters import SOILS
@@ -38,6 +39,8 @@ STYLE: Any = {
 }
 
 
+PLACE_STEP = 2.0**-20
+"""Places in a figure are multiples of this fraction of it: far below a pixel, far above rounding errors."""
 EVERY = 3
 """Every third record of a traverse is drawn; the mean is over all records."""
 
@@ -47,11 +50,30 @@ def figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def save(made: Figure, path: Path) -> None:
+def save(made: Figure, path: Path, dpi: int = 150) -> None:
     """Write a figure; the same numbers give the same bytes."""
+    _fix_layout(made)
     path.parent.mkdir(parents=True, exist_ok=True)
     metadata = {"Date": None} if path.suffix == ".svg" else {}
-    made.savefig(path, dpi=150, metadata=metadata)
+    made.savefig(path, dpi=dpi, metadata=metadata)
+
+
+def _fix_layout(made: Figure) -> None:
+    """Lay out the figure once and round the places of its panels.
+
+    The solver of the constrained layout orders its variables by their addresses in memory, so that its last bits
+    differ from call to call; an SVG's identifiers are hashes of these places.
+    """
+    made.draw_without_rendering()
+    made.set_layout_engine("none")
+    for part in made.subfigs:
+        part.bbox_relative.set_points(_rounded(part.bbox_relative.get_points()))
+    for panel in made.axes:
+        panel.set_position(Bbox(_rounded(panel.get_position(original=True).get_points())))
+
+
+def _rounded(places: Array) -> Array:
+    return np.round(places / PLACE_STEP) * PLACE_STEP
 
 
 def sizing(figures: Mapping[str, float], path: Path) -> None:
