@@ -101,7 +101,7 @@ def compare(
         ]
         return merged(found)
     progress("simulating")
-    candidates = simulation.candidates(library())
+    candidates: Sequence[Candidate] = [each.form_for(simulation) for each in simulation.candidates(library())]
     stated = stated_in(candidates, effects, simulation.stated_effects())
 
     def pose(values: Mapping[str, float] | None) -> Problem:
@@ -219,7 +219,8 @@ def _about_the_mask(problem: Problem) -> list[str]:
             f"There is nothing to compare at {kind} {', '.join(map(str, silent))}: it never turns, or is not measured."
         )
     notes += [
-        f"{each.readings} readings of {each.channel} are not compared: {each.reason}." for each in problem.left_out
+        f"Readings of {each.channel} that are not compared: {each.readings} ({each.reason})."
+        for each in problem.left_out
     ]
     return notes
 
@@ -233,10 +234,14 @@ def _beyond_prior_in_words(parameter: CalibratedParameter) -> str:
 
 
 def _not_looked_for(problem: Problem, candidates: Sequence[Candidate], applicable: Sequence[str]) -> list[str]:
-    """Return notes of the candidates that this recording or simulation does not allow."""
-    notes = []
+    """Return a note of the candidates that this recording or simulation does not allow, by what they lack."""
+    lacking: dict[str, list[str]] = {}
     for candidate in candidates:
         if candidate.name not in applicable:
-            lacking = ", ".join(name for name in candidate.requires if name not in problem.covariates)
-            notes.append(f"{candidate.name} was not looked for: it needs {lacking or 'another simulation'}.")
-    return notes
+            needs = ", ".join(name for name in candidate.requires if name not in problem.covariates)
+            lacking.setdefault(needs or "another kind of machine", []).append(candidate.name)
+    if not lacking:
+        return []
+    return [
+        "Not looked for: " + "; ".join(f"{', '.join(names)} (needs {needs})" for needs, names in lacking.items()) + "."
+    ]

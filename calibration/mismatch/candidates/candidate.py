@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from regolithd.calibration.mismatch.problem.predictor import Predictor
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -107,6 +108,10 @@ class Candidate:
         super().__init_subclass__()
         if "name" in vars(cls) and "label" not in vars(cls):
             cls.label = " ".join(cls.name.rsplit("-", 1)).replace("_", " ")
+
+    def form_for(self, simulation: Predictor) -> Candidate:  # noqa: ARG002  # subclasses look
+        """Return the candidate in the form that it has for a simulation; by default it has only one."""
+        return self
 
     def applies(self, problem: Problem) -> bool:
         """Return whether this recording and simulation allow the effect at all."""

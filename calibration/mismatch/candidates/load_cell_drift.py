@@ -1,4 +1,4 @@
-"""Drift of one load cell: the simulation gets a wrong load as its input."""
+"""Drift of one load cell: the simulation gets a wrong load as its input, or is compared with a wrong one."""
 
 from __future__ import annotations
 
@@ -6,14 +6,22 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.candidate import (
+    Array,
+    Candidate,
+    Coefficient,
+    Shape,
+    growth_since,
+    onset_grid,
+)
 from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.signal.hat_basis import hat_functions
 from regolithd.calibration.mismatch.signal.noise import estimate_noise
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
+    from regolithd.calibration.mismatch.problem.predictor import Predictor
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 WANDER_KNOTS, POSTURE_KNOTS = 24, 4
@@ -27,6 +35,10 @@ LEAST_SHARE = 0.1
 """Share of the reading that is left of the load at least: the contact model needs a positive load (a choice)."""
 LEAST_READINGS = 10
 """Readings below which no posture is fitted: as many as the regression has columns."""
+RISES = (0.05, 0.15)
+"""Time constants of a predicted load's creep, as shares of the recording (a choice: quick and slow)."""
+FIRST_ONSET, LAST_ONSET = 0.01, 0.97
+"""Range of the optimised onset, as shares of the recording (a choice)."""
 
 
 class LoadCellDrift(Candidate):
@@ -38,17 +50,21 @@ class LoadCellDrift(Candidate):
 
     name = "load-cell-drift"
     covariate = "time"
-    channel = "load_N"
+    channel: ClassVar[str | None] = "load_N"
     equation = "W = W_cell − D(t);  ΔI = −(∂I/∂W) D(t)"
     words = "a load cell whose reading drifts"
     signature = "one wheel's load departs from what pitch and roll explain, and its current does not follow"
     experiment = "drive back over the same ground, and lift the wheels and spin all six at one speed"
     source = "creep and temperature drift of faulty strain gauges: some percent of full scale per hour"
-    requires = ("load", "pitch", "roll")
+    requires: ClassVar[tuple[str, ...]] = ("load", "pitch", "roll")
     acts_unloaded = False
     coefficients: ClassVar = (Coefficient("drift_as_the_cell_shows_it", "1", 1),)
     sharing: ClassVar = ("one",)
     free: ClassVar = {"relative_offset": (-3.0, 0.85)}
+
+    def form_for(self, simulation: Predictor) -> Candidate:
+        """Return another form where the simulation predicts what the cell reads."""
+        return DriftOfPredictedLoad() if simulation.channel.startswith("load") else self
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
         """Return the drift as the cell shows it, with several offsets of its mean."""
@@ -70,7 +86,7 @@ class LoadCellDrift(Candidate):
             total += weight * self._simulated(problem, here)
         return total[None]
 
-    def own_channel_evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array]:  # noqa: ARG002
+    def own_channel_evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array] | None:  # noqa: ARG002
         """Return Δχ² of the drift in each cell's own reading, and its coefficient there, which is 1."""
         key = ("drift seen by the cell", 0.0)
         if key not in problem.made:
@@ -106,6 +122,38 @@ class LoadCellDrift(Candidate):
             load = problem.covariates["load"]
             problem.made[key] = _without_posture(problem, load / np.where(known_mean(load) > 0, known_mean(load), 1.0))
         return problem.made[key]
+
+
+class DriftOfPredictedLoad(LoadCellDrift):
+    """The drift of a cell whose reading is predicted: it departs after an onset, whatever the load is."""
+
+    channel = None
+    requires = ()
+    acts_unloaded = True
+    equation = "ΔW = D g(t − t_0)"
+    signature = "one reading departs from the prediction after some time, by an amount that does not depend on the load"
+    experiment = "take the load off, note the reading, and repeat with a known load"
+    along_motion = False
+    coefficients: ClassVar = (Coefficient("drift", "{unit}", 0),)
+    free: ClassVar = {"onset_s": (0.0, float("inf"))}
+
+    def shapes(self, problem: Problem) -> Sequence[Shape]:
+        """Return, for each onset, two exponential approaches (creep) and a steady ramp."""
+        rises = (*(share * problem.length_s for share in RISES), float("inf"))
+        return [{"onset_s": t, "rise_s": rise} for t in onset_grid(problem) for rise in rises]
+
+    def columns(self, problem: Problem, shape: Shape) -> Array:
+        """Return g(t − t_0), 0 before the onset and 1 at last."""
+        grown = growth_since(problem, float(shape["onset_s"]), float(shape["rise_s"]))
+        return (grown + 0.0 * problem.filled)[None]
+
+    def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
+        """Return the recording without its ends: the reading must be seen before the drift and with it."""
+        return {"onset_s": (FIRST_ONSET * problem.length_s, LAST_ONSET * problem.length_s)}
+
+    def own_channel_evidence(self, problem: Problem, shape: Shape) -> None:  # noqa: ARG002
+        """Return nothing: the predicted channel is the cell's own."""
+        return
 
 
 def _without_posture(problem: Problem, values: Array) -> Array:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,6 +13,8 @@ from regolithd.calibration.mismatch.inference.sandwich import Linearisation, lin
 from regolithd.calibration.mismatch.inference.size_interval import relative_size_interval
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
@@ -24,6 +25,8 @@ NINE_TENTHS = (0.05, 0.95)
 """Quantiles of a 90 % interval."""
 LEAST_MARGIN = 0.05
 """Share of the interval's width by which it reaches beyond its value (a choice: a value is never its own bound)."""
+FEWEST_DRAWS_WITHIN = 20
+"""Draws within the declared bounds from which quantiles are taken (a choice: one is then below the 5 % quantile)."""
 UNIT_OF_ENDING = {"_rad_s": "rad/s", "_degC": "degC", "_K": "K", "_s": "s"}
 
 
@@ -71,8 +74,7 @@ def _of_term(
     units |= {name: unit_of(name) for name in candidate.free}
     limits = candidate.bounds(equations.problem, shape)
     found = {
-        name: within(interval(value, drawn[name], units.get(name, "1")), limits.get(name))
-        for name, value in central.items()
+        name: interval(value, drawn[name], units.get(name, "1"), limits.get(name)) for name, value in central.items()
     }
     onset = candidate.change_point
     if onset in shape and onset in candidate.free:
@@ -80,18 +82,24 @@ def _of_term(
     return found
 
 
-def interval(value: float, drawn: list[float] | Array, unit: str) -> Parameter:
-    """Return a value with the bounds of its draws; a value outside of them widens the interval beyond itself."""
-    low, high = (float(bound) for bound in np.quantile(drawn, NINE_TENTHS))
+def interval(
+    value: float, drawn: Sequence[float] | Array, unit: str, bounds: tuple[float, float] | None = None
+) -> Parameter:
+    """Return a value with the bounds of its draws; a value outside of them widens the interval beyond itself.
+
+    Where `bounds` are declared, draws beyond them are impossible: those within are the posterior. A best value that
+    stands on a bound is then no centre of it, and its median is returned instead.
+    """
+    least, most = bounds or (-np.inf, np.inf)
+    inside = np.asarray(drawn, np.float64)
+    inside = inside[(inside >= least) & (inside <= most)]
+    if len(inside) < FEWEST_DRAWS_WITHIN:
+        inside = np.clip(drawn, least, most)
+    low, high = (float(bound) for bound in np.quantile(inside, NINE_TENTHS))
+    if not least < value < most:
+        value = float(np.median(inside))
     margin = LEAST_MARGIN * (high - low)
-    return Parameter(value, min(low, value - margin), max(high, value + margin), unit)
-
-
-def within(parameter: Parameter, bounds: tuple[float, float] | None) -> Parameter:
-    """Return a parameter whose interval stays within the declared bounds."""
-    if bounds is None:
-        return parameter
-    return replace(parameter, low=max(parameter.low, bounds[0]), high=min(parameter.high, bounds[1]))
+    return Parameter(value, max(min(low, value - margin), least), min(max(high, value + margin), most), unit)
 
 
 def unit_of(name: str) -> str:

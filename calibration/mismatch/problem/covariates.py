@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,8 @@ Array = NDArray[np.float64]
 
 KEPT_WHERE_CONSTANT = frozenset({"wheel_speed", "direction", "wheel_acceleration", "wheel_angle", "time", "torque"})
 """Covariates that candidates need even where they are constant."""
+UNIT_WORD = re.compile(r"[munkM]?(A|V|N|Nm|W|J|m|s|g|Pa|Hz|bar|l)[23]?|K|deg[CF]?|rad[2]?|min|h|rpm|per|percent")
+"""A part of a column's name that is of its unit: `A` of `current_A`, `m` and `s` of `flow_m_s`."""
 LONGEST_STEP = 3.0
 """Steps of time longer than so many usual ones are gaps: nothing is differentiated across them."""
 
@@ -28,13 +31,22 @@ def covariates_of(
     found = dict(simulation.covariates(inputs))
     found["time"] = np.broadcast_to(_elapsed(recording)[:, None], recording.shape)
     if not simulation.arbitrary_zero:
-        found.setdefault("torque", np.abs(prediction))
+        # Torque is what something that turns carries; of anything else the prediction is the quantity that it is.
+        found.setdefault("torque" if "wheel_speed" in found else quantity(simulation.channel), np.abs(prediction))
     if "wheel_speed" in found:
         speed = found["wheel_speed"]
         found["direction"] = np.sign(speed)
         found["wheel_acceleration"] = _derivative(speed, recording)
         found["wheel_angle"] = _integral(speed, recording)
     return {name: values for name, values in found.items() if name in KEPT_WHERE_CONSTANT or _varies(values)}
+
+
+def quantity(channel: str) -> str:
+    """Return a channel's name without the unit at its end: `load` of `load_N` and of `load_kN`."""
+    words = channel.split("_")
+    while len(words) > 1 and UNIT_WORD.fullmatch(words[-1]):
+        words.pop()
+    return "_".join(words)
 
 
 def _varies(values: Array) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from linear_machine import NOISE, equations_of, problem_of, table, term_of
 
-from regolithd.calibration.mismatch.inference.intervals import interval, normal_draws, parameters_of, unit_of, within
+from regolithd.calibration.mismatch.inference.intervals import interval, normal_draws, parameters_of, unit_of
 from regolithd.calibration.mismatch.inference.sandwich import block_sums, linearised, sandwich
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
@@ -128,11 +128,14 @@ def test_a_value_is_within_its_own_interval() -> None:
     assert interval(5.0, [2.0, 3.0, 4.0], "V").high == pytest.approx(5.0 + 0.05 * 1.8)
 
 
-def test_an_interval_stays_within_the_declared_bounds() -> None:
-    """A power that may be at most 1.4 is not said to be 1.5."""
-    found = within(interval(1.35, [1.2, 1.3, 1.5], "1"), (0.7, 1.4))
-    assert found.high == 1.4
-    assert found.low == interval(1.35, [1.2, 1.3, 1.5], "1").low
+def test_an_interval_stays_within_declared_bounds() -> None:
+    """Draws beyond the bounds are impossible, and a best value on a bound gives way to the median of the others."""
+    drawn = np.linspace(-1.0, 1.0, 2001)
+    found = interval(0.0, drawn, "s", (0.0, 0.5))
+    assert (found.low, found.value, found.high) == pytest.approx((0.025, 0.25, 0.475), abs=1e-3)
+    kept = interval(0.3, drawn, "s", (0.0, 0.5))
+    assert kept.value == 0.3
+    assert interval(1.35, [1.2, 1.3, 1.5], "1", (0.7, 1.4)).high <= 1.4
 
 
 @pytest.mark.parametrize(
