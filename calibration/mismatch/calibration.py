@@ -11,11 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.regression.blocks import blocks_of_time, folds_of_blocks
-from regolithd.calibration.mismatch.regression.design_matrix import empty_design
-from regolithd.calibration.mismatch.regression.normal_equations import normal_equations
-from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
-from regolithd.calibration.mismatch.signal.noise import estimate_noise
+from regolithd.calibration.mismatch.regression.equations import free_parameter_equations
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -35,21 +31,12 @@ def linearised_where_it_fits(pose: Callable[[Mapping[str, float] | None], Proble
     """
     problem = pose(None)
     for _ in range(STEPS):
-        equations = free_parameters(problem)
+        equations = free_parameter_equations(problem)
         values = moved_values(equations, equations.fit(()))
         if not bent(problem, values):
             break
         problem = pose(values)
     return problem
-
-
-def free_parameters(problem: Problem) -> NormalEquations:
-    """Return the normal equations of the simulation's free parameters alone."""
-    residual = np.where(problem.mask, problem.measured - problem.filled, 0.0)
-    noise = estimate_noise(residual, problem.mask, problem.thresholds)
-    folds = folds_of_blocks(problem, blocks_of_time(problem, noise))
-    design, nuisance = with_nuisance(empty_design(problem, folds))
-    return normal_equations(design, nuisance, noise.weights)
 
 
 def moved_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:

@@ -14,12 +14,15 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     passes_entry_test,
 )
 from regolithd.calibration.mismatch.selection.cross_validation import squares_on_fold, training_equations
+from regolithd.calibration.mismatch.selection.decision import without_name
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Fit, Group, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+    from regolithd.calibration.mismatch.selection.decision import Decision
 
 Array = NDArray[np.float64]
 
@@ -105,3 +108,23 @@ def chosen_effects(train: NormalEquations, entry_threshold: float) -> tuple[Term
             break
         terms = best.terms
     return terms
+
+
+def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOutErrors]:
+    """Return the decision without names that lower no held-out error, the worst dropped first; and those errors.
+
+    `grid` are the groups before any data optimised their shapes.
+    """
+    equations, threshold = decision.equations, decision.entry_threshold
+    problem, kept = equations.problem, set(map(id, grid))
+    choice = [group for group in equations.design.groups if id(group) in kept or _only_proposed(problem, group)]
+    held_out = held_out_errors(equations, decision.named, choice, threshold)
+    while (idle := held_out.without_gain()) is not None:
+        decision = without_name(decision, idle)
+        held_out = held_out_errors(equations, decision.named, choice, threshold)
+    return decision, held_out
+
+
+def _only_proposed(problem: Problem, group: Group) -> bool:
+    """Return whether a candidate's shapes come from a residual alone, so that the grid has none of them."""
+    return group.candidate is not None and not group.candidate.shapes(problem)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.library import library
-from regolithd.calibration.mismatch.report.statements import listed, plural
+from regolithd.calibration.mismatch.inference.statements import listed, plural
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
+from regolithd.calibration.mismatch.inference.statements import listed
 from regolithd.calibration.mismatch.report.axes import number
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.figures import curve_figure, fit_figure, interval_figure, map_figure
 from regolithd.calibration.mismatch.report.labels import capital
-from regolithd.calibration.mismatch.report.statements import listed
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Answer, Curve, Effect, Evidence, Unexplained

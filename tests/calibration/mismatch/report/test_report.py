@@ -24,12 +24,12 @@ from regolithd.calibration.mismatch.answer import (
 )
 from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.candidates.coulomb_friction import CoulombFriction
+from regolithd.calibration.mismatch.inference.statements import plural, statement
 from regolithd.calibration.mismatch.report.axes import number, ticks
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.labels import Labels, verdict_sentence
 from regolithd.calibration.mismatch.report.notebook import notebook_html
 from regolithd.calibration.mismatch.report.page import Provenance, equation, render_report
-from regolithd.calibration.mismatch.report.statements import plural, statement
 
 FROM = Provenance("drive.csv", "SIM.toml", "ab" * 32, "cd" * 32, "regolithd mismatch drive.csv --simulation SIM.toml")
 WORN = Effect(

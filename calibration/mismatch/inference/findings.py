@@ -6,18 +6,28 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.answer import CalibratedParameter, Effect, Parameter, Unexplained
-from regolithd.calibration.mismatch.changes import ChangedSize, changes_of
+from regolithd.calibration.mismatch.answer import (
+    Answer,
+    CalibratedParameter,
+    Effect,
+    FitImprovement,
+    Parameter,
+    Unexplained,
+)
+from regolithd.calibration.mismatch.changes import ChangedSize, change_in_words, changes_of
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values, wheel_names
+from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
 from regolithd.calibration.mismatch.inference.intervals import parameters_of
+from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
+from regolithd.calibration.mismatch.inference.statements import statement
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
-from regolithd.calibration.mismatch.report.statements import statement
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from regolithd.calibration.mismatch.answer import Change, Verdict
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Term
@@ -28,6 +38,37 @@ NINETY_PERCENT_STDS = 1.645
 """Half the width of a 90 % interval of a normal density, in standard deviations."""
 BEGINNING, END = 0.01, 0.99
 """Shares of a curve's power before and after which it counts as not there."""
+
+
+def answer_of(
+    decision: Decision, held_out: HeldOutErrors, candidates: Sequence[Candidate], applicable: Sequence[Candidate]
+) -> Answer:
+    """Return what is told of a decision; `applicable` are those candidates that this recording allows."""
+    equations, threshold = decision.equations, decision.entry_threshold
+    problem, named = equations.problem, decision.named
+    effects, changes = named_effects(decision, held_out)
+    parameters = calibrated_parameters(decision)
+    moved = beyond_prior(parameters, equations.thresholds)
+    extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold)
+    channel, floor = problem.simulation.channel, noise_floor(decision)
+    return Answer(
+        verdict=verdict_of(decision, moved),
+        effects=effects,
+        unexplained=tuple(unexplained(decision, term) for term in decision.unnamed),
+        indistinguishable=sets,
+        sensitivity=sensitivities(extended, decision.whole, candidates, threshold),
+        fit=FitImprovement(channel, held_out.before, held_out.after if named.terms else held_out.before, floor),
+        parameters=parameters,
+        changes=changes,
+        left_out=problem.left_out,
+        notes=(
+            *map(_beyond_prior_in_words, moved),
+            *map(change_in_words, changes),
+            *problem.recording.notes,
+            *_about_the_mask(problem),
+            *_not_looked_for(problem, candidates, [candidate.name for candidate in applicable]),
+        ),
+    )
 
 
 def verdict_of(decision: Decision, moved: Sequence[CalibratedParameter]) -> Verdict:
@@ -126,3 +167,41 @@ def unexplained(decision: Decision, term: Term) -> Unexplained:
         to_s=float(last),
         share_of_residual=min(float(np.sum(squares) / max(float(np.sum(before)), 1e-300)), 1.0),
     )
+
+
+def _about_the_mask(problem: Problem) -> list[str]:
+    """Return notes of what was left out of the comparison, and why."""
+    notes = []
+    kind = problem.simulation.wheel_column
+    silent = [name for k, name in enumerate(problem.recording.wheels) if not problem.mask[:, k].any()]
+    if silent:
+        notes.append(
+            f"There is nothing to compare at {kind} {', '.join(map(str, silent))}: it never turns, or is not measured."
+        )
+    notes += [
+        f"Readings of {each.channel} that are not compared: {each.readings} ({each.reason})."
+        for each in problem.left_out
+    ]
+    return notes
+
+
+def _beyond_prior_in_words(parameter: CalibratedParameter) -> str:
+    away = abs(parameter.value - parameter.prior) / parameter.prior_std
+    return (
+        f"{parameter.name} had to leave its prior: {parameter.value:.4g} {parameter.unit}, "
+        f"{away:.1f} standard deviations from {parameter.prior:.4g}. Check the stated value and its standard deviation."
+    )
+
+
+def _not_looked_for(problem: Problem, candidates: Sequence[Candidate], applicable: Sequence[str]) -> list[str]:
+    """Return a note of the candidates that this recording or simulation does not allow, by what they lack."""
+    lacking: dict[str, list[str]] = {}
+    for candidate in candidates:
+        if candidate.name not in applicable:
+            needs = ", ".join(name for name in candidate.requires if name not in problem.covariates)
+            lacking.setdefault(needs or "another kind of machine", []).append(candidate.name)
+    if not lacking:
+        return []
+    return [
+        "Not looked for: " + "; ".join(f"{', '.join(names)} (needs {needs})" for needs, names in lacking.items()) + "."
+    ]

@@ -1,0 +1,52 @@
+"""The equations of a problem: every column of the regression, with the weights of the residual's noise.
+
+problem ─▶ noise ─▶ blocks and folds ─▶ columns: free parameters, candidates, smooth terms ─▶ normal equations
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from regolithd.calibration.mismatch.regression.blocks import blocks_of_time, folds_of_blocks
+from regolithd.calibration.mismatch.regression.candidate_groups import with_candidates
+from regolithd.calibration.mismatch.regression.design_matrix import empty_design
+from regolithd.calibration.mismatch.regression.normal_equations import normal_equations
+from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
+from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
+from regolithd.calibration.mismatch.signal.noise import estimate_noise
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate
+    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+    from regolithd.calibration.mismatch.regression.nuisance import Nuisance
+    from regolithd.calibration.mismatch.signal.noise import NoiseModel
+
+
+def equations_of(problem: Problem, candidates: Sequence[Candidate]) -> tuple[NormalEquations, tuple[Candidate, ...]]:
+    """Return the normal equations of free parameters, candidates and smooth terms, and the applicable candidates.
+
+    The weights are those of the whole residual; the decision estimates better ones.
+    """
+    design, nuisance, noise = _free_parameters(problem)
+    design, applicable = with_candidates(design, candidates)
+    return normal_equations(with_smooth_terms(design), nuisance, noise.weights), applicable
+
+
+def free_parameter_equations(problem: Problem) -> NormalEquations:
+    """Return the normal equations of the simulation's free parameters alone."""
+    design, nuisance, noise = _free_parameters(problem)
+    return normal_equations(design, nuisance, noise.weights)
+
+
+def _free_parameters(problem: Problem) -> tuple[DesignMatrix, Nuisance, NoiseModel]:
+    """Return a design matrix with the free parameters' columns, where they are in it, and the residual's noise."""
+    residual = np.where(problem.mask, problem.measured - problem.filled, 0.0)
+    noise = estimate_noise(residual, problem.mask, problem.thresholds)
+    folds = folds_of_blocks(problem, blocks_of_time(problem, noise))
+    return *with_nuisance(empty_design(problem, folds)), noise
