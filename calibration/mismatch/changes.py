@@ -41,7 +41,7 @@ class Stated:
 
     def column(self, problem: Problem) -> Array:
         """Return what it adds to the prediction, shape (time, wheel)."""
-        columns = np.where(problem.mask, self.candidate.columns(problem, self.contribution.shape), 0.0)
+        columns = np.where(problem.mask, self._columns(problem), 0.0)
         on = np.isin(np.array(problem.recording.wheels, dtype=object), list(self.contribution.wheels))
         coefficients = np.array(self.contribution.coefficients, np.float64)
         if len(coefficients) != len(columns):
@@ -49,6 +49,22 @@ class Stated:
                 f"[[effects]] {self.contribution.name}: {len(columns)} coefficients are needed, not {len(coefficients)}"
             )
         return np.einsum("c,ctw,w->tw", coefficients, columns, on)
+
+    def _columns(self, problem: Problem) -> Array:
+        """Return the candidate's columns; what never varies in this recording, a level drive's pitch, counts too."""
+        known = replace(problem, covariates={**problem.constants, **problem.covariates})
+        name, shape = self.contribution.name, self.contribution.shape
+        if lacking := [covariate for covariate in self.candidate.requires if covariate not in known.covariates]:
+            raise SimulationError(
+                f"[[effects]] {name} depends on {', '.join(lacking)}, which this recording does not have: "
+                "record it, or take the effect out of the file"
+            )
+        try:
+            return self.candidate.columns(known, shape)
+        except KeyError as error:
+            raise SimulationError(
+                f"[[effects]] {name}: its shape lacks {error}; find the effect again with --corrected"
+            ) from error
 
 
 class ChangedSize(Candidate):

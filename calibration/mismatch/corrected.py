@@ -19,8 +19,6 @@ from regolithd.calibration.mismatch.problem.prior import own_name
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.candidates.candidate import Candidate
-    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]
@@ -126,16 +124,3 @@ def stated_effects(tables: Mapping[str, Any]) -> tuple[Contribution, ...]:
         except (KeyError, TypeError, ValueError) as error:
             raise SimulationError(f"effect {number} needs name, shape, coefficients and wheels: {error}") from error
     return tuple(found)
-
-
-def effect_of(problem: Problem, candidates: Sequence[Candidate], effects: Sequence[Contribution]) -> Array:
-    """Return what stated effects add to the prediction, shape (time, wheel)."""
-    known = {candidate.name: candidate for candidate in candidates}
-    total = np.zeros(problem.mask.shape)
-    for effect in effects:
-        if effect.name not in known:
-            raise SimulationError(f"there is no effect {effect.name!r}; known are {', '.join(sorted(known))}")
-        columns = np.where(problem.mask, known[effect.name].columns(problem, effect.shape), 0.0)
-        on = np.isin(problem.recording.wheels, effect.wheels)
-        total += np.einsum("c,ctw,w->tw", np.array(effect.coefficients), columns, on)
-    return total

@@ -45,21 +45,29 @@ class BearingDrag(Candidate):
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """For each onset: a step, two exponential rises, and growth by a power of the time since the onset."""
         at = onset_grid(problem)
-        rises = (0.0, *(share * problem.length_s for share in RISES), float("inf"))
+        rises = (0.0, *(share * problem.length_s for share in RISES))
         rising: list[Shape] = [{"onset_s": t, "rise_s": rise} for t in at for rise in rises]
-        wear: list[Shape] = [{"onset_s": t, "rise_s": float("inf"), "power": p} for t in at for p in POWERS]
+        wear: list[Shape] = [{"onset_s": t, **_wear(problem, p)} for t in at for p in (1.0, *POWERS)]
         return [*rising, *wear]
 
     def onset_profiles(self, problem: Problem) -> Sequence[Shape]:
         """Add more powers of time than the search has: the onset's interval depends on how the drag grows after it."""
-        wear: list[Shape] = [{"rise_s": float("inf"), "power": p} for p in FURTHER_POWERS]
-        return [*super().onset_profiles(problem), *wear]
+        return [*super().onset_profiles(problem), *(_wear(problem, power) for power in FURTHER_POWERS)]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return sign(ω) g(t − t_0)."""
-        grown = growth_since(problem, float(shape["onset_s"]), float(shape["rise_s"])) ** float(shape.get("power", 1.0))
+        onset_s = float(shape["onset_s"])
+        if "power" in shape:
+            grown = growth_since(problem, onset_s, full_at_s=float(shape["full_at_s"])) ** float(shape["power"])
+        else:
+            grown = growth_since(problem, onset_s, rise_s=float(shape["rise_s"]))
         return (problem.covariates["direction"] * grown)[None]
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Return the recording without its ends: drag must be seen without and with the fault."""
         return {"onset_s": (FIRST_ONSET * problem.length_s, LAST_ONSET * problem.length_s)}
+
+
+def _wear(problem: Problem, power: float) -> Shape:
+    """Return growth by a power of the time since the onset, which is 1 at the end of this recording."""
+    return {"full_at_s": problem.length_s, "power": power}

@@ -132,7 +132,9 @@ class Candidate:
         Returns
         -------
         Array of shape (column, time, wheel), finite wherever `problem.mask` is set: the change of the predicted
-        channel for a coefficient of 1. One column for each of `coefficients`.
+        channel for a coefficient of 1. One column for each of `coefficients`. A corrected simulation keeps shape and
+        coefficients: what a column is scaled by (a mean, the coldest temperature) belongs in the shape, so that it is
+        the same law in any other recording.
         """
         raise NotImplementedError
 
@@ -207,14 +209,14 @@ def onset_grid(problem: Problem, count: int = ONSET_COUNT) -> list[float]:
     return [float(t) for t in problem.length_s * np.linspace(EARLIEST_ONSET, LATEST_ONSET, count)]
 
 
-def growth_since(problem: Problem, onset_s: float, rise_s: float) -> Array:
+def growth_since(problem: Problem, onset_s: float, *, rise_s: float = 0.0, full_at_s: float | None = None) -> Array:
     """Return growth from 0 at the onset, shape (time, 1).
 
-    A step (`rise_s` 0), an exponential approach to 1 with that time constant, or a ramp to 1 at the end (`rise_s` inf).
+    A step (`rise_s` 0), an exponential approach to 1 with that time constant, or a ramp that is 1 at `full_at_s`.
     """
     after = np.maximum(problem.time_s - onset_s, 0.0)
+    if full_at_s is not None:
+        return after / max(full_at_s - onset_s, 1e-9)
     if rise_s == 0:
         return (problem.time_s >= onset_s).astype(np.float64)
-    if np.isinf(rise_s):
-        return after / max(problem.length_s - onset_s, 1e-9)
     return -np.expm1(-after / rise_s)

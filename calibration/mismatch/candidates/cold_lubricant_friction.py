@@ -39,7 +39,10 @@ BEYOND_K = 20.0
 
 
 class ColdLubricantFriction(Candidate):
-    """Coulomb (power 0) or viscous (power 1) drag times a falling function of temperature: Vogel's law or a line."""
+    """Coulomb (power 0) or viscous (power 1) drag times a falling function of temperature: Vogel's law or a line.
+
+    The function is 1 at a reference temperature, the coldest of the recording in which the drag is identified.
+    """
 
     name = "cold-lubricant-friction"
     covariate = "temperature"
@@ -61,10 +64,9 @@ class ColdLubricantFriction(Candidate):
         ends = np.unique(np.maximum([*np.nanquantile(temperature, END_QUANTILES), top], soonest)).tolist()
         found: list[Shape] = []
         for power in (0.0, 1.0):
-            found += [
-                {"power": power, "pole_degC": pole, "scale_K": scale} for pole in POLES_DEGC for scale in SCALES_K
-            ]
-            found += [{"power": power, "no_drag_above_degC": end} for end in (*ends, top + BEYOND_K)]
+            cold: Shape = {"power": power, "reference_degC": _coldest(problem)}
+            found += [{**cold, "pole_degC": pole, "scale_K": scale} for pole in POLES_DEGC for scale in SCALES_K]
+            found += [{**cold, "no_drag_above_degC": end} for end in (*ends, top + BEYOND_K)]
         return found
 
     def prior_penalty(self, problem: Problem, shape: Shape) -> float:
@@ -72,7 +74,7 @@ class ColdLubricantFriction(Candidate):
         return 0.0 if problem.changes_within(self._growth(problem, shape)) else UNLIKELY_SHAPE_PENALTY
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return g(T) sign(ω)|ω|^p; g is 1 at the coldest reading."""
+        """Return g(T) sign(ω)|ω|^p; g is 1 at the reference temperature."""
         drag = problem.covariates["direction"] * self._growth(problem, shape)
         if float(shape["power"]) and "wheel_speed" in problem.covariates:
             drag = drag * np.abs(problem.covariates["wheel_speed"])
@@ -81,9 +83,9 @@ class ColdLubricantFriction(Candidate):
     def _growth(self, problem: Problem, shape: Shape) -> Array:
         """Return g(T), shape (time, wheel)."""
         temperature = np.nan_to_num(problem.covariates["temperature"])
-        coldest = _coldest(problem)
+        coldest = float(shape["reference_degC"])
         if "scale_K" in shape:
-            # Vogel: ln η = A + B/(T − T_0); near the coldest reading the viscosity falls by a factor e over the scale.
+            # Vogel: ln η = A + B/(T − T_0); near the reference the viscosity falls by a factor e over the scale.
             pole = float(shape["pole_degC"])
             above, coldest_above = (np.maximum(each - pole, ABOVE_POLE_K) for each in (temperature, coldest))
             return np.asarray(np.exp(coldest_above / float(shape["scale_K"]) * (coldest_above / above - 1)))

@@ -19,7 +19,7 @@ class GradeResistance(Candidate):
 
     name = "grade-resistance"
     covariate = "pitch"
-    equation = "ΔI = k W sin(pitch)"
+    equation = "ΔI = k (W/W_ref) sin(pitch)"
     words = "the weight's part along the slope"
     signature = "a residual along sin(pitch) that does not change sign with the direction of travel"
     experiment = "drive one slope up and down, forwards and backwards"
@@ -31,13 +31,16 @@ class GradeResistance(Candidate):
     sharing: ClassVar = ("all",)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """Return sharing in proportion to each wheel's load, where it is known, or evenly."""
-        return [{"shared": "by load"}, {"shared": "evenly"}] if "load" in problem.covariates else [{"shared": "evenly"}]
+        """Return sharing in proportion to each wheel's load over the mean one here, where it is known, or evenly."""
+        evenly: Shape = {"shared": "evenly"}
+        if "load" not in problem.covariates:
+            return [evenly]
+        reference = float(np.nanmean(problem.covariates["load"][problem.mask]))
+        return [{"shared": "by load", "reference_load": reference}, evenly]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return sin(pitch), times each wheel's share of the load relative to the mean."""
+        """Return sin(pitch), times each wheel's share of the load relative to the reference."""
         along = np.sin(np.nan_to_num(problem.covariates["pitch"]))
         if shape["shared"] == "by load":
-            load = np.nan_to_num(problem.covariates["load"])
-            along = along * load / np.mean(load[problem.mask])
+            along = along * np.nan_to_num(problem.covariates["load"]) / float(shape["reference_load"])
         return along[None]

@@ -23,21 +23,25 @@ if TYPE_CHECKING:
 LARGEST_LOSS = 2 / 3
 """Largest share of the stated efficiency that may be lost at any torque (a choice: a third is left)."""
 POWERS, LIGHT_LOADS, SLOPES = (0.0, 0.5, 1.0, 2.0, 3.5), (0.5, 1.0), (-0.2, 0.0, 0.3)
-"""Grid of the three forms: powers of torque, decay scales in mean torques, slopes of the efficiency (a choice)."""
+"""Grid of the three forms: powers of torque, decay scales in reference torques, slopes of the efficiency (a choice)."""
 
 
 class LoadDependentEfficiency(Candidate):
     """An efficiency that varies with torque, in one of three forms.
 
+    The torque is taken relative to a reference, the predicted channel's mean magnitude in the recording in which the
+    effect is identified; it is part of the shape (`reference_size`, in the channel's unit), so that the law holds for
+    any other recording.
+
     `power`: the relative loss grows as a power of the torque; with power 0 it is constant, so that the stated gain is
     wrong by more than its stated uncertainty. `light`: the loss decays exponentially with torque. `bent`: the
-    efficiency is the stated one at the mean torque and falls linearly with the torque above it, so that the current is
-    I/(1 − a x).
+    efficiency is the stated one at the reference torque and falls linearly with the torque above it, so that the
+    current is I/(1 − a x).
     """
 
     name = "load-dependent-efficiency"
     covariate = "torque"
-    equation = "ΔI = a I_sim |I_sim/Ī|^p,  or I_sim (1/(1 − a x) − 1) with x = |I_sim|/Ī − 1"
+    equation = "ΔI = a I_sim |I_sim/I_ref|^p,  or I_sim (1/(1 − a x) − 1) with x = |I_sim|/I_ref − 1"
     words = "a loss that depends on the transmitted torque"
     signature = "a residual along the predicted current, curved against it"
     experiment = "repeat at one speed with and without ballast, and up and down a slope"
@@ -45,21 +49,22 @@ class LoadDependentEfficiency(Candidate):
     requires = ("torque",)
     coefficients: ClassVar = (Coefficient("relative_loss", "1", 0),)
 
-    def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
+    def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return powers from proportional to strongly curved, losses at light load, and linear efficiencies."""
         curved: list[Shape] = [{"power": p} for p in POWERS]
         light: list[Shape] = [{"light": s} for s in LIGHT_LOADS]
         bent: list[Shape] = [{"bent": b} for b in SLOPES]
-        return [*curved, *light, *bent]
+        reference = max(float(np.mean(np.abs(problem.filled[problem.mask]))), 1e-30)
+        return [{**form, "reference_size": reference} for form in (*curved, *light, *bent)]
 
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
         """Return the linear efficiency with the fitted slope, as long as at least a third of the efficiency is left."""
         if "bent" not in shape:
             return shape
-        above = self._relative(problem)[problem.mask] - 1
+        above = _relative(problem, shape)[problem.mask] - 1
         least, most = LARGEST_LOSS / min(float(np.min(above)), -1e-9), LARGEST_LOSS / max(float(np.max(above)), 1e-9)
         bent = float(np.clip(values[0], least, most))
-        return shape if abs(bent - float(shape["bent"])) <= SHAPE_TOLERANCE * abs(bent) else {"bent": bent}
+        return shape if abs(bent - float(shape["bent"])) <= SHAPE_TOLERANCE * abs(bent) else {**shape, "bent": bent}
 
     def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
         """Charge a loss proportional to torque: it contradicts the stated gain's standard deviation."""
@@ -67,15 +72,17 @@ class LoadDependentEfficiency(Candidate):
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the loss as a multiple of the prediction."""
-        relative = self._relative(problem)
+        relative = _relative(problem, shape)
         if "bent" in shape:
             above = relative - 1
-            return (problem.filled * above / (1 - float(shape["bent"]) * above))[None]
+            # At torques beyond those of the identification, the line ends where a third of the efficiency is left.
+            left = np.maximum(1 - float(shape["bent"]) * above, 1 - LARGEST_LOSS)
+            return (problem.filled * above / left)[None]
         if "light" in shape:
             return (problem.filled * np.exp(-relative / float(shape["light"])))[None]
         return (problem.filled * relative ** float(shape["power"]))[None]
 
-    def _relative(self, problem: Problem) -> Array:
-        """Return the predicted current over its mean magnitude, shape (time, wheel)."""
-        size = np.abs(problem.filled)
-        return size / max(float(np.mean(size[problem.mask])), 1e-30)
+
+def _relative(problem: Problem, shape: Shape) -> Array:
+    """Return the predicted size over the reference, shape (time, wheel)."""
+    return np.asarray(np.abs(problem.filled) / float(shape["reference_size"]))

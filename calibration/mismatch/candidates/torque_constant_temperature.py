@@ -60,7 +60,9 @@ class TorqueConstantTemperature(Candidate):
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return (T − T_0)/(1 − α (T − T_0)) times the prediction, with α from the shape."""
         warmer = self._warmer(problem, shape)
-        return (warmer / (1 - float(shape.get("bent_per_K", 0.0)) * warmer) * problem.filled)[None]
+        # Where it is warmer than in the recording of the identification, a third of the torque constant is left.
+        left = np.maximum(1 - float(shape.get("bent_per_K", 0.0)) * warmer, 1 - LARGEST_LOSS)
+        return (warmer / left * problem.filled)[None]
 
     def _warmer(self, problem: Problem, shape: Shape) -> Array:
         return np.nan_to_num(problem.covariates["temperature"]) - float(shape["reference_degC"])

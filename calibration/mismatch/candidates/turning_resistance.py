@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 HALVES = {"rate": (0.3, 1.0, 100.0), "angle": (0.3, 1.0, 3.0)}
-"""Turn at which the effect has half its limit, in multiples of the mean turn (a choice: saturated to proportional)."""
+"""Turn at which the effect has half its limit, in multiples of the reference turn, which is the mean one of the
+recording in which the effect is identified (a choice: saturated to proportional)."""
 ENDS = (0.0, 0.5, 1.0)
 """How much more the end rows scrub than the middle one: 0 alike, 1 the middle not at all (a choice)."""
 NO_TURN_STD = 3.0
@@ -43,20 +44,17 @@ class TurningResistance(Candidate):
         ends = ENDS if problem.row is not None and np.ptp(problem.row) > 1 else (0.0,)
         by = ("rate", "angle") if "wheel_speed" in problem.covariates else ("rate",)
         # A rate has no limit, an angle has one: its grid has no proportional law.
-        return [{"half_at": h, "ends": end, "by": b} for b in by for h in HALVES[b] for end in ends]
+        return [
+            {"half_at": half, "ends": end, "by": b, **self._reference(problem, b, end)}
+            for b in by
+            for end in ends
+            for half in HALVES[b]
+        ]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return drag and moment, relative to those of the mean turn; drag alone where the machine has no sides."""
-        yaw = np.nan_to_num(problem.covariates["yaw_rate"])
-        noise = problem.simulation.sensors.get("yaw_rate_rad_s")
-        yaw = np.where(np.abs(yaw) > NO_TURN_STD * noise.absolute, yaw, 0.0) if noise else yaw
-        turned = np.abs(yaw) * self._lever(problem, float(shape["ends"]))
-        if shape["by"] == "angle":
-            # The slip angle is yaw rate × lever over the speed.
-            speed = np.abs(np.nan_to_num(problem.covariates["wheel_speed"]))
-            turned = turned / (speed + CREEP_SHARE * np.mean(speed[problem.mask]))
-        typical = float(np.mean(turned[yaw != 0])) if np.any(yaw != 0) else 1.0
-        relative = turned / typical
+        """Return drag and moment, relative to those of the reference turn; drag alone where there are no sides."""
+        yaw = _turning(problem)
+        relative = self._turn(problem, shape) / float(shape["reference_turn"])
         half = float(shape["half_at"])
         size = relative * (1 + half) / (relative + half)
         drag = size * problem.covariates["direction"]
@@ -64,9 +62,34 @@ class TurningResistance(Candidate):
             return drag[None]
         return np.stack((drag, size * np.sign(yaw) * problem.side))
 
+    def _reference(self, problem: Problem, by: str, ends: float) -> Shape:
+        """Return what the law is scaled by: the mean turn here, and the speed that limits a slip angle."""
+        shape: Shape = {"by": by, "ends": ends}
+        if by == "angle":
+            speed = np.abs(problem.covariates["wheel_speed"])[problem.mask]
+            shape["creep_speed"] = CREEP_SHARE * float(np.nanmean(speed))
+        turned = self._turn(problem, shape)[problem.mask & (_turning(problem) != 0)]
+        return {**shape, "reference_turn": float(np.mean(turned)) if turned.size else 1.0}
+
+    def _turn(self, problem: Problem, shape: Shape) -> Array:
+        """Return the size of the yaw rate, or of the slip angle, that each wheel meets, shape (time, wheel)."""
+        turned = np.abs(_turning(problem)) * self._lever(problem, float(shape["ends"]))
+        if shape["by"] == "rate":
+            return np.asarray(np.broadcast_to(turned, problem.mask.shape))
+        # The slip angle is yaw rate × lever over the speed.
+        speed = np.abs(np.nan_to_num(problem.covariates["wheel_speed"]))
+        return np.asarray(turned / (speed + float(shape["creep_speed"])))
+
     def _lever(self, problem: Problem, ends: float) -> Array | float:
         """Return each row's distance from the centre over its mean, mixed with 1 by `ends` (0: 1 for every row)."""
         if problem.row is None:
             return 1.0
         away = np.abs(problem.row - np.mean(problem.row))
         return 1 - ends + ends * away / max(float(np.mean(away)), 1e-9)
+
+
+def _turning(problem: Problem) -> Array:
+    """Return the yaw rate, 0 where it is no more than the sensor's noise, shape (time, wheel)."""
+    yaw = np.nan_to_num(problem.covariates["yaw_rate"])
+    noise = problem.simulation.sensors.get("yaw_rate_rad_s")
+    return np.where(np.abs(yaw) > NO_TURN_STD * noise.absolute, yaw, 0.0) if noise else yaw

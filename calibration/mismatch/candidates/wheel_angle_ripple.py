@@ -66,16 +66,17 @@ class WheelAngleRipple(Candidate):
         if _lowest(problem) >= _resolved(problem):
             return found
         for kind in kinds:
-            weighted = residual * self._base(problem, kind)
+            base: Shape = {"kind": kind, "reference_size": problem.mean_size} if kind == "load" else {"kind": kind}
+            weighted = residual * self._base(problem, base)
             order = self._strongest(problem, weighted)
-            line: Shape = {"order": order, "kind": kind, "lag": self._lag(problem, weighted, order)}
+            line: Shape = {"order": order, **base, "lag": self._lag(problem, weighted, order)}
             found += [{**line, "sines": sines} for sines in (1.0, 2.0)]
         return found
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return cosine and sine for each wheel, then those of the overtone, shape (2 sines wheels, time, wheel)."""
         phase = float(shape["order"]) * _angle(problem, float(shape.get("lag", 0.0)))
-        base = self._base(problem, str(shape["kind"]))
+        base = self._base(problem, shape)
         wheels, sines = problem.mask.shape[1], int(float(shape["sines"]))
         found = np.zeros((sines, wheels, 2, *problem.mask.shape))
         for sine in range(sines):
@@ -97,11 +98,13 @@ class WheelAngleRipple(Candidate):
         amplitude = float(np.sqrt(np.mean(amplitudes**2)))
         return {"amplitude": amplitude, "order": float(shape["order"])}
 
-    def _base(self, problem: Problem, kind: str) -> Array:
+    def _base(self, problem: Problem, shape: Shape) -> Array:
         """Return the factor of the sine: 1 (torque), the direction (drag), or the relative prediction (load)."""
-        if kind == "drag":
+        if shape["kind"] == "drag":
             return problem.covariates["direction"]
-        return np.ones(problem.mask.shape) if kind == "torque" else problem.filled / problem.mean_size
+        if shape["kind"] == "torque":
+            return np.ones(problem.mask.shape)
+        return problem.filled / float(shape["reference_size"])
 
     def autocorrelation_time_at(self, problem: Problem, residual: Array, shape: Shape) -> float:
         """Return the residual's power around this order over that of white noise: the autocorrelation time.
@@ -110,7 +113,7 @@ class WheelAngleRipple(Candidate):
         """
         kinds = ("drag", "torque") if "direction" in problem.covariates else ("torque",)
         return max(
-            self._autocorrelation_time(problem, residual * self._base(problem, kind), float(shape["order"]))
+            self._autocorrelation_time(problem, residual * self._base(problem, {"kind": kind}), float(shape["order"]))
             for kind in kinds
         )
 

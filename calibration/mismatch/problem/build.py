@@ -44,7 +44,7 @@ def build_problem(
     compared = np.isfinite(prediction) & np.isfinite(measured)
     residual = np.where(compared, measured - prediction, np.nan)
     outliers = isolated_outliers(residual, recording.run, thresholds)
-    found = covariates_of(prepared, simulation, inputs, prediction)
+    found, constants = covariates_of(prepared, simulation, inputs, prediction)
     covariates, blanks = blanks_of(found, simulation.undefined_at_times, compared, thresholds)
     mask = compared & ~outliers
     for blank in blanks.values():
@@ -62,6 +62,7 @@ def build_problem(
         prediction=prediction,
         mask=mask,
         covariates=covariates,
+        constants=constants,
         side=simulation.side(recording.wheels),
         row=simulation.row(recording.wheels),
         left_out=left_out(simulation.channel, measured, prediction, outliers, blanks),

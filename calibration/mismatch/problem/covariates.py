@@ -26,8 +26,8 @@ LONGEST_STEP = 3.0
 
 def covariates_of(
     recording: Recording, simulation: Predictor, inputs: Mapping[str, Array], prediction: Array
-) -> dict[str, Array]:
-    """Return what was measured, and what follows from it; what was never measured or never varies is left out."""
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """Return what was measured and varies, with what follows from it; and what was measured but is one number."""
     found = dict(simulation.covariates(inputs))
     found["time"] = np.broadcast_to(_elapsed(recording)[:, None], recording.shape)
     if not simulation.arbitrary_zero:
@@ -38,7 +38,9 @@ def covariates_of(
         found["direction"] = np.sign(speed)
         found["wheel_acceleration"] = _derivative(speed, recording)
         found["wheel_angle"] = _integral(speed, recording)
-    return {name: values for name, values in found.items() if name in KEPT_WHERE_CONSTANT or _varies(values)}
+    measured = {name: values for name, values in found.items() if np.isfinite(values).any()}
+    varying = {name: values for name, values in found.items() if name in KEPT_WHERE_CONSTANT or _varies(values)}
+    return varying, {name: values for name, values in measured.items() if name not in varying}
 
 
 def quantity(channel: str) -> str:

@@ -13,8 +13,9 @@ from rover_drives import TABLES, columns, recording, simulation
 
 from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.changes import corrected_problem, stated_in
 from regolithd.calibration.mismatch.comparison import Comparison, compare
-from regolithd.calibration.mismatch.corrected import corrected_tables, effect_of, stated_effects
+from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.simulation.load import load_simulation
@@ -96,7 +97,7 @@ def test_effects_of_other_kinds_are_read_again_too(worn: Comparison) -> None:
     tables = tomllib.loads(to_toml(corrected_tables(TABLES, simulation(), worn.evidence.values, (drag,))))
     assert stated_effects(tables) == (drag,)
     problem = build_problem(recording(3), simulation())
-    added = effect_of(problem, library(), stated_effects(tables))
+    added = corrected_problem(problem, stated_in(library(), stated_effects(tables), ())).added
     assert added[problem.time_s[:, 0] < 100].max() == 0
     assert np.abs(added[:, 2]).max() == pytest.approx(0.004, rel=0.01)
     assert np.abs(np.delete(added, 2, axis=1)).max() == 0

@@ -114,7 +114,7 @@ def test_an_efficiency_that_falls_with_torque_bends_the_current(problem: Problem
     candidate = next(c for c in library() if c.name == "load-dependent-efficiency")
     above = np.abs(problem.filled) / np.mean(np.abs(problem.filled[problem.mask])) - 1
     effect = np.where(problem.mask, problem.filled * (1 / (1 - 0.3 * above) - 1), 0.0)
-    shape: Shape = {"bent": 0.0}
+    shape: Shape = {"bent": 0.0, "reference_size": float(np.mean(np.abs(problem.filled[problem.mask])))}
     for _ in range(8):
         column = np.where(problem.mask, candidate.columns(problem, shape)[0], 0.0)
         fitted = float(np.sum(column * effect) / np.sum(column**2))

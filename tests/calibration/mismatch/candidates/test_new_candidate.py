@@ -16,8 +16,9 @@ from rover_drives import TABLES, columns, simulation
 
 from regolithd.calibration.mismatch import candidates
 from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.changes import corrected_problem, stated_in
 from regolithd.calibration.mismatch.comparison import Comparison, compare
-from regolithd.calibration.mismatch.corrected import corrected_tables, effect_of, stated_effects
+from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.report.page import Provenance, render_report
 from regolithd.calibration.toml_document import to_toml
@@ -84,7 +85,7 @@ def test_the_corrected_simulation_has_it_and_adds_it_again(found: Comparison) ->
     (term,) = stated_effects(tomllib.loads(text))
     assert term.name == "aerodynamic-drag"
     assert evidence.problem is not None
-    added = effect_of(evidence.problem, library(), [term])
+    added = corrected_problem(evidence.problem, stated_in(library(), [term], ())).added
     speed = evidence.problem.covariates["wheel_speed"]
     expected = np.where(evidence.problem.mask, term.coefficients[0] * speed * np.abs(speed), 0.0)
     np.testing.assert_allclose(added, expected)
