@@ -9,7 +9,7 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     Candidate,
     Coefficient,
     Shape,
-    growth_since,
+    growth,
     onset_grid,
 )
 
@@ -56,12 +56,7 @@ class BearingDrag(Candidate):
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return sign(ω) g(t − t_0)."""
-        onset_s = float(shape["onset_s"])
-        if "power" in shape:
-            grown = growth_since(problem, onset_s, full_at_s=float(shape["full_at_s"])) ** float(shape["power"])
-        else:
-            grown = growth_since(problem, onset_s, rise_s=float(shape["rise_s"]))
-        return (problem.covariates["direction"] * grown)[None]
+        return (problem.covariates["direction"] * growth(problem, shape))[None]
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Return the recording without its ends: drag must be seen without and with the fault."""

@@ -209,14 +209,18 @@ def onset_grid(problem: Problem, count: int = ONSET_COUNT) -> list[float]:
     return [float(t) for t in problem.length_s * np.linspace(EARLIEST_ONSET, LATEST_ONSET, count)]
 
 
-def growth_since(problem: Problem, onset_s: float, *, rise_s: float = 0.0, full_at_s: float | None = None) -> Array:
-    """Return growth from 0 at the onset, shape (time, 1).
+def growth(problem: Problem, shape: Shape) -> Array:
+    """Return growth from 0 at the shape's `onset_s`, shape (time, 1).
 
-    A step (`rise_s` 0), an exponential approach to 1 with that time constant, or a ramp that is 1 at `full_at_s`.
+    With `full_at_s`, by a `power` of the time since the onset, and 1 at that time; with `rise_s`, an exponential
+    approach to 1 with that time constant, and a step where it is 0.
     """
+    onset_s = float(shape["onset_s"])
     after = np.maximum(problem.time_s - onset_s, 0.0)
-    if full_at_s is not None:
-        return after / max(full_at_s - onset_s, 1e-9)
+    if "full_at_s" in shape:
+        relative = after / max(float(shape["full_at_s"]) - onset_s, 1e-9)
+        return np.asarray(relative ** float(shape.get("power", 1.0)))
+    rise_s = float(shape["rise_s"])
     if rise_s == 0:
         return (problem.time_s >= onset_s).astype(np.float64)
     return -np.expm1(-after / rise_s)

@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     Candidate,
     Coefficient,
     Shape,
-    growth_since,
+    growth,
     onset_grid,
 )
 from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
@@ -139,13 +139,13 @@ class DriftOfPredictedLoad(LoadCellDrift):
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return, for each onset, two exponential approaches (creep) and a steady ramp."""
-        rises = (*(share * problem.length_s for share in RISES), float("inf"))
-        return [{"onset_s": t, "rise_s": rise} for t in onset_grid(problem) for rise in rises]
+        ways: list[Shape] = [{"rise_s": share * problem.length_s} for share in RISES]
+        ways.append({"full_at_s": problem.length_s})
+        return [{"onset_s": t, **way} for t in onset_grid(problem) for way in ways]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return g(t − t_0), 0 before the onset and 1 at last."""
-        grown = growth_since(problem, float(shape["onset_s"]), float(shape["rise_s"]))
-        return (grown + 0.0 * problem.filled)[None]
+        """Return g(t − t_0), 0 before the onset."""
+        return (growth(problem, shape) + 0.0 * problem.filled)[None]
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Return the recording without its ends: the reading must be seen before the drift and with it."""

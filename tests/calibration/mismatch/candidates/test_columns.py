@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 import pytest
 
-from regolithd.calibration.mismatch.candidates.candidate import growth_since, onset_grid
+from regolithd.calibration.mismatch.candidates.candidate import growth, onset_grid
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.data.recording import Recording
 from regolithd.calibration.mismatch.problem.prior import Prior
@@ -259,8 +259,8 @@ def test_more_columns_than_coefficients_are_refused() -> None:
 
 def test_growth_is_a_step_a_rise_or_a_ramp() -> None:
     """0 before the onset; 1 from it on, 1 − 1/e after the time constant, or 1 where the ramp is full."""
-    step, rise = (growth_since(P, 20.0, rise_s=rise_s)[:, 0] for rise_s in (0.0, 10.0))
-    ramp = growth_since(P, 20.0, full_at_s=60.0)[:, 0]
+    ways: list[Shape] = [{"rise_s": 0.0}, {"rise_s": 10.0}, {"full_at_s": 60.0}]
+    step, rise, ramp = (growth(P, {"onset_s": 20.0, **way})[:, 0] for way in ways)
     at = {t: round(t / STEP_S) for t in (19.5, 20, 30, 40, 60)}
     assert [step[at[t]] for t in (19.5, 20, 60)] == [0, 1, 1]
     assert rise[at[30]] == pytest.approx(1 - np.exp(-1))
