@@ -14,10 +14,13 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.problem import Problem
 
-READINGS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
-"""Delays in the grid, in readings (a choice: a factor of two apart, since a fitted delay is refined from the nearest).
-A delay below about half a reading is not looked for: the acceleration's own lag covers it."""
-LONGEST_SHARE = 0.02
+FINEST_READINGS = 1.0
+"""Shortest delay in the grid, in readings (a choice). A delay below about half a reading is not looked for: the
+acceleration's own lag covers it."""
+RATIO_OF_CHANNEL, RATIO_OF_INPUT = 2.0, 4.0
+"""Ratio of neighbouring delays in the grid, for the predicted channel and for an input (a choice: a fitted delay is
+refined from the nearest; each delay of an input costs a run of the simulation)."""
+LONGEST_SHARE = 0.1
 """The longest delay, as a share of the recording (a choice: a longer one is a wrong clock, which is seen at once)."""
 
 
@@ -40,13 +43,17 @@ class SensorDelay(Candidate):
     free: ClassVar = {}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """Return the predicted channel and each input, late by 1 to 32 readings."""
-        step, longest = problem.recording.step_s, LONGEST_SHARE * problem.length_s
-        delays = [count * step for count in READINGS if count * step <= longest]
+        """Return the predicted channel and each input, late by one reading up to a tenth of the recording."""
         simulation = problem.simulation
-        return [
-            {"late": name, "secant_s": delay} for name in (simulation.channel, *simulation.inputs) for delay in delays
+        of_channel: list[Shape] = [
+            {"late": simulation.channel, "secant_s": delay} for delay in _delays(problem, RATIO_OF_CHANNEL)
         ]
+        of_inputs: list[Shape] = [
+            {"late": name, "secant_s": delay}
+            for name in simulation.inputs
+            for delay in _delays(problem, RATIO_OF_INPUT)
+        ]
+        return [*of_channel, *of_inputs]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the prediction's change for this delay of this channel, over the delay."""
@@ -66,6 +73,13 @@ class SensorDelay(Candidate):
         delay = float(np.clip(values[0], 0.1 * problem.recording.step_s, longest))
         before = float(shape["secant_s"])
         return shape if abs(delay - before) < 0.02 * before else {**shape, "secant_s": delay}
+
+
+def _delays(problem: Problem, ratio: float) -> list[float]:
+    """Return the delays of the grid [s]: a geometric series."""
+    shortest, longest = FINEST_READINGS * problem.recording.step_s, LONGEST_SHARE * problem.length_s
+    count = int(np.log(max(longest / shortest, 1.0)) / np.log(ratio) + 1e-9) + 1
+    return [float(delay) for delay in shortest * ratio ** np.arange(count)]
 
 
 def shifted(recording: Recording, values: Array, by_s: float) -> Array:

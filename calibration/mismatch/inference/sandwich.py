@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.discrepancy_basis import discrepancy_basis
 from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -126,7 +127,7 @@ def sandwich(equations: NormalEquations, fit: Fit, linearisation: Linearisation,
     """
     columns, precision, weights = linearisation.columns, linearisation.precision, equations.weights
     information = np.einsum("atw,w,btw->ab", columns, weights, columns, optimize=True)
-    inverse = np.linalg.pinv(information + np.diag(precision), rcond=SINGULAR, hermitian=True)
+    inverse = pseudo_inverse(information + np.diag(precision), SINGULAR)
     scores = columns * (residual_of(equations, fit) * weights)[None]
     sums = block_sums(scores, blocks)
     count = int(blocks.max()) + 1

@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.regression.schur import (
     delta_chi2_of_each,
     delta_chi2_together,
     explained_part,
+    pseudo_inverse,
     schur_complement,
     schur_diagonal,
 )
@@ -78,10 +79,11 @@ class NormalEquations:
     @property
     def wheel_sets(self) -> Mapping[tuple[int, ...], str]:
         """Wheels that may share an effect, and whether these are all, one alone, or some."""
-        found = {self.all_wheels: "all"}
+        found: dict[tuple[int, ...], str] = {(w,): "one" for w in self.all_wheels}
+        found[self.all_wheels] = "all"
         for some in self.problem.wheel_sets:
             found.setdefault(some, "some")
-        return {**{(w,): "one" for w in self.all_wheels}, **found}
+        return found
 
     def weighted(self, weights: Array) -> NormalEquations:
         """Return the equations with other weights of the wheels."""
@@ -115,7 +117,7 @@ class NormalEquations:
         columns = self._columns(terms)
         matrix, moment = self._normal(columns)
         base = len(self.nuisance.columns)
-        inverse = _inverse(matrix)
+        inverse = pseudo_inverse(matrix, SINGULAR)
         solved = inverse @ moment
         delta_chi2 = float(moment @ solved)
         if base:
@@ -190,7 +192,7 @@ class NormalEquations:
         columns = self._columns((*given, term))
         size = len(columns) - len(term.group.columns)
         matrix, _ = self._normal(columns)
-        inverse = _inverse(matrix[:size, :size]) if size else np.zeros((0, 0))
+        inverse = pseudo_inverse(matrix[:size, :size], SINGULAR) if size else np.zeros((0, 0))
         own = matrix[size:, size:]
         return own, schur_complement(own, matrix[:size, size:], inverse)
 
@@ -239,8 +241,3 @@ def membership(columns: Columns, wheel_count: int) -> Array:
     for row, (_, wheels) in enumerate(columns):
         share[row, list(wheels)] = 1
     return share
-
-
-def _inverse(matrix: Array) -> Array:
-    """Return the pseudo-inverse: undetermined directions have no part in the solution."""
-    return np.linalg.pinv(matrix, rcond=SINGULAR, hermitian=True).astype(np.float64)

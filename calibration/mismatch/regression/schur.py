@@ -18,6 +18,18 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
+def pseudo_inverse(matrix: Array, singular: float) -> Array:
+    """Return the pseudo-inverse of normal equations: undetermined directions have no part in the solution.
+
+    The matrix is scaled to a diagonal of 1 first, since precisions of priors differ by the squares of their units;
+    `singular` is the relative eigenvalue below which a direction then counts as undetermined.
+    """
+    size = np.sqrt(np.diag(matrix))
+    size = np.where(size > 0, size, 1.0)
+    scaled = np.linalg.pinv(matrix / np.outer(size, size), rcond=singular, hermitian=True)
+    return np.asarray(scaled / np.outer(size, size), np.float64)
+
+
 def explained_part(cross: Array, inverse: Array) -> Array:
     """Return Bᵀ A⁻¹ B, shape (new, new), from B of shape (fitted, new) and A⁻¹."""
     return cross.T @ inverse @ cross

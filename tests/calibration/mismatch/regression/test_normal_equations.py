@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from linear_machine import NOISE, equations_of, group_of, problem_of, table, term_of
+from linear_machine import NOISE, Level, equations_of, group_of, problem_of, table, term_of
 
+from regolithd.calibration.mismatch import from_columns
+from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations, normal_equations
 from regolithd.calibration.mismatch.regression.residuals import contribution, relative_size, residual_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
 
 PRIOR_STD = 0.5
 
@@ -153,3 +161,34 @@ def test_wheels_that_share_are_all_each_and_what_the_simulation_names(equations:
     """Two axes without sides and rows have no other sets."""
     assert equations.wheel_sets == {(0,): "one", (1,): "one", (0, 1): "all"}
     assert group_of(equations, "drag").may_be_shared("some")
+
+
+class BySides(Level):
+    """The level, on a machine whose first axis is its left side and whose second is its right."""
+
+    def side(self, wheels: Sequence[int | str]) -> NDArray[np.float64]:
+        """Return the sides."""
+        return np.array([-1.0, 1.0])[: len(wheels)]
+
+
+def test_a_side_of_one_wheel_is_one_wheel() -> None:
+    """What only one wheel can have is looked for there too."""
+    problem = build_problem(from_columns(table(), unit="axis"), BySides())
+    found = equations_of(problem)
+    assert found.wheel_sets == {(0,): "one", (1,): "one", (0, 1): "all"}
+
+
+def test_priors_of_any_unit_leave_the_fit_as_it_is(equations: NormalEquations) -> None:
+    """A parameter with a tiny standard deviation, which the channel does not depend on, changes no fit."""
+    found = equations.fit([term_of(equations, "drag", (0, 1))])
+    nuisance = equations.nuisance
+    column, columns = equations.design.extended([np.zeros(equations.problem.mask.shape)])
+    more = replace(
+        nuisance,
+        names=(*nuisance.names, "unused"),
+        columns=(*nuisance.columns, *columns),
+        precision=np.append(nuisance.precision, 1e18),
+        centre=np.append(nuisance.centre, 0.0),
+    )
+    again = equations.over(column).with_nuisance(more).fit(found.terms)
+    assert again.delta_chi2 == pytest.approx(found.delta_chi2, rel=1e-9)

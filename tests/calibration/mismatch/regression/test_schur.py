@@ -9,6 +9,7 @@ from regolithd.calibration.mismatch.regression.schur import (
     delta_chi2_of_each,
     delta_chi2_together,
     explained_part,
+    pseudo_inverse,
     schur_complement,
     schur_diagonal,
 )
@@ -81,3 +82,12 @@ def test_many_draws_of_moments_are_judged_at_once() -> None:
     np.testing.assert_allclose(found[:, 1], draws[:, 1] ** 2)
     np.testing.assert_allclose(found[:, 0], np.where(draws[:, 0] >= 0, draws[:, 0] ** 2, 0))
     np.testing.assert_allclose(found[:, 2], np.where(draws[:, 2] <= 0, draws[:, 2] ** 2, 0))
+
+
+def test_a_pseudo_inverse_does_not_depend_on_units() -> None:
+    """Columns of any size, and a prior of any precision beside them, are inverted as they are in units of their own."""
+    matrix, units = np.array([[2.0, 1.0], [1.0, 3.0]]), np.array([1e-9, 1e6])
+    found = pseudo_inverse(matrix * np.outer(units, units), 1e-10)
+    np.testing.assert_allclose(found * np.outer(units, units), np.linalg.inv(matrix), rtol=1e-9)
+    undetermined = pseudo_inverse(np.ones((2, 2)), 1e-10) @ np.array([1.0, -1.0])
+    np.testing.assert_allclose(undetermined, 0.0, atol=1e-12)
