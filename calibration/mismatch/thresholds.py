@@ -130,9 +130,10 @@ class Thresholds:
         "Length of a block of time in autocorrelation times of the noise.",
         f"{CHOICE}: the correlation between means of neighbouring blocks is then about 1/20",
     )
-    shortest_block_s: float = _threshold(20.0, "Shortest block of time [s].", f"{CHOICE}: for recordings of minutes")
-    longest_block_s: float = _threshold(
-        60.0, "Longest block of time [s].", f"{CHOICE}: half an hour then has thirty blocks"
+    most_blocks: int = _threshold(
+        90,
+        "Blocks of time at most, so that one is long against what the autocorrelation does not show.",
+        "standard: a variance from 90 independent values is known to sqrt(2/90) = 15 %, its root to 7 %",
     )
     blocks_per_fold: int = _threshold(
         6, "Blocks that each fold should have, if the recording is long enough.", f"{CHOICE}: folds that see all states"

@@ -36,7 +36,7 @@ class RotorInertia(Candidate):
     requires = ("wheel_acceleration",)
     along_motion = False
     coefficients: ClassVar = (Coefficient("inertia_current", "{unit} s²/rad"),)
-    free: ClassVar = {"lag_s": (0.0, 1.0)}
+    free: ClassVar = {"lag_s": (0.0, float("inf"))}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return no lag, and lags of half a reading and of one and a half."""
@@ -52,4 +52,4 @@ class RotorInertia(Candidate):
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Return lags of a few readings at most."""
-        return {"lag_s": (0.0, min(MOST_READINGS * problem.recording.step_s, self.free["lag_s"][1]))}
+        return {"lag_s": (0.0, MOST_READINGS * problem.recording.step_s)}

@@ -13,19 +13,23 @@ if TYPE_CHECKING:
 
 Index = NDArray[np.int64]
 
+SHORTEST_BLOCK = 2.0
+"""Readings in a block at least: of a single one there is no mean."""
+ROUNDING = 1e-6
+"""Blocks by which an instant may be off, so that the unit of time does not move it into the next one."""
+
 
 def blocks_of_time(problem: Problem, noise: NoiseModel) -> Index:
     """Return each instant's block, shape (time,).
 
-    A block is long against the noise's autocorrelation time, and short enough that every fold has several. No block
-    holds instants of two runs.
+    A block is long against the noise's autocorrelation time, and short enough that every fold has several. Its length
+    is counted in readings: no second is built in. No block holds instants of two runs.
     """
-    limits, step_s = problem.thresholds, problem.recording.step_s
-    wanted_s = limits.block_autocorrelation_times * noise.autocorrelation_time * step_s
-    wanted_s = np.clip(wanted_s, limits.shortest_block_s, limits.longest_block_s)
-    longest_s = problem.length_s / (limits.blocks_per_fold * limits.folds)
-    length_s = min(wanted_s, max(longest_s, 2 * step_s))
-    number = np.floor(problem.time_s[:, 0] / length_s).astype(np.int64)
+    limits, readings = problem.thresholds, problem.time_s[:, 0] / problem.recording.step_s
+    wanted = limits.block_autocorrelation_times * noise.autocorrelation_time
+    shortest, longest = readings[-1] / limits.most_blocks, readings[-1] / (limits.blocks_per_fold * limits.folds)
+    length = max(float(np.clip(wanted, shortest, longest)), SHORTEST_BLOCK)
+    number = np.floor(readings / length + ROUNDING).astype(np.int64)
     pairs = np.stack((problem.recording.run, number), axis=1)
     return np.unique(pairs, axis=0, return_inverse=True)[1].ravel()
 

@@ -20,11 +20,16 @@ def block_lengths(autocorrelation_time: float, **limits: float) -> np.ndarray:
     return np.bincount(blocks)[:-1] * STEP_S
 
 
-@pytest.mark.parametrize(("time", "seconds"), [(1.0, 5.0), (2.0, 10.0), (8.0, 40.0), (100.0, 60.0)])
-def test_a_block_is_ten_autocorrelation_times_long(time: float, seconds: float) -> None:
-    """Between the least and the most that are allowed."""
-    found = block_lengths(time, shortest_block_s=5.0, blocks_per_fold=1)
-    np.testing.assert_allclose(found, seconds, atol=STEP_S)
+@pytest.mark.parametrize("time", [1.0, 2.0, 3.0])
+def test_a_block_is_ten_autocorrelation_times_long(time: float) -> None:
+    """Where that is neither too many blocks nor too few."""
+    found = block_lengths(time, most_blocks=INSTANTS, blocks_per_fold=1)
+    np.testing.assert_allclose(found, 10 * time * STEP_S, atol=STEP_S)
+
+
+def test_there_are_no_more_blocks_than_a_variance_needs() -> None:
+    """Under white noise blocks are as long as the most of them allow."""
+    np.testing.assert_allclose(block_lengths(1.0, most_blocks=40), LENGTH_S / 40, atol=STEP_S)
 
 
 def test_a_short_recording_has_enough_blocks_for_its_folds() -> None:
