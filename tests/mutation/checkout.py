@@ -1,0 +1,124 @@
+"""A copy of the checkout to mutate, and pytest in it with limits of CPU time."""
+
+from __future__ import annotations
+
+import os
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import venv
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from pathlib import Path
+
+CLOCK_TIMEOUT_S = 1800.0
+"""Time on the clock after which a run is ended without a result: far beyond every limit of CPU time."""
+TEST_TIMEOUT_S = 60
+"""Time on the clock for one fast test: one that waits for what never comes uses no CPU time."""
+NO_TEST, USAGE_ERROR = 5, 4
+"""pytest's exit statuses where every test is left out, and where a test is not found."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What became of a run of pytest.
+
+    Attributes
+    ----------
+    status: pytest's exit status; minus the signal that ended it
+    output: what it printed
+    ended: whether it was ended after `CLOCK_TIMEOUT_S`
+    """
+
+    status: int
+    output: str
+    ended: bool = False
+
+    @property
+    def passed(self) -> bool:
+        """Whether every test passed."""
+        return self.status in {0, NO_TEST}
+
+    @property
+    def cpu_exceeded(self) -> bool:
+        """Whether the process used more CPU time than it had."""
+        return self.status in {-signal.SIGXCPU, -signal.SIGKILL} and not self.ended
+
+    @property
+    def timed_out(self) -> bool:
+        """Whether a test waited for too long, which a busy machine may have caused."""
+        return self.ended or "Timeout (>" in self.output
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """Names of the tests that pytest's summary lists as failed."""
+        return tuple(re.findall(r"^(?:FAILED|ERROR) (.+?::.+?)(?: - |$)", self.output, flags=re.MULTILINE))
+
+
+@dataclass(frozen=True)
+class Checkout:
+    """A copy of the tracked files, with an environment that imports the copy."""
+
+    root: Path
+
+    @property
+    def python(self) -> Path:
+        """The environment's interpreter."""
+        return self.root / ".venv" / "bin" / "python"
+
+    def pytest(self, arguments: Iterable[str], cpu_s: int, environment: Mapping[str, str] | None = None) -> Run:
+        """Run pytest; `cpu_s` limits the CPU time of each of its processes."""
+        command = [str(self.python), "-m", "pytest", "-p", "no:cacheprovider", "-q"]
+        command += ["-m", "not vcan and not systemd", f"--timeout={TEST_TIMEOUT_S}", *arguments]
+        settings = {"OPENBLAS_NUM_THREADS": "1", "CI": "", "COLUMNS": "400", **(environment or {})}
+        process = subprocess.Popen(
+            command,
+            cwd=self.root,
+            env=os.environ | settings,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            start_new_session=True,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s + 5)),  # noqa: PLW1509  # no threads
+        )
+        try:
+            output, _ = process.communicate(timeout=CLOCK_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            return Run(-signal.SIGKILL, "", ended=True)
+        finally:
+            _end(process)
+        return Run(process.returncode, output)
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End what a run has left behind."""
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except ProcessLookupError:
+        return
+    process.wait()
+
+
+def copy_of(source: Path, folder: Path) -> Checkout:
+    """Copy the tracked files of a checkout, and make an environment that imports the copy; nothing, if it is there."""
+    made = Checkout(folder)
+    ready = folder / ".venv" / "copy.ready"
+    if ready.exists():
+        return made
+    listed = subprocess.run(["git", "ls-files"], cwd=source, check=True, capture_output=True, text=True)
+    for name in listed.stdout.split():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(source / name, folder / name, follow_symlinks=False)
+    venv.create(folder / ".venv", with_pip=False)
+    (packages,) = (folder / ".venv" / "lib").glob("python*/site-packages")
+    paths = [str(folder / "src"), *(path for path in sys.path if path.endswith("site-packages"))]
+    (packages / "copy.pth").write_text("\n".join(paths) + "\n")
+    ready.touch()
+    return made

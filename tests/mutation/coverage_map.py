@@ -1,0 +1,98 @@
+"""Which fast tests execute which line: each room's tests run once under coverage, and the result is kept."""
+
+from __future__ import annotations
+
+import ast
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import coverage
+from fast_tests import WRITTEN_TO
+from mutants import ROOMS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from checkout import Checkout
+
+LONGEST_CPU_S = 3600
+"""CPU time of a room's tests under coverage."""
+FEWEST_FAST = 0.5
+"""Share of a room's tests that have to pass and be fast; otherwise something is wrong with the machine."""
+AT_IMPORT = ""
+"""Coverage's context of lines that an import executes."""
+
+
+@dataclass(frozen=True)
+class CoverageMap:
+    """The fast tests of a room: what each costs, and the lines of each file that each executes."""
+
+    seconds: Mapping[str, float]
+    lines: Mapping[str, Mapping[str, list[str]]]
+
+    def of_lines(self, file: str, lines: range) -> set[str]:
+        """Return the tests that execute one of the lines; `AT_IMPORT` among them where an import does."""
+        found = self.lines.get(file, {})
+        return {test for line in lines for test in found.get(str(line), ())}
+
+    def of_file(self, file: str) -> set[str]:
+        """Return the tests that execute anything of a file but its import."""
+        return {test for tests in self.lines.get(file, {}).values() for test in tests if test}
+
+
+def coverage_map(checkout: Checkout, room: str, kept: Path) -> CoverageMap:
+    """Return a room's map, from `kept` where it was written before."""
+    if not kept.exists():
+        kept.write_text(json.dumps(asdict(_measured(checkout, room, kept.with_suffix(".jsonl")))))
+    return CoverageMap(**json.loads(kept.read_text()))
+
+
+def _measured(checkout: Checkout, room: str, times: Path) -> CoverageMap:
+    """Run a room's tests under coverage."""
+    times.unlink(missing_ok=True)
+    data_file = checkout.root / f".coverage.{room.replace('/', '-')}"
+    package = f"regolithd.{room.replace('/', '.')}"
+    under_coverage = ["-p", "fast_tests", f"--cov={package}", "--cov-context=test", "--cov-report="]
+    settings = {
+        WRITTEN_TO: str(times),
+        "PYTHONPATH": str(Path(__file__).parent),
+        "COVERAGE_FILE": str(data_file),
+        "COVERAGE_CORE": "ctrace",
+    }
+    run = checkout.pytest([*under_coverage, ROOMS[room]], LONGEST_CPU_S, settings)
+    rows = [json.loads(line) for line in times.read_text().splitlines()]
+    seconds = {row["test"]: row["clock_s"] for row in rows if row["fast"]}
+    if len(seconds) < FEWEST_FAST * len(rows) or not rows:
+        raise SystemExit(f"{len(seconds)} of {len(rows)} tests of {room} pass and are fast\n{run.output[-4000:]}")
+    print(f"{room}: {len(seconds)} of {len(rows)} tests are fast and pass", flush=True)
+    data = coverage.CoverageData(str(data_file))
+    data.read()
+    lines = {}
+    for measured in data.measured_files():
+        file = str(Path(measured).resolve().relative_to(checkout.root.resolve()))
+        lines[file] = {
+            str(line): sorted({name for name in map(_test_of, contexts) if name in seconds or name == AT_IMPORT})
+            for line, contexts in data.contexts_by_lineno(measured).items()
+        }
+    return CoverageMap(seconds, lines)
+
+
+def _test_of(context: str) -> str:
+    """Return the test of a coverage context, `tests/…::test_name|run`."""
+    return context.rpartition("|")[0]
+
+
+def statement_lines(source: str, line: int) -> range:
+    """Return the lines of the smallest statement that a line is in; of a compound one, its head."""
+    found = range(line, line + 1)
+    size = 10**6
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.stmt) and node.lineno <= line <= (node.end_lineno or 0):
+            body = getattr(node, "body", None)
+            last = body[0].lineno - 1 if isinstance(body, list) and body else node.end_lineno or line
+            here = range(node.lineno, max(last, node.lineno) + 1)
+            if line in here and len(here) <= size:
+                found, size = here, len(here)
+    return found

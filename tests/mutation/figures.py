@@ -1,0 +1,95 @@
+"""Score of a sample, and the page of the documentation that shows it: docs/explanation/mutation-testing.md."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mutants import ROOMS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from trial import Result
+
+SURVIVORS = Path(__file__).with_name("survivors.toml")
+PAGE = """# Mutation testing
+
+Do the tests notice when the code is wrong? `make mutants` changes random places of `drivers/`, `daemon/` and
+`calibration/mismatch/`, one at a time, by the operators of [Cosmic Ray](https://github.com/sixty-north/cosmic-ray):
+another comparison, another operator, another number, a `not` added, a decorator removed. It runs those fast tests of
+the same room that execute the changed line (at most {fast_s:g} s of CPU time each), and counts the changes after which
+a test fails.
+
+{line}
+
+| room | mutants | killed |
+|---|---|---|
+{rows}
+
+Limits are of CPU time, and a test that fails is repeated alone, so that a busy machine kills no mutant. Left out are
+annotations, which do not run, and the values of constants named `…_TIMEOUT_S`, because no requirement fixes a time
+limit to a second.
+
+Each survivor of a sample has a word in `tests/mutation/survivors.toml`: `equal`, where the changed program does the
+same, or the test that was added and notices it now. An interrupted run continues; another seed draws another sample.
+"""
+
+
+@dataclass(frozen=True)
+class Words:
+    """What is said of known survivors, by file and diff: `equal: …` or `test: …`."""
+
+    of: Mapping[tuple[str, str], str]
+
+    def word(self, result: Result) -> str:
+        """Return the word for a survivor; empty where there is none."""
+        return self.of.get((result.file, result.diff.strip()), "")
+
+
+def read_words() -> Words:
+    """Return the words of `survivors.toml`."""
+    listed: list[dict[str, Any]] = tomllib.loads(SURVIVORS.read_text()).get("survivor", [])
+    return Words({(each["file"], each["diff"].strip()): each["word"] for each in listed})
+
+
+def score(results: Sequence[Result], seed: int, words: Words) -> dict[str, Any]:
+    """Return the figures of a sample."""
+    survivors = [each for each in results if each.verdict == "survived"]
+    rooms = {room: [each for each in results if each.file.startswith(room + "/")] for room in ROOMS}
+    return {
+        "seed": seed,
+        "mutants": len(results),
+        "killed": len(results) - len(survivors),
+        "share_killed": 1 - len(survivors) / max(len(results), 1),
+        "equal": sum(words.word(each).startswith("equal") for each in survivors),
+        "test_added": sum(words.word(each).startswith("test") for each in survivors),
+        "rooms": {
+            room: {"mutants": len(mine), "killed": sum(each.verdict == "killed" for each in mine)}
+            for room, mine in rooms.items()
+        },
+    }
+
+
+def line_of(figures: Mapping[str, Any]) -> str:
+    """Return the figures as one line."""
+    return (
+        f"Seed {figures['seed']}: {figures['killed']} of {figures['mutants']} mutants killed "
+        f"({100 * figures['share_killed']:.1f} %). Of the survivors, {figures['equal']} are equal programs, and for "
+        f"{figures['test_added']} a test was added."
+    )
+
+
+def write_page(figures: Mapping[str, Any], fast_s: float, path: Path) -> None:
+    """Write the page of the documentation."""
+    rows = "\n".join(f"| `{room}/` | {each['mutants']} | {each['killed']} |" for room, each in figures["rooms"].items())
+    path.write_text(PAGE.format(line=line_of(figures), rows=rows, fast_s=fast_s), encoding="utf-8")
+
+
+def write_figures(figures: Mapping[str, Any], path: Path) -> None:
+    """Write the figures as JSON."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(figures, indent=1) + "\n")

@@ -1,0 +1,110 @@
+"""Mutations of the three rooms' code: Cosmic Ray's operators at every place, and a random sample of the places.
+
+Left out are places that no test can judge: annotations and `if TYPE_CHECKING`, which do not run, and the values of
+constants whose name ends in TIMEOUT_S, because no requirement fixes a time limit to a second.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import random
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cosmic_ray.ast import ast_nodes, get_ast
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.plugins import get_operator, operator_names
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+ROOMS = {"drivers": "tests/drivers", "daemon": "tests/daemon", "calibration/mismatch": "tests/calibration/mismatch"}
+"""Folders that are mutated, and their own tests."""
+TIME_LIMIT = re.compile(r"_?([A-Z]+_)*TIMEOUT_S")
+EQUAL = ("_Is_Eq", "_IsNot_NotEq")
+"""Left out: `is` compares enumeration members and None here, for which `==` gives the same."""
+
+
+@dataclass(frozen=True)
+class Mutation:
+    """One mutation: Cosmic Ray's operator, which occurrence of it in the file, and where that is."""
+
+    file: str
+    line: int
+    column: int
+    operator: str
+    occurrence: int
+
+    def applied(self, source: str) -> str:
+        """Return the file's text with the mutation."""
+        return str(mutate_code(source, get_operator(self.operator)(), self.occurrence))
+
+
+def difference(original: str, mutated: str) -> str:
+    """Return the changed lines."""
+    lines = difflib.unified_diff(original.splitlines(), mutated.splitlines(), lineterm="", n=0)
+    return "\n".join(line for line in lines if line[:3] not in {"---", "+++"} and line[:2] != "@@")
+
+
+def room_of(file: str) -> str:
+    """Return the room that a file belongs to."""
+    return next(room for room in ROOMS if file.startswith(room + "/"))
+
+
+def _parts_left_out(node: ast.AST) -> list[ast.AST | None]:
+    """Return the parts of a node that no test can judge."""
+    match node:
+        case ast.If(test=ast.Name(id="TYPE_CHECKING")):
+            return [node.test, *node.body]
+        case ast.arg() | ast.AnnAssign() if node.annotation:
+            return [node.annotation]
+        case ast.FunctionDef() | ast.AsyncFunctionDef():
+            return [node.returns]
+        case ast.Assign(targets=[ast.Name(id=name)]) if TIME_LIMIT.fullmatch(name):
+            return [node.value]
+    return []
+
+
+def left_out(tree: ast.Module) -> set[tuple[int, int]]:
+    """Return (line, column) of every place that is not mutated."""
+    parts = [part for node in ast.walk(tree) for part in _parts_left_out(node)]
+    return {
+        (line, column)
+        for part in parts
+        if isinstance(part, ast.expr | ast.stmt)
+        for line in range(part.lineno, (part.end_lineno or part.lineno) + 1)
+        for column in range(
+            part.col_offset if line == part.lineno else 0,
+            (part.end_col_offset or 0) if line == part.end_lineno else 400,
+        )
+    }
+
+
+def mutations(root: Path, file: str) -> Iterator[Mutation]:
+    """Yield every mutation of a file of a checkout."""
+    source = (root / file).read_text()
+    without, tree = left_out(ast.parse(source)), get_ast(source)
+    for name in operator_names():
+        kind = get_operator(name)
+        if kind.arguments() or name.endswith(("NoOp", *EQUAL)):
+            continue
+        operator = kind()
+        places = [start for node in ast_nodes(tree) for start, _ in operator.mutation_positions(node)]
+        for occurrence, (line, column) in enumerate(places):
+            if (line, column) not in without:
+                yield Mutation(file, line, column, name, occurrence)
+
+
+def sample(root: Path, count: int, seed: int, only: str) -> list[Mutation]:
+    """Draw places evenly over all of them, and one mutation of each; a larger sample begins with the smaller one."""
+    files = sorted(str(path.relative_to(root)) for room in ROOMS for path in (root / room).rglob("*.py"))
+    places: dict[tuple[str, int, int], list[Mutation]] = {}
+    for file in files:
+        for mutation in mutations(root, file) if file.startswith(only) else ():
+            places.setdefault((mutation.file, mutation.line, mutation.column), []).append(mutation)
+    generator, order = random.Random(seed), sorted(places)
+    generator.shuffle(order)
+    return [random.Random(f"{seed} {place}").choice(places[place]) for place in order[:count]]
