@@ -14,11 +14,13 @@ from regolithd.daemon.control.socket import ControlSocketError, group_id
 if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
 
+TIMEOUT_S = 5.0
+
 
 async def running_daemon(configuration: Configuration) -> Status | ControlError | None:
     """Return the status of the running daemon, the error if permission is missing, or None where none is running."""
     try:
-        async with asyncio.timeout(5), control_connection(configuration.control.socket) as daemon:
+        async with asyncio.timeout(TIMEOUT_S), control_connection(configuration.control.socket) as daemon:
             daemon.send(StatusRequest())
             reply = await daemon.reply()
     except ControlError as error:

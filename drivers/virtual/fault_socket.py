@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from regolithd.drivers.virtual.rover import VirtualRover
 
 
+ANSWER_TIMEOUT_S = 5.0
+CONNECT_TIMEOUT_S = 1.0
+
+
 class FaultSocketError(OSError):
     """No virtual rover listens at the socket, or another one already does."""
 
@@ -48,7 +52,7 @@ async def fault_socket(rover: VirtualRover, path: Path) -> AsyncIterator[None]:
         _remove(path)
 
 
-def send_command(path: Path, line: str, timeout_s: float = 5.0) -> str:
+def send_command(path: Path, line: str, timeout_s: float = ANSWER_TIMEOUT_S) -> str:
     """Send one command and return the answer.
 
     Raises
@@ -86,7 +90,7 @@ def _remove(path: Path) -> None:
 def _answers(path: Path) -> bool:
     try:
         with socket.socket(socket.AF_UNIX) as connection:
-            connection.settimeout(1.0)
+            connection.settimeout(CONNECT_TIMEOUT_S)
             connection.connect(str(path))
     except OSError:
         return False

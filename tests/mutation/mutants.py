@@ -1,13 +1,15 @@
 """Mutations of the three rooms' code: Cosmic Ray's operators at every place, and a random sample of the places.
 
 Left out are places that no test can judge: annotations and `if TYPE_CHECKING`, which do not run, and the values of
-constants whose name ends in TIMEOUT_S, because no requirement fixes a time limit to a second.
+constants, fields and parameters named `timeout_s` or `…_timeout_s`, because no requirement fixes a time limit to a
+second.
 """
 
 from __future__ import annotations
 
 import ast
 import difflib
+import hashlib
 import random
 import re
 from dataclasses import dataclass
@@ -23,7 +25,7 @@ if TYPE_CHECKING:
 
 ROOMS = {"drivers": "tests/drivers", "daemon": "tests/daemon", "calibration/mismatch": "tests/calibration/mismatch"}
 """Folders that are mutated, and their own tests."""
-TIME_LIMIT = re.compile(r"_?([A-Z]+_)*TIMEOUT_S")
+TIME_LIMIT = re.compile(r"(\w*_)?timeout_s", flags=re.IGNORECASE)
 EQUAL = ("_Is_Eq", "_IsNot_NotEq")
 """Left out: `is` compares enumeration members and None here, for which `==` gives the same."""
 
@@ -59,13 +61,24 @@ def _parts_left_out(node: ast.AST) -> list[ast.AST | None]:
     match node:
         case ast.If(test=ast.Name(id="TYPE_CHECKING")):
             return [node.test, *node.body]
+        case ast.AnnAssign(target=ast.Name(id=name)) if TIME_LIMIT.fullmatch(name):
+            return [node]
         case ast.arg() | ast.AnnAssign() if node.annotation:
             return [node.annotation]
         case ast.FunctionDef() | ast.AsyncFunctionDef():
-            return [node.returns]
+            return [node.returns, *_default_time_limits(node.args)]
         case ast.Assign(targets=[ast.Name(id=name)]) if TIME_LIMIT.fullmatch(name):
             return [node.value]
     return []
+
+
+def _default_time_limits(given: ast.arguments) -> Iterator[ast.expr | None]:
+    """Yield the default values of parameters that are time limits."""
+    positional = [*given.posonlyargs, *given.args]
+    defaults = zip(positional[len(positional) - len(given.defaults) :], given.defaults, strict=True)
+    for parameter, default in (*defaults, *zip(given.kwonlyargs, given.kw_defaults, strict=True)):
+        if TIME_LIMIT.fullmatch(parameter.arg):
+            yield default
 
 
 def left_out(tree: ast.Module) -> set[tuple[int, int]]:
@@ -105,6 +118,5 @@ def sample(root: Path, count: int, seed: int, only: str) -> list[Mutation]:
     for file in files:
         for mutation in mutations(root, file) if file.startswith(only) else ():
             places.setdefault((mutation.file, mutation.line, mutation.column), []).append(mutation)
-    generator, order = random.Random(seed), sorted(places)
-    generator.shuffle(order)
+    order = sorted(places, key=lambda place: hashlib.sha256(f"{seed} {place}".encode()).digest())
     return [random.Random(f"{seed} {place}").choice(places[place]) for place in order[:count]]
