@@ -34,7 +34,7 @@ from regolithd.drivers.errors import BusOpenError
 from regolithd.drivers.master.network import Network, NetworkSettings
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from regolithd.daemon.config.configuration import Configuration
     from regolithd.daemon.pipeline.onnx_models import OnnxModels
@@ -85,14 +85,16 @@ class Service:
     """
 
     def __init__(self, configuration: Configuration, models: OnnxModels) -> None:
+        self._network: Network | None = None
         self.configuration = configuration
         self.models = models
         self.chain = Chain(configuration, models)
-        self.recorder = _recorder(configuration, models.terrain) if configuration.recording.enabled else None
+        self.recorder = (
+            _recorder(configuration, models.terrain, self._unit_frames) if configuration.recording.enabled else None
+        )
         self.liveness = TaskLiveness()
         self.bus_problem = ""
         self.sinks: list[Sink] = []
-        self._network: Network | None = None
         self._opened = asyncio.Event()
         self._syncs_tried = -1
 
@@ -154,6 +156,9 @@ class Service:
                 self.bus_problem = ""
                 return bus
 
+    def _unit_frames(self) -> list[Frame]:
+        return self._network.decoder.unit_frames if self._network else []
+
     def _take_frames(self, batch: Sequence[Frame]) -> None:
         self.liveness.beat(NETWORK)
         if self.recorder:
@@ -212,14 +217,17 @@ class Service:
 def network_settings(configuration: Configuration) -> NetworkSettings:
     """Return the settings of the CANopen network."""
     nodes = configuration.nodes
+    nodes = configuration.nodes
     return NetworkSettings(
-        nodes=nodes.described(),
+        nodes=configuration.described(),
         sync_rate_Hz=configuration.sync.rate_Hz,
         gear_ratio=configuration.drivetrain.ratio,
         master_heartbeat_s=nodes.heartbeat_ms / 2000,
         master_lost_after_s=nodes.heartbeat_timeout_ms / 1000,
         node_heartbeat_s=nodes.heartbeat_ms / 1000,
         node_lost_after_s=nodes.heartbeat_timeout_ms / 1000,
+        sdo_timeout_s=nodes.sdo_timeout_s,
+        boot_up_timeout_s=nodes.boot_timeout_s,
     )
 
 
@@ -234,10 +242,12 @@ def _plain(value: Any) -> Any:  # noqa: ANN401  # any field of an event
     return value.value if isinstance(value, Enum) else str(value)
 
 
-def _recorder(configuration: Configuration, terrain: TerrainNetwork) -> Recorder:
+def _recorder(
+    configuration: Configuration, terrain: TerrainNetwork, preamble: Callable[[], Sequence[Frame]]
+) -> Recorder:
     metadata = {
         "configuration": configuration.model_dump_json(),
         "model_version": terrain.card.version,
         "started_ns": str(time.time_ns()),
     }
-    return Recorder(configuration.recording, configuration.bus.channel, metadata)
+    return Recorder(configuration.recording, configuration.bus.channel, metadata, preamble=preamble)

@@ -33,13 +33,8 @@ _INTRODUCTION = """# The bus
 others. The node-IDs are set in `rover.toml`; below are the defaults, *id* being the node's own."""
 _ANOTHER_DEVICE = """## Another device
 
-Of a kind that is listed above:
-
-1. Put its EDS file in place of that in `drivers/devices/eds/`: identity (0x1000, 0x1018), data types and access rights
-   are taken from it.
-2. Where it has other objects or scales, change the layout in the kind's file in `drivers/devices/`. A layout that the
-   EDS does not allow – no such object, not mappable, more than 8 bytes – is refused when the daemon starts.
-3. `regolithd check` reads every node's identity, and changes nothing.
+Of a kind that is listed above: describe it in `rover.toml`, table `[devices]` (docs/how-to/devices.md). Nothing is
+programmed.
 
 Of a new kind:
 

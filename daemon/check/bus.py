@@ -38,7 +38,7 @@ async def check_bus(configuration: Configuration, running: Status | None) -> lis
         return [*link, *load, *nodes_of_daemon(running)]
     try:
         async with open_bus(bus.interface, bus.channel, bitrate=bus.bitrate) as opened:
-            found = await scan(opened, configuration.nodes.described())
+            found = await scan(opened, configuration.described())
     except BusError as error:
         return [
             *link,
@@ -69,7 +69,7 @@ def check_load(configuration: Configuration) -> list[Finding]:
     rate_Hz, bitrate = configuration.sync.rate_Hz, configuration.bus.bitrate
     heartbeat_s = configuration.nodes.heartbeat_ms / 1000
     share = bus_load(
-        configuration.nodes.described(),
+        configuration.described(),
         sync_rate_Hz=rate_Hz,
         bitrate=bitrate,
         node_heartbeat_s=heartbeat_s,

@@ -38,7 +38,7 @@ class SimulatedDrive:
 
 def simulate(scenario: Scenario, configuration: Configuration, profile: SpeedProfile) -> SimulatedDrive:
     """Drive the speed profile in the scenario; the configuration says which nodes answer."""
-    world, nodes = VirtualWorld(scenario), configuration.nodes.described()
+    world, nodes = VirtualWorld(scenario), configuration.described()
     batches, truth = [], []
     for time_s, wheel_speed in zip(profile.time_s.tolist(), profile.wheel_speed_rad_s.tolist(), strict=True):
         speed = np.full(6, wheel_speed * scenario.drivetrain.ratio)

@@ -54,7 +54,7 @@ def bench(
     from regolithd.drivers.virtual.fault_socket import FaultSocketError
 
     settings = _scenario(scenario, soil or [], seed, no_noise=no_noise)
-    nodes = KAPVIK if config is None else configuration_or_exit(config).nodes.described()
+    nodes = KAPVIK if config is None else configuration_or_exit(config).described()
     try:
         counts = asyncio.run(_run(interface, channel, VirtualRover(VirtualWorld(settings), nodes), control, seconds))
     except (BusError, FaultSocketError) as error:

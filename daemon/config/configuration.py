@@ -6,14 +6,17 @@ file. Every relative path is relative to the file's folder.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path  # pydantic reads it at run time
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, create_model
 
 from regolithd.calibration.parameters import Drivetrain, LoadCells, Positive, Rover, Table, Wheel
+from regolithd.daemon.config.devices import DeviceTable  # noqa: TC001  # pydantic reads it at run time
 from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
 from regolithd.drivers.devices.node import NodeDescription
+from regolithd.drivers.devices.profiles.compose import compose
 from regolithd.drivers.devices.registry import DEVICES
 
 if TYPE_CHECKING:
@@ -69,19 +72,20 @@ _NodeIds = create_model(  # type: ignore[call-overload]
 
 
 class Nodes(_NodeIds):
-    """`[nodes]`: node-IDs on the bus, and heartbeat times; the k-th number of a list of six belongs to wheel k."""
+    """`[nodes]`: node-IDs on the bus, and time limits; the k-th number of a list of six belongs to wheel k.
+
+    `boot_timeout_s`: from the NMT reset to the boot-up message; `sdo_timeout_s`: until an SDO request is answered.
+    """
 
     mirrored_wheels: tuple[WheelNumber, ...] = ()
     motor_diagnostics: bool = False
     heartbeat_ms: Annotated[int, Field(ge=20, le=10_000)] = 200
     heartbeat_timeout_ms: Annotated[int, Field(ge=50, le=30_000)] = 600
-
-    def described(self) -> tuple[NodeDescription, ...]:
-        """Return the description of every node, in the order of the device registry."""
-        return tuple(node for _, node in self.by_key())
+    boot_timeout_s: Annotated[float, Field(ge=0.1, le=120)] = 3.0
+    sdo_timeout_s: Annotated[float, Field(ge=0.05, le=60)] = 1.0
 
     def by_key(self) -> Iterator[tuple[str, NodeDescription]]:
-        """Yield every node with the key that names its node-ID, such as `motors[0]`."""
+        """Yield every node, as the device that comes with regolithd, with the key of its node-ID: `motors[0]`."""
         for device in DEVICES:
             key = device.configuration_key
             ids = getattr(self, key)
@@ -179,6 +183,7 @@ class Configuration(Table):
     bus: Bus = Bus()
     sync: SyncTiming = SyncTiming()
     nodes: Nodes = Nodes()
+    devices: dict[str, DeviceTable] = Field(default_factory=dict)
     wheel: Wheel = Wheel()
     load_cells: LoadCells = LoadCells()
     drivetrain: Drivetrain = Drivetrain()
@@ -190,3 +195,29 @@ class Configuration(Table):
     recording: Recording = Recording()
     mqtt: Mqtt = Mqtt()
     control: Control = Control()
+
+    def described(self) -> tuple[NodeDescription, ...]:
+        """Return the description of every node, in the order of the device registry.
+
+        Raises
+        ------
+        DescriptionError
+            `[devices]` describes a device that cannot be; `reader` reports each of them as a problem.
+        """
+        return tuple(self._described(node) for _, node in self.nodes.by_key())
+
+    def device_table(self, node: NodeDescription) -> tuple[str, DeviceTable] | None:
+        """Return the key and the table in `[devices]` that count for a node, or None."""
+        for key in (str(node.node_id), node.device.configuration_key):
+            if key in self.devices:
+                return key, self.devices[key]
+        return None
+
+    def _described(self, node: NodeDescription) -> NodeDescription:
+        chosen = self.device_table(node)
+        if chosen is None:
+            return node
+        device, problems = compose(node.device, chosen[1].choice())
+        if device is None:
+            raise problems[0]
+        return replace(node, device=device, serial=chosen[1].serial)

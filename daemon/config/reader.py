@@ -11,18 +11,25 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from regolithd.daemon.config.configuration import Configuration, Nodes
+from regolithd.daemon.config.configuration import MASTER_NODE, Configuration, Nodes
+from regolithd.drivers.devices.profiles.compose import DescriptionError, compose
+from regolithd.drivers.errors import DictionaryError
+from regolithd.drivers.master.boot_configuration import boot_writes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from pydantic_core import ErrorDetails
+
+    from regolithd.daemon.config.devices import DeviceTable
+    from regolithd.drivers.devices.node import NodeDescription
+    from regolithd.drivers.devices.profiles.choice import DeviceChoice
 
 EXIT_STATUS = 78
 """EX_CONFIG of sysexits.h; the systemd unit has it in RestartPreventExitStatus."""
@@ -75,9 +82,10 @@ def parse_configuration(text: str, path: Path) -> Configuration:
         found = [_problem(details, text, path) for details in _without_consequences(error.errors())]
         # Tables that are valid alone may still contradict each other: report that in the same run.
         raise ConfigurationError(found + _problems_together(_valid_tables(tables), text, path)) from error
-    if problems := _problems_together(configuration, text, path):
+    configuration = _with_absolute_paths(configuration, path.absolute().parent)
+    if problems := [*_problems_together(configuration, text, path), *_device_problems(configuration, text, path)]:
         raise ConfigurationError(problems)
-    return _with_absolute_paths(configuration, path.absolute().parent)
+    return configuration
 
 
 def _whole_file(path: Path, reason: str) -> Problem:
@@ -138,12 +146,19 @@ def _unknown_key(location: list[str], key: str, text: str, path: Path) -> Proble
 
 def _model_at(location: list[str]) -> type[BaseModel] | None:
     model: type[BaseModel] = Configuration
+    tables: type[BaseModel] | None = None
     for name in location:
-        field = model.model_fields.get(name)
-        if field is None or not isinstance(field.annotation, type) or not issubclass(field.annotation, BaseModel):
+        if tables is not None:  # `name` is one that the user gave
+            model, tables = tables, None
+            continue
+        annotation = field.annotation if (field := model.model_fields.get(name)) else None
+        if get_origin(annotation) is dict:
+            tables = get_args(annotation)[1]
+        elif isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            model = annotation
+        else:
             return None
-        model = field.annotation
-    return model
+    return model if tables is None else None
 
 
 def _default(location: list[str]) -> str | None:
@@ -155,10 +170,7 @@ def _default(location: list[str]) -> str | None:
 
 
 def _problems_together(configuration: Configuration, text: str, path: Path) -> list[Problem]:
-    return [
-        Problem(str(path), line_of(text, key.split(".")), key, expected, found, remedy)
-        for key, expected, found, remedy in _checks_together(configuration)
-    ]
+    return [_at(text, path, *each) for each in _checks_together(configuration)]
 
 
 def _checks_together(configuration: Configuration) -> Iterator[tuple[str, str, str, str]]:
@@ -174,6 +186,43 @@ def _checks_together(configuration: Configuration) -> Iterator[tuple[str, str, s
     mqtt = configuration.mqtt
     if mqtt.password_file is not None and mqtt.username is None:
         yield ("mqtt.username", "a name beside password_file", "nothing", "Set it, or remove password_file.")
+
+
+def _device_problems(configuration: Configuration, text: str, path: Path) -> Iterator[Problem]:
+    """Yield a problem for each mistake in `[devices]`, the EDS files that it names included."""
+    nodes = configuration.nodes
+    known = {name for _, node in nodes.by_key() for name in (str(node.node_id), node.device.configuration_key)}
+    for key in configuration.devices.keys() - known:
+        expected = "a kind of device of [nodes], or the id of a node that is there"
+        yield _at(text, path, f"devices.{key}", expected, key, "Correct it, or add the node to [nodes].")
+    reported: set[str] = set()
+    for _, node in nodes.by_key():
+        chosen = configuration.device_table(node)
+        if chosen is None or chosen[0] in reported:
+            continue
+        reported.add(chosen[0])
+        for error in device_problems(node, chosen[1].choice()):
+            key = f"devices.{chosen[0]}.{error.key}"
+            where = "" if error.index is None else f"object 0x{error.index:04X}:{error.subindex:02X}, "
+            yield _at(text, path, key, "a device that can be configured", where + error.what, f"{error.remedy}.")
+
+
+def device_problems(node: NodeDescription, choice: DeviceChoice) -> Iterator[DescriptionError]:
+    """Yield each reason why a node cannot be the device that `[devices]` describes; its boot list is tried as well."""
+    device, problems = compose(node.device, choice)
+    yield from problems
+    if device is None:
+        return
+    try:
+        boot_writes(replace(node, device=device), heartbeat_s=0.2, master_id=MASTER_NODE, master_lost_after_s=0.6)
+    except DictionaryError as error:
+        mine = any((each.index, each.subindex) == (error.index, error.subindex) for each in choice.settings)
+        key = "settings" if mine else "eds"
+        yield DescriptionError(error.what, key, index=error.index, subindex=error.subindex, remedy=error.remedy)
+
+
+def _at(text: str, path: Path, key: str, expected: str, found: str, remedy: str) -> Problem:
+    return Problem(str(path), line_of(text, key.split(".")), key, expected, found, remedy)
 
 
 def _shared_node_ids(nodes: Nodes) -> Iterator[tuple[str, str, str, str]]:
@@ -192,8 +241,15 @@ def _shared_node_ids(nodes: Nodes) -> Iterator[tuple[str, str, str, str]]:
 
 def _with_absolute_paths(configuration: Configuration, folder: Path) -> Configuration:
     """Return the configuration with every path in it absolute; a relative one is relative to `folder`."""
-    changed: dict[str, BaseModel] = {}
+    changed: dict[str, BaseModel | dict[str, DeviceTable]] = {
+        "devices": {
+            name: each.model_copy(update={"eds": folder / each.eds}) if each.eds else each
+            for name, each in configuration.devices.items()
+        }
+    }
     for name, table in configuration:
+        if not isinstance(table, BaseModel):
+            continue
         paths = {key: folder / value for key, value in table if isinstance(value, Path)}
         if paths:
             changed[name] = table.model_copy(update=paths)
@@ -212,4 +268,4 @@ def line_of(text: str, location: list[str]) -> int | None:
                 table_line = number
         elif here == table and re.match(rf"\s*[\"']?{re.escape(key)}[\"']?\s*=", line):
             return number
-    return table_line
+    return line_of(text, location[:-1]) if table_line is None and len(location) > 2 else table_line

@@ -45,7 +45,7 @@ class Chain:
     """Decoder, acquisition and pipeline in a row; no clock, no input or output."""
 
     def __init__(self, configuration: Configuration, models: OnnxModels) -> None:
-        nodes = configuration.nodes.described()
+        nodes = configuration.described()
         self.decoder = Decoder(nodes)
         period_ns = int(1e9 / configuration.sync.rate_Hz)
         self.acquisition = Acquisition(nodes, self.decoder.expected, period_ns)

@@ -153,7 +153,7 @@ class MqttSink:
                 self._published_nodes[node_id] = state
                 self.publisher.publish(f"node/{node_id}", NodeMessage, **fields)
         active = current_alarms(self._alarm_inputs())
-        for name in alarm_names(node.node_id for node in self._service.configuration.nodes.described()):
+        for name in alarm_names(node.node_id for node in self._service.configuration.described()):
             alarm = active.get(name)
             if name not in self._published_alarms or self._published_alarms[name] != alarm:
                 self._publish_alarm(name, alarm)
@@ -220,7 +220,7 @@ class MqttSink:
         }
 
     def _emergency_fields(self, event: NodeEmergency) -> dict[str, Any]:
-        nodes = {node.node_id: node for node in self._service.configuration.nodes.described()}
+        nodes = {node.node_id: node for node in self._service.configuration.described()}
         node = nodes.get(event.node_id)
         emergency = event.emergency
         return {

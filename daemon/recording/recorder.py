@@ -74,6 +74,8 @@ class Recorder:
         Metadata of every file: configuration, version of the terrain network, start.
     now_ns
         The clock from which the files are named.
+    preamble
+        Returns the frames that each log begins with: those that state the devices' units.
     monotonic_ns
         The clock by which pauses and the length of a file are measured.
     """
@@ -84,12 +86,14 @@ class Recorder:
         interface: str,
         metadata: Mapping[str, str],
         now_ns: Callable[[], int] = time.time_ns,
+        preamble: Callable[[], Sequence[Frame]] = tuple,
         monotonic_ns: Callable[[], int] = time.monotonic_ns,
     ) -> None:
         self._settings = settings
         self._interface = interface
         self._metadata = metadata
         self._now_ns = now_ns
+        self._preamble = preamble
         self._monotonic_ns = monotonic_ns
         self._pair: _Pair | None = None
         self._retry_ns = 0
@@ -151,6 +155,7 @@ class Recorder:
         self._make_room()
         stem = _next_stem(folder, self._now_ns())
         log = stem.with_suffix(".log").open("x", encoding="ascii")
+        log.writelines(frame_line(frame, self._interface) for frame in self._preamble())
         mcap = McapFile(stem.with_suffix(".mcap").open("xb"), self._metadata)
         self._pair = _Pair(mcap, log, stem.with_suffix(".mcap"), stem.with_suffix(".log"), self._monotonic_ns())
         self.problem = None

@@ -10,10 +10,13 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from regolithd.drivers.devices.units import StatedUnit
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from regolithd.drivers.devices.units import ObjectKey, Scale
     from regolithd.drivers.devices.virtual.device import VirtualDevice
 
 SYNCHRONOUS = 1  # PDO transmission type (CiA 301, 7.5.2.35): at every SYNC
@@ -55,12 +58,15 @@ class Quantity:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """An object that holds a measurement: `quantity` = raw value × `scale`, in the quantity's unit."""
+    """An object that holds a measurement: `quantity` = raw value × `scale`, in the quantity's unit.
+
+    `scale` is a number, or a unit that the device states (`devices.units`).
+    """
 
     index: int
     subindex: int
     quantity: Quantity
-    scale: float
+    scale: Scale
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,10 +80,11 @@ class Validity:
 
 @dataclass(frozen=True, slots=True)
 class Commanded:
-    """An object that the master writes by RPDO."""
+    """An object that the master writes by RPDO; a commanded quantity is the raw value × `scale`, as in `Measured`."""
 
     index: int
     subindex: int = 0
+    scale: Scale = 1.0
 
 
 PdoObject = Measured | Validity | Commanded
@@ -109,9 +116,32 @@ class Setting:
     value: int
 
 
+@dataclass(frozen=True, slots=True)
+class KnownIdentity:
+    """Identity of a device as far as it is known beside its EDS; None is not known.
+
+    Attributes
+    ----------
+    profile_number
+        CiA device profile, the lower 16 bits of 0x1000.
+    vendor, product
+        0x1018:01 and :02.
+    revisions
+        Lowest and highest 0x1018:03 that is accepted; None accepts the EDS's own major revision.
+    """
+
+    profile_number: int | None = None
+    vendor: int | None = None
+    product: int | None = None
+    revisions: tuple[int, int] | None = None
+
+
+NOTHING_KNOWN = KnownIdentity()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Device:
-    """A kind of device.
+    """A kind of device, or one that `rover.toml` describes (`devices.profiles`).
 
     Attributes
     ----------
@@ -138,6 +168,10 @@ class Device:
         It consumes the master's heartbeat (0x1016) and stops by itself when that ends.
     error_texts
         The manufacturer's own EMCY error codes.
+    identity
+        What is known of its identity beside the EDS.
+    left_out
+        Quantities that the EDS does not offer, and why, in words.
     """
 
     kind: str
@@ -151,6 +185,24 @@ class Device:
     per_wheel: bool = False
     monitors_master: bool = False
     error_texts: Mapping[int, str] = field(default_factory=lambda: MappingProxyType({}))
+    identity: KnownIdentity = NOTHING_KNOWN
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def commanded(self) -> bool:
+        """Whether the master moves it: a motor controller."""
+        return bool(self.rpdos)
+
+    @property
+    def stated_units(self) -> tuple[ObjectKey, ...]:
+        """The objects in which it states units, without repetition."""
+        scales = (
+            each.scale
+            for layout in (*self.tpdos, *self.rpdos)
+            for each in layout.objects
+            if isinstance(each, Measured | Commanded)
+        )
+        return tuple(dict.fromkeys(key for scale in scales if isinstance(scale, StatedUnit) for key in scale.objects))
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

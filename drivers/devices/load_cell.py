@@ -18,6 +18,7 @@ LOWER_LIMIT, UPPER_LIMIT = 0x9148, 0x9149
 NOT_VALID, POSITIVE_OVERLOAD, NEGATIVE_OVERLOAD = 0x01, 0x02, 0x04  # bits of 0x6150
 
 _NEWTON = 0x0021_0000  # CiA 303-2
+_NO_LIMIT = 1 << 31
 
 LOAD = Quantity("load_N", "The load cell's reading.", noisy=True)
 
@@ -26,20 +27,22 @@ class VirtualLoadCell(VirtualDevice):
     """A virtual load-cell amplifier."""
 
     def measure(self, measurement: Measurement) -> None:
-        """Put the load into 0x9130 and the overload bits into 0x6150."""
+        """Put the load into its object (0x9130) and the overload bits into 0x6150."""
         dictionary = self.dictionary
         load = float(measurement.load_N[self.wheel or 0])
-        if not dictionary.get(OPERATING_MODE, 1) or not math.isfinite(load):
-            dictionary.put(STATUS, 1, NOT_VALID)
+        place = self.places[LOAD.name]
+        channel = place.subindex
+        if not dictionary.get(OPERATING_MODE, channel, 1) or not math.isfinite(load):
+            dictionary.put(STATUS, channel, NOT_VALID)
             return
-        value = round(load * 10 ** dictionary.get(DECIMAL_DIGITS, 1))
+        value = load / self.factor(place.scale)
         status = 0
-        if value > dictionary.get(UPPER_LIMIT, 1):
+        if value > dictionary.get(UPPER_LIMIT, channel, _NO_LIMIT):
             status = POSITIVE_OVERLOAD
-        elif value < dictionary.get(LOWER_LIMIT, 1):
+        elif value < dictionary.get(LOWER_LIMIT, channel, -_NO_LIMIT):
             status = NEGATIVE_OVERLOAD
-        dictionary.put(PROCESS_VALUE, 1, value)
-        dictionary.put(STATUS, 1, status)
+        dictionary.put(place.index, channel, value)
+        dictionary.put(STATUS, channel, status)
 
 
 LOAD_CELL = Device(

@@ -20,11 +20,14 @@ from regolithd.drivers.devices.device import (
     Setting,
 )
 from regolithd.drivers.devices.eds import EDS_FOLDER
+from regolithd.drivers.devices.units import RAD_S_PER_RPM
 from regolithd.drivers.devices.virtual.device import VirtualDevice
 from regolithd.drivers.devices.virtual.power_state import HALT, STAYS_IN_QUICK_STOP, PowerState, next_state
 
 if TYPE_CHECKING:
-    from regolithd.drivers.devices.virtual.device import ErrorReports, Key, ObjectValues
+    from collections.abc import Mapping
+
+    from regolithd.drivers.devices.virtual.device import ErrorReports, Key, ObjectValues, Place
     from regolithd.drivers.devices.virtual.measurement import Measurement
 
 ABORT_CONNECTION_OPTION, ERROR_CODE, CONTROLWORD, STATUSWORD_OBJECT = 0x6007, 0x603F, 0x6040, 0x6041
@@ -35,7 +38,6 @@ CURRENT_AVERAGED, VELOCITY_AVERAGED = 0x2027, 0x2028
 MAX_VELOCITY, ACCELERATION, DECELERATION, QUICK_STOP_DECELERATION = 0x607F, 0x6083, 0x6084, 0x6085
 
 PROFILE_VELOCITY = 3  # modes of operation, 0x6060
-RAD_S_PER_RPM = 2.0 * math.pi / 60.0
 
 MOTOR_CURRENT = Quantity("motor_current_A", "At the motor, signed.", mirrored=True, noisy=True)
 MOTOR_SPEED = Quantity("motor_speed_rad_s", "At the motor, before the gears, signed.", mirrored=True)
@@ -72,6 +74,8 @@ _EPOS_ERRORS = MappingProxyType(
     }
 )
 
+_QUICK_STOP_RAMP = 2  # of 0x605A and 0x605E
+_NO_LIMIT = 1 << 31
 COASTING_RPM_PER_S = 50_000.0
 """Deceleration of a motor without current: the friction of its gears (1400 : 1) stops it almost at once."""
 AVERAGING_S = 0.05  # time constant of 0x2027 and 0x2028
@@ -93,8 +97,14 @@ class VirtualMotorController(VirtualDevice):
 
     latches_errors = True  # until fault reset
 
-    def __init__(self, dictionary: ObjectValues, errors: ErrorReports, wheel: int | None) -> None:
-        super().__init__(dictionary, errors, wheel)
+    def __init__(
+        self,
+        dictionary: ObjectValues,
+        errors: ErrorReports,
+        wheel: int | None,
+        places: Mapping[str, Place] = MappingProxyType({}),
+    ) -> None:
+        super().__init__(dictionary, errors, wheel, places)
         self.state = PowerState.NOT_READY_TO_SWITCH_ON
         self.speed_rpm = 0.0
         self._controlword = 0
@@ -131,7 +141,7 @@ class VirtualMotorController(VirtualDevice):
         if key == (CONTROLWORD, 0):
             before, self._controlword = self._controlword, value
             was = self.state
-            self.state = next_state(was, value, before, quick_stop_option=self.dictionary.get(QUICK_STOP_OPTION))
+            self.state = next_state(was, value, before, quick_stop_option=self._quick_stop_option)
             if self.state is not was:
                 self._entered(was)
         elif key == (MODE, 0):
@@ -146,14 +156,14 @@ class VirtualMotorController(VirtualDevice):
         self.errors.set(code)
         powered = self.state in _POWERED
         self.state = PowerState.FAULT_REACTION_ACTIVE
-        option = self.dictionary.get(FAULT_REACTION_OPTION) if powered else 0
+        option = self.dictionary.get(FAULT_REACTION_OPTION, missing=_QUICK_STOP_RAMP) if powered else 0
         self._stop_rpm_per_s = self._ramp({1: DECELERATION, 2: QUICK_STOP_DECELERATION}.get(option))
         self._settle()
         self._show()
 
     def connection_lost(self) -> None:
         """React according to 0x6007."""
-        option = self.dictionary.get(ABORT_CONNECTION_OPTION)
+        option = self.dictionary.get(ABORT_CONNECTION_OPTION, missing=3)
         was = self.state
         if option == 1:
             self.fault(HEARTBEAT_LOST)
@@ -178,31 +188,42 @@ class VirtualMotorController(VirtualDevice):
     def measure(self, measurement: Measurement) -> None:
         """Put current, voltage and temperature into the dictionary."""
         wheel = self.wheel or 0
-        put = self.dictionary.put
-        current_mA = 1000 * float(measurement.motor_current_A[wheel])
+        current_A = float(measurement.motor_current_A[wheel])
         weight = 1 - math.exp(-self._since_measured_s / AVERAGING_S)
         self._since_measured_s = 0.0
-        for place, value in enumerate((current_mA, self.speed_rpm)):
+        for place, value in enumerate((1000 * current_A, self.speed_rpm)):
             self._averages[place] += weight * (value - self._averages[place])
-        put(CURRENT, 0, round(current_mA))
-        put(CURRENT_AVERAGED, 0, round(self._averages[0]))
-        put(VELOCITY_AVERAGED, 0, round(self._averages[1]))
-        put(VOLTAGE, 0, round(1000 * measurement.bus_voltage_V))
-        put(TEMPERATURE, 0, round(10 * float(measurement.motor_temperature_degC[wheel])))
+        self.dictionary.put(CURRENT_AVERAGED, 0, self._averages[0])
+        self.dictionary.put(VELOCITY_AVERAGED, 0, self._averages[1])
+        self.put_quantity(MOTOR_CURRENT.name, current_A)
+        self.put_quantity(BUS_VOLTAGE.name, measurement.bus_voltage_V)
+        self.put_quantity(MOTOR_TEMPERATURE.name, float(measurement.motor_temperature_degC[wheel]))
+
+    @property
+    def _quick_stop_option(self) -> int:
+        return self.dictionary.get(QUICK_STOP_OPTION, missing=_QUICK_STOP_RAMP)
+
+    @property
+    def _rpm_per_unit(self) -> float:
+        """Rpm of one velocity unit of the drive."""
+        place = self.places.get(MOTOR_SPEED.name)
+        return 1.0 if place is None else self.factor(place.scale) / RAD_S_PER_RPM
 
     def _ramp(self, index: int | None) -> float:
-        return COASTING_RPM_PER_S if index is None else float(self.dictionary.get(index))
+        """Return a ramp [rpm/s] from its object, in velocity units per second; 0, or no object, is no ramp."""
+        slope = 0 if index is None else self.dictionary.get(index, missing=0)
+        return slope * self._rpm_per_unit or COASTING_RPM_PER_S
 
     def _entered(self, was: PowerState) -> None:
         """Choose how the motor stops in the state just entered, and clear what a fault reset ends."""
         get = self.dictionary.get
         option: int | None = None
         if self.state is PowerState.QUICK_STOP_ACTIVE:
-            code = get(QUICK_STOP_OPTION)
+            code = self._quick_stop_option
             option = {1: DECELERATION, 2: QUICK_STOP_DECELERATION, 5: DECELERATION, 6: QUICK_STOP_DECELERATION}.get(
                 code
             )
-        elif self.state is PowerState.SWITCHED_ON and get(DISABLE_OPTION) == 1:
+        elif self.state is PowerState.SWITCHED_ON and get(DISABLE_OPTION, missing=0) == 1:
             option = DECELERATION
         self._stop_rpm_per_s = self._ramp(option)
         if was is PowerState.FAULT:
@@ -216,10 +237,7 @@ class VirtualMotorController(VirtualDevice):
             return
         if self.state is PowerState.FAULT_REACTION_ACTIVE:
             self.state = PowerState.FAULT
-        elif (
-            self.state is PowerState.QUICK_STOP_ACTIVE
-            and self.dictionary.get(QUICK_STOP_OPTION) not in STAYS_IN_QUICK_STOP
-        ):
+        elif self.state is PowerState.QUICK_STOP_ACTIVE and self._quick_stop_option not in STAYS_IN_QUICK_STOP:
             self.state = PowerState.SWITCH_ON_DISABLED
 
     def _goal(self) -> tuple[float, float]:
@@ -227,10 +245,11 @@ class VirtualMotorController(VirtualDevice):
         if self.state is not PowerState.OPERATION_ENABLED:
             return 0.0, self._stop_rpm_per_s
         get = self.dictionary.get
-        limit = get(MAX_VELOCITY)
+        limit = get(MAX_VELOCITY, missing=0) or _NO_LIMIT
         goal = 0 if self._controlword & HALT else min(max(get(TARGET_VELOCITY), -limit), limit)
-        faster = abs(goal) > abs(self.speed_rpm) and goal * self.speed_rpm >= 0
-        return float(goal), float(get(ACCELERATION if faster else DECELERATION))
+        goal_rpm = goal * self._rpm_per_unit
+        faster = abs(goal_rpm) > abs(self.speed_rpm) and goal_rpm * self.speed_rpm >= 0
+        return goal_rpm, self._ramp(ACCELERATION if faster else DECELERATION)
 
     def _show(self) -> None:
         """Put state and speed into the dictionary."""
@@ -242,7 +261,7 @@ class VirtualMotorController(VirtualDevice):
             word |= _TARGET_REACHED
         if not self.speed_rpm:
             word |= _SPEED_ZERO
-        speed = round(self.speed_rpm)
+        speed = self.speed_rpm / self._rpm_per_unit
         self.dictionary.put(STATUSWORD_OBJECT, 0, word)
         self.dictionary.put(VELOCITY_ACTUAL, 0, speed)
         self.dictionary.put(VELOCITY_DEMAND, 0, speed)
@@ -274,7 +293,7 @@ MOTOR_CONTROLLER = Device(
         ),
     ),
     # Commands act at once: a quick stop must not wait for a SYNC, nor be lost with it.
-    rpdos=(PdoLayout(1, (Commanded(CONTROLWORD), Commanded(TARGET_VELOCITY)), EVENT_DRIVEN),),
+    rpdos=(PdoLayout(1, (Commanded(CONTROLWORD), Commanded(TARGET_VELOCITY, scale=RAD_S_PER_RPM)), EVENT_DRIVEN),),
     settings=(
         Setting(MODE, 0, PROFILE_VELOCITY),
         Setting(ABORT_CONNECTION_OPTION, 0, 3),  # on the master's loss: quick stop

@@ -1,6 +1,6 @@
 """Booting a node: reset, identify, configure, start (the boot-slave process of CiA 302-2, for one master and no files).
 
-    NMT reset ─▶ boot-up ─▶ 0x1000, 0x1018 ─▶ each write, read back ─▶ heartbeat ─▶ NMT start ─▶ operational
+    NMT reset ─▶ boot-up ─▶ 0x1000, 0x1018 ─▶ each write, read back ─▶ units ─▶ heartbeat ─▶ NMT start ─▶ operational
 
 Each failure has a `BootReason` and a remedy. Compared with the error letters of CiA 302-2:
 
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from regolithd.drivers.canopen.nmt import NmtCommand, NmtState
-from regolithd.drivers.canopen.object_dictionary import object_dictionary
+from regolithd.drivers.devices.units import UnknownUnitError
 from regolithd.drivers.errors import (
     BusError,
     DictionaryError,
@@ -29,15 +29,12 @@ from regolithd.drivers.errors import (
 )
 from regolithd.drivers.master.boot_configuration import Write, boot_writes
 from regolithd.drivers.master.boot_error import BootError, BootReason
-from regolithd.drivers.master.events import Identity
+from regolithd.drivers.master.identity import compare_identity, read_identity
 
 if TYPE_CHECKING:
-    from regolithd.drivers.devices.node import NodeDescription
+    from regolithd.drivers.master.events import Identity
     from regolithd.drivers.master.remote_node import RemoteNode
 
-DEVICE_TYPE = 0x1000
-IDENTITY = 0x1018
-_MAJOR = 0xFFFF0000  # major revision number: the CANopen behaviour; the minor number may differ
 _HEARTBEATS = 5  # within which the node must report the commanded state
 
 
@@ -73,41 +70,6 @@ async def boot(remote: RemoteNode, settings: BootSettings) -> Identity:
         raise BootError(BootReason.BUS_DOWN, error.what, node_id=remote.node.node_id) from error
 
 
-async def read_identity(remote: RemoteNode) -> Identity:
-    """Return a node's device type (0x1000) and identity (0x1018); an optional entry that it lacks is 0."""
-    device_type = await remote.sdo.read_number(DEVICE_TYPE)
-    vendor = await remote.sdo.read_number(IDENTITY, 1)
-    rest = []
-    for subindex in (2, 3, 4):
-        try:
-            rest.append(await remote.sdo.read_number(IDENTITY, subindex))
-        except SdoAbortError:
-            rest.append(0)
-    return Identity(device_type, vendor, *rest)
-
-
-def compare_identity(node: NodeDescription, found: Identity) -> tuple[BootReason, str] | None:
-    """Return the first difference between a node's identity and its EDS and description, or None."""
-    all_bits = 0xFFFFFFFF
-    checks = (
-        (BootReason.WRONG_DEVICE_TYPE, "device type", found.device_type, _expected(node, DEVICE_TYPE), all_bits),
-        (BootReason.WRONG_VENDOR, "vendor", found.vendor, _expected(node, IDENTITY, 1), all_bits),
-        (BootReason.WRONG_PRODUCT, "product code", found.product, _expected(node, IDENTITY, 2), all_bits),
-        (BootReason.WRONG_REVISION, "major revision", found.revision, _expected(node, IDENTITY, 3), _MAJOR),
-        (BootReason.WRONG_SERIAL, "serial number", found.serial, node.serial, all_bits),
-    )
-    for reason, name, value, wanted, mask in checks:
-        if wanted is not None and (value ^ wanted) & mask:
-            return reason, f"its {name} is 0x{value & mask:08X}, expected 0x{wanted & mask:08X} ({node.kind})"
-    return None
-
-
-def _expected(node: NodeDescription, index: int, subindex: int = 0) -> int | None:
-    """Return the EDS's default of an object, or None where it has none."""
-    entry = object_dictionary(node.device.eds).get_variable(index, subindex)
-    return None if entry is None else entry.default
-
-
 class _Boot:
     """One run of the boot process."""
 
@@ -121,6 +83,7 @@ class _Boot:
         try:
             identity = await self._identify_restarted()
             await self._configure()
+            await self._read_units()
         except SdoInterruptedError as error:
             raise self._error(BootReason.RESTARTED, "booted up again while it was being configured") from error
         except SdoTimeoutError as error:
@@ -183,18 +146,30 @@ class _Boot:
         look_first = write.keep or write.read_only
         present = await sdo.read_number(index, subindex) if look_first else 0
         if not write.read_only and not (look_first and present & write.mask == write.value & write.mask):
-            await sdo.write(index, subindex, write.data(present))
+            for data in write.steps(present):
+                await sdo.write(index, subindex, data)
             present = await sdo.read_number(index, subindex, signed=write.signed)
         if present & write.mask != write.value & write.mask:
-            done = "must be" if write.read_only else "was set to"
-            what = f"{done} 0x{write.value:X}, and reads 0x{present & write.mask:X}"
             raise BootError(
-                BootReason.CONFIGURATION_NOT_KEPT,
-                what,
+                BootReason.FIXED_OTHERWISE if write.read_only else BootReason.CONFIGURATION_NOT_KEPT,
+                write.difference(present),
                 node_id=self._remote.node.node_id,
                 index=index,
                 subindex=subindex,
             )
+
+    async def _read_units(self) -> None:
+        """Read the objects in which the device states its units; their factors must be plausible."""
+        remote = self._remote
+        for index, subindex in remote.node.device.stated_units:
+            try:
+                remote.stated[index, subindex] = await remote.sdo.read_number(index, subindex)
+            except SdoAbortError as error:
+                raise self._error(BootReason.UNKNOWN_UNIT, error.what, error) from error
+        try:
+            remote.check_units()
+        except UnknownUnitError as error:
+            raise self._error(BootReason.UNKNOWN_UNIT, str(error)) from error
 
     async def _start(self) -> None:
         remote = self._remote

@@ -18,6 +18,8 @@ class BootReason(StrEnum):
     WRONG_REVISION = "wrong-revision"  # N: 0x1018:03
     WRONG_SERIAL = "wrong-serial"  # O: 0x1018:04
     CONFIGURATION_REFUSED = "configuration-refused"  # J: the node aborted a write
+    FIXED_OTHERWISE = "fixed-otherwise"  # an object that cannot be written has another value than is needed
+    UNKNOWN_UNIT = "unknown-unit"  # the device states no unit, or an implausible one
     CONFIGURATION_NOT_KEPT = "configuration-not-kept"  # J: a write was acknowledged, but another value is read back
     FELL_SILENT = "fell-silent"  # J: it stopped answering during the configuration
     RESTARTED = "restarted"  # it booted up again during the configuration
@@ -32,18 +34,24 @@ REMEDIES = {
     BootReason.NO_BOOT_UP: "Is it powered and wired, is its node-ID right, and has the bus its two 120 Ω terminators?",
     BootReason.NO_SDO_ANSWER: "Does another device use this node-ID? If not, the node hangs: power it off and on",
     BootReason.WRONG_DEVICE_TYPE: "Another kind of device has this node-ID: correct the wiring, or rover.toml",
-    BootReason.WRONG_VENDOR: "Another maker's device has this node-ID: correct the wiring, or put its EDS in place",
-    BootReason.WRONG_PRODUCT: "Another product has this node-ID: correct the wiring, or put its EDS in place",
-    BootReason.WRONG_REVISION: "Its firmware behaves differently: update it, or put the EDS of its revision in place",
+    BootReason.WRONG_VENDOR: "Another maker's device has this node-ID: correct the wiring, or name its profile and EDS "
+    "in [devices]",
+    BootReason.WRONG_PRODUCT: "Another product has this node-ID: correct the wiring, or name its EDS, or `product`, in "
+    "[devices]",
+    BootReason.WRONG_REVISION: "Where this firmware is meant, state the range: `revisions = [lowest, highest]` in "
+    "[devices]",
     BootReason.WRONG_SERIAL: "The device was exchanged: put its serial number into rover.toml, and calibrate it",
-    BootReason.CONFIGURATION_REFUSED: "The EDS does not describe this device: compare it with the device's own EDS",
+    BootReason.CONFIGURATION_REFUSED: "The device does not allow what its EDS says: `regolithd check` lists every such "
+    "object; name the EDS of its firmware in [devices] eds",
+    BootReason.FIXED_OTHERWISE: "Set it with the maker's own program, or choose fitting objects and units in [devices]",
+    BootReason.UNKNOWN_UNIT: "Set it in the drive with the maker's program, or state the unit in [devices.….objects]",
     BootReason.CONFIGURATION_NOT_KEPT: "The device changes the value by itself: compare its EDS, update its firmware",
     BootReason.FELL_SILENT: "Its supply or its plug may be loose; it is tried again",
     BootReason.RESTARTED: "Its supply may be too weak; it is tried again",
     BootReason.MALFORMED_ANSWER: "Two devices may share this node-ID, or its firmware breaks CiA 301",
     BootReason.NO_HEARTBEAT: "It takes a heartbeat time and sends none: check its firmware",
     BootReason.NOT_OPERATIONAL: "It may refuse because of an error of its own: see its emergency messages",
-    BootReason.UNUSABLE_EDS: "Put the device's own EDS in place; it must list what the driver configures",
+    BootReason.UNUSABLE_EDS: "`regolithd check` lists what the EDS lacks; name the complete EDS in [devices] eds",
     BootReason.BUS_DOWN: "Bring the link up: `ip link set can0 up type can bitrate 1000000 restart-ms 100`",
 }
 

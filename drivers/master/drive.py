@@ -7,26 +7,33 @@ with the controlword and the target velocity, so that no drive receives only one
 from __future__ import annotations
 
 import asyncio
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from regolithd.drivers.can.frame import Frame
+from regolithd.drivers.canopen.emcy import error_text
 from regolithd.drivers.devices.decoding.pdo import rpdos
+from regolithd.drivers.devices.device import Commanded
 from regolithd.drivers.devices.motor_controller import (
     CONTROLWORD,
     ERROR_CODE,
     MODE_DISPLAY,
     PROFILE_VELOCITY,
-    RAD_S_PER_RPM,
     STATUSWORD_OBJECT,
     TARGET_VELOCITY,
 )
-from regolithd.drivers.errors import DriveError
+from regolithd.drivers.devices.units import UnknownUnitError
+from regolithd.drivers.errors import DriveError, SdoAbortError
 from regolithd.drivers.master.cia402 import Controlword, DriveState, at_standstill, enabling_step, state_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from regolithd.drivers.can.bus import Bus
+    from regolithd.drivers.devices.node import NodeDescription
     from regolithd.drivers.master.remote_node import RemoteNode
 
+ERROR_HISTORY = 0x1003  # sub-index 1: the newest error
 _ENABLE_TIMEOUT_S = 3.0
 _STOP_TIMEOUT_S = 3.0
 _RESEND_S = 0.2  # a drive still enabled this long after the quick stop has not received it
@@ -44,6 +51,7 @@ class Drive:
         self.reported = DriveState.UNKNOWN  # in the last `DriveStateChanged` event
         self._bus = bus
         self._rpdo = rpdos(remote.node.device)[0]
+        self._velocity_unit = next(each.scale for each in _commanded(remote.node) if each.index == TARGET_VELOCITY)
 
     @property
     def state(self) -> DriveState:
@@ -96,7 +104,11 @@ class Drive:
     async def turn(self, motor_speed_rad_s: float) -> None:
         """Send the target velocity [rad/s at the motor, forward positive]; the drive must be in operation enabled."""
         direction = -1 if self.remote.node.mirrored else 1
-        await self._command(Controlword.ENABLE_OPERATION, direction * round(motor_speed_rad_s / RAD_S_PER_RPM))
+        try:
+            factor = self.remote.factor(self._velocity_unit)
+        except UnknownUnitError as error:
+            raise self._error(f"cannot be commanded: {error}", "Boot the node again") from error
+        await self._command(Controlword.ENABLE_OPERATION, direction * round(motor_speed_rad_s / factor))
 
     async def send_quick_stop(self) -> None:
         """Send the quick stop and do not wait."""
@@ -128,8 +140,8 @@ class Drive:
     def _standing(self) -> bool:
         return self.statusword is not None and at_standstill(self.statusword)
 
-    async def _command(self, word: Controlword, velocity_rpm: int) -> None:
-        data = self._rpdo.pack(word, velocity_rpm)
+    async def _command(self, word: Controlword, velocity: int) -> None:
+        data = self._rpdo.pack(word, velocity)
         await self._bus.send(Frame(0, self._rpdo.cob_id(self.node_id), data))
 
     async def _write_controlword(self, word: Controlword) -> None:
@@ -138,9 +150,21 @@ class Drive:
     async def _not_enabled(self) -> DriveError:
         remedy = "See its emergency messages; cut its supply and switch it on again"
         if self.state is DriveState.FAULT:
-            code = await self.remote.sdo.read_number(ERROR_CODE)
-            return self._error(f"stays in fault, error code 0x{code:04X}", remedy)
+            return self._error(f"stays in fault{await self._error_code()}", remedy)
         return self._error(f"is still in {self.state} after {_ENABLE_TIMEOUT_S:g} s", remedy)
+
+    async def _error_code(self) -> str:
+        """Return the fault's code in words: from 0x603F, which is optional, or the newest entry of 0x1003."""
+        for index, subindex in ((ERROR_CODE, 0), (ERROR_HISTORY, 1)):
+            with suppress(SdoAbortError):
+                code = await self.remote.sdo.read_number(index, subindex) & 0xFFFF
+                return f", error code 0x{code:04X}: {error_text(code, self.remote.node.device.error_texts)}"
+        return "; it has no object that holds the error code"
 
     def _error(self, what: str, remedy: str) -> DriveError:
         return DriveError(what, node_id=self.node_id, remedy=remedy)
+
+
+def _commanded(node: NodeDescription) -> Iterator[Commanded]:
+    for layout in node.device.rpdos:
+        yield from (each for each in layout.objects if isinstance(each, Commanded))

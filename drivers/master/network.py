@@ -27,9 +27,9 @@ from regolithd.drivers.canopen.nmt import NmtCommand
 from regolithd.drivers.canopen.sync import produce_sync
 from regolithd.drivers.devices.decoding.decoder import Decoder
 from regolithd.drivers.devices.decoding.signals import NodeState, Reading
-from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER, STATUSWORD
+from regolithd.drivers.devices.motor_controller import STATUSWORD
 from regolithd.drivers.errors import DriverError
-from regolithd.drivers.master.boot_configuration import CONSUMER_HEARTBEAT
+from regolithd.drivers.master.boot_configuration import CONSUMER_HEARTBEAT, monitors_master
 from regolithd.drivers.master.cia402 import DriveState
 from regolithd.drivers.master.drive import Drive
 from regolithd.drivers.master.events import (
@@ -189,7 +189,7 @@ class Network:
         remote = RemoteNode(self.bus, node, sdo_timeout_s=self.settings.sdo_timeout_s)
         self._supervisors[node_id] = Supervisor(remote, self.settings, self._emit)
         self._sdo_clients[remote.answer_cob_id] = remote.sdo
-        if node.device is MOTOR_CONTROLLER:
+        if node.device.commanded:
             self._drives[node_id] = Drive(self.bus, remote)
 
     def _status(self, node_id: int) -> NodeStatus:
@@ -288,7 +288,8 @@ class Network:
                 try:
                     await self.disable()
                 finally:
-                    await each(drive.remote.sdo.write(CONSUMER_HEARTBEAT, 1, bytes(4)) for drive in self._motion.live())
+                    live = [drive.remote for drive in self._motion.live() if monitors_master(drive.remote.node)]
+                    await each(remote.sdo.write(CONSUMER_HEARTBEAT, 1, bytes(4)) for remote in live)
         for supervisor in self._supervisors.values():
             with suppress(DriverError):
                 await supervisor.remote.send_command(NmtCommand.ENTER_PRE_OPERATIONAL)

@@ -14,8 +14,8 @@ from regolithd.drivers.canopen.nmt import NmtState
 from regolithd.drivers.devices.decoding.decoder import Decoder
 from regolithd.drivers.devices.decoding.signals import NodeState
 from regolithd.drivers.errors import BusError, SdoError
-from regolithd.drivers.master.boot import compare_identity, read_identity
 from regolithd.drivers.master.boot_error import REMEDIES, BootReason
+from regolithd.drivers.master.identity import compare_identity, read_identity
 from regolithd.drivers.master.remote_node import RemoteNode
 
 if TYPE_CHECKING:

@@ -19,6 +19,7 @@ from regolithd.drivers.master.boot import BootSettings, boot
 from regolithd.drivers.master.boot_error import BootError, BootReason
 from regolithd.drivers.master.events import NetworkEvent, NodeBooted, NodeBootFailed, NodeLost, NodeReturned
 from regolithd.drivers.master.heartbeat_consumer import until_lost
+from regolithd.drivers.master.identity import reservations
 from regolithd.drivers.master.status import NetworkSettings, NodePhase, NodeStatus
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ class Supervisor:
         else:
             self._note_return()
             boots = self._status.boots + 1
-            text = f"node {node_id} ({self.remote.node.kind}) is operational"
+            text = f"node {node_id} ({self.remote.node.kind}) is operational{reservations(self.remote.node, identity)}"
             self._status = replace(
                 self._status, phase=NodePhase.OPERATIONAL, identity=identity, reason=None, text=text, boots=boots
             )

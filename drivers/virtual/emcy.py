@@ -61,15 +61,15 @@ class EmergencyProducer:
     def _remember(self, code: int) -> None:
         dictionary = self._dictionary
         for sub in range(_HISTORY_LENGTH, 1, -1):
-            dictionary.put(HISTORY, sub, dictionary.get(HISTORY, sub - 1))
+            dictionary.put(HISTORY, sub, dictionary.get(HISTORY, sub - 1, missing=0))
         dictionary.put(HISTORY, 1, code)
-        dictionary.put(HISTORY, 0, min(dictionary.get(HISTORY, 0) + 1, _HISTORY_LENGTH))
+        dictionary.put(HISTORY, 0, min(dictionary.get(HISTORY, 0, missing=0) + 1, _HISTORY_LENGTH))
 
     def _send(self, code: int, detail: bytes) -> None:
         register = 0
         for active in {*self.active, code} - {NO_ERROR}:
             register |= 0x01 | _REGISTER_BITS.get(active >> 12, 0) | _REGISTER_BITS.get(active >> 8, 0)
         self._dictionary.put(REGISTER, 0, register)
-        cob_id = self._dictionary.get(COB_ID_OBJECT)
+        cob_id = self._dictionary.get(COB_ID_OBJECT, missing=_DISABLED)
         if not cob_id & _DISABLED:
             self._emit(cob_id & 0x7FF, struct.pack("<HB5s", code, register, detail))

@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING
 
 from regolithd.drivers.canopen import cob_id
 from regolithd.drivers.canopen.sdo_abort import Abort, AbortError
+from regolithd.drivers.devices.device import Measured
+from regolithd.drivers.devices.profiles.identity import identity_entries
+from regolithd.drivers.devices.virtual.device import Place
 from regolithd.drivers.virtual import emcy, pdo
 from regolithd.drivers.virtual.emcy import EmergencyProducer
 from regolithd.drivers.virtual.faults import Faults
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from regolithd.drivers.can.frame import Frame
+    from regolithd.drivers.devices.device import Device
     from regolithd.drivers.devices.node import NodeDescription
     from regolithd.drivers.devices.virtual.device import Key
     from regolithd.drivers.devices.virtual.measurement import Measurement
@@ -29,6 +33,7 @@ if TYPE_CHECKING:
 BOOT_NS = 20_000_000
 """From reset to boot-up."""
 
+_DEVICE_TYPE = 0x1000
 _SYNC_OBJECT, _CONSUMER, _PRODUCER, _IDENTITY, _ERROR_BEHAVIOUR = 0x1005, 0x1016, 0x1017, 0x1018, 0x1029
 _STAYS, _STOPS = 1, 2  # values of 0x1029:01; 0 (the default) enters pre-operational
 
@@ -59,7 +64,9 @@ class VirtualNode:
         self._now = 0
         self.dictionary = Dictionary(description.device.eds, self.id)
         self._emergency = EmergencyProducer(self.dictionary, self._send_emergency)
-        self.device = description.device.virtual(self.dictionary, self._emergency, description.wheel)
+        self.device = description.device.virtual(
+            self.dictionary, self._emergency, description.wheel, _places(description.device)
+        )
         self._sdo = SdoServer(self.dictionary)
         self.dictionary.on_write = self._check
         self.dictionary.after_write = self._written
@@ -105,9 +112,11 @@ class VirtualNode:
         self._configure()
 
     def _identify(self) -> None:
-        """Set 0x1018: the EDS's identity with the node-ID as serial number, overridden by the injected fault."""
+        """Set 0x1018: the expected identity, the node-ID as serial number, overridden by the injected fault."""
         self.dictionary.reset(_IDENTITY, _IDENTITY)
-        for sub, value in ({4: self.id} | self.faults.identity).items():
+        known = identity_entries(self.description.device)
+        self.dictionary.put(_DEVICE_TYPE, 0, known.pop(0, 0))
+        for sub, value in (known | {4: self.id} | self.faults.identity).items():
             self.dictionary.put(_IDENTITY, sub, value)
 
     def _boot_up(self) -> None:
@@ -166,7 +175,7 @@ class VirtualNode:
             self._request(frame.data)
         elif can_id in self._receive:
             self._receive_rpdo(self._receive[can_id], frame.data)
-        elif can_id == cob_id.ERROR_CONTROL + self._master:
+        elif can_id == cob_id.ERROR_CONTROL + self._master and self._master:
             self._master_heartbeat()
 
     def _request(self, data: bytes) -> None:
@@ -263,7 +272,7 @@ class VirtualNode:
                     self._send_if_changed(each)
 
     def _heartbeat(self) -> None:
-        period = self.dictionary.get(_PRODUCER) * 1_000_000
+        period = self.dictionary.get(_PRODUCER, missing=0) * 1_000_000
         due = self._heartbeat_due or 0
         # Keep the phase, but do not send what was missed.
         self._heartbeat_due = due + period if self._now < due + period else self._now + period
@@ -273,10 +282,10 @@ class VirtualNode:
 
     @property
     def _master(self) -> int:
-        return self.dictionary.get(_CONSUMER, 1) >> 16 & 0x7F
+        return self.dictionary.get(_CONSUMER, 1, missing=0) >> 16 & 0x7F
 
     def _master_heartbeat(self) -> None:
-        period = self.dictionary.get(_CONSUMER, 1) & 0xFFFF
+        period = self.dictionary.get(_CONSUMER, 1, missing=0) & 0xFFFF
         if not period:
             return
         self._master_due = self._now + period * 1_000_000
@@ -292,7 +301,7 @@ class VirtualNode:
         self.counts["master_lost"] += 1
         self.device.connection_lost()
         self._emergency.set(emcy.HEARTBEAT_LOST)
-        behaviour = self.dictionary.get(_ERROR_BEHAVIOUR, 1)
+        behaviour = self.dictionary.get(_ERROR_BEHAVIOUR, 1, missing=0)
         if behaviour == _STOPS:
             self.enter(VirtualNmtState.STOPPED)
         elif behaviour != _STAYS and self.state is VirtualNmtState.OPERATIONAL:
@@ -342,7 +351,9 @@ class VirtualNode:
             raise AbortError(Abort.HARDWARE)
         if index == emcy.HISTORY and value:
             raise AbortError(Abort.INVALID_VALUE)
-        if index == emcy.COB_ID_OBJECT and not pdo.usable(value):
+        if index == emcy.COB_ID_OBJECT and (
+            not pdo.usable(value) or pdo.moved_while_enabled(self.dictionary.get(index), value)
+        ):
             raise AbortError(Abort.INVALID_VALUE)
         if index == _SYNC_OBJECT and (value & 0x6000_0000 or not value & 0x7FF):
             raise AbortError(
@@ -357,7 +368,7 @@ class VirtualNode:
         if index in self.faults.forgotten:
             self.dictionary.values[key] = self.dictionary.entries[key].default
         elif index == emcy.HISTORY:
-            for sub in range(1, 9):
+            for sub in range(1, 255):
                 self.dictionary.put(emcy.HISTORY, sub, 0)
         elif index == _PRODUCER:
             self._heartbeat_due = self._now + value * 1_000_000 if value else None
@@ -370,8 +381,14 @@ class VirtualNode:
 
     def _configure(self) -> None:
         """Compile SYNC and PDO configuration from the communication objects."""
-        self.sync_cob_id = self.dictionary.get(_SYNC_OBJECT) & 0x7FF
+        self.sync_cob_id = self.dictionary.get(_SYNC_OBJECT, missing=cob_id.SYNC) & 0x7FF
         self._transmit = pdo.transmit_pdos(self.dictionary)
         self._receive = pdo.receive_pdos(self.dictionary)
         for each in self._transmit:
             each.sent_ns = self._now
+
+
+def _places(device: Device) -> dict[str, Place]:
+    """Return where each quantity of a device lies, by its name."""
+    measured = (each for layout in device.tpdos for each in layout.objects if isinstance(each, Measured))
+    return {each.quantity.name: Place(each.index, each.subindex, each.scale) for each in measured}

@@ -6,48 +6,45 @@ SDO clients use `read` and `write`, which are refused as CiA 301 prescribes. The
 from __future__ import annotations
 
 import struct
-import warnings
 from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-import canopen
-from canopen.objectdictionary import ODVariable, datatypes
+from canopen.objectdictionary import ODVariable
 
+from regolithd.drivers.canopen.object_dictionary import STRUCT_CODES, parse_eds
 from regolithd.drivers.canopen.sdo_abort import Abort, AbortError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
     from pathlib import Path
 
+    import canopen
+
     from regolithd.drivers.devices.virtual.device import Key
 
-_FORMATS = {
-    datatypes.UNSIGNED8: "B",
-    datatypes.UNSIGNED16: "H",
-    datatypes.UNSIGNED32: "I",
-    datatypes.INTEGER8: "b",
-    datatypes.INTEGER16: "h",
-    datatypes.INTEGER32: "i",
-}
+Value = int | float | bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One entry as the EDS describes it. `format` is its struct code; empty for a string."""
+    """One entry as the EDS describes it. `format` is its struct code; empty for strings and other lengths.
+
+    The values of an entry without struct code are bytes.
+    """
 
     format: str
     readable: bool
     writable: bool
     mappable: bool
-    default: int | bytes
+    default: Value
     low: int | None
     high: int | None
 
     @property
     def bits(self) -> int:
-        """Its length on the bus; 0 for a string."""
+        """Its length on the bus; 0 where it has no struct code."""
         return 8 * struct.calcsize(self.format) if self.format else 0
 
 
@@ -61,7 +58,7 @@ class Dictionary:
     def __init__(self, path: Path, node_id: int) -> None:
         self.entries = _entries(path, node_id)
         self.indices = {index for index, _ in self.entries}
-        self.values: dict[Key, int | bytes] = {}
+        self.values: dict[Key, Value] = {}
         self.on_write: Callable[[Key, int], None] = lambda _key, _value: None
         self.after_write: Callable[[Key, int], None] = lambda _key, _value: None
         self.reset(0x0000, 0xFFFF)
@@ -70,16 +67,27 @@ class Dictionary:
         """Give the objects from index `first` to `last` their power-on values."""
         self.values.update({key: entry.default for key, entry in self.entries.items() if first <= key[0] <= last})
 
-    def get(self, index: int, sub: int = 0) -> int:
-        """Return a number, as the device sees it."""
-        value = self.values[index, sub]
+    def get(self, index: int, sub: int = 0, missing: int | None = None) -> int:
+        """Return an integer, as the device sees it; `missing` where the EDS lists no such object."""
+        value = self.values.get((index, sub), missing)
+        if value is None:
+            raise KeyError(f"0x{index:04X}:{sub:02X}")
         if isinstance(value, bytes):
             raise TypeError(f"0x{index:04X}:{sub:02X} is a string")
-        return value
+        return int(value)
 
-    def put(self, index: int, sub: int, value: int) -> None:
-        """Set a number, as the device does: access rights do not apply; a value outside its type's range is clipped."""
-        entry = self.entries[index, sub]
+    def put(self, index: int, sub: int, value: float) -> None:
+        """Set a number, as the device does: access rights do not apply; a value outside its type's range is clipped.
+
+        An object that the EDS does not list is not set.
+        """
+        entry = self.entries.get((index, sub))
+        if entry is None or not entry.format:
+            return
+        if entry.format in "fd":
+            self.values[index, sub] = float(value)
+            return
+        value = round(value)
         span = 1 << entry.bits
         lowest = -span // 2 if entry.format.islower() else 0
         self.values[index, sub] = min(max(value, lowest), lowest + span - 1)
@@ -108,6 +116,9 @@ class Dictionary:
         """Take an SDO download's (or RPDO's) bytes: rights, length and limits first, then the device's own rules."""
         self.check_writable(key)
         entry = self.entries[key]
+        if not entry.format:
+            self.values[key] = bytes(data)
+            return
         if 8 * len(data) != entry.bits:
             raise AbortError(Abort.TOO_LONG if 8 * len(data) > entry.bits else Abort.TOO_SHORT)
         (value,) = struct.unpack("<" + entry.format, data)
@@ -123,9 +134,7 @@ class Dictionary:
 @cache
 def _entries(path: Path, node_id: int) -> Mapping[Key, Entry]:
     """Return what the EDS describes; `$NODEID` in a default is the node's."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        od = canopen.import_od(str(path), node_id)
+    od = parse_eds(path.read_text(encoding="utf-8-sig", errors="replace"), node_id)
     return MappingProxyType({(each.index, each.subindex): _entry(each) for each in _variables(od)})
 
 
@@ -138,14 +147,21 @@ def _variables(od: canopen.ObjectDictionary) -> Iterator[ODVariable]:
 
 
 def _entry(variable: ODVariable) -> Entry:
-    text = variable.data_type == datatypes.VISIBLE_STRING
-    default = variable.default
+    code = STRUCT_CODES.get(variable.data_type or 0, "")
     return Entry(
-        format="" if text else _FORMATS[int(variable.data_type or 0)],
-        readable=variable.access_type != "wo",
-        writable=variable.access_type in {"rw", "rww", "rwr", "wo"},
+        format=code,
+        readable=variable.readable,
+        writable=variable.writable,
         mappable=variable.pdo_mappable,
-        default=str(default).encode("ascii") if text else int(default or 0),
+        default=_default(variable, code),
         low=variable.min,
         high=variable.max,
     )
+
+
+def _default(variable: ODVariable, code: str) -> Value:
+    """Return an entry's power-on value: that of a DCF, the default of the EDS, or 0."""
+    value = variable.default if variable.value is None else variable.value
+    if code:
+        return 0 if value is None else value
+    return value if isinstance(value, bytes) else str(value or "").encode("utf-8")

@@ -76,6 +76,11 @@ def usable(cob_id: int) -> bool:
     return not reserved and not cob_id & _EXTENDED
 
 
+def moved_while_enabled(before: int, after: int) -> bool:
+    """Whether a COB-ID would change its identifier while bit 31 says that its service is in use (CiA 301, 7.5.2.17)."""
+    return not (before | after) & DISABLED and bool((before ^ after) & _COB_ID)
+
+
 def check(dictionary: Dictionary, key: Key, value: int) -> None:
     """Abort a write to a PDO's configuration that CiA 301 forbids."""
     index, sub = key
@@ -84,7 +89,8 @@ def check(dictionary: Dictionary, key: Key, value: int) -> None:
         _check_communication(dictionary, key, value, transmit=part == TPDO)
     elif part in {RPDO_MAPPING, TPDO_MAPPING}:
         transmit = part == TPDO_MAPPING
-        if not dictionary.get((TPDO if transmit else RPDO) + number, 1) & DISABLED:
+        cob_id = ((TPDO if transmit else RPDO) + number, 1)
+        if not dictionary.get(*cob_id) & DISABLED and dictionary.entries[cob_id].writable:
             raise AbortError(Abort.UNSUPPORTED_ACCESS)
         if sub == 0:
             _check_mapping(dictionary, index, value, transmit=transmit)
@@ -97,8 +103,8 @@ def check(dictionary: Dictionary, key: Key, value: int) -> None:
 def _compile(dictionary: Dictionary, communication: int, mapping: int) -> list[EnabledPdo]:
     pdos = []
     for number in range(0x200):
-        if communication + number not in dictionary.indices:
-            break
+        if communication + number not in dictionary.indices or mapping + number not in dictionary.indices:
+            continue
         cob_id = dictionary.get(communication + number, 1)
         count = dictionary.get(mapping + number, 0)
         if cob_id & DISABLED or not count:
@@ -106,9 +112,9 @@ def _compile(dictionary: Dictionary, communication: int, mapping: int) -> list[E
         keys = tuple(_split(dictionary.get(mapping + number, sub))[0] for sub in range(1, count + 1))
         layout = struct.Struct("<" + "".join(dictionary.entries[key].format for key in keys))
         pdo = EnabledPdo(cob_id & _COB_ID, dictionary.get(communication + number, 2), keys, layout)
-        if communication == TPDO:
-            pdo.inhibit_ns = dictionary.get(communication + number, 3) * 100_000
-            pdo.event_ns = dictionary.get(communication + number, 5) * 1_000_000
+        if communication == TPDO and not pdo.synchronous:  # CiA 301, 7.5.2.37: both are for event-driven TPDOs
+            pdo.inhibit_ns = dictionary.get(communication + number, 3, missing=0) * 100_000
+            pdo.event_ns = dictionary.get(communication + number, 5, missing=0) * 1_000_000
         pdos.append(pdo)
     return pdos
 
@@ -140,10 +146,8 @@ def _check_communication(dictionary: Dictionary, key: Key, value: int, *, transm
     index, sub = key
     before = dictionary.get(index, 1)
     enabled = not before & DISABLED
-    if sub == 1 and not value & DISABLED:
-        moved = enabled and (value ^ before) & _COB_ID
-        if moved or not usable(value):
-            raise AbortError(Abort.INVALID_VALUE)
+    if sub == 1 and not value & DISABLED and (moved_while_enabled(before, value) or not usable(value)):
+        raise AbortError(Abort.INVALID_VALUE)
     if sub == 2 and value > LAST_SYNCHRONOUS and value not in _EVENT_DRIVEN:
         raise AbortError(Abort.INVALID_VALUE)  # reserved, or by remote request, which these nodes do not serve
     if sub == 3 and transmit and enabled:

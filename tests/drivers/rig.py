@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from regolithd.drivers.can.bus import Bus
     from regolithd.drivers.can.frame import Frame
     from regolithd.drivers.devices.decoding.signals import Signal
+    from regolithd.drivers.devices.device import Quantity
     from regolithd.drivers.devices.node import NodeDescription
     from regolithd.drivers.master.events import NetworkEvent
     from regolithd.drivers.virtual.plant import Plant
@@ -83,6 +84,11 @@ class Rig:
     def readings(self, node_id: int) -> list[Reading]:
         """Return what one node has measured so far."""
         return [signal for signal in self.signals if isinstance(signal, Reading) and signal.node_id == node_id]
+
+    def latest(self, node_id: int, quantity: Quantity) -> float:
+        """Return the newest value of a quantity; NaN before the first."""
+        values = (value for reading in reversed(self.readings(node_id)) for q, value in reading.values if q is quantity)
+        return next(values, float("nan"))
 
     async def wait_for_event(self, kind: type, **fields: object) -> NetworkEvent:
         """Wait for an event that has not been waited for before, and return it."""

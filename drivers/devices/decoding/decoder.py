@@ -16,8 +16,9 @@ from regolithd.drivers.can.frame import Frame
 from regolithd.drivers.canopen import cob_id
 from regolithd.drivers.canopen.emcy import Emergency, parse
 from regolithd.drivers.canopen.nmt import parse_state
-from regolithd.drivers.devices.decoding.pdo import DevicePdo, rpdos, tpdos
+from regolithd.drivers.devices.decoding.pdo import DevicePdo, fixed_tpdos, rpdos, tpdos
 from regolithd.drivers.devices.decoding.signals import NodeState, Reading, Signal, Sync
+from regolithd.drivers.devices.decoding.stated_units import StatedUnits
 from regolithd.drivers.devices.device import Measured, Quantity, Validity
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ class Decoder:
         self.undecodable: Counter[Undecodable] = Counter()
         self._handlers: dict[int, _Handler] = {cob_id.NMT: _nothing, cob_id.SYNC: _sync}
         self._handlers[cob_id.ERROR_CONTROL + master_id] = _nothing
+        self._units: list[StatedUnits] = []
         for node in self.nodes:
             self._add(node)
 
@@ -53,6 +55,11 @@ class Decoder:
         return frozenset(
             pdo.cob_id(node.node_id) for node in self.nodes for pdo in tpdos(node.device, diagnostics=node.diagnostics)
         )
+
+    @property
+    def unit_frames(self) -> list[Frame]:
+        """The last frames from which units were learned: with them, decoding can begin anew at any later frame."""
+        return [frame for units in self._units for frame in units.frames.values()]
 
     def decode(self, frame: Frame) -> Signal | None:
         """Return the signal in a frame, or None; never raises."""
@@ -69,14 +76,19 @@ class Decoder:
 
     def _add(self, node: NodeDescription) -> None:
         handlers, node_id = self._handlers, node.node_id
-        handlers[cob_id.SDO_ANSWER + node_id] = _nothing
+        units = StatedUnits(node.device)
+        handlers[cob_id.SDO_ANSWER + node_id] = units.take if units else _nothing
+        if units:
+            self._units.append(units)
         handlers[cob_id.SDO_REQUEST + node_id] = _nothing
         handlers[cob_id.EMCY + node_id] = self._emergency(node)
         handlers[cob_id.ERROR_CONTROL + node_id] = self._state(node_id)
         for pdo in rpdos(node.device):
             handlers[pdo.cob_id(node_id)] = _nothing
         for pdo in tpdos(node.device, diagnostics=node.diagnostics):
-            handlers[pdo.cob_id(node_id)] = self._reading(pdo, node)
+            handlers[pdo.cob_id(node_id)] = self._reading(pdo, node, units)
+        for other in fixed_tpdos(node.device, node_id):
+            handlers.setdefault(other, _nothing)
 
     def _emergency(self, node: NodeDescription) -> _Handler:
         def decode(frame: Frame) -> Emergency | None:
@@ -98,14 +110,16 @@ class Decoder:
 
         return decode
 
-    def _reading(self, pdo: DevicePdo, node: NodeDescription) -> _Handler:
+    def _reading(self, pdo: DevicePdo, node: NodeDescription, units: StatedUnits) -> _Handler:
         node_id = node.node_id
         size, unpack, own_cob_id = pdo.layout.size, pdo.layout.unpack, pdo.cob_id(node_id)
-        scales: tuple[tuple[int, Quantity, int, float], ...] = tuple(
-            (place, each.quantity, -1 if node.mirrored and each.quantity.mirrored else 1, each.scale)
-            for place, each in enumerate(pdo.objects)
-            if isinstance(each, Measured)
-        )
+        scales = _scales(pdo, node, units)
+
+        def rescale() -> None:
+            nonlocal scales
+            scales = _scales(pdo, node, units)
+
+        units.notify(rescale)
         masks = tuple((place, each.mask) for place, each in enumerate(pdo.objects) if isinstance(each, Validity))
 
         def decode(frame: Frame) -> Reading | None:
@@ -120,6 +134,15 @@ class Decoder:
             return Reading(frame.time_ns, node_id, own_cob_id, values)
 
         return decode
+
+
+def _scales(pdo: DevicePdo, node: NodeDescription, units: StatedUnits) -> tuple[tuple[int, Quantity, int, float], ...]:
+    """Return place, quantity, sign and factor of each measured object whose unit is known."""
+    return tuple(
+        (place, each.quantity, -1 if node.mirrored and each.quantity.mirrored else 1, factor)
+        for place, each in enumerate(pdo.objects)
+        if isinstance(each, Measured) and (factor := units.factor(each.scale)) is not None
+    )
 
 
 def _nothing(_frame: Frame) -> None:

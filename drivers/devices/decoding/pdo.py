@@ -6,10 +6,13 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
+from regolithd.drivers.canopen.object_dictionary import object_dictionary
 from regolithd.drivers.canopen.pdo import Pdo, compile_mapping
 
 if TYPE_CHECKING:
     from regolithd.drivers.devices.device import Device, PdoLayout, PdoObject
+
+_IDENTIFIER = 0x7FF
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +33,14 @@ def tpdos(device: Device, *, diagnostics: bool = False) -> tuple[DevicePdo, ...]
 def rpdos(device: Device) -> tuple[DevicePdo, ...]:
     """Return the RPDOs that command a node of this kind."""
     return tuple(compile_pdo(device, layout, transmit=False) for layout in device.rpdos)
+
+
+def fixed_tpdos(device: Device, node_id: int) -> tuple[int, ...]:
+    """Return the COB-IDs of TPDOs that are not used and that the node does not let the master disable."""
+    dictionary, used = object_dictionary(device.eds), {pdo.communication_index for pdo in tpdos(device)}
+    entries = (dictionary.get_variable(index, 1) for index in range(0x1800, 0x1A00) if index not in used)
+    fixed = (each for each in entries if each is not None and not each.writable)
+    return tuple(((each.default or 0) & _IDENTIFIER) + (node_id if each.relative else 0) for each in fixed)
 
 
 def compile_pdo(device: Device, layout: PdoLayout, *, transmit: bool) -> DevicePdo:

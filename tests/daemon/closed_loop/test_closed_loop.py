@@ -141,7 +141,7 @@ def test_the_frames_of_a_sync_hold_the_measurement(body: Configuration) -> None:
         ground_speed_m_s=0.0213,
         bus_voltage_V=24.0,
     )
-    nodes = body.nodes.described()
+    nodes = body.described()
     sent = list(frames(nodes, 1_000, 400.0 + wheel, read))
     assert (sent[0].can_id, sent[0].data, sent[0].time_ns, sent[0].sent) == (0x080, b"", 1_000, True)
     assert [frame.can_id for frame in sent[1:]] == sorted(frame.can_id for frame in sent[1:])

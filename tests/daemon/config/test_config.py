@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.config.devices import DeviceTable
 from regolithd.daemon.config.reader import ConfigurationError, parse_configuration, read_configuration
 
 ROVER = Path(__file__).resolve().parents[3] / "rover.toml"
@@ -22,15 +23,21 @@ def test_the_shipped_file_is_the_defaults_with_both_body_sensors() -> None:
     shipped = read_configuration(ROVER)
     sensors = shipped.nodes.model_copy(update={"inclinometer": None, "ground_speed": None})
     assert shipped.model_copy(update={"nodes": sensors}) == Configuration()
-    assert len(shipped.nodes.described()) == 14
+    assert len(shipped.described()) == 14
 
 
 def test_every_key_of_the_model_is_shown_in_the_shipped_file() -> None:
     """Each table and each key of the model is in `rover.toml`."""
     text = ROVER.read_text()
     for name, field in Configuration.model_fields.items():
-        assert f"[{name}]" in text
-        for key in field.annotation.model_fields:  # type: ignore[union-attr]
+        if name == "devices":
+            assert "# [devices.motors]" in text
+        else:
+            assert f"[{name}]" in text
+        table = DeviceTable if name == "devices" else field.annotation
+        for key in table.model_fields:  # type: ignore[union-attr]
+            if key == "objects":
+                continue
             assert f"{key} = " in text, f"{name}.{key}"
 
 
@@ -93,6 +100,7 @@ def test_every_path_of_the_model_is_in_the_list_of_path_keys() -> None:
     found = {
         f"{name}.{key}"
         for name, table in Configuration.model_fields.items()
+        if name != "devices"
         for key, field in table.annotation.model_fields.items()  # type: ignore[union-attr]
         if "Path" in str(field.annotation)
     }
@@ -126,7 +134,7 @@ def test_an_absolute_path_is_not_changed(name: str) -> None:
 def test_only_the_motors_of_the_mirrored_wheels_are_mirrored() -> None:
     """`mirrored_wheels` counts wheels from 1, and applies to motors only."""
     nodes = parse_configuration("[nodes]\nmirrored_wheels = [2, 6]\ninclinometer = 21\n", Path("rover.toml")).nodes
-    described = nodes.described()
+    described = Configuration(nodes=nodes).described()
     assert [node.node_id for node in described if node.mirrored] == [2, 6]
     assert [node.wheel for node in described if node.mirrored] == [1, 5]
 
@@ -134,7 +142,7 @@ def test_only_the_motors_of_the_mirrored_wheels_are_mirrored() -> None:
 def test_motor_diagnostics_are_of_the_motors_alone() -> None:
     """`motor_diagnostics` applies to motors only."""
     nodes = parse_configuration("[nodes]\nmotor_diagnostics = true\n", Path("rover.toml")).nodes
-    assert [node.node_id for node in nodes.described() if node.diagnostics] == [1, 2, 3, 4, 5, 6]
+    assert [node.node_id for node in Configuration(nodes=nodes).described() if node.diagnostics] == [1, 2, 3, 4, 5, 6]
 
 
 def test_a_wrong_element_of_a_list_is_reported_with_its_place() -> None:

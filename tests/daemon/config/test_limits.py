@@ -57,10 +57,12 @@ def test_a_key_has_its_limits(table: str, key: str, allowed: tuple[Any, ...], re
 
 def test_the_default_nodes() -> None:
     """Motors 1 to 6, load cells 11 to 16 on wheels 0 to 5; body sensors only where given; the master is 127."""
-    found = [(node.node_id, node.kind, node.wheel, node.required) for node in Configuration().nodes.described()]
+    found = [(node.node_id, node.kind, node.wheel, node.required) for node in Configuration().described()]
     assert found == [(1 + k, "motor", k, True) for k in range(6)] + [(11 + k, "load-cell", k, True) for k in range(6)]
     nodes = Configuration.model_validate({"nodes": {"inclinometer": 30, "ground_speed": 31}}).nodes
-    body = [(node.node_id, node.kind, node.wheel, node.required) for node in nodes.described()[12:]]
+    body = [
+        (node.node_id, node.kind, node.wheel, node.required) for node in Configuration(nodes=nodes).described()[12:]
+    ]
     assert sorted(body) == [(30, "inclinometer", None, False), (31, "ground-speed", None, False)]
     assert [key for key, _ in nodes.by_key()][5:7] == ["motors[5]", "load_cells[0]"]
     assert MASTER_NODE == 127

@@ -66,7 +66,7 @@ def test_at_the_start_every_alarm_is_published_once_as_not_active(service: Any) 
     publisher = Recorder()
     sink = MqttSink(service, publisher)  # type: ignore[arg-type]
     sink._publish_changes()
-    names = alarm_names(node.node_id for node in service.configuration.nodes.described())
+    names = alarm_names(node.node_id for node in service.configuration.described())
     published = publisher.taken()
     assert [topic for topic, _ in published] == [f"alarm/{name}" for name in names]
     assert not any(fields["active"] for _, fields in published)

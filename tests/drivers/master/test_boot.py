@@ -88,8 +88,8 @@ async def test_a_sensor_with_another_unit_is_refused() -> None:
         objects = r.rover.nodes[11].dictionary
         objects.entries = {**objects.entries, (0x6132, 1): replace(objects.entries[0x6132, 1], default=3)}
         r.rover.inject_fault("on 11")
-        failed = await r.wait_for_event(NodeBootFailed, reason=BootReason.CONFIGURATION_NOT_KEPT)
-        assert "object 0x6132:01: must be 0x2, and reads 0x3" in failed.text
+        failed = await r.wait_for_event(NodeBootFailed, reason=BootReason.FIXED_OTHERWISE)
+        assert "object 0x6132:01: cannot be written, must be 0x2, and reads 0x3" in failed.text
 
 
 async def test_an_unusable_eds_is_a_boot_failure(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,11 +14,11 @@ from regolithd.drivers.devices.decoding.signals import NodeState
 from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
 from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.errors import SdoAbortError, SdoTimeoutError
-from regolithd.drivers.master.boot import compare_identity, read_identity
 from regolithd.drivers.master.boot_error import REMEDIES, BootReason
 from regolithd.drivers.master.bus_load import bus_load
 from regolithd.drivers.master.events import Identity
 from regolithd.drivers.master.heartbeat_consumer import Loss, until_lost
+from regolithd.drivers.master.identity import compare_identity, read_identity
 from regolithd.drivers.master.remote_node import RemoteNode
 from regolithd.drivers.master.scan import _result
 from regolithd.drivers.master.status import NetworkCounters, NetworkSettings, NodePhase, NodeStatus

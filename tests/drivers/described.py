@@ -1,0 +1,57 @@
+"""Devices composed from profiles for tests, and the makers' EDS files where somebody has them."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from regolithd.drivers.devices.load_cell import LOAD_CELL
+from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
+from regolithd.drivers.devices.node import NodeDescription
+from regolithd.drivers.devices.profiles.choice import DeviceChoice, Placement
+from regolithd.drivers.devices.profiles.compose import compose
+
+if TYPE_CHECKING:
+    from regolithd.drivers.devices.device import Device
+
+MAKERS = {
+    "MaxonEPOS2.eds": DeviceChoice("epos2"),
+    "MaxonEPOS4.eds": DeviceChoice("epos4"),
+    "cob_ElmoSimplIQ.dcf": DeviceChoice(
+        "cia402",
+        placements=(
+            Placement("motor_speed_rad_s", unit="mrpm"),
+            Placement("motor_current_A", unit="mA"),
+        ),
+    ),
+}
+"""Names of makers' files, which are not ours to distribute, and the choices that fit them."""
+
+
+def described(kind: Device, choice: DeviceChoice) -> Device:
+    """Return the device that a choice describes; fail with every reason why there is none."""
+    device, problems = compose(kind, choice)
+    assert device is not None, "\n".join(map(str, problems))
+    return device
+
+
+def maker(name: str) -> DeviceChoice:
+    """Return the choice of a maker's file, from the folder in REGOLITHD_EDS_FOLDER; skip where it is not there."""
+    path = Path(os.environ.get("REGOLITHD_EDS_FOLDER", "")) / name
+    if not os.environ.get("REGOLITHD_EDS_FOLDER") or not path.is_file():
+        pytest.skip(f"no {name}: set REGOLITHD_EDS_FOLDER to a folder with makers' EDS files")
+    choice = MAKERS[name]
+    return DeviceChoice(choice.profile, path, placements=choice.placements)
+
+
+def motor(choice: DeviceChoice, node_id: int = 3, wheel: int = 2) -> NodeDescription:
+    """Return a node with this motor controller."""
+    return NodeDescription(node_id, described(MOTOR_CONTROLLER, choice), wheel)
+
+
+def load_cell(choice: DeviceChoice, node_id: int = 14, wheel: int = 3) -> NodeDescription:
+    """Return a node with this load cell."""
+    return NodeDescription(node_id, described(LOAD_CELL, choice), wheel)
