@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
-
-import pytest
 
 from regolithd.drivers.devices.load_cell import LOAD_CELL
 from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
@@ -38,13 +37,10 @@ def described(kind: Device, choice: DeviceChoice) -> Device:
     return device
 
 
-def maker(name: str) -> DeviceChoice:
-    """Return the choice of a maker's file, from the folder in REGOLITHD_EDS_FOLDER; skip where it is not there."""
-    path = Path(os.environ.get("REGOLITHD_EDS_FOLDER", "")) / name
-    if not os.environ.get("REGOLITHD_EDS_FOLDER") or not path.is_file():
-        pytest.skip(f"no {name}: set REGOLITHD_EDS_FOLDER to a folder with makers' EDS files")
-    choice = MAKERS[name]
-    return DeviceChoice(choice.profile, path, placements=choice.placements)
+def makers() -> dict[str, DeviceChoice]:
+    """Return the choices of the makers' files that lie in the folder REGOLITHD_EDS_FOLDER, if it is set."""
+    folder = Path(os.environ.get("REGOLITHD_EDS_FOLDER", os.devnull))
+    return {name: replace(choice, eds=folder / name) for name, choice in MAKERS.items() if (folder / name).is_file()}
 
 
 def motor(choice: DeviceChoice, node_id: int = 3, wheel: int = 2) -> NodeDescription:

@@ -63,7 +63,7 @@ class Objects:
 def drive_of(objects: Objects, bus: Bus, *, node_id: int = 4, wheel: int | None = 3, mirrored: bool = False) -> Drive:
     """Return the master of a drive with these objects."""
     node = NodeDescription(node_id, MOTOR_CONTROLLER, wheel, mirrored=mirrored)
-    return Drive(bus, SimpleNamespace(node=node, sdo=objects))
+    return Drive(bus, SimpleNamespace(node=node, sdo=objects, factor=float))
 
 
 @pytest.fixture(autouse=True)
@@ -99,9 +99,28 @@ async def test_a_drive_in_another_mode_is_not_enabled() -> None:
 async def test_a_drive_that_stays_in_fault_is_named_with_its_error_code() -> None:
     """After the timeout the error code (0x603F) is read; meanwhile bit 7 alternates."""
     objects = Objects(FAULT, error_code=0x3220)
-    with pytest.raises(DriveError, match=r"^node 4: stays in fault, error code 0x3220\. See its emergency messages"):
+    with pytest.raises(DriveError, match=r"^node 4: stays in fault, error code 0x3220: undervoltage: .*\. See its em"):
         await drive_of(objects, Bus()).enable()
     assert [data for _, data in objects.writes[1:4]] == [b"\x00\x00", b"\x80\x00", b"\x00\x00"]
+
+
+@pytest.mark.parametrize(
+    ("history", "said"),
+    [({(0x1003, 1): 0x0001_2310}, r", error code 0x2310: "), ({}, r"; it has no object that holds")],
+)
+async def test_a_drive_without_an_error_code_object_is_still_named(
+    history: dict[tuple[int, int], int], said: str
+) -> None:
+    """0x603F is optional: the newest entry of 0x1003 counts, or none, and the fault is said in any case."""
+
+    class WithoutErrorCode(Objects):
+        async def read_number(self, index: int, subindex: int = 0, *, signed: bool = False) -> int:
+            if index == 0x603F or (index == 0x1003 and (index, subindex) not in history):
+                raise SdoAbortError(0x06020000, "no such object", node_id=4, index=index, subindex=subindex)
+            return history.get((index, subindex)) or await super().read_number(index, subindex, signed=signed)
+
+    with pytest.raises(DriveError, match=rf"^node 4: stays in fault{said}"):
+        await drive_of(WithoutErrorCode(FAULT), Bus()).enable()
 
 
 async def test_a_drive_that_does_not_enable_is_named_with_its_state() -> None:

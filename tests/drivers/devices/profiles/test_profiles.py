@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from described import MAKERS, load_cell, maker, motor
+from described import load_cell, makers, motor
 from rig import rig, until
 
 from regolithd.drivers.devices.decoding.pdo import rpdos, tpdos
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 SPEED = 50.0  # rad/s at the motor
 MOTORS = ("epos24", "epos2", "epos4", "cia402")
+CHOICES = {name: DeviceChoice(name) for name in MOTORS} | makers()
 CELLS = {
     "newton": DeviceChoice("newton"),
     "cia404": DeviceChoice("cia404"),
@@ -55,16 +56,10 @@ async def drive_and_measure(node: NodeDescription) -> None:
         await r.network.quick_stop()
 
 
-@pytest.mark.parametrize("profile", MOTORS)
-async def test_a_profile_of_a_drive_boots_drives_and_measures(profile: str) -> None:
+@pytest.mark.parametrize("name", CHOICES)
+async def test_a_profile_of_a_drive_boots_drives_and_measures(name: str) -> None:
     """One line in `rover.toml` is enough: current and speed agree with what the drive does."""
-    await drive_and_measure(motor(DeviceChoice(profile)))
-
-
-@pytest.mark.parametrize("name", MAKERS)
-async def test_a_makers_file_boots_drives_and_measures(name: str) -> None:
-    """The virtual drive of a maker's own EDS file does as well."""
-    await drive_and_measure(motor(maker(name)))
+    await drive_and_measure(motor(CHOICES[name]))
 
 
 @pytest.mark.parametrize("profile", CELLS)
