@@ -10,7 +10,7 @@ import pytest
 
 from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
 from regolithd.drivers.devices.node import NodeDescription
-from regolithd.drivers.errors import BusDownError, DriveError, SdoTimeoutError
+from regolithd.drivers.errors import BusDownError, DriveError, SdoAbortError, SdoTimeoutError
 from regolithd.drivers.master import drive as drive_module
 from regolithd.drivers.master.cia402 import DriveState, at_standstill, target_reached
 from regolithd.drivers.master.drive import Drive
