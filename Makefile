@@ -9,7 +9,7 @@ export PYTHON
 RECORDINGS ?= ../shared/recordings
 
 .PHONY: help demo test check docs clean install uninstall
-.PHONY: sizing reproduce evaluate loop prove prove-machines real scaling thresholds mutants frames pictures picture
+.PHONY: sizing reproduce evaluate loop prove prove-machines real scaling thresholds mutations mutants frames pictures picture
 
 help:
 	@awk -F ':.*## ' '/^## / { print "\n" substr($$0, 4) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -63,14 +63,17 @@ prove: $(DEV) ## blind trials of `regolithd mismatch` on 200 recordings; continu
 prove-machines: $(DEV) ## the same on five other machines, one of them an FMU (needs a C compiler; CASES=…)
 	$(BIN)/python -m regolithd.calibration.validation.machine_trials --cases $(or $(CASES),300) $(if $(SEED),--seed $(SEED))
 
-real: $(DEV) ## worked examples on recordings that are not part of this project (RECORDINGS=…)
-	$(BIN)/python docs/examples/run.py $(RECORDINGS) build/figures/real.json build/real
+real: $(DEV) ## worked examples on recordings that are not part of this project (RECORDINGS=… ONLY="…")
+	$(BIN)/python docs/examples/run.py $(RECORDINGS) build/figures/real.json build/real $(ONLY)
 
 thresholds: $(DEV) ## each threshold of the mismatch engine halved and doubled, on blind trials: hours (SEED=… COUNT=… ONLY="…")
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.blind_trials.thresholds --seed $(or $(SEED),1) --recordings $(or $(COUNT),40) $(if $(ONLY),--only $(ONLY))
 
 scaling: $(DEV) ## time and memory of a comparison against rows and candidates
 	$(BIN)/python -m regolithd.calibration.validation.blind_trials.figures.cost_scaling build/figures/scaling.json docs/mismatch-scaling.svg
+
+mutations: $(DEV) ## `regolithd mismatch` on a thousand damaged files of each kind, and in other units (half an hour)
+	MUTATIONS=1000 INVARIANCES=1000 $(BIN)/python -m pytest tests/daemon/mismatch tests/calibration/mismatch/test_invariance.py
 
 mutants: $(DEV) ## mutation testing on a random sample (SEED=… COUNT=… ONLY=drivers/can)
 	$(BIN)/python tests/mutation/sample.py --seed $(or $(SEED),1) --count $(or $(COUNT),200) $(if $(ONLY),--only $(ONLY))
