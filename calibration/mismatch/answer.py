@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict, dataclass, field
+from importlib import resources
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -77,6 +79,7 @@ class Sensitivity:
     """The smallest effect that the recording shows with a probability of 90 %; infinite where it shows none."""
 
     name: str
+    channel: str
     smallest_detectable: float
     unit: str
 
@@ -131,13 +134,32 @@ class Answer:
     left_out: tuple[LeftOut, ...] = ()
     notes: tuple[str, ...] = ()
     """What was wrong with the recording, and which candidates could not be looked for."""
+    fits: tuple[FitImprovement, ...] = ()
+    """Of several channels: the fit of each; `fit` is that of the channel that gains most."""
     version: int = 2
 
     def to_json(self) -> dict[str, Any]:
-        """Return the JSON object: tuples as lists, and null for numbers that are not finite."""
+        """Return the JSON object of answer.schema.json: tuples as lists, and null for numbers that are not finite."""
         plain: dict[str, Any] = _plain(asdict(self))
-        findings = ("effects", "unexplained", "indistinguishable", "sensitivity", "fit", "parameters", "changes")
+        plain["fits"] = plain["fits"] or [plain["fit"]]
+        findings = (
+            "effects",
+            "unexplained",
+            "indistinguishable",
+            "sensitivity",
+            "fit",
+            "fits",
+            "parameters",
+            "changes",
+        )
         return {name: plain[name] for name in ("version", "verdict", *findings, "left_out", "notes")}
+
+
+def answer_schema() -> dict[str, Any]:
+    """Return the JSON Schema of the answer (draft 2020-12)."""
+    text = resources.files("regolithd.calibration.mismatch").joinpath("answer.schema.json").read_text("utf-8")
+    schema: dict[str, Any] = json.loads(text)
+    return schema
 
 
 def _plain(value: object) -> Any:  # noqa: ANN401  # JSON has no narrower type

@@ -35,6 +35,8 @@ def corrected_tables(
     values: Mapping[str, float],
     contributions: Sequence[Contribution],
     effects: Sequence[Effect] = (),
+    *,
+    within_priors: bool = True,
 ) -> dict[str, Any]:
     """Return SIM.toml's tables with the calibrated parameters and every effect.
 
@@ -44,12 +46,15 @@ def corrected_tables(
     values: the parameters' values in the fit with the effects
     contributions: the effects' terms
     effects: the same, with their intervals, in the same order; left out, the terms have no standard deviation
+    within_priors: whether parameters go no further than three standard deviations of their priors, for a fit that has
+        moved them to imitate something unexplained; else the file has the values that the answer calls calibrated
     """
     # Changes of effects that the simulation had already follow the named effects.
     named, changes = contributions[: len(effects)], contributions[len(effects) :]
     pairs = zip(named, effects, strict=True)
     contributions = [*(replace(term, relative_std=_relative_std(effect)) for term, effect in pairs), *changes]
-    calibrated = {**tables, **simulation.corrected_tables(_within_three_std(simulation, values))}
+    held = _within_three_std(simulation, values) if within_priors else values
+    calibrated = {**tables, **simulation.corrected_tables(held)}
     corrected, rest = simulation.absorb_effects(calibrated, contributions)
     before = list(tables.get("effects", []))
     if before or rest:

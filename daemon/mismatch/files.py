@@ -33,8 +33,10 @@ def write_corrected(
 
     In another folder than SIM.toml, `[simulation] path` leads to the user's class or FMU.
     """
-    evidence = found.evidence
-    new = corrected_tables(tables, simulated, evidence.values, evidence.contributions, found.answer.effects)
+    evidence, answer = found.evidence, found.answer
+    imitating = bool(answer.unexplained)
+    terms = evidence.contributions
+    new = corrected_tables(tables, simulated, evidence.values, terms, answer.effects, within_priors=imitating)
     if path.resolve().parent != simulation.resolve().parent and tables["simulation"]["model"] != "rover-wheel":
         folder = model_folder(tables, simulation.resolve().parent)
         new["simulation"] = {**new["simulation"], "path": os.path.relpath(folder.resolve(), path.resolve().parent)}

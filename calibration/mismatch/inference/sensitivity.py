@@ -23,12 +23,12 @@ def sensitivities(
     equations: NormalEquations, given: Fit, candidates: Sequence[Candidate], entry_threshold: float
 ) -> tuple[Sensitivity, ...]:
     """Return root mean squares on the wheels concerned, in the channel's unit, beside the effects of the fit."""
-    unit = equations.problem.simulation.unit
+    channel, unit = equations.problem.simulation.channel, equations.problem.simulation.unit
     found = []
     for candidate in candidates:
         groups = [group for group in equations.design.groups if group.name == candidate.name and group.named]
         if not groups:
-            found.append(Sensitivity(candidate.name, float("inf"), unit))
+            found.append(Sensitivity(candidate.name, channel, float("inf"), unit))
             continue
         # A shape in the middle of the grid stands for the family.
         group = groups[len(groups) // 2]
@@ -37,7 +37,7 @@ def sensitivities(
         # What was found already is looked for anew, not beside itself.
         others = [term for term in given.terms if term.name != candidate.name]
         sizes = [smallest_detectable(equations, others, Term(group, on), entry_threshold) for on in patterns]
-        found.append(Sensitivity(candidate.name, float(np.median(sizes)), unit))
+        found.append(Sensitivity(candidate.name, channel, float(np.median(sizes)), unit))
     return tuple(sorted(found, key=lambda one: one.name))
 
 

@@ -27,6 +27,7 @@ def merged_answers(answers: Sequence[Answer]) -> Answer:
         effects=tuple(each for answer in answers for each in answer.effects),
         unexplained=tuple(each for answer in answers for each in answer.unexplained),
         indistinguishable=tuple(dict.fromkeys(each for answer in answers for each in answer.indistinguishable)),
+        fits=tuple(answer.fit for answer in answers),
         sensitivity=tuple(each for answer in answers for each in answer.sensitivity),
         parameters=tuple(map(combined, *(answer.parameters for answer in answers))),
         changes=tuple(each for answer in answers for each in answer.changes),

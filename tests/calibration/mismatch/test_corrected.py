@@ -66,6 +66,13 @@ def test_parameters_that_lean_over_stay_where_they_can_be(found: Comparison) -> 
     assert tables["soil"]["friction_angle_deg"] == pytest.approx(30.3 * (1 + 3 * 0.02))
 
 
+def test_parameters_that_left_their_priors_are_written_as_they_were_run() -> None:
+    """Where everything is explained, the file gives what the answer promised."""
+    servo = {"simulation": {"model": "servo:ServoAxis"}}
+    tables = corrected_tables(servo, ServoAxis(), {"mass_kg": 70.0}, (), within_priors=False)
+    assert tables["parameters"]["mass_kg"] == {"value": 70.0, "std": 2.0}
+
+
 def test_the_user_s_comments_and_order_stay(found: Comparison) -> None:
     """SIM.toml is edited, not written anew."""
     text = to_toml(TABLES).replace("[soil]", "[soil]  # from the bin").replace("k_phi_kN", "# stiff\nk_phi_kN")

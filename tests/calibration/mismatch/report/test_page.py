@@ -85,7 +85,10 @@ ANSWER = Answer(
     (WORN, VISCOUS),
     (Unexplained("motor_current_A", (1, 2), "voltage", 0.0, 1800.0, 0.1),),
     (Indistinguishable(("coulomb-friction", "viscous-friction"), "Drive a staircase."),),
-    (Sensitivity("coulomb-friction", float("inf"), "A"), Sensitivity("rotor-inertia", 0.0123, "A s²/rad")),
+    (
+        Sensitivity("coulomb-friction", "motor_current_A", float("inf"), "A"),
+        Sensitivity("rotor-inertia", "motor_current_A", 0.0123, "A s²/rad"),
+    ),
     FitImprovement("motor_current_A", 0.0061, 0.0049, 0.0048),
     notes=("bus_voltage_V was never measured.",),
 )

@@ -105,7 +105,9 @@ def evidence() -> Evidence:
 def answer(**said: object) -> Answer:
     """Return a consistent answer, changed as told."""
     fit = FitImprovement("motor_current_A", 0.0061, 0.0049, 0.0048)
-    plain = Answer("consistent", (), (), (), (Sensitivity("coulomb-friction", float("inf"), "A"),), fit)
+    plain = Answer(
+        "consistent", (), (), (), (Sensitivity("coulomb-friction", "motor_current_A", float("inf"), "A"),), fit
+    )
     return replace(plain, **said)  # type: ignore[arg-type]
 
 
