@@ -22,7 +22,7 @@ MAKERS = {
     "cob_ElmoSimplIQ.dcf": DeviceChoice(
         "cia402",
         placements=(
-            Placement("motor_speed_rad_s", unit="mrpm"),
+            Placement("motor_speed_rad_s", unit="rpm"),
             Placement("motor_current_A", unit="mA"),
         ),
     ),
