@@ -172,6 +172,10 @@ class Candidate:
         """Return the Δχ² that a shape must gain beyond others, for contradicting what was stated before."""
         return 0.0
 
+    def plausible(self, problem: Problem, shape: Shape, values: Sequence[float]) -> bool:  # noqa: ARG002
+        """Return whether fitted coefficients are possible; their signs are tested before."""
+        return True
+
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002
         """Return the shape that agrees with its fitted coefficients `values`, where the law is not linear in them.
 

@@ -14,9 +14,11 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.problem import Problem
 
-FINEST_READINGS = 1.0
-"""Shortest delay in the grid, in readings (a choice). A delay below about half a reading is not looked for: the
-acceleration's own lag covers it."""
+FINEST_READINGS = 2.0
+"""Shortest delay in the grid, in readings (a choice)."""
+LEAST_READINGS = 1.5
+"""Shortest delay that is named, in readings: what a sampled input does between two readings is not recorded, and a
+solver that holds it, or interpolates it, is early or late by up to one (a choice: half a reading more)."""
 RATIO_OF_CHANNEL, RATIO_OF_INPUT = 2.0, 4.0
 """Ratio of neighbouring delays in the grid, for the predicted channel and for an input (a choice: a fitted delay is
 refined from the nearest; each delay of an input costs a run of the simulation)."""
@@ -43,7 +45,7 @@ class SensorDelay(Candidate):
     free: ClassVar = {}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """Return the predicted channel and each input, late by one reading up to a tenth of the recording."""
+        """Return the predicted channel and each input, late by two readings up to a tenth of the recording."""
         simulation = problem.simulation
         of_channel: list[Shape] = [
             {"late": simulation.channel, "secant_s": delay} for delay in _delays(problem, RATIO_OF_CHANNEL)
@@ -66,6 +68,10 @@ class SensorDelay(Candidate):
                 moved = problem.with_input(late, shifted(problem.recording, problem.recording.channels[late], delay))
             problem.made[key] = (moved - problem.filled) / delay
         return problem.made[key][None]
+
+    def plausible(self, problem: Problem, shape: Shape, values: Sequence[float]) -> bool:  # noqa: ARG002
+        """Return whether the delay is more than sampling itself leaves open."""
+        return values[0] >= LEAST_READINGS * problem.recording.step_s
 
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
         """Return the shape at the fitted delay."""

@@ -14,8 +14,9 @@ from regolithd.calibration.mismatch.regression.candidate_groups import with_cand
 from regolithd.calibration.mismatch.regression.design_matrix import empty_design
 from regolithd.calibration.mismatch.regression.normal_equations import normal_equations
 from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
+from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
-from regolithd.calibration.mismatch.signal.noise import estimate_noise
+from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.regression.nuisance import Nuisance
-    from regolithd.calibration.mismatch.signal.noise import NoiseModel
 
 
 def equations_of(problem: Problem, candidates: Sequence[Candidate]) -> tuple[NormalEquations, tuple[Candidate, ...]]:
@@ -45,8 +45,16 @@ def free_parameter_equations(problem: Problem) -> NormalEquations:
 
 
 def _free_parameters(problem: Problem) -> tuple[DesignMatrix, Nuisance, NoiseModel]:
-    """Return a design matrix with the free parameters' columns, where they are in it, and the residual's noise."""
-    residual = np.where(problem.mask, problem.measured - problem.filled, 0.0)
-    noise = estimate_noise(residual, problem.mask, problem.thresholds)
+    """Return a design matrix with the free parameters' columns, where they are in it, and the noise that they leave.
+
+    A parameter that is far off makes the residual large and slow, and that noise would hold the parameter at its prior.
+    So the noise is that of what the parameters leave when they are fitted under a short autocorrelation time.
+    """
+    limits = problem.thresholds
+    noise = estimate_noise(np.where(problem.mask, problem.measured - problem.filled, 0.0), problem.mask, limits)
     folds = folds_of_blocks(problem, blocks_of_time(problem, noise))
-    return *with_nuisance(empty_design(problem, folds)), noise
+    design, nuisance = with_nuisance(empty_design(problem, folds))
+    short = min(noise.autocorrelation_time, limits.provisional_autocorrelation_time)
+    provisional = normal_equations(design, nuisance, NoiseModel(noise.deviation, short).weights)
+    left = residual_of(provisional, provisional.fit(()))
+    return design, nuisance, estimate_noise(left, problem.mask, limits)

@@ -15,6 +15,7 @@ from regolithd.calibration.mismatch.regression.smooth_groups import with_periodi
 from regolithd.calibration.mismatch.selection.best_subsets import best_subsets, passes_entry_test
 from regolithd.calibration.mismatch.selection.cross_validation import drop_what_does_not_transfer
 from regolithd.calibration.mismatch.selection.noise_estimation import noise_beside_terms
+from regolithd.calibration.mismatch.selection.released_parameters import released
 from regolithd.calibration.mismatch.selection.sign_flip_test import entry_threshold
 from regolithd.calibration.mismatch.selection.smooth_terms import weigh_against_smooth_terms
 from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
@@ -62,7 +63,11 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
     named = _largest_that_passes(equations, subsets, threshold)
     named = drop_what_does_not_transfer(equations, named, threshold)
     simpler = [fit for fit in subsets[1:] if len(fit.terms) < len(named.terms)]
-    named, unnamed = weigh_against_smooth_terms(equations, named, simpler, threshold)
+    chosen = named
+    named, unnamed = weigh_against_smooth_terms(equations, chosen, simpler, threshold)
+    kept = chosen if unnamed else named
+    if (freed := released(equations, kept)) is not None:
+        equations, named, unnamed = freed, freed.fit(kept.terms), ()
     whole = equations.fit((*named.terms, *unnamed))
     noise = estimate_noise(residual_of(equations, whole), problem.mask, limits)
     equations = equations.weighted(noise.weights)

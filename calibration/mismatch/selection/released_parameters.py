@@ -1,0 +1,39 @@
+"""Parameters that were stated wrongly, against smooth terms: a value beyond its prior explains more than a curve.
+
+The prior of a parameter holds as long as its statement is right. Where a fit pulls parameters beyond
+`furthest_prior_stds`, the prior would bias them, and a free curve beside them is paid twice: for what it fits, and for
+every deviation that the parameters need not go then. So these priors are widened; if the parameters are all that is
+wrong, nothing significant is left beside them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from regolithd.calibration.mismatch.selection.smooth_terms import unexplained_beside
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+
+def released(equations: NormalEquations, named: Fit) -> NormalEquations | None:
+    """Return equations with the priors of those parameters widened that would have to leave them.
+
+    None where no parameter would, or where something stays unexplained all the same.
+    """
+    limits, nuisance = equations.thresholds, equations.nuisance
+    fit = equations.fit(named.terms)
+    base = len(nuisance.columns)
+    away = np.abs(fit.coefficients[:base] - nuisance.centre) * np.sqrt(nuisance.precision)
+    own = [name in equations.problem.simulation.parameters for name in nuisance.names]
+    leaving = np.flatnonzero((away > limits.furthest_prior_stds) & own)
+    if not leaving.size:
+        return None
+    for place in leaving:
+        wide = nuisance.precision[place] / limits.furthest_linearisation_stds**2
+        nuisance = nuisance.with_precision(int(place), float(wide))
+    freed = equations.with_nuisance(nuisance)
+    return freed if unexplained_beside(freed, freed.fit(named.terms)) is None else None

@@ -1,0 +1,66 @@
+"""A parameter far beyond its prior is a finding, and no curve takes its place."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch.data.recording import from_columns
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from regolithd.calibration.mismatch.answer import Answer
+
+ROWS = 3000
+
+
+class Heated(Simulation):
+    """A body that loses heat in proportion to its temperature: stateful, nonlinear in the loss."""
+
+    channel, unit = "body_temperature_degC", "degC"
+    inputs = ("power_W",)
+    parameters: ClassVar = {"loss_W_K": Prior(4.0, 0.1, "W/K"), "capacity_J_K": Prior(2000.0, 40.0, "J/K")}
+
+    def predict(self, inputs: Mapping[str, NDArray[np.float64]], values: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return the temperature over that of the room, by explicit steps of a second."""
+        found, now = np.zeros_like(inputs["power_W"]), 0.0
+        for row, power in enumerate(inputs["power_W"][:, 0]):
+            found[row] = now
+            now += (power - values["loss_W_K"] * now) / values["capacity_J_K"]
+        return found
+
+
+def answer(loss_W_K: float, leak_W: float = 0.0) -> Answer:
+    """Compare with a body whose loss is this, from half of the time on with a further constant loss."""
+    generator = np.random.default_rng(4)
+    time_s = np.arange(ROWS, dtype=float)
+    power = np.where((time_s // 400) % 2 == 0, 300.0, 80.0)
+    true = Heated().predict(
+        {"power_W": (power - leak_W * (time_s > 1500))[:, None]}, {"loss_W_K": loss_W_K, "capacity_J_K": 2000.0}
+    )[:, 0]
+    noise = np.convolve(generator.normal(0, 1, ROWS + 11), np.ones(12) / np.sqrt(12), "valid")
+    return compare(
+        from_columns({"t_s": time_s, "power_W": power, "body_temperature_degC": true + 12 * noise}), Heated()
+    ).answer
+
+
+def test_a_parameter_six_deviations_off_is_told_with_its_value_and_nothing_else() -> None:
+    """The finding is the parameter; there is no name, and nothing unexplained."""
+    found = answer(3.4)
+    loss = next(parameter for parameter in found.parameters if parameter.name == "loss_W_K")
+    assert (found.verdict, found.effects, found.unexplained) == ("missing-physics", (), ())
+    assert loss.value == pytest.approx(3.4, abs=0.1)
+    assert loss.low < 3.4 < loss.high
+
+
+def test_what_no_parameter_explains_stays_unexplained() -> None:
+    """A loss that begins half way is located in time, though parameters would absorb a part of it."""
+    found = answer(4.0, leak_W=60.0)
+    assert found.verdict == "unexplained"
+    assert [term.covariate for term in found.unexplained] == ["time"]
