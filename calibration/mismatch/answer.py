@@ -68,10 +68,22 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class Indistinguishable:
-    """Effects that this recording cannot tell apart, and the experiment that tells them apart."""
+    """Effects that this recording cannot tell apart, and the experiment that tells them apart.
+
+    Attributes
+    ----------
+    effects: names of the effects, and of parameters of the simulation
+    experiment: what to do, as text
+    vary: the same for a program: the covariates to vary, each apart from the others
+    duration_s: for how long in all
+    lift: whether a part of it is without load
+    """
 
     effects: tuple[str, ...]
     experiment: str
+    vary: tuple[str, ...] = ()
+    duration_s: float = 0.0
+    lift: bool = False
 
 
 @dataclass(frozen=True)

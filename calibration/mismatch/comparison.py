@@ -103,7 +103,7 @@ def compare(
     evidence = replace(
         evidence_of(decision),
         candidates=tuple(candidates),
-        covariate_labels=simulation.covariate_labels,
+        covariate_labels=problem.labels,
         wheel_column=simulation.wheel_column,
     )
     return Comparison(answer, evidence)

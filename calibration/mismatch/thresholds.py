@@ -347,6 +347,16 @@ class Thresholds:
         "Smallest effect that a proposed experiment must show, over the mean magnitude.",
         f"{CHOICE}: as in trials",
     )
+    shortest_experiment: float = _threshold(
+        1 / 3,
+        "Shortest experiment that is proposed, as a share of the recording.",
+        f"{CHOICE}: the machine has to settle in each of the states that it varies",
+    )
+    longest_experiment: float = _threshold(
+        4.0,
+        "Longest experiment that is proposed, as a multiple of the recording.",
+        f"{CHOICE}: what was recorded for half an hour can be recorded for two",
+    )
     experiment_tolerance: float = _threshold(
         0.1,
         "Tolerance expected of an effect in an experiment that varies its covariate.",

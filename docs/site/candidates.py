@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.problem.words import in_units, in_words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -34,13 +35,13 @@ def _rows(candidate: Candidate) -> Iterator[tuple[str, str]]:
     yield "wheels", " or ".join(WHEELS[each] for each in candidate.sharing)
     yield "parameters", ", ".join(_parameters(candidate))
     yield "in a residual", candidate.signature
-    yield "experiment", candidate.experiment
+    yield "experiment", in_words(candidate.experiment, {})
     yield "source", candidate.source
 
 
 def _parameters(candidate: Candidate) -> Iterator[str]:
     for coefficient in candidate.coefficients:
-        unit = coefficient.unit.format(unit="channel's unit")
+        unit = in_units(coefficient.unit, "channel's unit", {})
         yield f"`{coefficient.name}`" + (f" [{unit}]" if unit != "1" else "")
     yield from (f"`{name}`" for name in candidate.free)
 

@@ -23,10 +23,11 @@ search, the answer's sentence, the report, `--corrected` and the documentation t
         equation = "ΔI = d sign(ω) ω²"
         words = "drag that grows with the square of speed"
         signature = "a residual along the motion that is a parabola over speed"
-        experiment = "drive a staircase of at least four constant speeds, both ways"
+        experiment = "hold at least four values of the {wheel_speed}, both ways"
+        vary = ("wheel_speed", "direction")
         source = "Newton (1687), Book II: resistance of a fluid"
         requires = ("wheel_speed",)
-        coefficients: ClassVar = (Coefficient("drag_coefficient", "{unit} s²/rad²"),)
+        coefficients: ClassVar = (Coefficient("drag_coefficient", "{unit} {per_speed2}"),)
 
         def columns(self, problem: Problem, shape: Shape) -> Array:
             '''Return sign(ω) ω².'''

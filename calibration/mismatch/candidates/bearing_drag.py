@@ -35,7 +35,8 @@ class BearingDrag(Candidate):
     equation = "ΔI = I_b g(t − t_0) sign(ω)"
     words = "drag that was not there before"
     signature = "one wheel's residual along sign(ω), none before its onset, growing after"
-    experiment = "drive back over the same ground, and lift the wheels and spin all six at one speed"
+    experiment = "repeat the beginning of this recording as it was"
+    run_unloaded = True
     source = "reports of seal and bearing failures: from some percent of rated current up to stalling"
     requires = ("direction",)
     coefficients: ClassVar = (Coefficient("drag_current", "{unit}"),)

@@ -41,7 +41,8 @@ class Coefficient:
     Attributes
     ----------
     name: as the answer's `parameters` has it
-    unit: of the coefficient; `{unit}` stands for the unit of the predicted channel
+    unit: of the coefficient; `{unit}` stands for the unit of the predicted channel, `{per_speed}`, `{per_speed2}` and
+        `{per_acceleration}` for one over that of `wheel_speed`, of its square and of its rate of change
     sign: +1 or −1 where physics allows one sign only, 0 for either
     """
 
@@ -71,8 +72,14 @@ class Candidate:
     signature: ClassVar[str]
     """What the effect looks like in a residual, for the documentation."""
     experiment: ClassVar[str]
-    """An instruction in the imperative, lower case, without a full stop: the drive that varies `covariate` and nothing
-    else. The answer gives it where this effect cannot be told from another."""
+    """An instruction in the imperative, lower case, without a full stop: how to vary what `vary` names, and nothing
+    else. The answer gives it where this effect cannot be told from another. A covariate in braces, `{wheel_speed}`, is
+    replaced by what the user's machine calls it."""
+    vary: ClassVar[tuple[str, ...]] = ()
+    """The covariates that the experiment varies, for programs; by default `covariate`."""
+    run_unloaded: ClassVar[bool] = False
+    """Whether the experiment has a part without load: what the load does is absent there, this effect or its like is
+    not."""
     source: ClassVar[str]
     """Where the form of the law and the usual size come from: author and year, data sheet, or the law of physics."""
     coefficients: ClassVar[tuple[Coefficient, ...]]
@@ -97,9 +104,6 @@ class Candidate:
     change_point: ClassVar[str] = "onset_s"
     """The shape parameter, where a candidate has it, that is the time at which the effect begins. Its Δχ² is no smooth
     function of it, so that it has an interval of its own."""
-    experiment_minutes: ClassVar[tuple[int, int]] = (10, 120)
-    """The least and the most minutes that the experiment may be asked to last (a choice: a drive has to settle, and a
-    rover's battery lasts some two hours)."""
     acts_unloaded: ClassVar[bool] = True
     """Whether the effect is there with the wheels lifted, where soil and load have no part in the channel."""
 
@@ -108,10 +112,16 @@ class Candidate:
         super().__init_subclass__()
         if "name" in vars(cls) and "label" not in vars(cls):
             cls.label = " ".join(cls.name.rsplit("-", 1)).replace("_", " ")
+        if "covariate" in vars(cls) and "vary" not in vars(cls):
+            cls.vary = () if cls.covariate == "none" else (cls.covariate,)
 
     def form_for(self, simulation: Predictor) -> Candidate:  # noqa: ARG002  # subclasses look
         """Return the candidate in the form that it has for a simulation; by default it has only one."""
         return self
+
+    def varied(self, problem: Problem) -> tuple[str, ...]:  # noqa: ARG002  # subclasses look
+        """Return the covariates that the experiment varies on this machine; by default `vary`."""
+        return self.vary
 
     def applies(self, problem: Problem) -> bool:
         """Return whether this recording and simulation allow the effect at all."""

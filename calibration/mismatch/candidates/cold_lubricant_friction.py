@@ -49,11 +49,11 @@ class ColdLubricantFriction(Candidate):
     equation = "ΔI = I_cold g(T) sign(ω) |ω|^p,  g falling with T"
     words = "drag that grows as the gearbox gets colder"
     signature = "a residual along sign(ω) that shrinks as the motor warms"
-    experiment = "start cold, warm up, stop until cold again and repeat, so that temperature does not follow time"
+    experiment = "start cold, warm up, cool down and repeat, so that the {temperature} does not follow the time"
     source = "Vogel–Fulcher viscosity of low-temperature greases: a factor e in 10 to 40 K; linear in a small range"
     requires = ("temperature", "direction")
     parameter_labels: ClassVar = {"scale_K": "temperature scale"}
-    coefficients: ClassVar = (Coefficient("cold_drag", "{unit} (s/rad)^p"),)
+    coefficients: ClassVar = (Coefficient("cold_drag", "{unit} ({per_speed})^p"),)
     free: ClassVar = {"scale_K": (STEEPEST_K, 80.0), "no_drag_above_degC": (-60.0, 80.0)}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:

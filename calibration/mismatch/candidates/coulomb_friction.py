@@ -20,7 +20,7 @@ class CoulombFriction(Candidate):
     equation = "ΔI = I_c sign(ω)"
     words = "constant drag against the motion (Coulomb friction, no-load current)"
     signature = "a residual of constant size that changes sign with the direction of rotation"
-    experiment = "drive the same stretch forwards and backwards at one speed"
+    experiment = "run to and fro at one and the same {wheel_speed}"
     source = "Maxon RE 25: no-load current about 37 mA; harmonic drives add their starting torque"
     requires = ("direction",)
     label = "Coulomb friction"

@@ -22,7 +22,8 @@ class CurrentSensorBias(Candidate):
     equation = "ΔI = I_0"
     words = "an offset of one reading, whatever the direction"
     signature = "one wheel's residual is constant and keeps its sign when the wheel reverses"
-    experiment = "stand still with the motors unpowered, then drive one stretch both ways"
+    experiment = "read the sensor at rest and without power, then run to and fro"
+    vary: ClassVar = ("direction",)
     source = "data sheets of shunt amplifiers: offsets of milliamperes"
     along_motion = False
     coefficients: ClassVar = (Coefficient("offset", "{unit}", 0),)

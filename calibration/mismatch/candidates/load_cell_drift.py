@@ -54,7 +54,8 @@ class LoadCellDrift(Candidate):
     equation = "W = W_cell − D(t);  ΔI = −(∂I/∂W) D(t)"
     words = "a load cell whose reading drifts"
     signature = "one wheel's load departs from what pitch and roll explain, and its current does not follow"
-    experiment = "drive back over the same ground, and lift the wheels and spin all six at one speed"
+    experiment = "repeat the beginning of this recording as it was, with the same load"
+    run_unloaded = True
     source = "creep and temperature drift of faulty strain gauges: some percent of full scale per hour"
     requires: ClassVar[tuple[str, ...]] = ("load", "pitch", "roll")
     acts_unloaded = False

@@ -20,10 +20,11 @@ class QuadraticDrag(Candidate):
     equation = "ΔI = d sign(ω) ω²"
     words = "drag that grows with the square of speed"
     signature = "a residual along sign(ω) that rises with ω² and is flat near standstill"
-    experiment = "drive a staircase of at least four constant speeds up to the highest, both ways"
+    experiment = "hold at least four values of the {wheel_speed}, from the slowest to the highest, both ways"
+    vary: ClassVar = ("wheel_speed", "direction")
     source = "Newton's drag law F = ½ ρ c A v²; centrifugal fans and pumps have torque proportional to speed squared"
     requires = ("wheel_speed",)
-    coefficients: ClassVar = (Coefficient("quadratic_coefficient", "{unit} s²/rad²"),)
+    coefficients: ClassVar = (Coefficient("quadratic_coefficient", "{unit} {per_speed2}"),)
 
     def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002
         """Return sign(ω) ω²."""

@@ -32,10 +32,11 @@ class RotorInertia(Candidate):
     words = "current that goes into accelerating rotor and wheel"
     signature = "short residuals at each change of speed, with the acceleration's sign"
     experiment = "start, stop and reverse sharply, twenty times"
+    vary: ClassVar = ("wheel_acceleration", "direction")
     source = "RE 25 rotor 10 g cm²; through 1400:1 about 2 kg m² at the wheel"
     requires = ("wheel_acceleration",)
     along_motion = False
-    coefficients: ClassVar = (Coefficient("inertia_current", "{unit} s²/rad"),)
+    coefficients: ClassVar = (Coefficient("inertia_current", "{unit} {per_acceleration}"),)
     free: ClassVar = {"lag_s": (0.0, float("inf"))}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:

@@ -38,11 +38,16 @@ class SensorDelay(Candidate):
     equation = "y(t) = y_true(t − τ)"
     words = "a channel that is late"
     signature = "a residual proportional to the rate of change of one channel"
-    experiment = "change speed and load in steps, both ways, twenty times"
+    experiment = "change each input in steps, twenty times"
     source = "filters, buses and polling: a first-order filter delays slow changes by its time constant"
     along_motion = False
     coefficients: ClassVar = (Coefficient("delay_s", "s", 1),)
     free: ClassVar = {}
+
+    def varied(self, problem: Problem) -> tuple[str, ...]:
+        """Return the covariates whose steps show a delay: speed and load of what turns, else whatever is recorded."""
+        names = [name for name in ("wheel_acceleration", "torque") if name in problem.covariates]
+        return tuple(names or [name for name in problem.covariates if name != "time"])
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the predicted channel and each input, late by two readings up to a tenth of the recording."""

@@ -30,7 +30,8 @@ class SoilTransition(Candidate):
     equation = "c, tan φ → (1 + s) c, (1 + s) tan φ  for t > t_0"
     words = "a change of the soil's strength"
     signature = "on all wheels at once, a residual along the predicted current that begins at one time and stays"
-    experiment = "drive back over the same ground, and lift the wheels and spin all six at one speed"
+    experiment = "drive back over the same ground"
+    run_unloaded = True
     source = "Table 1 of the paper: strengths differ by a factor of five between soils"
     acts_unloaded = False
     coefficients: ClassVar = (Coefficient("relative_strength_change", "1", 0),)

@@ -35,7 +35,8 @@ class StribeckFriction(Candidate):
     equation = "ΔI = I_s sign(ω) exp(−(|ω|/ω_s)^δ), or I_s sign(ω) / (1 + (ω/ω_s)²)"
     words = "extra drag near standstill that decays with speed"
     signature = "a residual along sign(ω) that is largest at the slowest speeds"
-    experiment = "drive a staircase of at least four constant speeds, from creeping to full speed, both ways"
+    experiment = "hold at least four values of the {wheel_speed}, from the slowest to the highest, both ways"
+    vary: ClassVar = ("wheel_speed", "direction")
     source = "Armstrong-Hélouvry, Dupont and Canudas de Wit (1994): δ from 1 to 2; Hess and Soom (1990): the quotient"
     requires = ("wheel_speed",)
     label = "Stribeck friction"

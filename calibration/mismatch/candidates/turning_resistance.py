@@ -33,6 +33,7 @@ class TurningResistance(Candidate):
     words = "scrub of the wheels while the machine turns"
     signature = "a residual only while turning: alike on all wheels (drag) or opposite on the two sides (moment)"
     experiment = "turn on the spot and along arcs of several radii, both ways"
+    vary: ClassVar = ("yaw_rate", "direction")
     source = "skid-steer terramechanics: lateral friction saturates within a few degrees of side slip"
     requires = ("yaw_rate", "direction")
     acts_unloaded = False

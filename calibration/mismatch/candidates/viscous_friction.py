@@ -22,10 +22,11 @@ class ViscousFriction(Candidate):
     equation = "ΔI = b sign(ω) |ω|^p"
     words = "drag that grows with speed"
     signature = "a residual along sign(ω) that rises with |ω| and vanishes towards standstill"
-    experiment = "drive a staircase of at least four constant speeds, from creeping to full speed, both ways"
+    experiment = "hold at least four values of the {wheel_speed}, from the slowest to the highest, both ways"
+    vary: ClassVar = ("wheel_speed", "direction")
     source = "grease viscosity; power 0.7 (shear-thinning) to 1.4 (churning)"
     requires = ("wheel_speed",)
-    coefficients: ClassVar = (Coefficient("viscous_coefficient", "{unit} (s/rad)^p"),)
+    coefficients: ClassVar = (Coefficient("viscous_coefficient", "{unit} ({per_speed})^p"),)
     free: ClassVar = {"power": (0.7, 1.4)}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002

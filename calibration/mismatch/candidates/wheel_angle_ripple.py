@@ -40,7 +40,8 @@ class WheelAngleRipple(Candidate):
     equation = "ΔI = Σ a_k cos(order θ) + b_k sin(order θ), wheel by wheel"
     words = "a ripple that is periodic in the wheel's angle"
     signature = "a line in the residual's spectrum over wheel angle that stays put when the speed changes"
-    experiment = "drive straight at three constant speeds, sampled at four times the ripple's frequency"
+    experiment = "hold three values of the {wheel_speed}, sampled at four times the ripple's frequency"
+    vary: ClassVar = ("wheel_speed",)
     source = "grousers: as many cycles per turn as there are; harmonic drive: two per turn of its wave generator"
     requires = ("wheel_angle",)
     coefficients: ClassVar = (Coefficient("amplitude", "{unit}", 0),)

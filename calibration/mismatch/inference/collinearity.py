@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from regolithd.calibration.mismatch.answer import Indistinguishable
-from regolithd.calibration.mismatch.inference.experiment import experiment_for
+from regolithd.calibration.mismatch.inference.experiment import with_experiment
 from regolithd.calibration.mismatch.regression.group import Term
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from regolithd.calibration.mismatch.answer import Indistinguishable
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
@@ -38,8 +38,7 @@ def collinear_sets(equations: NormalEquations, given: Fit, entry_threshold: floa
         first = [terms[member][0] for member in members]
         names = (*members, *parameters_like(equations, given.terms, first))
         if len(names) > 1:
-            experiment = experiment_for(equations, given.terms, first, entry_threshold)
-            found.append(Indistinguishable(names, experiment))
+            found.append(with_experiment(names, equations, given.terms, first, entry_threshold))
     return tuple(found)
 
 

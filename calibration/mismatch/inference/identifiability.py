@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.answer import Indistinguishable
 from regolithd.calibration.mismatch.inference.collinearity import collinear_sets, parameters_like
-from regolithd.calibration.mismatch.inference.experiment import experiment_for
+from regolithd.calibration.mismatch.inference.experiment import with_experiment
 from regolithd.calibration.mismatch.regression.residuals import relative_size
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
@@ -17,6 +16,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
 )
 
 if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.answer import Indistinguishable
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
@@ -47,8 +47,7 @@ def rivals(
         members += [more for more in additions if more.name not in taken]
         names = (*(member.name for member in members), *parameters_like(equations, others, members))
         if len(names) > 1:
-            experiment = experiment_for(equations, others, members, entry_threshold)
-            found.append(Indistinguishable(names, experiment))
+            found.append(with_experiment(names, equations, others, members, entry_threshold))
     return equations, tuple(found)
 
 

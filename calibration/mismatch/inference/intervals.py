@@ -11,9 +11,10 @@ from regolithd.calibration.mismatch.answer import Parameter
 from regolithd.calibration.mismatch.inference.onset_interval import onset_bounds
 from regolithd.calibration.mismatch.inference.sandwich import Linearisation, linearised, sandwich
 from regolithd.calibration.mismatch.inference.size_interval import relative_size_interval
+from regolithd.calibration.mismatch.problem.words import ANGULAR_SPEED, in_units, speed_unit
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
@@ -27,7 +28,7 @@ LEAST_MARGIN = 0.05
 """Share of the interval's width by which it reaches beyond its value (a choice: a value is never its own bound)."""
 FEWEST_DRAWS_WITHIN = 20
 """Draws within the declared bounds from which quantiles are taken (a choice: one is then below the 5 % quantile)."""
-UNIT_OF_ENDING = {"_rad_s": "rad/s", "_degC": "degC", "_K": "K", "_s": "s"}
+UNIT_OF_ENDING = {"_rad_s": ANGULAR_SPEED, "_degC": "degC", "_K": "K", "_s": "s"}
 
 
 def parameters_of(equations: NormalEquations, fit: Fit, blocks: Index) -> list[dict[str, Parameter]]:
@@ -70,15 +71,16 @@ def _of_term(
             other[slope.name] = float(shape[slope.name]) + row[place] / slope.scale
         for name, value in candidate.parameters(other, ((fit.coefficients[at] + row[at]) / scale).tolist()).items():
             drawn[name].append(value)
-    units = {c.name: c.unit.format(unit=equations.problem.simulation.unit) for c in candidate.coefficients}
-    units |= {name: unit_of(name) for name in candidate.free}
+    channel, labels = equations.problem.simulation.unit, equations.problem.labels
+    units = {c.name: in_units(c.unit, channel, labels) for c in candidate.coefficients}
+    units |= {name: unit_of(name, labels) for name in candidate.free}
     limits = candidate.bounds(equations.problem, shape)
     found = {
         name: interval(value, drawn[name], units.get(name, "1"), limits.get(name)) for name, value in central.items()
     }
     onset = candidate.change_point
     if onset in shape and onset in candidate.free:
-        found[onset] = Parameter(float(shape[onset]), *onset_bounds(equations, fit, index), unit_of(onset))
+        found[onset] = Parameter(float(shape[onset]), *onset_bounds(equations, fit, index), unit_of(onset, labels))
     return found
 
 
@@ -102,6 +104,7 @@ def interval(
     return Parameter(value, max(min(low, value - margin), least), min(max(high, value + margin), most), unit)
 
 
-def unit_of(name: str) -> str:
-    """Return the unit that a shape parameter's name ends in."""
-    return next((unit for ending, unit in UNIT_OF_ENDING.items() if name.endswith(ending)), "1")
+def unit_of(name: str, labels: Mapping[str, str]) -> str:
+    """Return the unit that a shape parameter's name ends in; of a speed, the machine's own."""
+    unit = next((unit for ending, unit in UNIT_OF_ENDING.items() if name.endswith(ending)), "1")
+    return speed_unit(labels) if unit == ANGULAR_SPEED else unit

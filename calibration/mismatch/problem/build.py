@@ -13,6 +13,7 @@ from regolithd.calibration.mismatch.problem.covariates import covariates_of
 from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.problem import Problem
+from regolithd.calibration.mismatch.problem.words import labels_of
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ def build_problem(
         mask=mask,
         covariates=covariates,
         constants=constants,
+        labels=labels_of(simulation.covariate_labels, {**constants, **covariates}, recording.channels),
         side=simulation.side(recording.wheels),
         row=simulation.row(recording.wheels),
         left_out=left_out(simulation.channel, measured, prediction, outliers, blanks),

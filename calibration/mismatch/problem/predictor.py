@@ -65,6 +65,10 @@ class Predictor(Protocol):
         """Covariates whose NaN means that they do not apply, not that they were not measured."""
 
     @property
+    def covariate_labels(self) -> Mapping[str, str]:
+        """Labels of covariates with their units."""
+
+    @property
     def unloaded_experiment(self) -> str:
         """How to run the machine without its load, as an instruction; empty where that cannot be done."""
 

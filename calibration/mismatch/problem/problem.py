@@ -65,6 +65,7 @@ class Problem:
     stated: the effects that the simulation was corrected by; `prediction` has them
     covariates: by the contract's names, each of shape (time, wheel)
     constants: what was measured but never varies, likewise: no effect shows in it, one that was corrected depends on it
+    labels: what the covariates are called on this machine, with their units
     side, row: each wheel's place on the machine, or None
     thresholds: the numbers that decide
     made: what candidates have computed, for use again: a cache, by name and step
@@ -80,6 +81,7 @@ class Problem:
     side: Array | None
     row: Array | None
     constants: Mapping[str, Array] = field(default_factory=dict)
+    labels: Mapping[str, str] = field(default_factory=dict)
     left_out: tuple[LeftOut, ...] = ()
     stated: tuple[StatedEffect, ...] = ()
     thresholds: Thresholds = THRESHOLDS

@@ -9,6 +9,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.inference.statements import listed, plural
+from regolithd.calibration.mismatch.problem.words import COVARIATES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -16,17 +17,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Answer, Evidence
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
 
-COVARIATES = {
-    "wheel_speed": "speed",
-    "direction": "direction of motion",
-    "torque": "predicted value",
-    "wheel_acceleration": "acceleration",
-    "wheel_angle": "angle",
-    "voltage": "bus voltage",
-    "wheel_row": "row",
-    "none": "nothing (a constant)",
-}
-"""Names of covariates for a simulation that gives no labels of its own; the others read well as they are."""
 PARAMETERS = {"onset_s": "onset", "relative_size": "share of the mean reading"}
 """Parameters that the engine adds to those of a candidate."""
 UNITS = {"degC": "°C", "1": ""}

@@ -33,6 +33,7 @@ from regolithd.calibration.validation.blind_trials.errors import OtherBatchError
 from regolithd.calibration.validation.blind_trials.isolation import run_isolated
 from regolithd.calibration.validation.blind_trials.recordings.files import write_trial
 from regolithd.calibration.validation.blind_trials.recordings.generator import Plan, Trial, make_trial, plan_batch
+from regolithd.calibration.validation.blind_trials.recordings.traverse import ProposedExperiment
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -174,8 +175,8 @@ def run_trial(batch: Batch, plan: Plan) -> Outcome:
 def run_experiment(batch: Batch, plan: Plan) -> None:
     """Record the experiment that the answer proposes, and run the solver on it; the commitment is still closed."""
     answer = json.loads(batch.path("answers", plan.number).read_text())["answer"]
-    proposed = "; ".join(one.get("experiment", "") for one in answer.get("indistinguishable", []))
-    if not proposed:
+    proposed = ProposedExperiment.of_answer(answer)
+    if proposed is None:
         return
     trial = make_trial(plan, duration_s=batch.duration_s, experiment=proposed)
     write_trial(trial, batch.path("trials", plan.number, ""))

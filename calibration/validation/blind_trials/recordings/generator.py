@@ -24,10 +24,9 @@ from regolithd.calibration.validation.blind_trials.recordings.out_of_library imp
 from regolithd.calibration.validation.blind_trials.recordings.traverse import (
     ALL_CONDITIONS,
     KINDS,
+    ProposedExperiment,
     Traverse,
     autocorrelated_noise,
-    conditions_of,
-    duration_of,
     make_traverse,
 )
 
@@ -188,11 +187,13 @@ def motor_effects(effects: tuple[ConcealedEffect, ...], traverse: Traverse) -> A
     return np.asarray(sum(at_motor, np.zeros(traverse.load_N.shape)), np.float64)
 
 
-def make_trial(plan: Plan, *, duration_s: float = 1800.0, step_s: float = 0.2, experiment: str = "") -> Trial:
+def make_trial(
+    plan: Plan, *, duration_s: float = 1800.0, step_s: float = 0.2, experiment: ProposedExperiment | None = None
+) -> Trial:
     """Return the trial of a plan; the same plan always gives the same trial.
 
-    With the text of an experiment, the same rover with the same effects drives again: it varies the conditions that the
-    text asks for, and drives for as long, if that is longer than `duration_s`.
+    With an experiment, the same rover with the same effects drives again: it varies the conditions that are asked for,
+    and drives for as long, if that is longer than `duration_s`.
     """
     rng = np.random.default_rng([plan.seed, 1, plan.number])
     tables = simulation_tables(rng)
@@ -202,8 +203,8 @@ def make_trial(plan: Plan, *, duration_s: float = 1800.0, step_s: float = 0.2, e
     effects = conceal(rng, plan, model)
     if experiment:
         rng = np.random.default_rng([plan.seed, 3, plan.number])
-        duration_s = max(duration_s, duration_of(experiment))
-        traverse = _traverse(rng, "experiment", tables, duration_s, step_s, conditions_of(experiment))
+        duration_s = max(duration_s, experiment.duration_s)
+        traverse = _traverse(rng, "experiment", tables, duration_s, step_s, experiment.conditions)
         model = replace(model, traverse=traverse)
         repeated = (effect_of_plan(plan, model, index) for index in range(len(effects)))
         effects = tuple(replace(now, size=before.size) for now, before in zip(repeated, effects, strict=True))

@@ -7,14 +7,15 @@ excite the dynamics.
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.random import Generator
 
 Array = NDArray[np.float64]
@@ -40,18 +41,21 @@ class DriveProfile:
 ALL_CONDITIONS = frozenset({"speed", "reverse", "stop", "turn", "slope", "temperature", "slip"})
 """Conditions that an ordinary traverse varies."""
 
-PHRASES = {
-    "speed": ("staircase", "speeds"),
-    "reverse": ("backwards", "both ways", "reverse"),
-    "stop": ("start, stop", "stand still"),
-    "turn": ("turn on the spot", "arcs"),
-    "slope": ("slope",),
-    "temperature": ("cold", "warm"),
-    "slip": ("sledge", "slip"),
-    "ballast": ("ballast", "weights"),
-    "lift": ("lift the wheels",),
+CONDITIONS_OF = {
+    "wheel_speed": {"speed"},
+    "direction": {"reverse"},
+    "wheel_acceleration": {"stop", "reverse"},
+    "yaw_rate": {"turn"},
+    "pitch": {"slope"},
+    "roll": {"slope"},
+    "temperature": {"temperature"},
+    "slip": {"slip", "ballast"},
+    "torque": {"slope", "ballast"},
+    "load": {"ballast"},
 }
-"""Phrases in the text of an experiment, and the condition that each asks to vary."""
+"""The conditions that vary a covariate; none varies the others."""
+UNLOADED = frozenset({"lift", "speed", "reverse"})
+"""Conditions of a drive with the wheels lifted: they spin at several speeds, both ways."""
 
 KINDS = {
     "patrol": DriveProfile((8, 36), (0.08, 0.46), (2.0, 2.0), 0.10, 0.06, 0.35),
@@ -168,15 +172,28 @@ def slips(rng: Generator, t_s: Array, pitch: Array) -> Array:
     return np.asarray(np.clip((shared + uphill)[:, None] * differences, 0.003, 0.4), np.float64)
 
 
-def conditions_of(experiment: str) -> frozenset[str]:
-    """Return the conditions that the text of an experiment asks to vary."""
-    text = experiment.lower()
-    return frozenset(condition for condition, phrases in PHRASES.items() if any(phrase in text for phrase in phrases))
+@dataclass(frozen=True)
+class ProposedExperiment:
+    """What an answer proposes to record, from `vary`, `duration_s` and `lift` of its indistinguishable sets."""
 
+    vary: frozenset[str]
+    duration_s: float
+    lift: bool
 
-def duration_of(experiment: str) -> float:
-    """Return the longest duration in the text of an experiment [s]; 0 if it has none."""
-    return max((60.0 * float(minutes) for minutes in re.findall(r"(\d+) minutes", experiment)), default=0.0)
+    @classmethod
+    def of_answer(cls, answer: Mapping[str, Any]) -> ProposedExperiment | None:
+        """Return one experiment for all sets of an answer's JSON; None where it has no set."""
+        sets = answer.get("indistinguishable", [])
+        if not sets:
+            return None
+        vary = frozenset(name for one in sets for name in one["vary"])
+        return cls(vary, max(one["duration_s"] for one in sets), any(one["lift"] for one in sets))
+
+    @property
+    def conditions(self) -> frozenset[str]:
+        """The conditions of a traverse that it varies."""
+        varied = frozenset[str]().union(*(CONDITIONS_OF.get(name, ()) for name in self.vary))
+        return varied | UNLOADED if self.lift else varied
 
 
 def experiment_profile(rng: Generator, varied: frozenset[str]) -> DriveProfile:

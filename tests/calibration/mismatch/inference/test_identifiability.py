@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
@@ -16,9 +16,12 @@ from regolithd.calibration.mismatch.inference.collinearity import (
     parameters_like,
     representatives,
 )
-from regolithd.calibration.mismatch.inference.experiment import experiment_for, minutes_needed
+from regolithd.calibration.mismatch.inference.experiment import rounded_up, seconds_needed, with_experiment
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable, rivals, wrong_choice_rate
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities, smallest_detectable
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 THRESHOLD = 8.0
 
@@ -135,38 +138,59 @@ def test_at_one_size_of_speed_powers_are_one_effect() -> None:
 
 
 class Patient(Drag):
-    """A drag whose experiment lasts long."""
+    """A drag whose experiment has a part without load, and names a covariate in braces."""
 
     name = "patient"
-    experiment_minutes: ClassVar = (45, 90)
-    acts_unloaded: ClassVar = False
+    experiment = "wait for {time}"
+    vary: ClassVar = ("time", "wheel_speed")
+    run_unloaded: ClassVar = True
 
 
 def test_an_experiment_names_each_drive_once_and_its_length() -> None:
-    """Capitalised, joined, with minutes within the candidates' limits."""
+    """Capitalised, joined, in the machine's words; the same as data."""
     equations = equations_of(problem_of(table()), (Drag(), Power(), Patient()))
     members = [term_of(equations, name) for name in ("drag", "patient", "power")]
-    sentence = experiment_for(equations, (), members, THRESHOLD)
-    assert sentence == "Drive both ways; then drive fast and slowly; 45 minutes in all."
-    assert experiment_for(equations, (), members[:1], THRESHOLD) == "Drive both ways; 10 minutes in all."
+    found = with_experiment(("drag", "patient", "power"), equations, (), members, THRESHOLD)
+    assert found.experiment.startswith("Drive both ways; then wait for time; then drive fast and slowly; ")
+    assert found.vary == ("direction", "time", "wheel_speed")
+    assert not found.lift, "the machine does not say how it runs without load"
+    alone = with_experiment(("drag",), equations, (), members[:1], THRESHOLD)
+    assert alone.experiment == f"Drive both ways; {rounded_up(alone.duration_s)[1]} in all."
 
 
-def test_more_noise_needs_a_longer_experiment() -> None:
-    """In steps of five minutes, in proportion to the variance."""
+def test_more_noise_needs_a_longer_experiment_within_what_the_recording_allows() -> None:
+    """In proportion to the variance; from a third of the recording's length to four times it."""
     equations = equations_of(problem_of(table()))
-    noisy = equations.weighted(equations.weights / 400)
-    found = minutes_needed(noisy, THRESHOLD)
-    assert found % 5 == 0
-    assert found > 5
-    assert minutes_needed(noisy.weighted(equations.weights / 1600), THRESHOLD) == pytest.approx(4 * found, rel=0.2)
+    length_s = equations.problem.length_s
+    assert seconds_needed(equations.weighted(equations.weights * 1e6), THRESHOLD) == pytest.approx(length_s / 3)
+    assert seconds_needed(equations.weighted(equations.weights / 1e6), THRESHOLD) == pytest.approx(4 * length_s)
+    limits = replace(equations.thresholds, shortest_experiment=0.0, longest_experiment=1e9)
+    free = replace(equations.problem, thresholds=limits)
+    open_ended = replace(equations, design=replace(equations.design, problem=free))
+    found = seconds_needed(open_ended, THRESHOLD)
+    assert seconds_needed(open_ended.weighted(open_ended.weights / 4), THRESHOLD) == pytest.approx(4 * found)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "rounded", "words"),
+    [(3.0, 5.0, "5 s"), (31.0, 35.0, "35 s"), (310.0, 600.0, "10 minutes"), (18100.0, 36000.0, "10 hours")],
+)
+def test_a_duration_is_told_in_its_own_unit(seconds: float, rounded: float, words: str) -> None:
+    """Rounded up to five of them."""
+    assert rounded_up(seconds) == (rounded, words)
+
+
+def instruction(equations: NormalEquations, name: str) -> str:
+    """Return the text of the experiment for one effect alone."""
+    return with_experiment((name,), equations, (), [term_of(equations, name)], THRESHOLD).experiment
 
 
 def test_where_free_parameters_hide_a_member_the_load_is_taken_off(monkeypatch: pytest.MonkeyPatch) -> None:
     """If the machine says how to run without its load."""
     equations = equations_of(problem_of(table()), (Constant(), Drag()))
     monkeypatch.setattr(type(equations.problem.simulation), "unloaded_experiment", "lift it", raising=False)
-    assert "lift it" in experiment_for(equations, (), [term_of(equations, "offset")], THRESHOLD)
-    assert "lift it" not in experiment_for(equations, (), [term_of(equations, "drag")], THRESHOLD)
+    assert "lift it" in instruction(equations, "offset")
+    assert "lift it" not in instruction(equations, "drag")
     strict = replace(equations.problem, thresholds=replace(equations.thresholds, experiment_tolerance=1e-9))
     patient = replace(equations, design=replace(equations.design, problem=strict))
-    assert "lift it" not in experiment_for(patient, (), [term_of(equations, "offset")], THRESHOLD)
+    assert "lift it" not in instruction(patient, "offset")

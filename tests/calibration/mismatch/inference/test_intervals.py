@@ -143,4 +143,4 @@ def test_an_interval_stays_within_declared_bounds() -> None:
 )
 def test_a_shape_parameter_s_name_ends_in_its_unit(name: str, unit: str) -> None:
     """Without an ending that is known it has none."""
-    assert unit_of(name) == unit
+    assert unit_of(name, {}) == unit

@@ -33,7 +33,8 @@ json.dump({'verdict': 'consistent', 'effects': [], 'files': sorted(os.listdir('.
 ASKS = """
 import gzip, json, sys
 speeds = {line.split(',')[3] for line in gzip.open('recording.csv.gz', 'rt')}
-told = {'effects': ['coulomb-friction', 'viscous-friction'], 'experiment': 'a staircase of speeds, both ways'}
+told = {'effects': ['coulomb-friction', 'viscous-friction'], 'experiment': 'hold four speeds, both ways'}
+told |= {'vary': ['wheel_speed', 'direction'], 'duration_s': 600.0, 'lift': False}
 said = {'verdict': 'consistent', 'effects': [], 'indistinguishable': [told] if len(speeds) < 5 else []}
 json.dump(said | {'speeds': len(speeds)}, open(sys.argv[1], 'w'))
 """

@@ -30,6 +30,7 @@ from regolithd.calibration.validation.blind_trials.recordings.ground import (
 )
 from regolithd.calibration.validation.blind_trials.recordings.library_effects import LIBRARY_EFFECTS
 from regolithd.calibration.validation.blind_trials.recordings.out_of_library import OUT_OF_LIBRARY
+from regolithd.calibration.validation.blind_trials.recordings.traverse import ProposedExperiment
 
 FOLDER = Path(recordings.__file__).parent
 
@@ -117,7 +118,8 @@ def test_an_experiment_varies_what_it_asks_for_and_keeps_the_effect() -> None:
     """The same rover with the same drag drives several speeds in both directions, on level ground as before."""
     plan = Plan(3, 11, "constant", ("coulomb-friction",))
     before, after = (
-        make_trial(plan, duration_s=400, experiment=told) for told in ("", "a staircase of speeds, both ways")
+        make_trial(plan, duration_s=400, experiment=told)
+        for told in (None, ProposedExperiment(frozenset({"wheel_speed", "direction"}), 0.0, lift=False))
     )
     assert before.tables == after.tables
     assert before.effects[0].size == after.effects[0].size
@@ -130,7 +132,7 @@ def test_an_experiment_varies_what_it_asks_for_and_keeps_the_effect() -> None:
 def test_an_experiment_lasts_as_long_as_it_asks_and_lifts_the_wheels_where_it_says_so() -> None:
     """In the last third loads and hub speeds are zero, and the current is the concealed drag alone."""
     plan = Plan(3, 11, "constant", ("coulomb-friction",))
-    trial = make_trial(plan, duration_s=300, experiment="a staircase, both ways; lift the wheels; 10 minutes in all.")
+    trial = make_trial(plan, duration_s=300, experiment=ProposedExperiment(frozenset({"direction"}), 600.0, lift=True))
     traverse = trial.traverse
     assert traverse.t_s[-1] == pytest.approx(600, abs=1)
     lifted = traverse.t_s > 2 / 3 * traverse.t_s[-1]
@@ -151,3 +153,16 @@ def test_a_batch_contains_every_effect() -> None:
         assert sum(plan.group == group for plan in plans) == round(200 * share)
     assert [plan.number for plan in plans] == list(range(200))
     assert all(len(set(plan.names)) == 2 for plan in plans if plan.group == "pair")
+
+
+def test_an_answer_s_experiment_is_read_from_its_data() -> None:
+    """All sets together: what each varies, the longest duration, and whether one lifts the wheels."""
+    sets = [
+        {"vary": ["direction"], "duration_s": 600.0, "lift": False, "experiment": "a staircase of speeds"},
+        {"vary": ["torque", "time"], "duration_s": 1200.0, "lift": True, "experiment": ""},
+    ]
+    found = ProposedExperiment.of_answer({"indistinguishable": sets})
+    assert found == ProposedExperiment(frozenset({"direction", "torque", "time"}), 1200.0, lift=True)
+    assert found.conditions == {"reverse", "slope", "ballast", "lift", "speed"}
+    assert ProposedExperiment(frozenset({"yaw_rate"}), 60.0, lift=False).conditions == {"turn"}
+    assert ProposedExperiment.of_answer({"indistinguishable": []}) is None

@@ -1,0 +1,56 @@
+"""Words and units in an answer are those of the user's machine."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch.problem.words import in_units, in_words, label_of_column, labels_of
+
+
+@pytest.mark.parametrize(
+    ("column", "label"),
+    [
+        ("carriage_speed_m_s", "carriage speed (m/s)"),
+        ("motor_acceleration_rad_s2", "motor acceleration (rad/s²)"),
+        ("oil_temperature_degC", "oil temperature (°C)"),
+        ("shaft_rpm", "shaft (rpm)"),
+        ("inflow_m3_s", "inflow (m³/s)"),
+        ("pull_N", "pull (N)"),
+        ("gear", "gear"),
+    ],
+)
+def test_a_column_s_name_is_a_label_with_its_unit(column: str, label: str) -> None:
+    """Unit words at the end are a unit, seconds divide."""
+    assert label_of_column(column) == label
+
+
+def test_a_covariate_is_called_as_the_simulation_says_or_as_the_column_that_it_is() -> None:
+    """What is derived from columns has no label of its own."""
+    speed, load, derived = (np.full((3, 1), value) for value in (1.0, 2.0, 3.0))
+    covariates = {"wheel_speed": speed, "load": load, "power": derived}
+    channels = {"belt_speed_m_s": speed.copy(), "pull_N": load}
+    found = labels_of({"load": "pull of the rope (kN)"}, covariates, channels)
+    assert found == {"wheel_speed": "belt speed (m/s)", "load": "pull of the rope (kN)"}
+
+
+def test_an_instruction_has_the_machine_s_words() -> None:
+    """A covariate in braces is replaced by its label without the unit, or by what it is called anywhere."""
+    text = "hold the {wheel_speed}, then the {oil_pressure}"
+    assert in_words(text, {"wheel_speed": "belt speed (m/s)"}) == "hold the belt speed, then the oil pressure"
+
+
+@pytest.mark.parametrize(
+    ("label", "viscous", "quadratic", "inertia"),
+    [
+        ("speed", "N s/rad", "N s²/rad²", "N s²/rad"),
+        ("belt speed (m/s)", "N s/m", "N s²/m²", "N s²/m"),
+        ("shaft speed (rpm)", "N 1/rpm", "N (1/rpm)²", "N 1 s/rpm"),
+        ("feed (mm/min)", "N min/mm", "N (min/mm)²", "N min s/mm"),
+    ],
+)
+def test_a_coefficient_s_unit_follows_the_speed_s(label: str, viscous: str, quadratic: str, inertia: str) -> None:
+    """One over the speed, over its square, over its rate of change in seconds."""
+    units = "{unit} {per_speed}", "{unit} {per_speed2}", "{unit} {per_acceleration}"
+    found = [in_units(unit, "N", {"wheel_speed": label}) for unit in units]
+    assert found == [viscous, quadratic, inertia]
