@@ -171,6 +171,11 @@ class Thresholds:
         "Penalty, in Δχ², of one wheel (or some) for an effect that all wheels may have.",
         f"{CHOICE}: prior odds of about 20 to 1 (2 ln 20) that what all wheels are built with is on all",
     )
+    unlikely_penalty: float = _threshold(
+        9.2,
+        "Penalty, in Δχ², of an effect that the simulation calls unlikely on its machine.",
+        f"{CHOICE}: prior odds of one in a hundred (2 ln 100)",
+    )
     own_channel_share: float = _threshold(
         0.5,
         "Share of a fault's Δχ² in its own channel that is credited to it in the predicted one.",

@@ -26,6 +26,8 @@ NINE_TENTHS = (0.05, 0.95)
 """Quantiles of a 90 % interval."""
 LEAST_MARGIN = 0.05
 """Share of the interval's width by which it reaches beyond its value (a choice: a value is never its own bound)."""
+ON_THE_BOUND = 0.01
+"""Distance to a declared bound, as a share of the range, within which a value stands on it (a choice)."""
 FEWEST_DRAWS_WITHIN = 20
 """Draws within the declared bounds from which quantiles are taken (a choice: one is then below the 5 % quantile)."""
 UNIT_OF_ENDING = {"_rad_s": ANGULAR_SPEED, "_degC": "degC", "_K": "K", "_s": "s"}
@@ -98,7 +100,8 @@ def interval(
     if len(inside) < FEWEST_DRAWS_WITHIN:
         inside = np.clip(drawn, least, most)
     low, high = (float(bound) for bound in np.quantile(inside, NINE_TENTHS))
-    if not least < value < most:
+    edge = ON_THE_BOUND * (most - least) if np.isfinite(most - least) else 0.0
+    if not least + edge < value < most - edge:
         value = float(np.median(inside))
     margin = LEAST_MARGIN * (high - low)
     return Parameter(value, max(min(low, value - margin), least), min(max(high, value + margin), most), unit)

@@ -49,6 +49,10 @@ class Predictor(Protocol):
         """Names of parameters as effects."""
 
     @property
+    def unlikely_effects(self) -> frozenset[str]:
+        """Names of candidates that this machine hardly has."""
+
+    @property
     def sensors(self) -> Mapping[str, SensorError]:
         """The errors of the recorded inputs, by column."""
 

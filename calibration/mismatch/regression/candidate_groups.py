@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
 
 Array = NDArray[np.float64]
@@ -22,6 +23,12 @@ def coefficient_signs(candidate: Candidate, count: int) -> tuple[int, ...]:
     """Return the sign of each of `count` columns; columns beyond the declared coefficients may have either."""
     declared = tuple(coefficient.sign for coefficient in candidate.coefficients[:count])
     return declared + (0,) * (count - len(declared))
+
+
+def _implausibility(problem: Problem, candidate: Candidate, shape: Shape) -> float:
+    """Return the Δχ² that a candidate must gain for being hardly possible on this machine, or in this shape."""
+    unlikely = candidate.name in problem.simulation.unlikely_effects
+    return candidate.prior_penalty(problem, shape) + (problem.thresholds.unlikely_penalty if unlikely else 0.0)
 
 
 def with_candidate(
@@ -44,7 +51,7 @@ def with_candidate(
                 columns=tuple(range(first, first + len(found))),
                 signs=coefficient_signs(candidate, len(found)),
                 sharing=candidate.sharing,
-                selection_penalty=selected_from_many + candidate.prior_penalty(problem, shape),
+                selection_penalty=selected_from_many + _implausibility(problem, candidate, shape),
                 candidate=candidate,
                 shape=shape,
                 noise_reduction=reduction,

@@ -32,6 +32,7 @@ class OneChannel(Simulation):
             "parameters",
             "own_to_each_wheel",
             "parameter_effects",
+            "unlikely_effects",
             "covariate_labels",
             "unloaded_experiment",
             "between_readings",

@@ -69,6 +69,7 @@ class RoverWheel(Simulation):
     }
 
     undefined_at_times: ClassVar = frozenset({"slip", "load", "place"})  # a wheel that stands, or hangs in the air
+    unlikely_effects = frozenset({"quadratic-drag"})  # air at 0.1 m/s: some 10 µN
     unloaded_experiment = "lift the wheels and spin all six at several speeds, both ways"
     covariate_labels: ClassVar = {
         "wheel_speed": "wheel speed (rad/s)",

@@ -59,6 +59,9 @@ class Simulation:
     """Parameters of which each wheel has a deviation of its own (`Thresholds.own_share`) beside the common one."""
     parameter_effects: ClassVar[Mapping[str, str]] = {}
     """Names of parameters as effects, for sets of effects that cannot be told apart."""
+    unlikely_effects: ClassVar[frozenset[str]] = frozenset()
+    """Names of candidates that this machine hardly has: each must gain `Thresholds.unlikely_penalty` more than others.
+    Physics that it cannot have at all is left out of `candidates`."""
     covariate_labels: ClassVar[Mapping[str, str]] = {}
     """Axis labels with units for the report, by covariate: {"wheel_speed": "carriage speed (m/s)"}."""
     unloaded_experiment: ClassVar[str] = ""
