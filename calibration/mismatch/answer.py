@@ -246,6 +246,7 @@ class Evidence:
     candidates: those that were looked for, for their labels
     covariate_labels: axis labels with units, as the simulation gives them
     wheel_column: what the recording calls a wheel, an axis or a side
+    others: of several channels, the evidence of the others
     """
 
     channel: str
@@ -265,3 +266,4 @@ class Evidence:
     candidates: tuple[Candidate, ...] = field(default=(), repr=False)
     covariate_labels: Mapping[str, str] = field(default_factory=dict, repr=False)
     wheel_column: str = "wheel"
+    others: tuple[Evidence, ...] = field(default=(), repr=False)

@@ -7,14 +7,14 @@ What lies further away than that is named as a change of this effect: more, less
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Change, Contribution
 from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
-from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
 
 if TYPE_CHECKING:
@@ -40,7 +40,18 @@ class Stated:
     in_simulation: bool
 
     def column(self, problem: Problem) -> Array:
-        """Return what it adds to the prediction, shape (time, wheel)."""
+        """Return what it adds to the prediction, shape (time, wheel).
+
+        Raises
+        ------
+        RecordingError
+            When the recording has not what the effect depends on.
+        """
+        if missing := [name for name in self.candidate.requires if name not in problem.covariates]:
+            raise RecordingError(
+                f"the simulation was corrected by {self.contribution.name}, which needs {', '.join(missing)}; "
+                "the recording does not have it"
+            )
         columns = np.where(problem.mask, self._columns(problem), 0.0)
         on = np.isin(np.array(problem.recording.wheels, dtype=object), list(self.contribution.wheels))
         coefficients = np.array(self.contribution.coefficients, np.float64)
@@ -181,14 +192,19 @@ def changes_of(change: ChangedSize, parameters: Mapping[str, Parameter]) -> tupl
     return tuple(found)
 
 
-def change_in_words(change: Change) -> str:
-    """Return one sentence about a change."""
+def direction_of(change: Change) -> Literal["gone", "larger", "smaller"]:
+    """Return what became of a corrected effect."""
     ratio = change.now / change.corrected if change.corrected else float("inf")
     if min(change.low, change.high) <= 0 <= max(change.low, change.high) and abs(ratio) < GONE_WITHIN:
-        told = "is gone"
-    else:
-        told = f"is {'larger' if abs(ratio) > 1 else 'smaller'} than the corrected simulation has it"
+        return "gone"
+    return "larger" if abs(ratio) > 1 else "smaller"
+
+
+def change_in_words(change: Change) -> str:
+    """Return one sentence about a change."""
+    direction = direction_of(change)
+    told = "gone" if direction == "gone" else f"{direction} than the corrected simulation has it"
     return (
-        f"{change.name} {told}: {change.parameter} {change.now:.4g} "
+        f"{change.name} is {told}: {change.parameter} {change.now:.4g} "
         f"(90 % sure: {change.low:.4g} to {change.high:.4g}), corrected {change.corrected:.4g}."
     )

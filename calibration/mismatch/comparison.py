@@ -116,9 +116,11 @@ def _labelled(comparison: Comparison, channel: str) -> Comparison:
 
 
 def merged(comparisons: Sequence[Comparison]) -> Comparison:
-    """Return one comparison of several channels: every finding, and the pictures of the channel with most of them."""
+    """Return one comparison of several channels: every finding, and the evidence of each channel."""
     answer = merged_answers([each.answer for each in comparisons])
-    shown = max(comparisons, key=lambda each: len(each.answer.effects) + len(each.answer.unexplained))
-    terms = tuple(term for each in comparisons for term in each.evidence.contributions)
+    first, *others = (each.evidence for each in comparisons)
+    # As in one channel: the terms of named effects, then those of changes.
+    named = [term for each in comparisons for term in each.evidence.contributions[: len(each.answer.effects)]]
+    changes = [term for each in comparisons for term in each.evidence.contributions[len(each.answer.effects) :]]
     values = {parameter.name: parameter.value for parameter in answer.parameters}
-    return Comparison(answer, replace(shown.evidence, contributions=terms, values=values))
+    return Comparison(answer, replace(first, contributions=(*named, *changes), values=values, others=tuple(others)))

@@ -85,7 +85,8 @@ def held_out_errors(
 
 
 def _rms(squares: Array, counts: Array) -> float:
-    return float(np.sqrt(squares.sum() / counts.sum()))
+    # Rounding may leave a negative sum where the fit is exact.
+    return float(np.sqrt(max(float(squares.sum()), 0.0) / counts.sum()))
 
 
 def chosen_effects(train: NormalEquations, entry_threshold: float) -> tuple[Term, ...]:

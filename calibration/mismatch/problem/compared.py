@@ -50,11 +50,13 @@ def blanks_of(
 ) -> tuple[dict[str, Array], dict[str, Mask]]:
     """Return the covariates that are known well enough, and where each of them is blank.
 
-    A covariate that is never known at a wheel says nothing there, and costs no reading. One that is blank too often is
-    left out as a whole, rather than the readings.
+    A covariate that is never known at a wheel says nothing there, and costs no reading. One that is known nowhere, or
+    is blank too often, is left out as a whole, rather than the readings.
     """
     kept, blanks = {}, {}
     for name, values in covariates.items():
+        if not np.isfinite(values[compared]).any():
+            continue
         blank = compared & ~np.isfinite(values)
         partly = blank & (compared & np.isfinite(values)).any(axis=0)
         if name in undefined_at_times or not partly.any():

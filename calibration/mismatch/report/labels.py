@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.changes import direction_of
 from regolithd.calibration.mismatch.inference.statements import listed, plural
 from regolithd.calibration.mismatch.problem.words import COVARIATES
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.answer import Answer, Evidence
+    from regolithd.calibration.mismatch.answer import Answer, CalibratedParameter, Change, Evidence
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
 
-PARAMETERS = {"onset_s": "onset", "relative_size": "share of the mean reading"}
+PARAMETERS = {"lag_s": "lag", "onset_s": "onset", "relative_size": "share of the mean reading"}
 """Parameters that the engine adds to those of a candidate."""
 UNITS = {"degC": "°C", "1": ""}
 """Units whose spelling in the answer is not the usual one."""
@@ -107,11 +109,30 @@ def capital(sentence: str) -> str:
 def verdict_sentence(answer: Answer, labels: Labels | None = None) -> str:
     """Return the verdict in one sentence."""
     labels = labels or Labels()
-    names = list(dict.fromkeys(labels.effect(effect.name) for effect in answer.effects))
     if answer.verdict == "consistent":
         return "Simulation and recording agree to within the noise."
+    left_out = _left_out_sentence(answer, labels)
+    changed = [f"{capital(labels.effect(change.name))} is {_than_corrected(change)}." for change in answer.changes]
+    moved = [f"The parameter {each.name} had to leave its prior." for each in answer.parameters if beyond_prior(each)]
+    return " ".join(sentence for sentence in (left_out, *dict.fromkeys(changed), *moved) if sentence)
+
+
+def beyond_prior(parameter: CalibratedParameter) -> bool:
+    """Return whether a parameter lies more than three deviations from its prior."""
+    reach = THRESHOLDS.furthest_prior_stds * parameter.prior_std
+    return parameter.prior_std > 0 and abs(parameter.value - parameter.prior) > reach
+
+
+def _than_corrected(change: Change) -> str:
+    direction = direction_of(change)
+    return "gone" if direction == "gone" else f"{direction} than it was"
+
+
+def _left_out_sentence(answer: Answer, labels: Labels) -> str:
+    """Return what is named and what is not; empty where there is neither."""
+    names = list(dict.fromkeys(labels.effect(effect.name) for effect in answer.effects))
     if answer.verdict == "missing-physics":
-        return f"The simulation leaves out {listed(names)}."
+        return f"The simulation leaves out {listed(names)}." if names else ""
     covariates = list(dict.fromkeys(labels.covariate(place.covariate) for place in answer.unexplained))
     place = f" that depends on {listed(covariates)}" if covariates else ""
     if names:

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from regolithd.calibration.mismatch.report import sections
+from regolithd.calibration.mismatch.report import sections, tables
 from regolithd.calibration.mismatch.report.axes import number
+from regolithd.calibration.mismatch.report.channel import channel_parts
 from regolithd.calibration.mismatch.report.labels import Labels, verdict_sentence
 
 if TYPE_CHECKING:
@@ -59,14 +60,12 @@ def render_report(answer: Answer, evidence: Evidence, provenance: Provenance) ->
             style=Markup(_resource("style.css")),  # noqa: S704  # our own file
             verdict=verdict_sentence(answer, labels),
             summary=sections.summary(evidence, labels),
-            map=sections.residual_map(answer, evidence, labels),
-            curves=sections.curves(answer, evidence, labels),
-            effects=[sections.effect(effect, evidence, labels) for effect in answer.effects],
-            unexplained=[sections.unexplained(place, evidence, labels) for place in answer.unexplained],
-            fit=sections.fit(answer, evidence, labels),
+            parts=channel_parts(answer, evidence),
             confusions=sections.confusions(answer, labels),
-            sensitivity=sections.sensitivity(answer, evidence, labels),
-            other_curves=sections.other_curves(answer, evidence, labels),
+            calibrated=tables.calibrated(answer),
+            changes=tables.changes(answer, labels),
+            left_out=tables.left_out(answer),
+            channels=tables.channels(answer, {each.channel: each.unit for each in (evidence, *evidence.others)}),
             versions=_versions(),
         )
     )

@@ -88,7 +88,7 @@ class ConfusionRow:
 
 @dataclass(frozen=True)
 class SensitivityRow:
-    """A candidate's smallest detectable effect; empty texts: it cannot be detected here."""
+    """A candidate's smallest detectable effect."""
 
     label: str
     size: str
@@ -98,11 +98,13 @@ class SensitivityRow:
 def summary(evidence: Evidence, labels: Labels) -> tuple[tuple[str, str], ...]:
     """Return what was compared, as pairs of a number and its noun."""
     length = float(evidence.time_s[-1] - evidence.time_s[0]) * labels.time_factor
-    values = int(np.isfinite(evidence.before).sum())
     everything = labels.wheels(evidence.wheels, evidence.wheels).removeprefix("all ")
     count = [tuple(everything.split(" ", 1))] if everything else []
-    found = [*count, (number(length), labels.time_unit), (f"{values:,}", f"values of {evidence.channel} compared")]
-    return tuple((first, second) for first, second in found)
+    values = [
+        (f"{int(np.isfinite(each.before).sum()):,}", f"values of {each.channel} compared")
+        for each in (evidence, *evidence.others)
+    ]
+    return tuple((first, second) for first, second in (*count, (number(length), labels.time_unit), *values))
 
 
 def residual_map(answer: Answer, evidence: Evidence, labels: Labels) -> Markup:
@@ -209,18 +211,23 @@ def confusions(answer: Answer, labels: Labels) -> tuple[ConfusionRow, ...]:
 
 
 def sensitivity(answer: Answer, evidence: Evidence, labels: Labels) -> tuple[SensitivityRow, ...]:
-    """Return the smallest detectable effect of each candidate that was not found."""
+    """Return the smallest detectable effect of each candidate that was not found, where there is one."""
     mean = float(np.nanmean(np.abs(evidence.measured)))
     found = {each.name for each in answer.effects}
     rows = []
     for one in answer.sensitivity:
-        if one.name not in found:
+        if one.name not in found and np.isfinite(one.smallest_detectable):
             size = number(labels.scaled(one.unit)[0] * one.smallest_detectable, 2)
             share = f"{100 * one.smallest_detectable / mean:.1f} %" if mean > 0 else "–"
-            known = np.isfinite(one.smallest_detectable)
-            label = capital(labels.effect(one.name))
-            rows.append(SensitivityRow(label, size if known else "", share if known else ""))
+            rows.append(SensitivityRow(capital(labels.effect(one.name)), size, share))
     return tuple(rows)
+
+
+def undetectable(answer: Answer, labels: Labels) -> str:
+    """Return the candidates that this recording cannot show, however large, or that it does not allow."""
+    found = {each.name for each in answer.effects}
+    names = [one.name for one in answer.sensitivity if not np.isfinite(one.smallest_detectable)]
+    return ", ".join(labels.effect(name) for name in names if name not in found)
 
 
 def other_curves(answer: Answer, evidence: Evidence, labels: Labels) -> tuple[Figure, ...]:

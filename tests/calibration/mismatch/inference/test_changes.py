@@ -12,7 +12,7 @@ from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import stated_in
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
-from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -111,3 +111,18 @@ def test_the_answer_tells_where_each_parameter_is() -> None:
     assert written["version"] == 2
     assert written["parameters"][0]["prior"] == 2.0
     assert written["changes"] == []
+
+
+def test_a_corrected_effect_whose_covariate_was_never_measured_is_one_message() -> None:
+    """The message names the effect and what it needs."""
+    whole = moving(1, 0.5)
+    blank = whole.with_channels(speed_m_s=np.full(whole.shape, np.nan))
+
+    class WithoutDrag(Axis):
+        inputs = ("acceleration_m_s2",)
+
+        def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+            return values["mass_kg"] * inputs["acceleration_m_s2"]
+
+    with pytest.raises(RecordingError, match="corrected by coulomb-friction, which needs direction"):
+        compare(blank, WithoutDrag(), effects=[COULOMB])

@@ -108,3 +108,12 @@ def test_what_is_left_out_is_counted_with_its_reason() -> None:
     assert [(each.channel, each.readings) for each in told] == [("current_A", 2), ("current_A", 3)]
     assert "predicts nothing" in told[0].reason
     assert "yaw_rate" in told[1].reason
+
+
+def test_a_covariate_that_is_known_nowhere_is_left_out() -> None:
+    """It costs no reading, and nothing is computed from it."""
+    compared = np.ones((COUNT, 2), np.bool_)
+    known, never = np.ones((COUNT, 2)), np.full((COUNT, 2), np.nan)
+    kept, blanks = blanks_of({"known": known, "never": never}, frozenset(), compared, LIMITS)
+    assert list(kept) == ["known"]
+    assert not blanks

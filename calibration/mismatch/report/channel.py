@@ -1,0 +1,71 @@
+"""What the report shows of each predicted channel: the part of the answer about it, its drawings and its units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from regolithd.calibration.mismatch.report import sections
+from regolithd.calibration.mismatch.report.labels import Labels
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from markupsafe import Markup
+
+    from regolithd.calibration.mismatch.answer import Answer, Evidence
+
+
+@dataclass(frozen=True)
+class ChannelPart:
+    """The sections about one channel; `heading` is empty where there is one channel alone."""
+
+    heading: str
+    map: Markup
+    curves: Sequence[sections.Figure]
+    effects: Sequence[sections.EffectSection]
+    unexplained: Sequence[sections.UnexplainedSection]
+    fit: sections.FitSection
+    sensitivity: Sequence[sections.SensitivityRow]
+    undetectable: str
+    other_curves: Sequence[sections.Figure]
+
+
+def channel_parts(answer: Answer, evidence: Evidence) -> tuple[ChannelPart, ...]:
+    """Return the parts of all channels, in the simulation's order."""
+    shown = (evidence, *evidence.others)
+    return tuple(_part(_about(answer, each.channel, shown), each, alone=len(shown) == 1) for each in shown)
+
+
+def _about(answer: Answer, channel: str, shown: Sequence[Evidence]) -> Answer:
+    """Return the answer with what it says of one channel alone."""
+    if len(shown) == 1:
+        return answer
+    predicted = {each.channel for each in shown}
+    return replace(
+        answer,
+        # The fault of a sensor that is not predicted stands with the first channel.
+        effects=tuple(
+            each
+            for each in answer.effects
+            if each.channel == channel or (channel == shown[0].channel and each.channel not in predicted)
+        ),
+        unexplained=tuple(each for each in answer.unexplained if each.channel == channel),
+        sensitivity=tuple(each for each in answer.sensitivity if each.channel == channel),
+        fit=next((fit for fit in answer.fits if fit.channel == channel), answer.fit),
+    )
+
+
+def _part(answer: Answer, evidence: Evidence, *, alone: bool) -> ChannelPart:
+    labels = Labels.of(evidence)
+    return ChannelPart(
+        heading="" if alone else evidence.channel,
+        map=sections.residual_map(answer, evidence, labels),
+        curves=sections.curves(answer, evidence, labels),
+        effects=[sections.effect(effect, evidence, labels) for effect in answer.effects],
+        unexplained=[sections.unexplained(place, evidence, labels) for place in answer.unexplained],
+        fit=sections.fit(answer, evidence, labels),
+        sensitivity=sections.sensitivity(answer, evidence, labels),
+        undetectable=sections.undetectable(answer, labels),
+        other_curves=sections.other_curves(answer, evidence, labels),
+    )

@@ -1,0 +1,108 @@
+"""Tables of the report about the whole answer: parameters, changes, readings left out, errors of channels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from regolithd.calibration.mismatch.changes import direction_of
+from regolithd.calibration.mismatch.report.axes import number
+from regolithd.calibration.mismatch.report.labels import beyond_prior, capital
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.answer import Answer
+    from regolithd.calibration.mismatch.report.labels import Labels
+
+
+@dataclass(frozen=True)
+class CalibratedRow:
+    """A parameter of the simulation: what was stated, and where the recording moved it."""
+
+    name: str
+    stated: str
+    value: str
+    low: str
+    high: str
+    unit: str
+    beyond_prior: bool
+
+
+@dataclass(frozen=True)
+class ChangeRow:
+    """What became of a corrected effect."""
+
+    label: str
+    direction: str
+    parameter: str
+    corrected: str
+    now: str
+    low: str
+    high: str
+
+
+@dataclass(frozen=True)
+class LeftOutRow:
+    """Readings that are not compared."""
+
+    channel: str
+    readings: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class ChannelRow:
+    """Held-out errors of one of several channels."""
+
+    channel: str
+    before: str
+    after: str
+    floor: str
+    unit: str
+
+
+def calibrated(answer: Answer) -> tuple[CalibratedRow, ...]:
+    """Return the simulation's parameters."""
+    rows = []
+    for one in answer.parameters:
+        stated = (
+            f"{number(one.prior)} ± {number(one.prior_std, 2)}" if one.prior_std else f"{number(one.prior)} (exact)"
+        )
+        ends = (number(one.low, 4), number(one.high, 4)) if one.prior_std else ("", "")
+        unit = "" if one.unit == "1" else one.unit
+        rows.append(CalibratedRow(one.name, stated, number(one.value, 4), *ends, unit, beyond_prior(one)))
+    return tuple(rows)
+
+
+def changes(answer: Answer, labels: Labels) -> tuple[ChangeRow, ...]:
+    """Return what differs from the effects that a corrected simulation brought."""
+    return tuple(
+        ChangeRow(
+            capital(labels.effect(one.name)),
+            direction_of(one),
+            labels.parameter(one.name, one.parameter),
+            number(one.corrected),
+            number(one.now),
+            number(one.low),
+            number(one.high),
+        )
+        for one in answer.changes
+    )
+
+
+def left_out(answer: Answer) -> tuple[LeftOutRow, ...]:
+    """Return what is not compared, and why."""
+    return tuple(LeftOutRow(one.channel, f"{one.readings:,}", one.reason) for one in answer.left_out)
+
+
+def channels(answer: Answer, units: dict[str, str]) -> tuple[ChannelRow, ...]:
+    """Return the errors of each channel, where there are several; `units` by channel."""
+    return tuple(
+        ChannelRow(
+            fit.channel,
+            number(fit.held_out_rmse_before),
+            number(fit.held_out_rmse_after),
+            number(fit.noise_floor_rmse),
+            units.get(fit.channel, ""),
+        )
+        for fit in answer.fits
+    )
