@@ -9,6 +9,7 @@ from regolithd.daemon.messages.alarm import Severity, SoilChangeEvidence
 from regolithd.daemon.messages.header import iso_time
 from regolithd.daemon.pipeline.soil_change import soil_change_text, wheels_of
 from regolithd.drivers.can.bus import BusState
+from regolithd.drivers.master.intruders import Intruders, Service
 from regolithd.drivers.master.status import NodePhase
 
 if TYPE_CHECKING:
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from regolithd.drivers.devices.device import Quantity
     from regolithd.drivers.master.status import NodeStatus
 
+NO_INTRUDERS = Intruders()
 _BUS_SEVERITY = {
     BusState.WARNING: Severity.WARNING,
     BusState.PASSIVE: Severity.ERROR,
@@ -46,6 +48,8 @@ class AlarmInputs:
     bus_problem: str = ""
     bus_state: BusState = BusState.ACTIVE
     kernel_drops: int = 0
+    shared_node_ids: tuple[int, ...] = ()
+    intruders: Intruders = NO_INTRUDERS
     store_problem: str = ""
     store_dropped: int = 0
     store_unstored: int = 0
@@ -61,7 +65,12 @@ class AlarmInputs:
 
 def current_alarms(inputs: AlarmInputs) -> dict[str, Alarm]:
     """Return the active alarms by name."""
-    found = [*_node_alarms(inputs.nodes.values()), *_bus_alarms(inputs), *_daemon_alarms(inputs)]
+    found = [
+        *_node_alarms(inputs.nodes.values()),
+        *_bus_alarms(inputs),
+        *_intruder_alarms(inputs),
+        *_daemon_alarms(inputs),
+    ]
     return {alarm.name: alarm for alarm in found}
 
 
@@ -70,6 +79,9 @@ def alarm_names(node_ids: Iterable[int]) -> tuple[str, ...]:
     return (
         "bus",
         "kernel",
+        "node-id",
+        "master",
+        "unexpected-node",
         "store",
         "recording",
         "control",
@@ -102,6 +114,26 @@ def _bus_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
     if inputs.kernel_drops:
         remedy = "Lower [sync] rate_Hz, or stop other programs on this computer."
         yield Alarm("kernel", Severity.ERROR, f"the kernel dropped {inputs.kernel_drops} frames in this run", remedy)
+
+
+def _intruder_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
+    if inputs.shared_node_ids:
+        which = ", ".join(map(str, inputs.shared_node_ids))
+        text = f"two nodes answer with node-ID {which}; their values are not published"
+        remedy = "Switch one off, and give it a node-ID of its own (DIP switches, LSS, or the maker's program)."
+        yield Alarm("node-id", Severity.ERROR, text, remedy)
+    if inputs.intruders.services:
+        what = " and ".join(inputs.intruders.services)
+        samples = Service.SYNC in inputs.intruders.services
+        text = f"another master on the bus {what}{'; values are not published meanwhile' if samples else ''}"
+        remedy = "End it, or switch off SYNC there (bit 30 of its 0x1005): one bus has one master."
+        yield Alarm("master", Severity.ERROR, text, remedy)
+    if inputs.intruders.nodes:
+        which = ", ".join(map(str, inputs.intruders.nodes))
+        remedy = "`regolithd scan` says what it is. Add it to [nodes], or take it off the bus."
+        yield Alarm(
+            "unexpected-node", Severity.WARNING, f"on the bus, but not in the configuration: node {which}", remedy
+        )
 
 
 def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:

@@ -75,7 +75,7 @@ class EventMessage(Header):
 
     kind: str
     """`node-booted`, `node-boot-failed`, `node-lost`, `node-returned`, `drive-state-changed`, `motion-stopped`,
-    `bus-state-changed`, `soil-change`, `node-emergency`."""
+    `bus-state-changed`, `soil-change`, `node-emergency`, `unexpected-node`, `unexpected-master`."""
     node_id: NodeNumber | None
     text: str
     suppressed: int = 0

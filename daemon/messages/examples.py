@@ -92,7 +92,15 @@ _HEALTH = {
     "bus_state": "active",
     "bus": {"received": 9106, "echoed": 3010, "kernel_drops": 0},
     "sync": {"produced": 501, "skipped": 0, "failed": 0, "worst_late_ms": 0.4, "mean_late_ms": 0.1},
-    "acquisition": {"snapshots": 500, "accepted": 6000, "late": 0, "duplicate": 0, "unexpected": 0, "missing": 0},
+    "acquisition": {
+        "snapshots": 500,
+        "accepted": 6000,
+        "late": 0,
+        "duplicate": 0,
+        "unexpected": 0,
+        "missing": 0,
+        "doubtful": 0,
+    },
     "events_withheld": 0,
     "publishing": {
         "connections": 1,

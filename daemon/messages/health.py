@@ -30,6 +30,7 @@ class AcquisitionReport(BaseModel):
     duplicate: int
     unexpected: int
     missing: int
+    doubtful: int
 
 
 class PublishingReport(BaseModel):

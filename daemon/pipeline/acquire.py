@@ -18,6 +18,14 @@ sent. So the answers of each PDO are counted: each SYNC makes one more outstandi
 An answer that was lost would keep its PDO ambiguous. It is forgotten once each window of the last `AMBIGUITY_NS`
 brought exactly one answer.
 
+Two cases in which nobody can say whose values these are, or of which instant, are noticed, and the values are dropped:
+
+- Two nodes with one node-ID: a single node never answers more often than there were SYNCs, so a PDO that was a
+  duplicate in `DUPLICATES` of the last `DOUBT_WINDOWS` windows has two senders (one duplicate alone may be a frame that
+  the CAN controller received twice). The node's values are dropped until its PDOs come once again.
+- A second SYNC producer: once our own SYNCs were seen, those of somebody else open no window, and for `DOUBT_WINDOWS`
+  windows after one, all values are dropped: they may have been sampled at the other SYNC.
+
 A snapshot's time is its SYNC's kernel time in whole microseconds. That is one bit on a 1 Mbit/s bus, and the resolution
 of a candump log.
 """
@@ -44,6 +52,10 @@ AWAITED_WINDOWS = 3
 AMBIGUITY_NS = 500_000_000
 """Longer than a node, or the computer that runs a virtual one, is delayed; at least `AWAITED_WINDOWS` windows."""
 
+DOUBT_WINDOWS = 4
+DUPLICATES = 2
+"""Of `DOUBT_WINDOWS` windows: how many brought a PDO more often than a single node sends it."""
+
 SYNCHRONOUS_WINDOW = 0.9
 """Share of the SYNC period in which an answer counts."""
 
@@ -60,11 +72,14 @@ class _PdoCount:
         Windows in a row in which it came exactly once while an answer was outstanding.
     received
         How often it came in this window.
+    duplicates
+        The last `DOUBT_WINDOWS` windows as bits, the present one lowest: whether it was a duplicate.
     """
 
     outstanding: int = 0
     steady: int = 0
     received: int = 0
+    duplicates: int = 0
 
     def begin_window(self, ambiguous_windows: int) -> None:
         """Count one more SYNC to be answered; forget lost answers after so many steady windows."""
@@ -73,6 +88,12 @@ class _PdoCount:
             self.outstanding = self.steady = 0  # the answers that are still outstanding were lost
         self.outstanding += 1
         self.received = 0
+        self.duplicates = self.duplicates << 1 & (1 << DOUBT_WINDOWS) - 1
+
+    @property
+    def has_two_senders(self) -> bool:
+        """Whether more answers came than one node sends."""
+        return self.duplicates.bit_count() >= DUPLICATES
 
 
 class Acquisition:
@@ -90,6 +111,9 @@ class Acquisition:
 
     def __init__(self, nodes: Iterable[NodeDescription], pdos: Iterable[int], period_ns: int) -> None:
         self._wheels = {node.node_id: node.wheel for node in nodes}
+        self._shared: dict[int, set[int]] = {}  # node-ID → its PDOs that have two senders
+        self._own_syncs = False
+        self._foreign_sync_windows = 0  # that are still doubtful
         self._pdos = frozenset(pdos)
         self._window_ns = int(period_ns * SYNCHRONOUS_WINDOW)
         self._ambiguous_windows = max(AWAITED_WINDOWS, -(-AMBIGUITY_NS // period_ns))
@@ -101,17 +125,33 @@ class Acquisition:
         self._awaited: set[int] = set()
         self._taken: set[int] = set()
         self._snapshots = self._accepted = self._late = self._duplicate = self._unexpected = self._missing = 0
+        self._doubtful = 0
 
     @property
     def counters(self) -> AcquisitionCounters:
         """Return the counts of snapshots and readings so far."""
         return AcquisitionCounters(
-            self._snapshots, self._accepted, self._late, self._duplicate, self._unexpected, self._missing
+            self._snapshots,
+            self._accepted,
+            self._late,
+            self._duplicate,
+            self._unexpected,
+            self._missing,
+            self._doubtful,
         )
+
+    @property
+    def shared_node_ids(self) -> tuple[int, ...]:
+        """Node-IDs that two nodes have at present."""
+        return tuple(sorted(node_id for node_id, pdos in self._shared.items() if pdos))
 
     def accept(self, item: Sync | Reading) -> Snapshot | None:
         """Take the next SYNC or reading; return the snapshot that it completes, if any."""
         if isinstance(item, Sync):
+            if self._own_syncs and not item.sent:
+                self._foreign_sync_windows = DOUBT_WINDOWS
+                return None
+            self._own_syncs |= item.sent
             closed = self._close_window() if self._open is not None else None
             self._begin_window(item.time_ns)
             return closed
@@ -121,8 +161,12 @@ class Acquisition:
         if self._sequence >= 0:
             self._heard = [*self._heard[1 - AWAITED_WINDOWS :], self._received_pdos]
             self._awaited = set().union(*self._heard)
-        for count in self._counts.values():
+        for cob_id, count in self._counts.items():
             count.begin_window(self._ambiguous_windows)
+            if not count.has_two_senders:
+                for pdos in self._shared.values():
+                    pdos.discard(cob_id)
+        self._foreign_sync_windows = max(self._foreign_sync_windows - 1, 0)
         self._taken = set()
         self._sequence += 1
         self._sync_ns = time_ns
@@ -144,16 +188,32 @@ class Acquisition:
         count.received += 1
         if not count.outstanding:
             self._duplicate += 1
+            self._note_duplicate(count, reading)
             return None
         count.outstanding -= 1
         in_window = reading.time_ns - self._sync_ns <= self._window_ns
         if count.outstanding or not in_window or self._open is None:
             self._late += 1
             return None
-        self._accepted += 1
-        self._taken.add(reading.cob_id)
-        self._write(self._open, reading)
+        if self._foreign_sync_windows or self._shared.get(reading.node_id):
+            self._doubtful += 1
+        else:
+            self._accepted += 1
+            self._taken.add(reading.cob_id)
+            self._write(self._open, reading)
         return self._close_window() if self._awaited and self._complete() else None
+
+    def _note_duplicate(self, count: _PdoCount, reading: Reading) -> None:
+        """Note that a PDO came more often than one node sends it; from the second window on, drop the node's values."""
+        if self._foreign_sync_windows:
+            return  # it answers the other SYNC
+        count.duplicates |= 1
+        if count.has_two_senders:
+            self._shared.setdefault(reading.node_id, set()).add(reading.cob_id)
+            wheel = self._wheels[reading.node_id]
+            if self._open is not None:
+                for quantity, _ in reading.values:
+                    self._open[ROW[quantity], slice(None) if wheel is None else wheel] = np.nan
 
     def _complete(self) -> bool:
         counts = [self._counts[cob_id] for cob_id in self._awaited]

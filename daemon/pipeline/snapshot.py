@@ -88,14 +88,15 @@ class Snapshot:
 
 @dataclass(frozen=True, slots=True)
 class AcquisitionCounters:
-    """Counts since the start: every reading is accepted, late, duplicate or unexpected."""
+    """Counts since the start: every reading is accepted, late, duplicate, unexpected or doubtful."""
 
     snapshots: int = 0
     accepted: int = 0  # readings that went into a snapshot
     late: int = 0  # readings before the first SYNC, after their window, or ambiguous (`acquire`)
     duplicate: int = 0  # a second reading of the same PDO in one window; the first is kept
     unexpected: int = 0  # readings from nodes that the configuration does not know
-    missing: int = 0  # PDOs that were expected in a window and did not come, or not in time
+    missing: int = 0  # PDOs that were expected in a window and did not come, not in time, or were doubtful
+    doubtful: int = 0  # readings while two nodes have one node-ID, or a second SYNC producer is on the bus
 
 
 class SlipSource(StrEnum):

@@ -10,7 +10,7 @@ import time
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from regolithd.daemon.health.alarms import Alarm, AlarmInputs, alarm_names, current_alarms
+from regolithd.daemon.health.alarms import NO_INTRUDERS, Alarm, AlarmInputs, alarm_names, current_alarms
 from regolithd.daemon.health.stuck_sensor import StuckSensorDetector
 from regolithd.daemon.messages.alarm import AlarmMessage, Severity
 from regolithd.daemon.messages.bus import EmergencyMessage, EventMessage, IdentityReport, NodeMessage
@@ -189,6 +189,8 @@ class MqttSink:
             bus_problem=service.bus_problem,
             bus_state=network.bus.state if network is not None else BusState.ACTIVE,
             kernel_drops=network.bus.counters.kernel_drops if network is not None else 0,
+            shared_node_ids=service.chain.acquisition.shared_node_ids,
+            intruders=network.intruders.present(time.time_ns()) if network is not None else NO_INTRUDERS,
             store_problem=self.publisher.store_problem,
             store_dropped=report.dropped,
             store_unstored=report.unstored,

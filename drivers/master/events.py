@@ -109,5 +109,23 @@ class BusStateChanged:
     text: str
 
 
+@dataclass(frozen=True, slots=True)
+class UnexpectedNode:
+    """A node that the configuration does not know sends on the bus."""
+
+    time_ns: int
+    node_id: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class UnexpectedMaster:
+    """Somebody else produces SYNC or the master's heartbeat, or sends NMT commands."""
+
+    time_ns: int
+    text: str
+    remedy: str
+
+
 NodeEvent = NodeBooted | NodeBootFailed | NodeLost | NodeReturned | NodeEmergency | DriveStateChanged
-NetworkEvent = NodeEvent | MotionStopped | BusStateChanged
+NetworkEvent = NodeEvent | MotionStopped | BusStateChanged | UnexpectedNode | UnexpectedMaster

@@ -26,7 +26,7 @@ from regolithd.drivers.canopen.heartbeat import produce_heartbeat
 from regolithd.drivers.canopen.nmt import NmtCommand
 from regolithd.drivers.canopen.sync import produce_sync
 from regolithd.drivers.devices.decoding.decoder import Decoder
-from regolithd.drivers.devices.decoding.signals import NodeState, Reading
+from regolithd.drivers.devices.decoding.signals import NodeState, Reading, Sync
 from regolithd.drivers.devices.motor_controller import STATUSWORD
 from regolithd.drivers.errors import DriverError
 from regolithd.drivers.master.boot_configuration import CONSUMER_HEARTBEAT, monitors_master
@@ -40,6 +40,7 @@ from regolithd.drivers.master.events import (
     NodeEmergency,
     NodeLost,
 )
+from regolithd.drivers.master.intruders import IntruderWatch
 from regolithd.drivers.master.motion import Motion, each
 from regolithd.drivers.master.remote_node import RemoteNode
 from regolithd.drivers.master.status import NetworkCounters, NetworkSettings, NodePhase, NodeStatus
@@ -83,6 +84,8 @@ class Network:
     ----------
     decoder
         Decodes the frames, and counts those that it cannot decode.
+    intruders
+        Watches for nodes that are not configured, and for a second master.
     """
 
     def __init__(
@@ -97,6 +100,7 @@ class Network:
         self.bus = bus
         self.settings = settings
         self.decoder = Decoder(settings.nodes, master_id=settings.master_id)
+        self.intruders = IntruderWatch((node.node_id for node in settings.nodes), master_id=settings.master_id)
         self._counters = NetworkCounters()
         self._on_frames = on_frames
         self._on_signals = on_signals
@@ -216,12 +220,21 @@ class Network:
             if signal is not None:
                 signals.append(signal)
                 if not frame.sent:
-                    self._take(signal)
-            elif frame.can_id in sdo_clients and frame.ordinary and not frame.sent:
+                    self._take(signal, frame)
+            elif frame.sent:
+                continue
+            elif frame.can_id in sdo_clients and frame.ordinary:
                 sdo_clients[frame.can_id].handle(frame)
+            else:
+                self._watch(frame)
         return signals
 
-    def _take(self, signal: Signal) -> None:
+    def _watch(self, frame: Frame) -> None:
+        event = self.intruders.take(frame)
+        if event is not None:
+            self._emit(event)
+
+    def _take(self, signal: Signal, frame: Frame) -> None:
         match signal:
             case Reading(node_id=node_id) if node_id in self._drives:
                 self._take_statusword(self._drives[node_id], signal)
@@ -229,6 +242,8 @@ class Network:
                 self._supervisors[node_id].remote.take_state(signal)
             case Emergency(node_id=node_id):
                 self._take_emergency(self._supervisors[node_id], signal)
+            case Sync():
+                self._watch(frame)
             case _:
                 pass
 

@@ -150,4 +150,4 @@ def _nothing(_frame: Frame) -> None:
 
 
 def _sync(frame: Frame) -> Sync:
-    return Sync(frame.time_ns)
+    return Sync(frame.time_ns, frame.sent)

@@ -14,9 +14,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Sync:
-    """A SYNC seen on the bus (the echo of our own included): the time of a snapshot."""
+    """A SYNC seen on the bus: the time of a snapshot. `sent`: the echo of our own."""
 
     time_ns: int
+    sent: bool = False
 
 
 class Reading(NamedTuple):

@@ -10,6 +10,7 @@ from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.devices.ground_speed import GROUND_SPEED_SENSOR
 from regolithd.drivers.devices.load_cell import LOAD_CELL
 from regolithd.drivers.devices.node import NodeDescription
+from regolithd.drivers.master.intruders import Intruders, Service
 from regolithd.drivers.master.status import NodePhase, NodeStatus
 
 CELL = NodeDescription(13, LOAD_CELL, 2)
@@ -22,6 +23,9 @@ TROUBLES = [
     ("bus_state", BusState.OFF, "bus", Severity.CRITICAL),
     ("bus_state", BusState.DOWN, "bus", Severity.CRITICAL),
     ("kernel_drops", 3, "kernel", Severity.ERROR),
+    ("shared_node_ids", (3,), "node-id", Severity.ERROR),
+    ("intruders", Intruders(services=(Service.SYNC,)), "master", Severity.ERROR),
+    ("intruders", Intruders(nodes=(44,)), "unexpected-node", Severity.WARNING),
     ("store_problem", "no permission", "store", Severity.ERROR),
     ("store_dropped", 3, "store", Severity.ERROR),
     ("store_unstored", 3, "store", Severity.WARNING),

@@ -155,6 +155,63 @@ def test_what_one_node_measures_for_the_body_stands_at_all_wheels_and_nothing_ca
         snapshot.load_N[0] = 1.0
 
 
+def twice(taken: Acquisition, k: int) -> list[Snapshot]:
+    """Feed one window in which two nodes answer with node-ID 3, with different currents."""
+    closed = window(taken, k)
+    return closed + [made for made in [taken.accept(reading(3, k * PERIOD_NS + 20 * MS, current=9.9))] if made]
+
+
+def test_of_two_nodes_with_one_id_no_value_is_published_from_the_second_duplicate_on() -> None:
+    """The others' values are; the node-ID is named, and free again once its PDO comes once for four windows."""
+    taken = acquisition()
+    window(taken, 0)
+    window(taken, 1)
+    twice(taken, 2)
+    assert taken.shared_node_ids == ()
+    twice(taken, 3)
+    assert taken.shared_node_ids == (3,)
+    for k in range(4, 7):
+        last = twice(taken, k)[-1]
+        assert np.isnan(last.motor_current_A).tolist() == [False, False, True, False, False, False]
+    assert taken.counters.doubtful == 3
+    for k in range(7, 12):
+        closed = window(taken, k)
+    assert taken.shared_node_ids == ()
+    assert closed[-1].motor_current_A[2] == pytest.approx(11.3)
+
+
+def test_a_single_duplicate_is_no_second_node() -> None:
+    """A CAN controller may receive one frame twice: the first is kept, and nothing is doubtful."""
+    taken = acquisition()
+    window(taken, 0)
+    twice(taken, 1)
+    for k in range(2, 6):
+        assert np.isfinite(window(taken, k)[-1].motor_current_A).all()
+    assert (taken.counters.duplicate, taken.counters.doubtful, taken.shared_node_ids) == (1, 0, ())
+
+
+def test_a_second_sync_producer_makes_no_snapshot_and_its_answers_no_value() -> None:
+    """Once our own SYNC is known, values sampled beside a foreign one are dropped; they return when it ends."""
+    taken = acquisition()
+
+    def syncs(k: int, *, foreign: bool) -> list[Snapshot]:
+        start = k * PERIOD_NS
+        items = [Sync(start, sent=True), *(reading(node, start + node * MS) for node in range(1, 7))]
+        if foreign:
+            items += [Sync(start + 200 * MS), *(reading(node, start + (200 + node) * MS) for node in range(1, 7))]
+        return [made for item in items if (made := taken.accept(item))]
+
+    made = [snapshot for k in range(3) for snapshot in syncs(k, foreign=False)]
+    disturbed = [snapshot for k in range(3, 8) for snapshot in syncs(k, foreign=True)]
+    after = [snapshot for k in range(8, 14) for snapshot in syncs(k, foreign=False)]
+    assert [snapshot.sequence for snapshot in (*made, *disturbed, *after)] == list(range(14))
+    assert np.isfinite(disturbed[0].motor_current_A).all()  # it had closed before the foreign SYNC came
+    assert all(np.isnan(snapshot.motor_current_A).all() for snapshot in disturbed[1:])
+    assert np.isfinite(after[-1].motor_current_A).all()
+    assert taken.shared_node_ids == ()
+    assert taken.counters.doubtful == 42
+
+
 @given(st.lists(st.tuples(st.integers(0, 7), st.integers(0, 20 * PERIOD_NS)), max_size=200))
 def test_every_reading_is_accounted_for_whatever_the_order(events: list[tuple[int, int]]) -> None:
     """The counts add up for any order of SYNCs, readings and unknown nodes, and for times that go backwards."""
@@ -166,6 +223,6 @@ def test_every_reading_is_accounted_for_whatever_the_order(events: list[tuple[in
     ]
     counters = taken.counters
     readings = sum(node != 0 for node, _ in events)
-    assert counters.accepted + counters.late + counters.duplicate + counters.unexpected == readings
+    assert counters.accepted + counters.late + counters.duplicate + counters.unexpected + counters.doubtful == readings
     assert counters.snapshots == len(snapshots)
     assert [snapshot.sequence for snapshot in snapshots] == list(range(len(snapshots)))

@@ -22,7 +22,8 @@ from regolithd.daemon.config.configuration import Configuration, Mqtt
 from regolithd.daemon.health.alarms import alarm_names
 from regolithd.daemon.messages.header import iso_time, time_fields
 from regolithd.daemon.messages.health import PublishingReport
-from regolithd.daemon.pipeline.snapshot import AcquisitionCounters, SoilChange
+from regolithd.daemon.pipeline.acquire import Acquisition
+from regolithd.daemon.pipeline.snapshot import SoilChange
 from regolithd.daemon.publish.connection import WINDOW, Connection
 from regolithd.daemon.publish.mqtt_sink import MqttSink
 from regolithd.daemon.publish.outbox import Outbox
@@ -58,7 +59,8 @@ class Recorder:
 @pytest.fixture
 def service() -> Any:
     """A service whose bus is not open yet, without problems."""
-    return SimpleNamespace(configuration=Configuration(), network=None, recorder=None, bus_problem="")
+    chain = SimpleNamespace(acquisition=Acquisition((), (), 1))
+    return SimpleNamespace(configuration=Configuration(), network=None, recorder=None, bus_problem="", chain=chain)
 
 
 def test_at_the_start_every_alarm_is_published_once_as_not_active(service: Any) -> None:
@@ -213,7 +215,6 @@ async def test_a_babbling_node_does_not_delay_the_end(service: Any, mosquitto: M
     spool = Spool(tmp_path, 100_000_000)
     publisher = Publisher(Configuration(mqtt=mqtt), spool)
     service.liveness = SimpleNamespace(expect=lambda *_: None, ages_s=dict)
-    service.chain = SimpleNamespace(acquisition=SimpleNamespace(counters=AcquisitionCounters()))
     sink = MqttSink(service, publisher)
 
     async def babble() -> None:

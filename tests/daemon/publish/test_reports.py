@@ -14,7 +14,7 @@ from regolithd.daemon.config.configuration import Configuration
 from regolithd.daemon.health.liveness import TaskLiveness
 from regolithd.daemon.messages.header import iso_time, time_fields
 from regolithd.daemon.messages.health import PublishingReport
-from regolithd.daemon.pipeline.snapshot import AcquisitionCounters
+from regolithd.daemon.pipeline.acquire import Acquisition
 from regolithd.daemon.publish import mqtt_sink
 from regolithd.daemon.publish.mqtt_sink import MqttSink, event_fields, node_fields
 from regolithd.drivers.can.bus import BusState
@@ -27,6 +27,7 @@ from regolithd.drivers.devices.node import NodeDescription
 from regolithd.drivers.master.boot_error import BootReason
 from regolithd.drivers.master.cia402 import DriveState
 from regolithd.drivers.master.events import BusStateChanged, Identity, NodeBootFailed, NodeEmergency, NodeLost
+from regolithd.drivers.master.intruders import IntruderWatch
 from regolithd.drivers.master.status import NetworkCounters, NodePhase, NodeStatus
 
 T_NS = 1_700_000_000_000_000_000
@@ -74,13 +75,13 @@ def service(clock: Clock, tmp_path: Path) -> Any:
     counters.sync.produced, counters.sync.skipped, counters.sync.failed = 10, 2, 1
     counters.sync.worst_late_ns, counters.sync.mean_late_ns = 1_500_000, 250_000.0
     bus = SimpleNamespace(state=BusState.PASSIVE, counters=BusCounters(kernel_drops=4))
-    network = SimpleNamespace(bus=bus, counters=counters, status={})
+    network = SimpleNamespace(bus=bus, counters=counters, status={}, intruders=IntruderWatch((), master_id=127))
     return SimpleNamespace(
         configuration=configuration,
         network=network,
         recorder=SimpleNamespace(paths=(tmp_path / "a.mcap", tmp_path / "a.log"), problem=None),
         bus_problem="",
-        chain=SimpleNamespace(acquisition=SimpleNamespace(counters=AcquisitionCounters())),
+        chain=SimpleNamespace(acquisition=Acquisition((), (), 1)),
         liveness=TaskLiveness(clock),
     )
 
