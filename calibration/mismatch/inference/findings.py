@@ -18,10 +18,10 @@ from regolithd.calibration.mismatch.changes import ChangedSize, change_in_words,
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values, wheel_names
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
 from regolithd.calibration.mismatch.inference.intervals import parameters_of
+from regolithd.calibration.mismatch.inference.located import share_of_residual, spell_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
 from regolithd.calibration.mismatch.inference.statements import statement
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
-from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 
 NINETY_PERCENT_STDS = 1.645
 """Half the width of a 90 % interval of a normal density, in standard deviations."""
-BEGINNING, END = 0.01, 0.99
-"""Shares of a curve's power before and after which it counts as not there."""
 
 
 def answer_of(
@@ -152,20 +150,14 @@ def _effect(problem: Problem, term: Term, parameters: Mapping[str, Parameter], e
 def unexplained(decision: Decision, term: Term) -> Unexplained:
     """Return where a smooth term acts, from when to when, and how much of the residual it is."""
     equations, problem = decision.equations, decision.equations.problem
-    on = list(term.wheels)
-    squares = contribution(equations, decision.whole, decision.whole.terms.index(term))[:, on] ** 2
-    before = residual_of(equations, equations.fit(()))[:, on] ** 2
-    power = np.sum(squares, axis=1)
-    grown = np.cumsum(power) / max(float(power.sum()), 1e-300)
-    time_s = problem.time_s[:, 0]
-    first, last = (time_s[min(int(np.searchsorted(grown, part)), len(time_s) - 1)] for part in (BEGINNING, END))
+    first_s, last_s = spell_of(equations, decision.whole, term)
     return Unexplained(
         channel=problem.simulation.channel,
         wheels=wheel_names(problem, term.wheels),
         covariate=term.name,
-        from_s=float(first),
-        to_s=float(last),
-        share_of_residual=min(float(np.sum(squares) / max(float(np.sum(before)), 1e-300)), 1.0),
+        from_s=first_s,
+        to_s=last_s,
+        share_of_residual=share_of_residual(equations, decision.whole, term),
     )
 
 
