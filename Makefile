@@ -9,7 +9,7 @@ export PYTHON
 RECORDINGS ?= ../shared/recordings
 
 .PHONY: help demo test check docs clean install uninstall
-.PHONY: sizing reproduce evaluate loop prove prove-machines real scaling thresholds mutations mutants frames pictures picture
+.PHONY: sizing reproduce evaluate loop prove prove-machines real scaling thresholds mutations mutants frames pictures picture screenshots
 
 help:
 	@awk -F ':.*## ' '/^## / { print "\n" substr($$0, 4) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -86,6 +86,9 @@ pictures: reproduce ## docs/*.svg from the results of sizing, reproduce, evaluat
 	test ! -f build/loop/loop.svg || cp build/loop/loop.svg docs/loop.svg
 	$(BIN)/regolithd pictures
 	$(BIN)/python -m regolithd.daemon.demo.screenshot docs/demo.svg
+
+screenshots: $(DEV) ## docs/ground-*.png: the ground page while a virtual rover drives (4 min; needs mosquitto and chromium)
+	PYTHONPATH=tests/bench $(BIN)/python tests/bench/ground_pictures.py docs
 
 picture: $(DEV) ## the README's first figure: the head of a report (needs chromium)
 	$(BIN)/python -m regolithd.calibration.validation.blind_trials.figures.report_screenshot docs/mismatch-report.png build/picture

@@ -13,7 +13,7 @@ import re
 import tomllib
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args, get_origin
+from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -23,13 +23,17 @@ from regolithd.drivers.errors import DictionaryError
 from regolithd.drivers.master.boot_configuration import boot_writes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from pydantic_core import ErrorDetails
 
     from regolithd.daemon.config.devices import DeviceTable
     from regolithd.drivers.devices.node import NodeDescription
     from regolithd.drivers.devices.profiles.choice import DeviceChoice
+
+    Checks = Callable[["Model"], Iterable[tuple[str, str, str, str]]]
+
+Model = TypeVar("Model", bound=BaseModel)
 
 EXIT_STATUS = 78
 """EX_CONFIG of sysexits.h; the systemd unit has it in RestartPreventExitStatus."""
@@ -62,28 +66,41 @@ class ConfigurationError(Exception):
 
 def read_configuration(path: Path) -> Configuration:
     """Read a `rover.toml`. A relative path in it, under whichever key, is relative to the file's folder."""
+    return read_tables(path, Configuration, _checks_together)
+
+
+def parse_configuration(text: str, path: Path) -> Configuration:
+    """Return the configuration of a TOML text, or raise with all its problems. `path` is the file that it came from."""
+    return _parse(text, path, Configuration, _checks_together)
+
+
+def read_tables(path: Path, model: type[Model], checks: Checks[Model]) -> Model:
+    """Read a TOML file into a model; `checks` yields key, expected, found and remedy of contradictions in it."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not UTF-8"
         raise ConfigurationError([_whole_file(path, reason)]) from error
-    return parse_configuration(text, path)
+    return _parse(text, path, model, checks)
 
 
-def parse_configuration(text: str, path: Path) -> Configuration:
-    """Return the configuration of a TOML text, or raise with all its problems. `path` is the file that it came from."""
+def _parse(text: str, path: Path, model: type[Model], checks: Checks[Model]) -> Model:
     try:
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ConfigurationError([_syntax_problem(path, error)]) from error
     try:
-        configuration = Configuration.model_validate(tables)
+        configuration = model.model_validate(tables)
     except ValidationError as error:
-        found = [_problem(details, text, path) for details in _without_consequences(error.errors())]
+        found = [_problem(details, text, path, model) for details in _without_consequences(error.errors())]
         # Tables that are valid alone may still contradict each other: report that in the same run.
-        raise ConfigurationError(found + _problems_together(_valid_tables(tables), text, path)) from error
+        together = _problems_together(checks(_valid_tables(tables, model)), text, path)
+        raise ConfigurationError(found + together) from error
     configuration = _with_absolute_paths(configuration, path.absolute().parent)
-    if problems := [*_problems_together(configuration, text, path), *_device_problems(configuration, text, path)]:
+    problems = _problems_together(checks(configuration), text, path)
+    if isinstance(configuration, Configuration):
+        problems += _device_problems(configuration, text, path)
+    if problems:
         raise ConfigurationError(problems)
     return configuration
 
@@ -99,16 +116,16 @@ def _syntax_problem(path: Path, error: tomllib.TOMLDecodeError) -> Problem:
     return Problem(str(path), line, "syntax", "valid TOML", f'"{what}"', "Correct this line; the rest was not read.")
 
 
-def _valid_tables(tables: Mapping[str, Any]) -> Configuration:
+def _valid_tables(tables: Mapping[str, Any], model: type[Model]) -> Model:
     valid: dict[str, BaseModel] = {}
-    for name, field in Configuration.model_fields.items():
+    for name, field in model.model_fields.items():
         table = field.annotation
         if name in tables and isinstance(table, type) and issubclass(table, BaseModel):
             try:
                 valid[name] = table.model_validate(tables[name])
             except ValidationError:
                 continue  # its own problems are already in the list
-    return Configuration.model_validate(valid)
+    return model.model_validate(valid)
 
 
 def _without_consequences(errors: list[ErrorDetails]) -> list[ErrorDetails]:
@@ -120,21 +137,21 @@ def _without_consequences(errors: list[ErrorDetails]) -> list[ErrorDetails]:
     ]
 
 
-def _problem(details: ErrorDetails, text: str, path: Path) -> Problem:
+def _problem(details: ErrorDetails, text: str, path: Path, root: type[BaseModel]) -> Problem:
     location = [part for part in details["loc"] if isinstance(part, str)]
     index = "".join(f"[{part}]" for part in details["loc"] if isinstance(part, int))
     key = ".".join(location) + index
     if details["type"] == "extra_forbidden":
-        return _unknown_key(location, key, text, path)
+        return _unknown_key(location, key, text, path, root)
     expected = re.sub(r"^(Input|Value|String|Tuple) should (be |have |match )?", "", details["msg"])
     found = "a table" if isinstance(details["input"], dict) else repr(details["input"])
-    default = _default(location)
+    default = _default(location, root)
     remedy = f"Change it, or leave it out for {default}." if default is not None else "Change it."
     return Problem(str(path), line_of(text, location), key, expected, found, remedy)
 
 
-def _unknown_key(location: list[str], key: str, text: str, path: Path) -> Problem:
-    model = _model_at(location[:-1])
+def _unknown_key(location: list[str], key: str, text: str, path: Path, root: type[BaseModel]) -> Problem:
+    model = _model_at(location[:-1], root)
     known = list(model.model_fields) if model else []
     near = difflib.get_close_matches(location[-1], known, n=1)
     remedy = f"Did you mean {near[0]}?" if near else "Remove it."
@@ -144,8 +161,8 @@ def _unknown_key(location: list[str], key: str, text: str, path: Path) -> Proble
     )
 
 
-def _model_at(location: list[str]) -> type[BaseModel] | None:
-    model: type[BaseModel] = Configuration
+def _model_at(location: list[str], root: type[BaseModel]) -> type[BaseModel] | None:
+    model = root
     tables: type[BaseModel] | None = None
     for name in location:
         if tables is not None:  # `name` is one that the user gave
@@ -161,16 +178,16 @@ def _model_at(location: list[str]) -> type[BaseModel] | None:
     return model if tables is None else None
 
 
-def _default(location: list[str]) -> str | None:
-    model = _model_at(location[:-1])
+def _default(location: list[str], root: type[BaseModel]) -> str | None:
+    model = _model_at(location[:-1], root)
     field = model.model_fields.get(location[-1]) if model else None
     if field is None or field.is_required() or isinstance(field.default, BaseModel):
         return None
     return "none" if field.default is None else str(field.default)
 
 
-def _problems_together(configuration: Configuration, text: str, path: Path) -> list[Problem]:
-    return [_at(text, path, *each) for each in _checks_together(configuration)]
+def _problems_together(found: Iterable[tuple[str, str, str, str]], text: str, path: Path) -> list[Problem]:
+    return [_at(text, path, *each) for each in found]
 
 
 def _checks_together(configuration: Configuration) -> Iterator[tuple[str, str, str, str]]:
@@ -239,14 +256,14 @@ def _shared_node_ids(nodes: Nodes) -> Iterator[tuple[str, str, str, str]]:
         taken.setdefault(node, name)
 
 
-def _with_absolute_paths(configuration: Configuration, folder: Path) -> Configuration:
+def _with_absolute_paths(configuration: Model, folder: Path) -> Model:
     """Return the configuration with every path in it absolute; a relative one is relative to `folder`."""
-    changed: dict[str, BaseModel | dict[str, DeviceTable]] = {
-        "devices": {
+    changed: dict[str, BaseModel | dict[str, DeviceTable]] = {}
+    if isinstance(configuration, Configuration):
+        changed["devices"] = {
             name: each.model_copy(update={"eds": folder / each.eds}) if each.eds else each
             for name, each in configuration.devices.items()
         }
-    }
     for name, table in configuration:
         if not isinstance(table, BaseModel):
             continue

@@ -1,0 +1,58 @@
+// Nodes, events, the last comparison with the simulation, and downloads.
+import { content, el, replace } from "./dom.js";
+import { moment, number, PLACES } from "./format.js";
+
+const KINDS = ["snapshot", "posterior", "odometry", "alarm", "event", "emcy", "node"];
+
+export function showNodes(latest) {
+  const nodes = Object.entries(latest).filter(([topic]) => topic.startsWith("node/")).map(([, node]) => node);
+  nodes.sort((a, b) => a.node_id - b.node_id);
+  replace(content("nodes"), JSON.stringify(nodes.map((node) => [node.node_id, node.phase, node.drive_state, node.text])), () => {
+    if (!nodes.length) return [el("p", { class: "none" }, "No node reported yet.")];
+    const row = (node) => el("tr", { class: node.phase === "operational" ? "" : "bad" },
+      el("th", { scope: "row" }, String(node.node_id)), el("td", {}, node.kind),
+      el("td", {}, node.wheel ? `${node.wheel} ${PLACES[node.wheel - 1]}` : "body"),
+      el("td", {}, node.phase), el("td", {}, node.drive_state ?? ""), el("td", {}, node.phase === "operational" ? "" : node.text));
+    const names = ["node", "kind", "wheel", "phase", "drive", "fault"];
+    return [el("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Table of nodes" },
+      el("table", {}, el("thead", {}, el("tr", {}, ...names.map((name) => el("th", { scope: "col" }, name)))),
+        el("tbody", {}, ...nodes.map(row))))];
+  });
+}
+
+export function showLog(lines) {
+  replace(content("log"), JSON.stringify(lines.slice(0, 3)) + lines.length, () => {
+    if (!lines.length) return [el("p", { class: "none" }, "No event yet.")];
+    return [el("ol", { reversed: true }, ...lines.map((line) =>
+      el("li", {}, el("time", { datetime: new Date(line.time_ms).toISOString() }, moment(line.time_ms).slice(5, 19)), " ",
+        el("b", {}, line.kind), ` ${line.text}`, line.who ? el("em", {}, ` ${line.who}`) : null,
+        line.late ? el("small", {}, " back-filled") : null)))];
+  });
+}
+
+function effectRow(effect) {
+  const interval = effect.low === null ? "" : `${number(effect.low, 3)} to ${number(effect.high, 3)}`;
+  return el("tr", {}, el("th", { scope: "row" }, effect.name), el("td", {}, effect.where),
+    el("td", {}, `${number(effect.size, 3)} ${effect.unit}`), el("td", {}, interval));
+}
+
+export function showComparison(message) {
+  replace(content("comparison"), JSON.stringify(message ?? null), () => {
+    if (!message) return [el("p", { class: "none" }, "None yet: it is made after each traverse.")];
+    const names = ["effect", "where", "size", "90 % interval"];
+    return [
+      el("p", { class: `verdict ${message.verdict}` }, el("b", {}, message.verdict), ` ${message.text}`),
+      message.effects.length ? el("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Table of effects" },
+        el("table", {}, el("thead", {}, el("tr", {}, ...names.map((name) => el("th", { scope: "col" }, name)))),
+          el("tbody", {}, ...message.effects.map(effectRow)))) : null,
+      el("p", { class: "history" }, `${message.recording} · ${moment(message.time)} · report: ${message.report}`),
+    ].filter(Boolean);
+  });
+}
+
+export function showDownloads(rover, from, to) {
+  const link = (kind, format) => el("a", { href: `/download/${encodeURIComponent(rover)}/${kind}.${format}?from=${from}&to=${to}`, download: true,
+    "aria-label": `${kind} as ${format}` }, format === "csv" ? "CSV" : "Parquet");
+  replace(content("downloads"), `${rover} ${from} ${to}`, () => [
+    el("ul", {}, ...KINDS.map((kind) => el("li", {}, `${kind}: `, link(kind, "csv"), " ", link(kind, "parquet"))))]);
+}

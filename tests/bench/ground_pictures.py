@@ -1,0 +1,76 @@
+"""Pictures of the ground page: a virtual rover drives from medium soil into sand, with an outage of the broker before.
+
+    python tests/bench/ground_pictures.py FOLDER
+
+Writes ground-light.png, ground-dark.png and ground-phone.png; takes four minutes.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from broker import Mosquitto
+from ground_rig import GroundRig, chromium, until
+from playwright.sync_api import Browser, sync_playwright
+
+SCENARIO = """
+[[ground.stretches]]
+soil = "medium-soil"
+until_m = 6.5
+[[ground.stretches]]
+soil = "lete-sand"
+"""
+OUTAGE_AFTER_S, OUTAGE_S = 60, 12
+AFTER_ALARM_S = 25
+LOOKS = {
+    "light": {"viewport": {"width": 1400, "height": 1120}},
+    "dark": {"viewport": {"width": 1400, "height": 1120}, "color_scheme": "dark"},
+    "phone": {"viewport": {"width": 390, "height": 844}, "device_scale_factor": 2, "is_mobile": True},
+}
+
+
+def drive(rig: GroundRig) -> None:
+    """Drive until some time after the alarm."""
+    rig.broker.start()
+    rig.start_ground()
+    rig.start_daemon(SCENARIO)
+    time.sleep(OUTAGE_AFTER_S)
+    rig.broker.stop()
+    time.sleep(OUTAGE_S)
+    rig.broker.start()
+    until(lambda: "soil-change" in str(rig.get("/api/state")["rovers"]["kapvik"]["alarms"]), "the alarm", 240)
+    time.sleep(AFTER_ALARM_S)
+
+
+def photograph(browser: Browser, rig: GroundRig, folder: Path) -> None:
+    """Write the pictures."""
+    for name, look in LOOKS.items():
+        page = browser.new_page(**look)  # type: ignore[arg-type]
+        page.goto(f"{rig.url}/#kapvik")
+        page.locator("#who").fill("Ada")
+        page.locator("h1").click()
+        page.wait_for_timeout(2500)
+        page.screenshot(path=folder / f"ground-{name}.png")
+        page.close()
+
+
+def main(folder: Path) -> None:
+    """Drive and photograph."""
+    with tempfile.TemporaryDirectory() as temporary, sync_playwright() as playwright:
+        place = Path(temporary)
+        settings = f"allow_anonymous true\npersistence true\npersistence_location {place}/\nmax_queued_messages 10000\n"
+        rig = GroundRig(place, Mosquitto(place, settings=settings))
+        try:
+            drive(rig)
+            browser = playwright.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
+            photograph(browser, rig, folder)
+        finally:
+            rig.end()
+            rig.broker.stop()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

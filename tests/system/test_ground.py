@@ -1,0 +1,362 @@
+"""The ground in Chromium, against mosquitto, the daemon and the virtual rover: what an operator sees and does."""
+
+from __future__ import annotations
+
+import re
+import signal
+import sqlite3
+import time
+from contextlib import closing
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from broker import Mosquitto, mosquitto_program
+from ground_rig import GroundRig, chromium, until
+from playwright.sync_api import expect, sync_playwright
+
+from regolithd.daemon.ground.web.users import add_user
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from playwright.sync_api import Browser, Page
+
+pytestmark = pytest.mark.timeout(180)
+PATIENCE_MS = 20_000
+EVIDENCE = {
+    "onset": "2026-11-22T04:00:00.000000000Z",
+    "direction": "fall",
+    "wheels": [1, 2],
+    "torque_ratio": 0.29,
+    "statistic": 11.1,
+    "threshold": 10.8,
+    "cohesion_fell": 0.91,
+    "friction_angle_fell": 0.6,
+    "drawbar_margin_fell": 0.71,
+}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """Chromium."""
+    program = chromium()
+    if program is None:
+        pytest.skip("no browser here: apt-get install chromium")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[GroundRig]:
+    """A broker, a ground, and a rover that has driven for some seconds."""
+    if mosquitto_program() is None:
+        pytest.skip("no broker here: apt-get install mosquitto")
+    folder = tmp_path_factory.mktemp("ground")
+    settings = f"allow_anonymous true\npersistence true\npersistence_location {folder}/\nmax_queued_messages 10000\n"
+    broker = Mosquitto(folder, settings=settings)
+    rig = GroundRig(folder, broker)
+    try:
+        broker.start()
+        rig.start_ground()
+        rig.start_daemon()
+        until(lambda: messages(rig, "posterior") > 8, "the first posteriors are stored")
+        yield rig
+    finally:
+        rig.end()
+        broker.stop()
+
+
+@pytest.fixture
+def page(browser: Browser, rig: GroundRig) -> Iterator[Page]:
+    """The page of the rover, without an error in the browser's console at its end."""
+    page = browser.new_page(viewport={"width": 1500, "height": 1000})
+    problems: list[str] = []
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    page.on("console", lambda line: problems.append(line.text) if line.type == "error" else None)
+    page.set_default_timeout(PATIENCE_MS)
+    page.goto(f"{rig.url}/#kapvik")
+    yield page
+    page.close()
+    assert not [each for each in problems if not re.search(r"ERR_|status of 400", each)]
+
+
+def messages(rig: GroundRig, topic: str) -> int:
+    """Return how many messages of a topic are stored."""
+    with closing(sqlite3.connect(rig.database)) as connection:
+        query = "SELECT count(*) FROM message JOIN topic ON topic.id = message.topic WHERE topic.name = ?"
+        return int(connection.execute(query, (topic,)).fetchone()[0])
+
+
+def coloured(page: Page, place: str) -> int:
+    """Return how many pixels of a canvas are drawn in a colour (not grey)."""
+    script = """canvas => {
+        const {data} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+        let count = 0;
+        for (let k = 0; k < data.length; k += 4)
+            if (data[k + 3] > 40 && Math.abs(data[k] - data[k + 1]) + Math.abs(data[k + 1] - data[k + 2]) > 25) count++;
+        return count; }"""
+    return int(page.locator(place).first.evaluate(script))
+
+
+def test_the_present_state_is_shown_and_moves(page: Page) -> None:
+    """Rover online, age of the data, six wheels with numbers that change, intervals of the soil and the track drawn."""
+    expect(page.locator("#presence")).to_contain_text(
+        re.compile(r"kapvik: online · data \d\.\d s old"), timeout=PATIENCE_MS
+    )
+    load = page.locator('[data-wheel="3"] [data-value="load_N"]')
+    expect(load).to_have_text(re.compile(r"\d+\.\d"), timeout=PATIENCE_MS)
+    first = load.text_content()
+    expect(load).not_to_have_text(first or "", timeout=PATIENCE_MS)
+    expect(page.locator("#plots figcaption output").first).to_contain_text("kPa (90 %:", timeout=PATIENCE_MS)
+    for place in (
+        "#plots .three figure:nth-child(1) canvas",
+        "#plots .three figure:nth-child(3) canvas",
+        "#track canvas",
+    ):
+        until(lambda place=place: coloured(page, place) > 100, f"{place} is drawn")
+    expect(page.locator("#track .legend")).to_contain_text("m driven")
+    expect(page.locator("#nodes tbody tr")).to_have_count(14)
+
+
+def test_an_alarm_stays_until_somebody_acknowledges_it(page: Page, rig: GroundRig) -> None:
+    """It begins, ends and stays; it is acknowledged with a name only, which stands in the journal."""
+    rig.inject_fault("off 13")
+    alarm = page.locator('[data-alarm="node-13"]')
+    expect(alarm.locator(".state")).to_have_text("active, unacknowledged", timeout=PATIENCE_MS)
+    expect(page.locator("#announcement")).to_contain_text("Alarm node-13, error")
+    rig.inject_fault("on 13")
+    expect(alarm.locator(".state")).to_have_text("cleared, unacknowledged", timeout=PATIENCE_MS)
+    expect(alarm).to_contain_text("no heartbeat for")
+    alarm.get_by_role("button", name="Acknowledge").press("Enter")
+    expect(page.locator("#problem")).to_contain_text("Enter your name first")
+    page.locator("#who").fill("Ada")
+    alarm.get_by_role("button", name="Acknowledge").press("Enter")
+    expect(alarm).to_have_count(0)
+    expect(page.locator("#log")).to_contain_text("node-13 acknowledged Ada")
+    page.reload()
+    expect(page.locator("#log")).to_contain_text("node-13 acknowledged Ada")
+    expect(alarm).to_have_count(0)
+
+
+def test_a_latching_alarm_of_another_rover_shows_its_evidence_and_needs_a_reset(page: Page, rig: GroundRig) -> None:
+    """Its end leaves it latched with the evidence as numbers; acknowledged it waits for a reset; it can be shelved."""
+    fields: dict[str, Any] = {"name": "soil-change", "severity": "warning", "latching": True, "evidence": EVIDENCE}
+    rig.publish("alarm/soil-change", "alarm", **fields, sequence=1, active=True, text="the soil is weaker")
+    rig.publish("alarm/soil-change", "alarm", **fields, sequence=2, active=False, text="the soil is weaker")
+    page.locator('[data-rover="other"]').click()
+    alarm = page.locator('[data-alarm="soil-change"]')
+    expect(alarm.locator(".state")).to_have_text("latched, unacknowledged")
+    for text in ("04:00:00", "1, 2", "29 %", "11.1, 10.8", "91 %", "60 %", "71 %"):
+        expect(alarm.locator(".evidence")).to_contain_text(text)
+    page.locator("#who").fill("Grace")
+    alarm.get_by_label("Shelve soil-change for").select_option("15 min")
+    expect(alarm.locator(".state")).to_have_text("shelved")
+    expect(alarm).to_contain_text("by Grace")
+    alarm.get_by_role("button", name="Unshelve").click()
+    alarm.get_by_role("button", name="Acknowledge").click()
+    expect(alarm.locator(".state")).to_have_text("latched, acknowledged")
+    alarm.get_by_role("button", name="Reset").click()
+    expect(alarm).to_have_count(0)
+
+
+def test_an_outage_of_the_broker_is_back_filled_and_marked(page: Page, rig: GroundRig) -> None:
+    """Without the broker the page says so; afterwards the gap is filled, marked, and each snapshot stored once."""
+    expect(page.locator("#presence")).to_contain_text("online", timeout=PATIENCE_MS)
+    rig.broker.stop()
+    expect(page.locator("#problem")).to_contain_text("connection refused", timeout=PATIENCE_MS)
+    expect(page.locator("#presence")).to_contain_text("unknown: no connection")
+    time.sleep(4)
+    rig.broker.start()
+    expect(page.locator("#presence")).to_contain_text("online", timeout=2 * PATIENCE_MS)
+
+    def late() -> float:
+        columns = rig.get("/api/history/kapvik")["snapshot"]
+        return sum(columns["late"])
+
+    until(lambda: late() > 0, "late messages are stored")
+    until(lambda: page.evaluate("document.querySelector('#plots .wheel-key') !== null"), "the plots exist")
+    now_ms = round(1000 * time.time())
+    history = rig.get(f"/api/history/kapvik?from={now_ms - 100_000}&to={now_ms}")["snapshot"]
+    pauses = [later - earlier for earlier, later in zip(history["time_ms"], history["time_ms"][1:], strict=False)]
+    assert max(pauses) < 1000, "no gap is left"
+    assert 20 < sum(history["late"]) < len(history["late"])
+    with closing(sqlite3.connect(rig.database)) as connection:
+        ((count, different),) = connection.execute(
+            "SELECT count(*), count(DISTINCT sequence) FROM message JOIN topic ON topic.id = topic"
+            " WHERE name = 'snapshot'"
+        )
+    assert count == different
+
+
+def test_a_killed_ground_has_lost_nothing_and_the_page_finds_it_again(page: Page, rig: GroundRig) -> None:
+    """SIGKILL: the broker keeps what comes meanwhile; history and journal are there, without gap or repetition."""
+    expect(page.locator("#presence")).to_contain_text("online", timeout=PATIENCE_MS)
+    before = rig.get("/api/log/kapvik")
+    rig.stop("ground", signal.SIGKILL)
+    expect(page.locator("#problem")).to_contain_text("No connection to the ground's server")
+    time.sleep(2)
+    rig.start_ground()
+    expect(page.locator("#problem")).to_be_hidden(timeout=PATIENCE_MS)
+    expect(page.locator("#presence")).to_contain_text("online", timeout=PATIENCE_MS)
+    until(
+        lambda: len(sequences(rig)) > 0 and sequences(rig) == list(range(len(sequences(rig)))),
+        "every snapshot is stored",
+    )
+    assert rig.get("/api/log/kapvik")[-len(before) :] == before
+
+
+def complete(numbers: list[int]) -> bool:
+    """Return whether numbers count from 0 without gap and repetition."""
+    return bool(numbers) and numbers == list(range(len(numbers)))
+
+
+def sequences(rig: GroundRig) -> list[int]:
+    """Return the sequence numbers of all stored snapshots."""
+    with closing(sqlite3.connect(rig.database)) as connection:
+        rows = connection.execute(
+            "SELECT sequence FROM message JOIN topic ON topic.id = topic WHERE name = 'snapshot' ORDER BY sequence"
+        )
+        return [row[0] for row in rows]
+
+
+@pytest.mark.parametrize("look", ["light", "dark", "phone"])
+def test_the_page_is_accessible(browser: Browser, rig: GroundRig, look: str) -> None:
+    """axe-core finds nothing serious, with an alarm shown, and nothing is wider than the phone's screen."""
+    rig.publish(
+        "alarm/bus", "alarm", rover=look, name="bus", severity="critical", active=True, text="bus-off", sequence=1
+    )
+    width = 390 if look == "phone" else 1400
+    page = browser.new_page(
+        viewport={"width": width, "height": 844}, color_scheme="dark" if look == "dark" else "light"
+    )
+    page.goto(f"{rig.url}/#{look}")
+    expect(page.locator('[data-alarm="bus"]')).to_be_visible(timeout=PATIENCE_MS)
+    found = Axe().run(page).response["violations"]
+    serious = [each for each in found if each["impact"] in {"serious", "critical"}]
+    assert [(each["id"], node["target"], node["failureSummary"]) for each in serious for node in each["nodes"]] == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.close()
+
+
+def test_every_table_can_be_downloaded(rig: GroundRig, page: Page) -> None:
+    """The links of the page give CSV and Parquet with the same rows."""
+    import io  # noqa: PLC0415  # only here
+    import urllib.request  # noqa: PLC0415
+
+    import pandas as pd  # noqa: PLC0415  # slow to import
+
+    expect(page.locator("#downloads a").first).to_be_visible(timeout=PATIENCE_MS)
+    for kind in ("snapshot", "posterior", "odometry", "alarm", "event", "node"):
+        links = {}
+        for form in ("csv", "parquet"):
+            link = page.locator(f'#downloads a[aria-label="{kind} as {form}"]').get_attribute("href")
+            assert link
+            with urllib.request.urlopen(rig.url + link.partition("&to")[0] + "&to=1e15", timeout=20) as answer:
+                links[form] = answer.read()
+        table = pd.read_csv(io.BytesIO(links["csv"]))
+        assert 0 < len(table) <= len(pd.read_parquet(io.BytesIO(links["parquet"])))
+        assert (table["time_ms"].diff().dropna() >= 0).all()
+    assert "load_N_6" in pd.read_csv(io.BytesIO(links["csv"])).columns or kind == "node"
+
+
+def test_an_hour_at_ten_hertz_is_drawn_fluently(rig: GroundRig, browser: Browser) -> None:
+    """A range of one hour at 10 Hz is read in some seconds, and frames keep coming while data arrive."""
+    with closing(sqlite3.connect(rig.database, timeout=20)) as connection:
+        fill_hour(connection)
+    page = browser.new_page(viewport={"width": 1500, "height": 1000})
+    page.goto(f"{rig.url}/#kapvik")
+    expect(page.locator("#presence")).to_contain_text("online", timeout=PATIENCE_MS)
+    begun = time.monotonic()
+    with page.expect_response(lambda answer: "/api/history" in answer.url):
+        page.locator("#span").select_option("1 h")
+    assert time.monotonic() - begun < 5
+    frames = page.evaluate(
+        """async () => { const frames = []; let last = performance.now();
+        for (let k = 0; k < 60; k++) { await new Promise(requestAnimationFrame);
+            const now = performance.now(); frames.push(now - last); last = now; }
+        return frames.sort((a, b) => a - b); }"""
+    )
+    print(f"frame times: median {frames[30]:.0f} ms, 90 % below {frames[54]:.0f} ms")
+    assert frames[30] < 60
+    assert frames[54] < 600
+    page.close()
+
+
+def fill_hour(connection: sqlite3.Connection) -> None:
+    """Copy the means of some minutes over the hour before: as many points as an hour has."""
+    rows = connection.execute("SELECT * FROM bucket WHERE span_s = 2 ORDER BY start_s").fetchall()
+    first = rows[0][3]
+    copies = [
+        (*row[:3], row[3] - shift, *row[4:]) for row in rows for shift in range(60, 3600, 60) if row[3] < first + 60
+    ]
+    connection.executemany("INSERT OR IGNORE INTO bucket VALUES (?, ?, ?, ?, ?, ?, ?)", copies)
+    connection.commit()
+
+
+def test_a_rover_that_ends_is_offline_and_grey(page: Page, rig: GroundRig) -> None:
+    """After its end the rover is offline with the reason, and what is shown of it is marked as last known."""
+    expect(page.locator("#presence")).to_contain_text("online", timeout=PATIENCE_MS)
+    assert rig.stop("daemon") == 0
+    expect(page.locator("#presence")).to_contain_text(re.compile(r"offline since \d\d:\d\d:\d\d \(stopped\)"))
+    assert "offline" in (page.locator("#rover").get_attribute("class") or "")
+    assert "grayscale(1)" in page.locator("#wheels .content").evaluate("e => getComputedStyle(e).filter")
+    expect(page.locator('[data-wheel="1"] [data-value="load_N"]')).to_have_text(re.compile(r"\d"))
+    page.reload()
+    expect(page.locator("#presence")).to_contain_text("offline")
+    until(lambda: coloured(page, "#track canvas") > 100, "the track is still there")
+
+
+def test_with_users_a_password_is_needed(browser: Browser, tmp_path: Path, mosquitto: Mosquitto) -> None:
+    """Nothing is shown or done without login; a wrong password is refused; actions carry the login's name."""
+    rig = GroundRig(tmp_path, mosquitto, page='users = "users"')
+    add_user(tmp_path / "users", "ada", "difference engine")
+    try:
+        rig.start_ground()
+        rig.publish("alarm/bus", "alarm", rover="kapvik", name="bus", severity="critical", active=True, sequence=1)
+        status, answer = rig.post("/api/alarms/kapvik/bus", {"action": "acknowledged", "who": "Eve"})
+        assert (status, answer["error"]) == (401, "You are not logged in.")
+        page = browser.new_page()
+        page.goto(rig.url)
+        page.get_by_label("Name").fill("ada")
+        page.get_by_label("Password").fill("analytical engine")
+        page.get_by_role("button", name="Log in").click()
+        expect(page.get_by_role("alert")).to_have_text("Name or password is wrong.")
+        page.get_by_label("Password").fill("difference engine")
+        page.get_by_role("button", name="Log in").click()
+        page.get_by_role("button", name="Acknowledge: bus").click()
+        expect(page.locator('[data-alarm="bus"]')).to_contain_text("by ada")
+        rig.stop("ground", signal.SIGKILL)
+        rig.start_ground()
+        page.reload()
+        expect(page.locator("#user")).to_have_text("ada")
+        page.get_by_role("button", name="Log out").click()
+        expect(page.get_by_label("Password")).to_be_visible()
+        assert "difference" not in (tmp_path / "users").read_text()
+        page.close()
+        for _ in range(5):
+            status, answer = rig.post("/login", {"name": "ada", "password": "guess"})
+        assert status == 401
+        assert rig.post("/login", {"name": "ada", "password": "difference engine"})[0] == 429
+    finally:
+        rig.end()
+
+
+def test_other_web_sites_are_refused(tmp_path: Path, mosquitto: Mosquitto) -> None:
+    """A request that another page makes, or that names another host, is refused; so is a second ground on the store."""
+    rig = GroundRig(tmp_path, mosquitto)
+    try:
+        rig.start_ground()
+        assert (
+            rig.post("/api/alarms/a/b", {"action": "acknowledged", "who": "E"}, Origin="http://evil.example")[0] == 403
+        )
+        assert rig.post("/api/alarms/a/b", {"action": "acknowledged", "who": "E"}, Host="evil.example")[0] == 421
+        assert rig.post("/api/alarms/a/b", {"action": "acknowledged", "who": "E"})[0] == 409
+        rig.spawn("second", "-m", "regolithd", "ground", "--config", "ground.toml")
+        assert rig.processes["second"].wait(30) == 1
+        assert "is in use by another" in rig.output("second")
+    finally:
+        rig.end()
