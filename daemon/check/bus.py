@@ -25,6 +25,12 @@ _UP = 0x1  # IFF_UP
 _HIGH_LOAD = 0.8  # bus load above which frames of low priority are delayed
 
 
+CONFIGURATION_REMEDY = (
+    "It cannot be booted like this: name the EDS of this firmware in [devices], state other objects or units there, or "
+    "set the value with the maker's program."
+)
+
+
 async def check_bus(configuration: Configuration, running: Status | None) -> list[Finding]:
     """Check the link; then probe every node, or ask the running daemon for their states."""
     bus = configuration.bus
@@ -128,11 +134,29 @@ def judge_nodes(found: list[ScanResult]) -> list[Finding]:
         for each in found
         if each.problem
     ]
+    for each in found:
+        lines += [
+            (wrong if each.node.required else warning)(f"node {each.node.node_id}", text, CONFIGURATION_REMEDY)
+            for text in each.differences
+        ]
+    lines += _reservations(found)
     well = Counter(each.node.kind for each in found if not each.problem)
     if well:
         kinds = ", ".join(f"{count} {kind}" for kind, count in well.items())
         lines.insert(0, good("nodes", f"{well.total()} of {len(found)} answer with the expected identity: {kinds}"))
     return lines
+
+
+def _reservations(found: list[ScanResult]) -> list[Finding]:
+    """Return one warning for each thing that cannot be checked, with the nodes that it concerns."""
+    nodes: dict[str, list[int]] = {}
+    for each in found:
+        if each.reservations:
+            nodes.setdefault(each.reservations.removeprefix("; "), []).append(each.node.node_id)
+    remedy = "What is not checked can be stated in [devices], so that another device is noticed."
+    return [
+        warning(f"node{'s' * (len(ids) > 1)} {', '.join(map(str, ids))}", text, remedy) for text, ids in nodes.items()
+    ]
 
 
 def nodes_of_daemon(status: Status) -> list[Finding]:
