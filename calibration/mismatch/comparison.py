@@ -6,23 +6,27 @@ recording, simulation ─▶ problem ─▶ equations ─▶ decision ─▶ ans
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from regolithd.calibration.mismatch.calibration import bent, linearised_where_it_fits, moved_values
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, with_changes
+from regolithd.calibration.mismatch.corrected import write_corrected
+from regolithd.calibration.mismatch.data.recording import as_recording
 from regolithd.calibration.mismatch.inference.evidence import evidence_of
 from regolithd.calibration.mismatch.inference.findings import answer_of
 from regolithd.calibration.mismatch.inference.held_out import earned
 from regolithd.calibration.mismatch.inference.several_channels import merged_answers
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.equations import equations_of
+from regolithd.calibration.mismatch.report.notebook import notebook_html
 from regolithd.calibration.mismatch.selection.decision import decide
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
 
     from regolithd.calibration.mismatch.answer import Answer, Contribution, Evidence
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
@@ -37,17 +41,35 @@ SEARCHES = 2
 
 @dataclass(frozen=True)
 class Comparison:
-    """The answer, and the arrays behind it."""
+    """The answer, the arrays behind it, and the simulation; a notebook shows it as the report."""
 
     answer: Answer
     evidence: Evidence
+    simulation: Simulation
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what `regolithd mismatch --json` writes."""
+        return self.answer.to_json()
+
+    def write_corrected(self, path: Path) -> None:
+        """Write the corrected SIM.toml, as `regolithd mismatch --corrected` does.
+
+        Raises
+        ------
+        SimulationError
+            When the simulation does not come from a SIM.toml.
+        """
+        write_corrected(path, self.answer, self.evidence, self.simulation)
+
+    def _repr_html_(self) -> str:
+        return notebook_html(self.answer, self.evidence)
 
 
 def compare(
-    recording: Recording,
+    recording: Recording | object,
     simulation: Simulation,
     *,
-    effects: Sequence[Contribution] = (),
+    effects: Sequence[Contribution] | None = None,
     thresholds: Thresholds = THRESHOLDS,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Comparison:
@@ -55,7 +77,8 @@ def compare(
 
     Parameters
     ----------
-    effects: those that the simulation has already (from an earlier `--corrected`)
+    recording: as `read_recording` returns it, or a table: a data frame (pandas, polars, pyarrow), a mapping of arrays
+    effects: those that the simulation has already; None: its own, as `--corrected` wrote them
     thresholds: the numbers that decide, for studies of them
     progress: called with the name of each stage
 
@@ -64,11 +87,13 @@ def compare(
     MismatchError
         When there is nothing to compare.
     """
+    recorded = as_recording(recording, unit=simulation.wheel_column)
+    effects = simulation.corrected_effects if effects is None else effects
     if simulation.channels:
         found = [
             _labelled(
                 compare(
-                    recording,
+                    recorded,
                     OneChannel(simulation, channel),
                     effects=[e for e in effects if e.channel == channel],
                     thresholds=thresholds,
@@ -78,13 +103,13 @@ def compare(
             )
             for channel in simulation.channels
         ]
-        return merged(found)
+        return merged(found, simulation)
     progress("simulating")
     candidates: Sequence[Candidate] = [each.form_for(simulation) for each in simulation.candidates(library())]
     stated = stated_in(candidates, effects, simulation.stated_effects())
 
     def pose(values: Mapping[str, float] | None) -> Problem:
-        return corrected_problem(build_problem(recording, simulation, values, thresholds=thresholds), stated)
+        return corrected_problem(build_problem(recorded, simulation, values, thresholds=thresholds), stated)
 
     problem = linearised_where_it_fits(pose)
     candidates = with_changes(problem, candidates, stated)
@@ -106,7 +131,7 @@ def compare(
         covariate_labels=problem.labels,
         wheel_column=simulation.wheel_column,
     )
-    return Comparison(answer, evidence)
+    return Comparison(answer, evidence, simulation)
 
 
 def _labelled(comparison: Comparison, channel: str) -> Comparison:
@@ -115,12 +140,13 @@ def _labelled(comparison: Comparison, channel: str) -> Comparison:
     return replace(comparison, evidence=replace(comparison.evidence, contributions=terms))
 
 
-def merged(comparisons: Sequence[Comparison]) -> Comparison:
-    """Return one comparison of several channels: every finding, and the evidence of each channel."""
+def merged(comparisons: Sequence[Comparison], simulation: Simulation) -> Comparison:
+    """Return one comparison of all channels of a simulation: every finding, and the evidence of each channel."""
     answer = merged_answers([each.answer for each in comparisons])
     first, *others = (each.evidence for each in comparisons)
     # As in one channel: the terms of named effects, then those of changes.
     named = [term for each in comparisons for term in each.evidence.contributions[: len(each.answer.effects)]]
     changes = [term for each in comparisons for term in each.evidence.contributions[len(each.answer.effects) :]]
     values = {parameter.name: parameter.value for parameter in answer.parameters}
-    return Comparison(answer, replace(first, contributions=(*named, *changes), values=values, others=tuple(others)))
+    evidence = replace(first, contributions=(*named, *changes), values=values, others=tuple(others))
+    return Comparison(answer, evidence, simulation)

@@ -6,19 +6,24 @@ to `[[effects]]`, each with its shape, coefficients and wheels, and are added to
 
 from __future__ import annotations
 
+import os
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import Contribution, Effect
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.prior import own_name
+from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects as stated_effects  # noqa: PLC0414  # for its users
+from regolithd.calibration.mismatch.simulation.load import model_folder, read_tables
+from regolithd.calibration.toml_document import with_tables
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
+    from regolithd.calibration.mismatch.answer import Answer, Contribution, Effect, Evidence
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]
@@ -27,6 +32,28 @@ FURTHEST_STD = 3.0
 """Standard deviations of its prior that a parameter may move (a choice: one in 370 lies further)."""
 INTERVAL_STDS = 2 * 1.645
 """Width of a 90 % interval of a normal density, in standard deviations."""
+
+
+def write_corrected(path: Path, answer: Answer, evidence: Evidence, simulation: Simulation) -> None:
+    """Write SIM.toml with the calibrated parameters and the effects; the user's comments and order stay.
+
+    In another folder than SIM.toml, `[simulation] path` leads to the user's class or FMU.
+
+    Raises
+    ------
+    SimulationError
+        When the simulation does not come from a SIM.toml.
+    """
+    source = simulation.source
+    if source is None:
+        raise SimulationError("a corrected simulation is a SIM.toml: load the simulation from one, by load_simulation")
+    tables, terms = read_tables(source), evidence.contributions
+    imitating = bool(answer.unexplained)
+    new = corrected_tables(tables, simulation, evidence.values, terms, answer.effects, within_priors=imitating)
+    if path.resolve().parent != source.resolve().parent and tables["simulation"]["model"] != "rover-wheel":
+        folder = model_folder(tables, source.resolve().parent)
+        new["simulation"] = {**new["simulation"], "path": os.path.relpath(folder.resolve(), path.resolve().parent)}
+    path.write_text(with_tables(source.read_text(encoding="utf-8-sig"), new), encoding="utf-8")
 
 
 def corrected_tables(
@@ -103,29 +130,3 @@ def _plain(value: Any) -> Any:  # noqa: ANN401  # what TOML can hold
     if isinstance(value, list | tuple):
         return [_plain(inner) for inner in value]
     return float(value) if isinstance(value, float) else value
-
-
-def stated_effects(tables: Mapping[str, Any]) -> tuple[Contribution, ...]:
-    """Return the effects that SIM.toml has already.
-
-    Raises
-    ------
-    SimulationError
-        When one of them is not as `--corrected` writes it.
-    """
-    found = []
-    for number, effect in enumerate(tables.get("effects", []), 1):
-        try:
-            found.append(
-                Contribution(
-                    str(effect["name"]),
-                    dict(effect["shape"]),
-                    tuple(float(c) for c in effect["coefficients"]),
-                    tuple(w if isinstance(w, str) else int(w) for w in effect["wheels"]),
-                    float(effect.get("relative_std", 0.0)),
-                    str(effect.get("channel", "")),
-                )
-            )
-        except (KeyError, TypeError, ValueError) as error:
-            raise SimulationError(f"effect {number} needs name, shape, coefficients and wheels: {error}") from error
-    return tuple(found)

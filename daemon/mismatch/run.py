@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from regolithd.calibration.mismatch.comparison import compare
-from regolithd.calibration.mismatch.corrected import stated_effects
-from regolithd.calibration.mismatch.errors import MismatchError, RecordingError, SimulationError
-from regolithd.calibration.mismatch.simulation.load import load_simulation, read_tables
-from regolithd.daemon.mismatch.files import write_corrected, write_json, write_page
+from regolithd.calibration.mismatch.errors import MismatchError, RecordingError
+from regolithd.calibration.mismatch.simulation.load import load_simulation
+from regolithd.daemon.mismatch.files import write_json, write_page
 from regolithd.daemon.mismatch.recordings import read_recordings
 from regolithd.daemon.mismatch.terminal import print_answer
 
@@ -50,22 +49,17 @@ def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs) -> None:
         When recording or simulation cannot be used.
     """
     outputs.check()
-    tables = read_tables(simulation)
     simulated = load_simulation(simulation)
-    try:
-        effects = stated_effects(tables)
-    except SimulationError as error:
-        raise SimulationError(f"{simulation}: {error}") from error
     with Console(stderr=True).status("reading") as status:
         recorded = read_recordings(recordings, simulated.wheel_column)
         try:
-            found = compare(recorded, simulated, effects=effects, progress=status.update)
+            found = compare(recorded, simulated, progress=status.update)
         except RecordingError as error:
             raise RecordingError(f"{', '.join(map(str, recordings))}: {error}") from error
     if outputs.json:
         write_json(outputs.json, found.answer)
     if outputs.corrected:
-        write_corrected(outputs.corrected, found, simulated, simulation, tables)
+        found.write_corrected(outputs.corrected)
     if outputs.report:
         write_page(outputs.report, found, recordings, simulation)
     print_answer(Console(), found.answer)

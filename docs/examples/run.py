@@ -24,11 +24,10 @@ from scipy.optimize import least_squares
 
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in
-from regolithd.calibration.mismatch.corrected import stated_effects
 from regolithd.calibration.mismatch.data.recording import read_recording
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
-from regolithd.calibration.mismatch.simulation.load import load_simulation, read_tables
+from regolithd.calibration.mismatch.simulation.load import load_simulation
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -54,9 +53,9 @@ def mismatch(recording: Path, simulation: Path, report: Path) -> dict[str, Any]:
 
 def problem_of(recording: Path, simulation: Path) -> Problem:
     """Return the recording with the simulation's prediction of it, effects included."""
-    tables, model = read_tables(simulation), load_simulation(simulation)
+    model = load_simulation(simulation)
     read = read_recording(recording, unit=model.wheel_column)
-    stated = stated_in(model.candidates(library()), stated_effects(tables), model.stated_effects())
+    stated = stated_in(model.candidates(library()), model.corrected_effects, model.stated_effects())
     return corrected_problem(build_problem(read, model), stated)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.simulation.checked import checked
+from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects
 from regolithd.calibration.mismatch.simulation.simulation import Simulation
 from regolithd.calibration.mismatch.simulation.toml_place import line_of
 from regolithd.calibration.mismatch.simulation.user_code import defined_at, user_line
@@ -55,9 +56,9 @@ def load_simulation(source: Path | Mapping[str, Any], *, beside: Path | None = N
         When the model is unknown, cannot be loaded, or its tables are wrong; with file and line.
     """
     if not isinstance(source, Path):
-        return _loaded(source, beside or Path.cwd())
+        return _loaded(source, beside or Path.cwd(), None)
     try:
-        return _loaded(read_tables(source), beside or source.resolve().parent)
+        return _loaded(read_tables(source), beside or source.resolve().parent, source)
     except SimulationError as error:
         if str(source) in str(error):
             raise
@@ -74,24 +75,30 @@ def model_folder(tables: Mapping[str, Any], beside: Path) -> Path:
     return beside / path
 
 
-def _loaded(tables: Mapping[str, Any], beside: Path) -> Simulation:
+def _loaded(tables: Mapping[str, Any], beside: Path, source: Path | None) -> Simulation:
     table = tables.get("simulation", {})
     model = table.get("model") if isinstance(table, dict) else None
     if not isinstance(model, str):
         raise SimulationError(f"[simulation] {MODELS}, not {model!r}", ("simulation", "model"))
     _check_effects(tables.get("effects", []))
-    folder = model_folder(tables, beside)
+    made = _of_model(model, tables, model_folder(tables, beside))
+    made.corrected_effects, made.source = stated_effects(tables), source
+    return checked(made)
+
+
+def _of_model(model: str, tables: Mapping[str, Any], folder: Path) -> Simulation:
+    """Return the built-in simulation, an FMU, or a class of the user's own."""
     if model == "rover-wheel":
         from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel  # noqa: PLC0415  # soil physics
 
-        return checked(RoverWheel.from_tables(tables))
+        return RoverWheel.from_tables(tables)
     if model.endswith(".fmu"):
         from regolithd.calibration.mismatch.simulation.fmu import FmuSimulation  # noqa: PLC0415  # needs FMPy
 
-        return checked(FmuSimulation.from_file(folder / model, tables))
+        return FmuSimulation.from_file(folder / model, tables)
     if model.count(":") != 1:
         raise SimulationError(f"[simulation] {MODELS}, not {model!r}", ("simulation", "model"))
-    return checked(_made(_imported(model, folder), tables))
+    return _made(_imported(model, folder), tables)
 
 
 def _check_effects(effects: object) -> None:

@@ -27,6 +27,7 @@ from regolithd.calibration.mismatch.simulation.stated_priors import stated_prior
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+    from pathlib import Path
 
     from regolithd.calibration.mismatch.answer import Contribution
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
@@ -77,6 +78,10 @@ class Simulation:
     """Tables of SIM.toml that the simulation reads itself, from `self.stated`."""
     stated: Mapping[str, Any] = {}
     """SIM.toml's tables, as read."""
+    corrected_effects: Sequence[Contribution] = ()
+    """The effects that SIM.toml's `[[effects]]` add to the prediction, as `--corrected` wrote them."""
+    source: Path | None = None
+    """The SIM.toml that the simulation was loaded from."""
     sensors: Mapping[str, SensorError] = {}
     """The errors of the recorded inputs, by column."""
 

@@ -1,0 +1,37 @@
+"""The effects that a corrected simulation has already: `[[effects]]` of SIM.toml, as `--corrected` writes them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from regolithd.calibration.mismatch.answer import Contribution
+from regolithd.calibration.mismatch.errors import SimulationError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+def stated_effects(tables: Mapping[str, Any]) -> tuple[Contribution, ...]:
+    """Return the effects that SIM.toml has already.
+
+    Raises
+    ------
+    SimulationError
+        When one of them is not as `--corrected` writes it.
+    """
+    found = []
+    for number, effect in enumerate(tables.get("effects", []), 1):
+        try:
+            found.append(
+                Contribution(
+                    str(effect["name"]),
+                    dict(effect["shape"]),
+                    tuple(float(c) for c in effect["coefficients"]),
+                    tuple(w if isinstance(w, str) else int(w) for w in effect["wheels"]),
+                    float(effect.get("relative_std", 0.0)),
+                    str(effect.get("channel", "")),
+                )
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            raise SimulationError(f"effect {number} needs name, shape, coefficients and wheels: {error}") from error
+    return tuple(found)
