@@ -32,6 +32,10 @@ def bench(
         typer.Option(help="Scenario file (TOML): soils, noise, friction, seed; see docs/virtual-rover.toml."),
     ] = None,
     config: Annotated[Path | None, typer.Option(help="A rover.toml: simulate its nodes instead of Kapvik's.")] = None,
+    nodes: Annotated[
+        str | None,
+        typer.Option(help="Simulate these nodes only, such as 11-16,21,22; the world follows the real ones' PDOs."),
+    ] = None,
     soil: Annotated[
         list[str] | None, typer.Option(help="Name of a soil; repeated: several, 5 m each. Overrides the scenario file.")
     ] = None,
@@ -41,6 +45,8 @@ def bench(
     control: Control = _CONTROL,
 ) -> None:
     """Run the virtual rover on a CAN bus: six drives, six load cells, inclinometer, ground-speed sensor.
+
+    With --nodes, real nodes take the places of the others: hardware in the loop.
 
     Prints `ready` once all nodes are on the bus. At its end it prints each node's counters as one line of JSON.
     """
@@ -54,9 +60,12 @@ def bench(
     from regolithd.drivers.virtual.fault_socket import FaultSocketError
 
     settings = _scenario(scenario, soil or [], seed, no_noise=no_noise)
-    nodes = KAPVIK if config is None else configuration_or_exit(config).described()
+    described = KAPVIK if config is None else configuration_or_exit(config).described()
+    virtual = None if nodes is None else _chosen(nodes, [node.node_id for node in described])
+    world = VirtualWorld(settings)
+    rover = VirtualRover(world, described, virtual=virtual, follow_loads=world.follow_loads)
     try:
-        counts = asyncio.run(_run(interface, channel, VirtualRover(VirtualWorld(settings), nodes), control, seconds))
+        counts = asyncio.run(_run(interface, channel, rover, control, seconds))
     except (BusError, FaultSocketError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error
@@ -77,6 +86,22 @@ def bench_fault(
     typer.echo(answer)
     if answer.startswith("error:"):
         raise typer.Exit(1)
+
+
+def _chosen(text: str, known: list[int]) -> set[int]:
+    """Return the node-IDs of `11-16,21`, or exit with 78 and the reason."""
+    chosen: set[int] = set()
+    try:
+        for part in text.split(","):
+            first, _, last = part.partition("-")
+            chosen |= set(range(int(first), int(last or first) + 1))
+    except ValueError:
+        typer.echo(f"--nodes {text}: expected node-IDs and ranges, such as 11-16,21,22", err=True)
+        raise typer.Exit(78) from None
+    if absent := sorted(chosen - set(known)):
+        typer.echo(f"--nodes {text}: there is no node {absent[0]}; there are {', '.join(map(str, known))}", err=True)
+        raise typer.Exit(78)
+    return chosen
 
 
 def _scenario(path: Path | None, soils: list[str], seed: int | None, *, no_noise: bool) -> Scenario:

@@ -76,8 +76,13 @@ class VirtualWorld:
         self._temperature = np.full(WHEELS, scenario.ambient_degC)
         self._distance_m = 0.0
         self._speed_m_s = 0.0
+        self._given_load_N = np.full(WHEELS, np.nan)
         self.truth: GroundTruth | None = None
         self.changes: list[GroundTruth] = []
+
+    def follow_loads(self, load_N: Array) -> None:
+        """Take these loads [N], shape (6,), as the true ones from now on; NaN: the scenario's."""
+        self._given_load_N = load_N
 
     def measure(self, time_s: float, motor_speed_rad_s: Array) -> Measurement:
         """Advance to `time_s` and return the sensors' readings (see `drivers.virtual.plant.Plant`).
@@ -96,6 +101,7 @@ class VirtualWorld:
         load_std = np.array(noise.load_relative_std)
         level = wheel_loads(np.array(pitch), np.array(roll), scenario.rover, scenario.motion.centre_of_mass_m)
         load = level * (1 + load_std * np.sqrt(noise.terrain_share) * terrain[:-1])
+        load = np.where(np.isfinite(self._given_load_N), self._given_load_N, load)
         torque, numbers = self._torque(np.maximum(load, 0.1), slip, wheel_speed, pitch)
         self._update_truth(numbers, load, slip, torque)
         steady = self._steady_current(torque, motor_speed_rad_s)

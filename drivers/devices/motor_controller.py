@@ -188,7 +188,7 @@ class VirtualMotorController(VirtualDevice):
     def measure(self, measurement: Measurement) -> None:
         """Put current, voltage and temperature into the dictionary."""
         wheel = self.wheel or 0
-        current_A = float(measurement.motor_current_A[wheel])
+        current_A = self.direction * float(measurement.motor_current_A[wheel])
         weight = 1 - math.exp(-self._since_measured_s / AVERAGING_S)
         self._since_measured_s = 0.0
         for place, value in enumerate((1000 * current_A, self.speed_rpm)):

@@ -67,6 +67,7 @@ class VirtualNode:
         self.device = description.device.virtual(
             self.dictionary, self._emergency, description.wheel, _places(description.device)
         )
+        self.device.direction = -1 if description.mirrored else 1
         self._sdo = SdoServer(self.dictionary)
         self.dictionary.on_write = self._check
         self.dictionary.after_write = self._written

@@ -29,9 +29,10 @@ from regolithd.drivers.errors import BusError
 from regolithd.drivers.virtual.fault_injection import inject_fault
 from regolithd.drivers.virtual.node import VirtualNode
 from regolithd.drivers.virtual.plant import WHEELS
+from regolithd.drivers.virtual.real_nodes import RealNodes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Collection, Iterable
 
     from regolithd.drivers.can.bus import Bus
     from regolithd.drivers.virtual.plant import Array, Plant
@@ -59,6 +60,10 @@ class VirtualRover:
         The simulated rover.
     nodes
         The nodes on the bus.
+    virtual
+        Node-IDs of those that are virtual; None: all. The plant follows what the others, real ones, report.
+    follow_loads
+        Called before each measurement with the loads [N] of real load cells, shape (6,), NaN where there is none.
     monotonic_ns, wall_ns
         Clocks for deadlines, and for the frames' kernel times.
     """
@@ -68,6 +73,8 @@ class VirtualRover:
         plant: Plant,
         nodes: Iterable[NodeDescription] = KAPVIK,
         *,
+        virtual: Collection[int] | None = None,
+        follow_loads: Callable[[Array], None] = lambda _load_N: None,
         monotonic_ns: Callable[[], int] = time.monotonic_ns,
         wall_ns: Callable[[], int] = time.time_ns,
     ) -> None:
@@ -77,7 +84,11 @@ class VirtualRover:
         self._at_once: list[Frame] = []
         self._later: list[tuple[int, int, Frame]] = []
         self._order = itertools.count()
-        self.nodes = {each.node_id: VirtualNode(each, self._emit) for each in nodes}
+        described = tuple(nodes)
+        ids = {each.node_id for each in described} if virtual is None else set(virtual)
+        self.nodes = {each.node_id: VirtualNode(each, self._emit) for each in described if each.node_id in ids}
+        self._real = RealNodes(each for each in described if each.node_id not in ids)
+        self._follow_loads = follow_loads
         self._drives = [node.device for node in self.nodes.values() if isinstance(node.device, VirtualMotorController)]
         self._time_s = 0.0
         self._advanced_ns: int | None = None  # by the wall clock, as is `_sync_ns`
@@ -96,6 +107,7 @@ class VirtualRover:
         """Let all nodes see a frame."""
         if frame.sent or frame.error:
             return
+        self._real.take(frame)
         if any(frame.can_id == node.sync_cob_id for node in self.nodes.values()):
             self._bus_counts["sync"] += 1
             self._step(frame.time_ns, now)
@@ -153,6 +165,7 @@ class VirtualRover:
     def _step(self, wall_ns: int, now: int) -> None:
         """Advance all nodes to `wall_ns` and let them measure the plant."""
         self._advance(wall_ns)
+        self._follow_loads(self._real.load_N)
         measurement = self._plant.measure(self._time_s, self._motor_speeds())
         for node in self.nodes.values():
             node.measure(measurement, now)
@@ -169,10 +182,10 @@ class VirtualRover:
             node.advance(elapsed_s)
 
     def _motor_speeds(self) -> Array:
-        speeds = np.zeros(WHEELS)
+        speeds = np.nan_to_num(self._real.motor_speed_rad_s)
         for drive in self._drives:
             if drive.wheel is not None:
-                speeds[drive.wheel] = drive.speed_rad_s
+                speeds[drive.wheel] = drive.direction * drive.speed_rad_s
         return speeds
 
     # The bus

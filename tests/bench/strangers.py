@@ -5,7 +5,8 @@
 python-canopen has no boot-up after a remote reset, no PDOs that follow a remote configuration, and no heartbeat
 consumer that acts; they are here, and share no code with regolithd. A COB-ID is not changed while it is valid, and no
 mapping while its PDO is (CiA 301): both are refused, as CANopenNode does. A line on standard input is a command:
-`fault ID`, `die ID`. Oddities: `late` (boots up 1.5 s after the reset), `elsewhere` (EMCY at 0x0C0 + ID, valid).
+`fault ID`, `die ID`, `current ID RAW`. Oddities: `late` (boots up 1.5 s after the reset), `elsewhere` (EMCY at
+0x0C0 + ID, valid).
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ class Stranger:
     state: str = "disabled"
     speed: float = 0.0
     alive: bool = True
+    current: int = CURRENT
 
     def __post_init__(self) -> None:
         """Join the network, as after power-on."""
@@ -207,7 +209,7 @@ class Stranger:
         self.put(0x6041, 0, word | (0x400 if self.state == "enabled" and abs(self.speed - target) < 1 else 0))
         self.put(0x606C, 0, self.speed)
         for index, subindex in CURRENT_OBJECTS:
-            self.put(index, subindex, CURRENT if self.state == "enabled" else IDLE_CURRENT)
+            self.put(index, subindex, self.current if self.state == "enabled" else IDLE_CURRENT)
         if self.kind == "load":
             for index in (0x9130, 0x6130, 0x7130, 0x6401):
                 self.put(index, 1, LOAD)
@@ -291,6 +293,8 @@ def obey(strangers: Strangers, line: str) -> None:
         strangers.nodes[int(rest[0])].fault()
     elif word == "die":
         strangers.nodes[int(rest[0])].die()
+    elif word == "current":
+        strangers.nodes[int(rest[0])].current = int(rest[1])
 
 
 def main() -> None:

@@ -53,6 +53,9 @@ class VirtualDevice:
     `wheel` is 0–5, or None for a device of the body; `places` says where each quantity lies, by its name.
     """
 
+    direction = 1
+    """−1 for a motor that is mounted mirrored: it turns backwards, by its own count, when the rover drives forward."""
+
     latches_errors = False
     """An error lasts until the device is told to reset it, not only until its cause has gone."""
 

@@ -112,3 +112,16 @@ def test_the_duration_may_be_limited(tmp_path: Path) -> None:
         output, _ = process.communicate(timeout=60)
         assert process.returncode == 0
     assert json.loads(output)["11"] == {"boot_up": 1}
+
+
+def test_some_nodes_may_be_real(tmp_path: Path) -> None:
+    """`--nodes` simulates these alone; a node that the configuration does not have is an error with status 78."""
+    line = command("bench", "--interface", "virtual", "--channel", "mixed", "--control", str(tmp_path / "mixed.sock"))
+    done = subprocess.run(
+        [*line, "--nodes", "11-16,21,22", "--seconds", "0.2"], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout.startswith("ready: 8 nodes on virtual mixed")
+    for nodes, said in (("11-99", "there is no node 17"), ("eleven", "expected node-IDs and ranges")):
+        wrong = subprocess.run([*line, "--nodes", nodes], capture_output=True, text=True, check=False, timeout=60)
+        assert wrong.returncode == 78
+        assert said in wrong.stderr
