@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
+import os
 import shutil
 import signal
 import socket
@@ -15,6 +17,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 PROCESS_TIMEOUT_s = 20
+PORTS = range(20_000, 30_000)
+"""Below 32768, where Linux begins to choose the ports of outgoing connections."""
+_first = os.getpid() * 97 % len(PORTS)
+_ports = itertools.cycle([*PORTS[_first:], *PORTS[:_first]])
 
 
 def mosquitto_program() -> str | None:
@@ -23,10 +29,16 @@ def mosquitto_program() -> str | None:
 
 
 def unused_port() -> int:
-    """Return an unused TCP port of the loopback interface."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """Return an unused TCP port of the loopback interface.
+
+    It is none of those that the kernel gives to outgoing connections, which could take it before it is used or while a
+    broker is stopped; and processes that run tests at the same time begin at different ports.
+    """
+    for port in itertools.islice(_ports, len(PORTS)):
+        with contextlib.suppress(OSError), socket.socket() as probe:
+            probe.bind(("127.0.0.1", port))
+            return port
+    raise RuntimeError(f"no port of {PORTS} is free")
 
 
 @dataclass
