@@ -54,7 +54,7 @@ def _measured(checkout: Checkout, room: str, times: Path) -> CoverageMap:
     times.unlink(missing_ok=True)
     data_file = checkout.root / f".coverage.{room.replace('/', '-')}"
     package = f"regolithd.{room.replace('/', '.')}"
-    under_coverage = ["-p", "fast_tests", f"--cov={package}", "--cov-context=test", "--cov-report="]
+    under_coverage = ["-p", "fast_tests", f"--cov={package}", "--cov-context=test", "--cov-report=", "--timeout=0"]
     settings = {
         WRITTEN_TO: str(times),
         "PYTHONPATH": str(Path(__file__).parent),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +25,8 @@ LONGEST_S = 90.0
 """Time of the tests of one mutant, as measured without it: the nearest and quickest of them."""
 STARTING_CPU_S, SLOWER = 60, 5.0
 """Limit of CPU time: so much, and so many times what the tests took without the mutant."""
+TEST_TIMEOUT_S = 60
+"""Time on the clock for one fast test: one that waits for what never comes uses no CPU time."""
 REPETITIONS = 4
 """Runs at most of the tests of one mutant, each without those that a busy machine made late before."""
 EVERYWHERE = ("tests/test_dataclasses.py",)
@@ -86,18 +87,13 @@ def outside_the_room(file: str) -> tuple[str, ...]:
 
 def try_mutant(mutation: Mutation, checkout: Checkout, found: CoverageMap) -> Result:
     """Run the tests for a mutant in the copy."""
-    path = checkout.root / mutation.file
-    original, times = path.read_text(), path.stat()
+    original = (checkout.root / mutation.file).read_text()
     mutated = mutation.applied(original)
     tests = tests_for(mutation, checkout.root, found)
     cpu_s = STARTING_CPU_S + math.ceil(SLOWER * sum(found.seconds[test] for test in tests))
     started = time.monotonic()
-    path.write_text(mutated)
-    try:
+    with checkout.changed(mutation.file, mutated):
         run, failed = _failing_run(checkout, [*tests, *outside_the_room(mutation.file)], cpu_s)
-    finally:
-        path.write_text(original)
-        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))  # so that its compiled form is valid again
     verdict: Verdict = "survived" if run is None else "killed"
     if run is not None and run.timed_out and not _run(checkout, failed, cpu_s).passed:
         verdict = "undecided"
@@ -136,9 +132,9 @@ def _failing_run(checkout: Checkout, tests: Sequence[str], cpu_s: int) -> tuple[
 
 def _run(checkout: Checkout, arguments: Iterable[str], cpu_s: int) -> Run:
     """Run tests without writing compiled files; where a mutant has renamed one, the files that they are in."""
-    settings = {"PYTHONDONTWRITEBYTECODE": "1"}
-    run = checkout.pytest(["-x", *arguments], cpu_s, settings)
+    settings, stopping = {"PYTHONDONTWRITEBYTECODE": "1"}, ["-x", f"--timeout={TEST_TIMEOUT_S}"]
+    run = checkout.pytest([*stopping, *arguments], cpu_s, settings)
     if run.status == USAGE_ERROR:
         files = {argument.partition("::")[0] for argument in arguments if not argument.startswith("-")}
-        run = checkout.pytest(["-x", *sorted(files)], cpu_s, settings)
+        run = checkout.pytest([*stopping, *sorted(files)], cpu_s, settings)
     return run
