@@ -21,7 +21,7 @@ demo: $(DEMO) ## virtual rover, daemon and broker for half a minute; no hardware
 
 test: $(DEV) ## all tests and checks (installs Debian packages for some of them, where permitted)
 	.ci/test-packages
-	$(BIN)/python -m pytest
+	.ci/all-tests $(BIN)/python
 
 check: $(DEV) ## lint, format, types and import rules alone
 	$(BIN)/ruff check

@@ -13,7 +13,7 @@ import hashlib
 import random
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
@@ -96,10 +96,23 @@ def left_out(tree: ast.Module) -> set[tuple[int, int]]:
     }
 
 
+def no_operators(tree: Any) -> set[tuple[int, int]]:
+    """Return (line, column) of each `*`, `/` and `**` of parameters, arguments and displays in parso's tree.
+
+    Cosmic Ray takes them for operators; changed, they are no program, or the same one.
+    """
+    return {
+        leaf.start_pos
+        for leaf in ast_nodes(tree)
+        if leaf.type == "operator" and leaf.value in {"*", "/", "**"} and leaf.parent.type not in {"term", "power"}
+    }
+
+
 def mutations(root: Path, file: str) -> Iterator[Mutation]:
     """Yield every mutation of a file of a checkout."""
     source = (root / file).read_text()
-    without, tree = left_out(ast.parse(source)), get_ast(source)
+    tree = get_ast(source)
+    without = left_out(ast.parse(source)) | no_operators(tree)
     for name in operator_names():
         kind = get_operator(name)
         if kind.arguments() or name.endswith(("NoOp", *EQUAL)):
@@ -119,4 +132,21 @@ def sample(root: Path, count: int, seed: int, only: str) -> list[Mutation]:
         for mutation in mutations(root, file) if file.startswith(only) else ():
             places.setdefault((mutation.file, mutation.line, mutation.column), []).append(mutation)
     order = sorted(places, key=lambda place: hashlib.sha256(f"{seed} {place}".encode()).digest())
-    return [random.Random(f"{seed} {place}").choice(places[place]) for place in order[:count]]
+    drawn: list[Mutation] = []
+    for place in order:
+        if len(drawn) == count:
+            break
+        here = places[place]
+        random.Random(f"{seed} {place}").shuffle(here)
+        found = next((each for each in here if is_program(each, root)), None)
+        drawn += [] if found is None else [found]
+    return drawn
+
+
+def is_program(mutation: Mutation, root: Path) -> bool:
+    """Return whether a mutation can be made, and Python accepts the result."""
+    try:
+        compile(mutation.applied((root / mutation.file).read_text()), mutation.file, "exec", dont_inherit=True)
+    except (SyntaxError, AttributeError):  # the latter from Cosmic Ray, for a dotted exception
+        return False
+    return True

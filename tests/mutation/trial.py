@@ -61,7 +61,7 @@ def mirrored_folder(root: Path, file: str) -> str:
     return str(folder)
 
 
-def tests_for(mutation: Mutation, root: Path, found: CoverageMap) -> list[str]:
+def selected_tests(mutation: Mutation, root: Path, found: CoverageMap) -> list[str]:
     """Return the fast tests to run: those that execute the line; where an import does, also those of file and folder.
 
     Those of the mirrored folder go first, then the quickest.
@@ -89,7 +89,7 @@ def try_mutant(mutation: Mutation, checkout: Checkout, found: CoverageMap) -> Re
     """Run the tests for a mutant in the copy."""
     original = (checkout.root / mutation.file).read_text()
     mutated = mutation.applied(original)
-    tests = tests_for(mutation, checkout.root, found)
+    tests = selected_tests(mutation, checkout.root, found)
     cpu_s = STARTING_CPU_S + math.ceil(SLOWER * sum(found.seconds[test] for test in tests))
     started = time.monotonic()
     with checkout.changed(mutation.file, mutated):

@@ -1,0 +1,157 @@
+"""What `make mutants` changes, which tests it runs, and that its copy of the checkout is left as it was."""
+
+from __future__ import annotations
+
+import ast
+import signal
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import pytest
+from checkout import Checkout, Run
+from coverage_map import CoverageMap, statement_lines
+from figures import Words, line_of, score, write_page
+from mutants import Mutation, left_out, mutations, sample
+from trial import Result, selected_tests
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+FILE = "drivers/can/limits.py"
+SOURCE = '''"""Limits."""
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+SEND_TIMEOUT_S = 3.0
+FRAMES = 7
+
+
+def within(count: int, timeout_s: float = 2.0, *, most: int = FRAMES) -> bool | None:
+    """Return whether there are not too many."""
+    return (
+        count < most
+        and timeout_s > 1
+    )
+'''
+KILLED = Result(
+    FILE, 7, 9, "core/NumberReplacer", "killed", 3, "tests/drivers/can/test_limits.py::test_most", 1.0, "+ 8"
+)
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    """A checkout with one file of drivers and its tests."""
+    (tmp_path / "drivers/can").mkdir(parents=True)
+    (tmp_path / "tests/drivers/can").mkdir(parents=True)
+    (tmp_path / FILE).write_text(SOURCE)
+    return tmp_path
+
+
+def test_time_limits_and_annotations_are_left_out(root: Path) -> None:
+    """The constant, the parameter's default, and types; numbers that decide something are mutated."""
+    lines = {each.line for each in mutations(root, FILE)}
+    assert lines == {7, 13, 14}
+    columns = {column for line, column in left_out(ast.parse(SOURCE)) if line == 10}
+    assert SOURCE.splitlines()[9].index("2.0") in columns
+    assert SOURCE.splitlines()[9].index("FRAMES") not in columns
+
+
+def test_every_mutant_is_a_program(root: Path) -> None:
+    """A `*` or `**` that is no operator is left out; a real one is mutated."""
+    text = "def f(*a: int, **b: int) -> object:\n    return g(*a, **b), [*a], {**b}, 2 * 3**4\n"
+    (root / FILE).write_text(text)
+    made = list(mutations(root, FILE))
+    assert {text.splitlines()[each.line - 1][each.column :][:2] for each in made if "Binary" in each.operator} == {
+        "* ",
+        "**",
+    }
+    for each in made:
+        compile(each.applied(text), FILE, "exec")
+
+
+def test_a_larger_sample_begins_with_the_smaller_one(root: Path) -> None:
+    """The order depends on the seed alone."""
+    assert sample(root, 4, 1, "")[:2] == sample(root, 2, 1, "")
+    assert [each.column for each in sample(root, 9, 1, "")] != [each.column for each in sample(root, 9, 2, "")]
+    assert sample(root, 9, 1, "daemon") == []
+
+
+def test_a_mutation_is_one_change(root: Path) -> None:
+    """The occurrence that it names."""
+    mutated = Mutation(FILE, 7, 9, "core/NumberReplacer", 0).applied("FRAMES = 7\nMORE = 7\n")
+    assert mutated in {"FRAMES = 8\nMORE = 7\n", "FRAMES = 6\nMORE = 7\n"}
+    assert root.is_dir()
+
+
+def test_a_line_belongs_to_the_lines_of_its_statement() -> None:
+    """Coverage names only some lines of a statement; of a function the head counts, not the body."""
+    assert statement_lines(SOURCE, 14) == range(12, 16)
+    assert statement_lines(SOURCE, 10) == range(10, 11)
+    assert statement_lines(SOURCE, 7) == range(7, 8)
+
+
+def test_tests_of_the_line_run_the_nearest_and_quickest_first(root: Path) -> None:
+    """Where an import executes the line, those of its file and folder run as well."""
+    far, slow, quick, other = (
+        "tests/drivers/master/test_boot.py::test_far",
+        "tests/drivers/can/test_limits.py::test_slow",
+        "tests/drivers/can/test_limits.py::test_quick",
+        "tests/drivers/can/test_bus.py::test_other",
+    )
+    lines = {"7": [""], "13": [far, quick, slow], "10": ["", far]}
+    found = CoverageMap({far: 0.1, slow: 2.0, quick: 1.0, other: 3.0}, {FILE: lines})
+    within, constant = Mutation(FILE, 13, 14, "", 0), Mutation(FILE, 7, 9, "", 0)
+    assert selected_tests(within, root, found) == [quick, slow, far]
+    assert selected_tests(constant, root, found) == [quick, slow, other, far]
+    long = replace(found, seconds={far: 0.1, slow: 2.0, quick: 100.0, other: 3.0})
+    assert selected_tests(within, root, long) == [slow, quick]
+
+
+@pytest.mark.parametrize(
+    ("run", "exceeded", "timed_out"),
+    [
+        (Run(-signal.SIGXCPU, ""), True, False),
+        (Run(-signal.SIGKILL, "", ended=True), False, True),
+        (Run(1, "FAILED tests/a.py::test_b - Failed: Timeout (>60.0s)"), False, True),
+        (Run(1, "FAILED tests/a.py::test_b - assert 1 == 2"), False, False),
+    ],
+)
+def test_a_run_says_why_it_failed(run: Run, exceeded: bool, timed_out: bool) -> None:
+    """CPU time is the mutant's own; time on the clock may be the machine's."""
+    assert (run.passed, run.cpu_exceeded, run.timed_out) == (False, exceeded, timed_out)
+
+
+def test_the_failed_tests_are_read_from_the_summary() -> None:
+    """Also where a parameter has spaces and a message follows."""
+    output = (
+        "FAILED tests/a.py::test_b[x y] - assert 1 == 2\nERROR tests/c.py::test_d\nERROR tests/e.py - ImportError\n"
+    )
+    assert Run(1, output).failed == ("tests/a.py::test_b[x y]", "tests/c.py::test_d")
+
+
+def test_a_killed_run_leaves_no_mutant_behind(root: Path) -> None:
+    """The next one restores text and time, by which Python knows that its compiled form is valid."""
+    before = (root / FILE).stat().st_mtime_ns
+    checkout = Checkout(root)
+    entered = checkout.changed(FILE, "FRAMES = 8\n")
+    entered.__enter__()
+    assert (root / FILE).read_text() == "FRAMES = 8\n"
+    Checkout(root).restore()
+    assert (root / FILE).read_text() == SOURCE
+    assert (root / FILE).stat().st_mtime_ns == before
+
+
+def test_the_page_tells_seed_share_and_words(tmp_path: Path) -> None:
+    """Survivors have a word; the share is of all mutants."""
+    lived = replace(KILLED, verdict="survived", file="daemon/a.py", diff="+ 9")
+    words = Words({("daemon/a.py", "+ 9"): "equal: the same"})
+    figures = score([KILLED, KILLED, KILLED, lived], 7, words)
+    assert line_of(figures) == (
+        "Seed 7: 3 of 4 mutants killed (75.0 %). Of the survivors, 1 are equal programs, and for 0 a test was added."
+    )
+    write_page(figures, 6.0, tmp_path / "page.md")
+    page = (tmp_path / "page.md").read_text()
+    assert line_of(figures) in page
+    assert "| `drivers/` | 3 | 3 |" in page
+    assert "| `daemon/` | 1 | 0 |" in page
