@@ -67,16 +67,22 @@ def _measured(checkout: Checkout, room: str, times: Path) -> CoverageMap:
     if len(seconds) < FEWEST_FAST * len(rows) or not rows:
         raise SystemExit(f"{len(seconds)} of {len(rows)} tests of {room} pass and are fast\n{run.output[-4000:]}")
     print(f"{room}: {len(seconds)} of {len(rows)} tests are fast and pass", flush=True)
+    return CoverageMap(seconds, _lines(data_file, checkout.root.resolve(), set(seconds)))
+
+
+def _lines(data_file: Path, root: Path, fast: set[str]) -> dict[str, dict[str, list[str]]]:
+    """Return, for each file of the checkout and each line, the fast tests that execute it."""
     data = coverage.CoverageData(str(data_file))
     data.read()
-    lines = {}
-    for measured in data.measured_files():
-        file = str(Path(measured).resolve().relative_to(checkout.root.resolve()))
-        lines[file] = {
-            str(line): sorted({name for name in map(_test_of, contexts) if name in seconds or name == AT_IMPORT})
+    files = {measured: Path(measured).resolve() for measured in data.measured_files()}
+    return {
+        str(file.relative_to(root)): {
+            str(line): sorted({name for name in map(_test_of, contexts) if name in fast or name == AT_IMPORT})
             for line, contexts in data.contexts_by_lineno(measured).items()
         }
-    return CoverageMap(seconds, lines)
+        for measured, file in files.items()
+        if file.is_relative_to(root)  # not a user's module that a test has written
+    }
 
 
 def _test_of(context: str) -> str:
