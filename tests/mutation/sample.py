@@ -19,7 +19,7 @@ from checkout import copy_of
 from coverage_map import coverage_map
 from fast_tests import FAST_S
 from figures import line_of, read_words, score, write_figures, write_page
-from mutants import room_of, sample
+from mutants import Mutation, room_of, sample
 from trial import Result, try_mutant
 
 if TYPE_CHECKING:
@@ -35,6 +35,14 @@ def read_results(path: Path) -> dict[tuple[str, int, int, str], Result]:
     """Return the results so far, by file, line, column and operator."""
     rows = [Result(**json.loads(line)) for line in path.read_text().splitlines()] if path.exists() else []
     return {(row.file, row.line, row.column, row.operator): row for row in rows}
+
+
+def drawn(root: Path, count: int, seed: int, only: str) -> list[Mutation]:
+    """Return the sample, drawn once: to list every mutation takes a minute."""
+    kept = root.parent / f"sample-{count}{only.replace('/', '-')}.json"
+    if not kept.exists():
+        kept.write_text(json.dumps([asdict(each) for each in sample(root, count, seed, only)]))
+    return [Mutation(**each) for each in json.loads(kept.read_text())]
 
 
 def show(number: int, result: Result, words: Words) -> None:
@@ -53,7 +61,7 @@ def main() -> None:
     given = parser.parse_args()
     folder = ROOT / "build" / "mutants" / f"seed-{given.seed}"
     checkout, words = copy_of(ROOT, folder / "copy"), read_words()
-    chosen, log = sample(checkout.root, given.count, given.seed, given.only), folder / "results.jsonl"
+    chosen, log = drawn(checkout.root, given.count, given.seed, given.only), folder / "results.jsonl"
     known, results = read_results(log), []
     for number, mutation in enumerate(chosen, 1):
         result = known.get((mutation.file, mutation.line, mutation.column, mutation.operator))
