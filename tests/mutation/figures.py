@@ -31,8 +31,8 @@ a test fails.
 {rows}
 
 Limits are of CPU time, and a test of the daemon or the drivers that fails is repeated alone, so that a busy machine
-kills no mutant. Left out are annotations, which do not run, and the values of constants, fields and parameters named `timeout_s` or `…_timeout_s`,
-because no requirement fixes a time limit to a second.
+kills no mutant. Left out are annotations, which do not run, and the values of constants, fields and parameters named
+`timeout_s` or `…_timeout_s`, because no requirement fixes a time limit to a second.
 
 Each survivor of a sample has a word in `tests/mutation/survivors.toml`: `equal`, where the changed program does the
 same, or the test that was added and notices it now. An interrupted run continues; another seed draws another sample.
