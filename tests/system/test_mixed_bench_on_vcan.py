@@ -98,8 +98,10 @@ async def test_torque_load_and_slip_of_a_mixed_bench_agree_with_the_scenario(tmp
             await until(lambda: all(each.boots for each in network.status.values()), lambda: str(network.status))
             await network.enable()
             await network.set_speed((WHEEL_RAD_S,) * 6)
-            await until(lambda: turning(sink.last) and carry(world, strangers.stdin), lambda: shown(sink.last, world))
-            await until(lambda: agrees(sink.last, world), lambda: shown(sink.last, world))
+            await until(lambda: turning(sink.last), lambda: shown(sink.last, world))
+            await until(
+                lambda: carry(world, strangers.stdin) and agrees(sink.last, world), lambda: shown(sink.last, world)
+            )
         finally:
             running.cancel()
             await asyncio.wait([running])
