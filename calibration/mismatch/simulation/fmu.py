@@ -36,7 +36,7 @@ from regolithd.calibration.mismatch.simulation.simulation import Simulation
 from regolithd.calibration.mismatch.simulation.stated_priors import finite_number
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
 Array = NDArray[np.float64]
 
@@ -130,10 +130,32 @@ class FmuSimulation(Simulation):
                 start_values={name: values[name] for name in self.parameters},
                 input=signal if columns else None,
                 output=list(self._outputs.values()),
+                step_finished=self._with_present_inputs(signal),
             )
         except Exception as error:  # FMPy raises plain Exception for whatever a model does
             raise SimulationError(f"the FMU could not be simulated: {error}") from error
         return {column: np.interp(time_s, result["time"], result[name]) for column, name in self._outputs.items()}
+
+    def _with_present_inputs(self, signal: NDArray[Any]) -> Callable[[float, Any], bool] | None:
+        """Return what reads the outputs of a co-simulation again, with the inputs of the same instant.
+
+        A slave's step has the inputs of its beginning: an output that depends on an input directly would be late by it.
+        """
+        references = {each.name: each.valueReference for each in self._description.modelVariables}
+        names = [name for name in signal.dtype.names or () if name != "time"]
+        if self._description.coSimulation is None or not names:
+            return None
+
+        def read_again(time: float, recorder: Any) -> bool:  # noqa: ANN401  # FMPy has no types
+            values = [float(np.interp(time, signal["time"], signal[name])) for name in names]
+            fmu = recorder.fmu
+            put = fmu.setReal if hasattr(fmu, "setReal") else fmu.setFloat64
+            put([references[name] for name in names], values)
+            recorder.rows.pop()
+            recorder.sample(time, force=True)
+            return True
+
+        return read_again
 
 
 def _fmpy() -> Any:  # noqa: ANN401  # a module without types
