@@ -18,9 +18,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ChannelPart:
-    """The sections about one channel; `heading` is empty where there is one channel alone."""
+    """The sections about one channel.
+
+    Attributes
+    ----------
+    heading: the channel's name; empty where there is one alone
+    along_motion: whether the map over time has the residual multiplied by the sign of a speed
+    """
 
     heading: str
+    along_motion: bool
     map: Markup
     curves: Sequence[sections.Figure]
     effects: Sequence[sections.EffectSection]
@@ -60,6 +67,7 @@ def _part(answer: Answer, evidence: Evidence, *, alone: bool) -> ChannelPart:
     labels = Labels.of(evidence)
     return ChannelPart(
         heading="" if alone else evidence.channel,
+        along_motion=evidence.problem is None or "direction" in evidence.problem.covariates,
         map=sections.residual_map(answer, evidence, labels),
         curves=sections.curves(answer, evidence, labels),
         effects=[sections.effect(effect, evidence, labels) for effect in answer.effects],

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.changes import direction_of
 from regolithd.calibration.mismatch.report.axes import number
-from regolithd.calibration.mismatch.report.labels import beyond_prior, capital
+from regolithd.calibration.mismatch.report.labels import UNITS, beyond_prior, capital
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Answer
@@ -68,7 +68,7 @@ def calibrated(answer: Answer) -> tuple[CalibratedRow, ...]:
             f"{number(one.prior)} ± {number(one.prior_std, 2)}" if one.prior_std else f"{number(one.prior)} (exact)"
         )
         ends = (number(one.low, 4), number(one.high, 4)) if one.prior_std else ("", "")
-        unit = "" if one.unit == "1" else one.unit
+        unit = UNITS.get(one.unit, one.unit)
         rows.append(CalibratedRow(one.name, stated, number(one.value, 4), *ends, unit, beyond_prior(one)))
     return tuple(rows)
 
@@ -102,7 +102,7 @@ def channels(answer: Answer, units: dict[str, str]) -> tuple[ChannelRow, ...]:
             number(fit.held_out_rmse_before),
             number(fit.held_out_rmse_after),
             number(fit.noise_floor_rmse),
-            units.get(fit.channel, ""),
+            UNITS.get(units.get(fit.channel, ""), units.get(fit.channel, "")),
         )
         for fit in answer.fits
     )
