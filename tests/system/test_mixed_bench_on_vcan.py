@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.drivetrain.torque import motor_current
+from regolithd.calibration.parameters import Drivetrain
 from regolithd.daemon.config.reader import read_configuration
 from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.service import Service
@@ -119,11 +120,11 @@ def turning(estimate: Estimate | None) -> bool:
 
 
 def carry(world: VirtualWorld, commands: asyncio.StreamWriter) -> bool:
-    """Let the foreign motors carry the torque of the soil, as they would on the ground; False at standstill."""
+    """Let the foreign motors, without friction, carry the torque of the soil; False at standstill."""
     truth = world.truth
     if truth is None or not np.all(np.abs(truth.torque_Nm) > 0.1):
         return False
-    current = motor_current(truth.torque_Nm, np.full(6, WHEEL_RAD_S * 1400), world.scenario.drivetrain)
+    current = motor_current(truth.torque_Nm, np.full(6, WHEEL_RAD_S * 1400), Drivetrain())
     for number, value in enumerate(current, start=1):
         commands.write(f"current {number} {round(1000 * value)}\n".encode())
     return True
@@ -141,7 +142,7 @@ def agrees(estimate: Estimate, world: VirtualWorld) -> bool:
     """Return whether torque, load and slip are the scenario's: within 1 mA, 0.01 N and the speed's resolution."""
     truth, snapshot = world.truth, estimate.snapshot
     assert truth is not None
-    step = 1e-3 * world.scenario.drivetrain.gain_Nm_per_A
+    step = 1e-3 * Drivetrain().gain_Nm_per_A
     return bool(
         np.allclose(estimate.wheel_torque_Nm, truth.torque_Nm, atol=2 * step)
         and np.allclose(snapshot.load_N, truth.load_N, rtol=0.01)
