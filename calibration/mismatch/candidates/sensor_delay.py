@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Array, Candidate, Coefficient, Shape
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.problem import Problem
@@ -30,7 +30,8 @@ class SensorDelay(Candidate):
     """The predicted channel, or one of the simulation's inputs, is late by a constant time.
 
     The change of the prediction is exact for the shape's own delay (no Taylor series); per second of delay, so that the
-    coefficient is the delay. Fit and shape are alternated until they agree.
+    coefficient is the delay. That of the predicted channel is optimised, since a delay shows in when the channel steps,
+    not in how far; that of an input costs a run of the simulation, and only follows the fit until both agree.
     """
 
     name = "sensor-delay"
@@ -38,16 +39,11 @@ class SensorDelay(Candidate):
     equation = "y(t) = y_true(t − τ)"
     words = "a channel that is late"
     signature = "a residual proportional to the rate of change of one channel"
-    experiment = "change each input in steps, twenty times"
+    experiment = "change speed and load in steps, both ways, twenty times"
     source = "filters, buses and polling: a first-order filter delays slow changes by its time constant"
     along_motion = False
     coefficients: ClassVar = (Coefficient("delay_s", "s", 1),)
-    free: ClassVar = {}
-
-    def varied(self, problem: Problem) -> tuple[str, ...]:
-        """Return the covariates whose steps show a delay: speed and load of what turns, else whatever is recorded."""
-        names = [name for name in ("wheel_acceleration", "torque") if name in problem.covariates]
-        return tuple(names or [name for name in problem.covariates if name != "time"])
+    free: ClassVar = {"secant_s": (0.0, float("inf"))}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the predicted channel and each input, late by two readings up to a tenth of the recording."""
@@ -56,7 +52,7 @@ class SensorDelay(Candidate):
             {"late": simulation.channel, "secant_s": delay} for delay in _delays(problem, RATIO_OF_CHANNEL)
         ]
         of_inputs: list[Shape] = [
-            {"late": name, "secant_s": delay}
+            {"late": name, "input_secant_s": delay}
             for name in simulation.inputs
             for delay in _delays(problem, RATIO_OF_INPUT)
         ]
@@ -64,15 +60,32 @@ class SensorDelay(Candidate):
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the prediction's change for this delay of this channel, over the delay."""
-        late, delay = str(shape["late"]), float(shape["secant_s"])
+        late = str(shape["late"])
+        if "secant_s" in shape:
+            delay = float(shape["secant_s"])
+            return ((shifted(problem.recording, problem.prediction, -delay) - problem.prediction) / delay)[None]
+        delay = float(shape["input_secant_s"])
         key = (f"{late} late", delay)
         if key not in problem.made:
-            if late == problem.simulation.channel:
-                moved = shifted(problem.recording, problem.filled, -delay)
-            else:
-                moved = problem.with_input(late, shifted(problem.recording, problem.recording.channels[late], delay))
+            moved = problem.with_input(late, shifted(problem.recording, problem.recording.channels[late], delay))
             problem.made[key] = (moved - problem.filled) / delay
         return problem.made[key][None]
+
+    def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
+        """Return delays from a fraction of a reading to the longest."""
+        return {"secant_s": (0.1 * problem.recording.step_s, LONGEST_SHARE * problem.length_s)}
+
+    def search_range(
+        self, problem: Problem, shape: Shape, name: str, bounds: tuple[float, float]
+    ) -> tuple[float, float]:
+        """Return where to optimise the delay: from half to twice that of the grid."""
+        del problem
+        at = float(shape[name])
+        return max(bounds[0], at / RATIO_OF_CHANNEL), min(bounds[1], at * RATIO_OF_CHANNEL)
+
+    def parameters(self, shape: Shape, values: Sequence[float]) -> dict[str, float]:  # noqa: ARG002
+        """Return the delay."""
+        return {"delay_s": float(values[0])}
 
     def plausible(self, problem: Problem, shape: Shape, values: Sequence[float]) -> bool:  # noqa: ARG002
         """Return whether the delay is more than sampling itself leaves open."""
@@ -80,10 +93,10 @@ class SensorDelay(Candidate):
 
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
         """Return the shape at the fitted delay."""
-        longest = LONGEST_SHARE * problem.length_s
-        delay = float(np.clip(values[0], 0.1 * problem.recording.step_s, longest))
-        before = float(shape["secant_s"])
-        return shape if abs(delay - before) < 0.02 * before else {**shape, "secant_s": delay}
+        name = "secant_s" if "secant_s" in shape else "input_secant_s"
+        delay = float(np.clip(values[0], *self.bounds(problem, shape)["secant_s"]))
+        before = float(shape[name])
+        return shape if abs(delay - before) < SHAPE_TOLERANCE * before else {**shape, name: delay}
 
 
 def _delays(problem: Problem, ratio: float) -> list[float]:

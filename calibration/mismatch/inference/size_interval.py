@@ -7,16 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import Parameter
+from regolithd.calibration.mismatch.inference.parameter_interval import interval
 from regolithd.calibration.mismatch.regression.residuals import where_it_acts
 
 if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.answer import Parameter
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
-
-NINE_TENTHS = (0.05, 0.95)
 
 
 def relative_size_interval(equations: NormalEquations, fit: Fit, index: int, columns: Array, moved: Array) -> Parameter:
@@ -33,8 +32,7 @@ def relative_size_interval(equations: NormalEquations, fit: Fit, index: int, col
     drawn[:, : len(term.group.columns)] += fit.coefficients[fit.of_term(index)]
     sizes = np.sqrt(np.maximum(np.einsum("da,ab,db->d", drawn, gram, drawn), 0)) / problem.mean_size
     value = _rms(equations, fit, index)
-    low, high = np.quantile(np.concatenate(_over_kinds_of_shape(equations, fit, index, sizes, value)), NINE_TENTHS)
-    return Parameter(value, float(min(low, value)), float(max(high, value)), "1")
+    return interval(value, np.concatenate(_over_kinds_of_shape(equations, fit, index, sizes, value)), "1")
 
 
 def _rms(equations: NormalEquations, fit: Fit, index: int) -> float:

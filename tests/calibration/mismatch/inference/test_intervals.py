@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from linear_machine import NOISE, equations_of, problem_of, table, term_of
 
-from regolithd.calibration.mismatch.inference.intervals import interval, normal_draws, parameters_of, unit_of
+from regolithd.calibration.mismatch.inference.intervals import normal_draws, parameters_of, unit_of
+from regolithd.calibration.mismatch.inference.parameter_interval import interval
 from regolithd.calibration.mismatch.inference.sandwich import block_sums, linearised, sandwich
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
