@@ -15,6 +15,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
 )
 from regolithd.calibration.mismatch.selection.cross_validation import squares_on_fold, training_equations
 from regolithd.calibration.mismatch.selection.decision import without_name
+from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -59,22 +60,24 @@ class HeldOutErrors:
 def held_out_errors(
     equations: NormalEquations, named: Fit, groups: Sequence[Group], entry_threshold: float
 ) -> HeldOutErrors:
-    """Choose and fit on all folds but one, measure on that one, for each fold in turn.
+    """Choose, optimise and fit on all folds but one, measure on that one, for each fold in turn.
 
     `groups` are those to choose from: the grid as it was before any data optimised its shapes.
     """
-    design, wheels = equations.design, len(equations.weights)
+    wheels = len(equations.weights)
     before, after = np.zeros(wheels), np.zeros(wheels)
     without = np.zeros((len(named.terms), wheels))
-    for fold in range(len(design.gram)):
+    for fold in range(len(equations.design.gram)):
         train = training_equations(equations, fold)
         chosen = chosen_effects(train.with_groups(groups), entry_threshold)
+        train, chosen = with_optimised_shapes(train, chosen)
+        design = train.design
         before += squares_on_fold(design, train.fit(()), fold)
         after += squares_on_fold(design, train.fit(chosen), fold)
         for index, term in enumerate(named.terms):
             rest = tuple(other for other in chosen if other.name != term.name)
             without[index] += squares_on_fold(design, train.fit(rest), fold)
-    counts = design.counts.sum(axis=0)
+    counts = equations.design.counts.sum(axis=0)
     on = [list(term.wheels) for term in named.terms]
     return HeldOutErrors(
         before=_rms(before, counts),
@@ -82,6 +85,14 @@ def held_out_errors(
         without=tuple(_rms(squares[w], counts[w]) for squares, w in zip(without, on, strict=True)),
         with_it=tuple(_rms(after[w], counts[w]) for w in on),
     )
+
+
+def with_optimised_shapes(train: NormalEquations, chosen: tuple[Term, ...]) -> tuple[NormalEquations, tuple[Term, ...]]:
+    """Return the chosen effects with their shapes optimised on the folds of `train` alone, and equations with them."""
+    terms = list(chosen)
+    for index, term in enumerate(chosen):
+        train, terms[index] = optimised_shape(train, terms[:index] + terms[index + 1 :], term)
+    return train, tuple(terms)
 
 
 def _rms(squares: Array, counts: Array) -> float:

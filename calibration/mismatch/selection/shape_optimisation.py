@@ -68,7 +68,7 @@ class ShapeProfile:
         problem, design = self.equations.problem, self.equations.design
         columns = np.asarray(self.candidate.columns(problem, shape), np.float64)
         kept = np.where(problem.mask, columns, 0.0)[:, :, list(self.wheels)]
-        fresh = np.swapaxes(kept, 1, 2)[:, :, design.order].astype(np.float32)
+        fresh = np.swapaxes(kept, 1, 2)[:, :, design.order[_fitted_instants(self.equations)]].astype(np.float32)
         return (fresh * _root_weights(self.equations, self.wheels)).reshape(len(fresh), -1)
 
 
@@ -76,14 +76,14 @@ def shape_profile(
     equations: NormalEquations, others: Sequence[Term], candidate: Candidate, wheels: tuple[int, ...]
 ) -> ShapeProfile:
     """Fit the other terms and return the candidate's profile beside them."""
-    design, fitted = equations.design, equations.fit(others)
-    columns = np.zeros((len(fitted.columns), len(wheels), design.columns.shape[2]), np.float32)
+    design, fitted, instants = equations.design, equations.fit(others), _fitted_instants(equations)
+    residual = design.residual[list(wheels)][:, instants].astype(np.float64)
+    columns = np.zeros((len(fitted.columns), *residual.shape), np.float32)
     for row, (column, on) in enumerate(fitted.columns):
         for place, wheel in enumerate(wheels):
             if wheel in on:
-                columns[row, place] = design.columns[column, wheel]
+                columns[row, place] = design.columns[column, wheel, instants]
     weights = _root_weights(equations, wheels)
-    residual = design.residual[list(wheels)].astype(np.float64)
     residual -= np.einsum("r,rwt->wt", fitted.coefficients, columns, optimize=True)
     return ShapeProfile(
         equations=equations,
@@ -93,6 +93,12 @@ def shape_profile(
         fitted=(columns * weights).reshape(len(columns), -1),
         left=(residual * weights).astype(np.float32).ravel(),
     )
+
+
+def _fitted_instants(equations: NormalEquations) -> NDArray[np.int64]:
+    """Return the places, in the order of folds, of the instants that the equations are summed over."""
+    cuts = equations.design.cuts
+    return np.concatenate([np.arange(cuts[fold], cuts[fold + 1]) for fold in equations.folds])
 
 
 def _root_weights(equations: NormalEquations, wheels: tuple[int, ...]) -> Single:
