@@ -20,11 +20,11 @@ FADES: dict[str, Callable[[Array], Array]] = {
     "quotient": lambda ratio: 1 / (1 + ratio**2),
 }
 """Share of the extra drag that is left, as a function of speed over the Stribeck speed."""
-SPEED_COUNT = 6
+SPEED_COUNT = 7
 """Stribeck speeds that are searched, in geometric steps (a choice)."""
-SLOWEST, MIDDLE = (0.5, 0.02), (0.8, 0.5)
-"""Ends of their range, as a factor on a quantile of the speed: below the first the effect decays before the slowest
-reading, above the second it resembles viscous friction (a choice)."""
+SLOWEST, FASTEST = (0.5, 0.02), (1.0, 0.98)
+"""Ends of their range, as a factor on a quantile of the speed (a choice): below the first the effect decays before the
+slowest reading, above the second it does not decay within the recording."""
 
 
 class StribeckFriction(Candidate):
@@ -45,7 +45,7 @@ class StribeckFriction(Candidate):
     free: ClassVar = {"stribeck_speed_rad_s": (0.0, np.inf)}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """Return Stribeck speeds between the slowest and the median speed, in three forms."""
+        """Return Stribeck speeds between the slowest and the highest speed, in three forms."""
         return [
             {"stribeck_speed_rad_s": float(speed), "fades": fades}
             for fades in FADES
@@ -59,11 +59,11 @@ class StribeckFriction(Candidate):
         return (np.sign(speed) * FADES[str(shape["fades"])](ratio))[None]
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
-        """Return the range in which it can be told from nothing and from viscous friction."""
+        """Return the range in which it can be told from nothing and from a constant."""
         return {"stribeck_speed_rad_s": self._range(problem)}
 
     def _range(self, problem: Problem) -> tuple[float, float]:
         speed = np.abs(problem.covariates["wheel_speed"][problem.mask])
         speed = speed[speed > 0]
-        low, high = (factor * float(np.quantile(speed, quantile)) for factor, quantile in (SLOWEST, MIDDLE))
+        low, high = (factor * float(np.quantile(speed, quantile)) for factor, quantile in (SLOWEST, FASTEST))
         return low, high
