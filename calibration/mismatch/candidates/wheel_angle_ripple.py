@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.problem.problem import Problem
 
-BINS_PER_TURN = 256
-"""Angle bins in a turn for the spectrum: four in a cycle of the highest order."""
+BINS_PER_CYCLE = 4
+"""Least angle bins, for the spectrum, in a cycle of the highest order that is looked at."""
 LOWEST_ORDER, HIGHEST_ORDER = 0.9, 64
 """Cycles per turn (a choice: above any number of grousers; ripples of single teeth are faster than the readings)."""
 LAGS = (0.0, -0.5, 0.5)
@@ -140,17 +140,23 @@ class WheelAngleRipple(Candidate):
 
     def _spectrum(self, problem: Problem, weighted: Array) -> tuple[Array, Array]:
         """Return orders and the residual's power at each, summed over the wheels; white noise has 1 on each wheel."""
-        angle = problem.covariates["wheel_angle"]
+        angle, per_turn = problem.covariates["wheel_angle"], _bins_per_turn(problem)
         low = np.min(angle, axis=0)
-        bins = np.rint((angle - low) * BINS_PER_TURN / (2 * np.pi)).astype(np.int64)
+        bins = np.rint((angle - low) * per_turn / (2 * np.pi)).astype(np.int64)
         length = padded_length(int(np.max(bins)))
         power: Array = np.zeros(length // 2 + 1)
         for k in range(angle.shape[1]):
             here = problem.mask[:, k]
             summed = power_of_sums(bins[here, k], weighted[here, k], length)
             power += summed / max(float(np.sum(weighted[here, k] ** 2)), 1e-300)
-        order = np.arange(len(power)) * BINS_PER_TURN / length
+        order = np.arange(len(power)) * per_turn / length
         return order, power
+
+
+def _bins_per_turn(problem: Problem) -> int:
+    """Return the angle bins in a turn, a power of two: of what turns fast, the readings resolve few orders."""
+    highest = _resolved(problem) + SIDE_BAND[1]
+    return int(2 ** np.ceil(np.log2(BINS_PER_CYCLE * min(highest, HIGHEST_ORDER))))
 
 
 def _lowest(problem: Problem) -> float:
@@ -160,8 +166,9 @@ def _lowest(problem: Problem) -> float:
 
 
 def _resolved(problem: Problem) -> float:
-    """Return the highest order with enough readings in a cycle at the median speed."""
-    usual = float(np.median(np.abs(problem.covariates["wheel_speed"][problem.mask])))
+    """Return the highest order with enough readings in a cycle at the median speed of what turns."""
+    speed = np.abs(problem.covariates["wheel_speed"][problem.mask])
+    usual = float(np.median(speed[speed > 0])) if np.any(speed > 0) else 0.0
     return min(HIGHEST_ORDER, 2 * np.pi / (READINGS_PER_CYCLE * problem.recording.step_s * max(usual, 1e-9)))
 
 

@@ -1,0 +1,71 @@
+"""The search for a ripple needs memory in proportion to the readings, and finds it on a machine that turns fast."""
+
+from __future__ import annotations
+
+import tracemalloc
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch import Simulation
+from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import WheelAngleRipple
+from regolithd.calibration.mismatch.data.recording import from_columns
+from regolithd.calibration.mismatch.problem.build import build_problem
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from regolithd.calibration.mismatch.problem.problem import Problem
+
+    Array = NDArray[np.float64]
+
+ROWS = 2573
+MEMORY_MB = 40
+"""Most memory of the search (a choice): two thousand numbers for each reading."""
+
+
+class Propeller(Simulation):
+    """A thrust of 1 N."""
+
+    channel, unit = "thrust_N", "N"
+    inputs: ClassVar = ("speed_rad_s",)
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:  # noqa: ARG002
+        """Return 1 N."""
+        return np.ones_like(inputs["speed_rad_s"])
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return speed and time."""
+        return {"wheel_speed": inputs["speed_rad_s"], "time": inputs["t_s"]}
+
+
+def spun(fastest_rad_s: float, step_s: float, order: float) -> tuple[Problem, Array]:
+    """Return the problem of a propeller that rests, spins up and rests, and a ripple of that order."""
+    time_s = step_s * np.arange(ROWS)
+    speed = fastest_rad_s * np.clip(np.sin(time_s * 2 * np.pi * 5 / time_s[-1]), 0, None)
+    angle = np.concatenate(([0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * step_s)))
+    columns = {"t_s": time_s, "thrust_N": np.ones(ROWS), "speed_rad_s": speed}
+    problem = build_problem(from_columns(columns), Propeller())
+    return problem, np.cos(order * angle)[:, None]
+
+
+@pytest.mark.parametrize("fastest_rad_s", [100.0, 3000.0])
+def test_a_fast_propeller_that_often_rests_takes_no_more_memory(fastest_rad_s: float) -> None:
+    """The time at rest resolves no order, and turns that no reading resolves need no bins."""
+    problem, ripple = spun(fastest_rad_s, 0.1, 1.0)
+    tracemalloc.start()
+    WheelAngleRipple().propose_shapes(problem, ripple)
+    peak_MB = tracemalloc.get_traced_memory()[1] / 1e6
+    tracemalloc.stop()
+    assert peak_MB < MEMORY_MB
+
+
+@pytest.mark.parametrize("order", [2.0, 7.0])
+def test_an_order_is_found_with_as_few_bins_as_the_readings_resolve(order: float) -> None:
+    """To the width of its line."""
+    problem, ripple = spun(20.0, 0.01, order)
+    found = [float(shape["order"]) for shape in WheelAngleRipple().propose_shapes(problem, ripple)]
+    assert any(each == pytest.approx(order, abs=0.02) for each in found)
