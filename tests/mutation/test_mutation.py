@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import ast
 import signal
+import tomllib
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from checkout import Checkout, Run
 from coverage_map import CoverageMap, statement_lines
-from figures import Words, line_of, score, write_page
+from figures import SURVIVORS, Words, line_of, score, write_page
 from mutants import Mutation, left_out, mutations, sample
 from trial import Result, selected_tests
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
+ROOT = Path(__file__).resolve().parents[2]
 FILE = "drivers/can/limits.py"
 SOURCE = '''"""Limits."""
 
@@ -155,3 +154,14 @@ def test_the_page_tells_seed_share_and_words(tmp_path: Path) -> None:
     assert line_of(figures) in page
     assert "| `drivers/` | 3 | 3 |" in page
     assert "| `daemon/` | 1 | 0 |" in page
+
+
+@pytest.mark.parametrize("survivor", tomllib.loads(SURVIVORS.read_text())["survivor"], ids=lambda each: each["file"])
+def test_every_survivor_is_equal_or_has_a_test(survivor: dict[str, str]) -> None:
+    """There is no third word; a test that is named exists."""
+    kind, _, rest = survivor["word"].partition(": ")
+    assert kind in {"equal", "test"}
+    assert rest
+    if kind == "test":
+        path, _, name = rest.partition("::")
+        assert f"def {name.partition('[')[0]}(" in (ROOT / path).read_text()
