@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Change, Contribution
 from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
-from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
+from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
 
 if TYPE_CHECKING:
@@ -44,14 +44,9 @@ class Stated:
 
         Raises
         ------
-        RecordingError
-            When the recording has not what the effect depends on.
+        SimulationError
+            When the recording has not what the effect depends on, or the effect's shape or coefficients are incomplete.
         """
-        if missing := [name for name in self.candidate.requires if name not in problem.covariates]:
-            raise RecordingError(
-                f"the simulation was corrected by {self.contribution.name}, which needs {', '.join(missing)}; "
-                "the recording does not have it"
-            )
         columns = np.where(problem.mask, self._columns(problem), 0.0)
         on = np.isin(np.array(problem.recording.wheels, dtype=object), list(self.contribution.wheels))
         coefficients = np.array(self.contribution.coefficients, np.float64)

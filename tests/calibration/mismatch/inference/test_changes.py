@@ -12,7 +12,7 @@ from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import stated_in
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
-from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
+from regolithd.calibration.mismatch.errors import SimulationError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -124,5 +124,7 @@ def test_a_corrected_effect_whose_covariate_was_never_measured_is_one_message() 
         def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
             return values["mass_kg"] * inputs["acceleration_m_s2"]
 
-    with pytest.raises(RecordingError, match="corrected by coulomb-friction, which needs direction"):
+    with pytest.raises(
+        SimulationError, match="coulomb-friction depends on direction, which this recording does not have"
+    ):
         compare(blank, WithoutDrag(), effects=[COULOMB])
