@@ -121,7 +121,7 @@ def implausible(dimension: str, factor: float, bits: int = 32) -> str:
 
 def _rated_current(values: tuple[int, ...]) -> float:
     if not values[0]:
-        raise ValueError("the rated current is 0: set it in the drive")
+        raise ValueError("the rated current is 0")
     return values[0] * 1e-6
 
 

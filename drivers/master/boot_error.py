@@ -41,8 +41,8 @@ REMEDIES = {
     BootReason.WRONG_REVISION: "Where this firmware is meant, state the range: `revisions = [lowest, highest]` in "
     "[devices]",
     BootReason.WRONG_SERIAL: "The device was exchanged: put its serial number into rover.toml, and calibrate it",
-    BootReason.CONFIGURATION_REFUSED: "The device does not allow what its EDS says: `regolithd check` lists every such "
-    "object; name the EDS of its firmware in [devices] eds",
+    BootReason.CONFIGURATION_REFUSED: "The device does not allow what its EDS says: name the EDS of its firmware in "
+    "[devices] eds, or set the object with the maker's program",
     BootReason.FIXED_OTHERWISE: "Set it with the maker's own program, or choose fitting objects and units in [devices]",
     BootReason.UNKNOWN_UNIT: "Set it in the drive with the maker's program, or state the unit in [devices.….objects]",
     BootReason.CONFIGURATION_NOT_KEPT: "The device changes the value by itself: compare its EDS, update its firmware",

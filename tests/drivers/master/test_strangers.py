@@ -238,7 +238,7 @@ async def test_a_late_boot_up_is_awaited_for_the_configured_time() -> None:
 @pytest.mark.parametrize(
     ("sets", "said"),
     [
-        ({"o6075_0": 0}, "0x6075:00 = 0x0: the rated current is 0: set it in the drive"),
+        ({"o6075_0": 0}, "0x6075:00 = 0x0: the rated current is 0"),
         ({"o60A9_0": 0x00B54700}, "0x60A9:00 = 0xB54700: no angle per time"),
         ({"o1000_0": 0x0002_0194}, "its device type is 0x00000194, expected 0x00000192"),
     ],
