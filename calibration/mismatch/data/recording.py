@@ -37,9 +37,10 @@ LONGEST_STEP_S, SHORTEST_STEP_S = 100.0, 1e-6
 some ten kHz)."""
 LONGEST_SPAN_S, LATEST_S = 1e10, 1e20
 """Three hundred years, and Unix time in nanoseconds times 50: what is longer or later is not in seconds."""
-GREATEST_READING, LEAST_READING = 1e30, 1e-100
-"""Readings beyond the first are codes for "not measured" (netCDF fills blanks with 9.97e36); those below the second
-are 0: the square of a smaller one has no digits."""
+GREATEST_READING, LEAST_READING = 1e15, 1e-100
+"""Readings beyond the first are codes for "not measured" (netCDF fills blanks with 9.97e36, climate models with 1e20),
+and their products with others would pass single precision; those below the second are 0: the square of a smaller one
+has no digits."""
 MOST_ROWS_PER_INSTANT = 1.5
 """Rows for each instant beyond which they are of several wheels, not repetitions (a choice: half of them)."""
 MOST_RUNS = 2**31

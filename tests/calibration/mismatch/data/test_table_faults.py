@@ -189,3 +189,13 @@ def test_parquet_and_csv_have_numbers_and_skip_texts(tmp_path: Path) -> None:
             (tmp_path / name).write_bytes(b"nothing")
         with pytest.raises(RecordingError, match=what):
             read_recording(tmp_path / name)
+
+
+@pytest.mark.parametrize(("code", "blank"), [(1e30, True), (-1e20, True), (9.97e36, True), (1e14, False)])
+def test_a_code_for_not_measured_is_blank(code: float, blank: bool) -> None:
+    """Fill values of other formats are counted in a note, and never compared."""
+    rows = table([0.0, 1.0, 2.0])
+    rows["value"][3] = code
+    found = from_columns(rows)
+    assert np.isnan(found.channels["value"][1, 1]) == blank
+    assert any("beyond 1e+15" in note for note in found.notes) == blank
