@@ -100,7 +100,7 @@ def axes(panel: Panel, x_label: str, y_label: str, *, x_about: int = 6, y_about:
     parts.append(text(panel.left + panel.width / 2, bottom + 35, x_label, anchor="middle"))
     if y_label:
         middle = panel.top + panel.height / 2
-        parts.append(text(panel.left - 44, middle, y_label, anchor="middle", turn=-90))
+        parts.append(text(panel.left - 66, middle, y_label, anchor="middle", turn=-90))
     return "".join(parts)
 
 

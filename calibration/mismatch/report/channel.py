@@ -23,11 +23,13 @@ class ChannelPart:
     Attributes
     ----------
     heading: the channel's name; empty where there is one alone
+    corrected: whether effects or changes were added to the simulation
     along_motion: whether the map over time has the residual multiplied by the sign of a speed
     """
 
     heading: str
     along_motion: bool
+    corrected: bool
     map: Markup
     curves: Sequence[sections.Figure]
     effects: Sequence[sections.EffectSection]
@@ -49,6 +51,7 @@ def _about(answer: Answer, channel: str, shown: Sequence[Evidence]) -> Answer:
     if len(shown) == 1:
         return answer
     predicted = {each.channel for each in shown}
+    changed = {term.name for term in shown[0].contributions if term.channel == channel}
     return replace(
         answer,
         # The fault of a sensor that is not predicted stands with the first channel.
@@ -58,6 +61,7 @@ def _about(answer: Answer, channel: str, shown: Sequence[Evidence]) -> Answer:
             if each.channel == channel or (channel == shown[0].channel and each.channel not in predicted)
         ),
         unexplained=tuple(each for each in answer.unexplained if each.channel == channel),
+        changes=tuple(each for each in answer.changes if each.name in changed),
         sensitivity=tuple(each for each in answer.sensitivity if each.channel == channel),
         fit=next((fit for fit in answer.fits if fit.channel == channel), answer.fit),
     )
@@ -68,6 +72,7 @@ def _part(answer: Answer, evidence: Evidence, *, alone: bool) -> ChannelPart:
     return ChannelPart(
         heading="" if alone else evidence.channel,
         along_motion=evidence.problem is None or "direction" in evidence.problem.covariates,
+        corrected=bool(answer.effects or answer.changes),
         map=sections.residual_map(answer, evidence, labels),
         curves=sections.curves(answer, evidence, labels),
         effects=[sections.effect(effect, evidence, labels) for effect in answer.effects],

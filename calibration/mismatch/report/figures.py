@@ -34,7 +34,7 @@ def map_figure(answer: Answer, evidence: Evidence, labels: Labels) -> str:
     rows = len(evidence.wheels)
     high, left, gap = 18.0, 84.0, 40.0
     wide = WIDTH - left - 12
-    headings = ("calibrated simulation", "with the effects added")[: 2 if answer.effects else 1]
+    headings = ("calibrated simulation", "with the effects added")[: 2 if answer.effects or answer.changes else 1]
     tops = [26.0 + k * (high * rows + gap) for k in range(len(headings))]
     panels = [Panel(left, top, wide, high * rows, (edges[0], edges[-1]), (0, rows)) for top in tops]
     parts: list[str] = []

@@ -15,7 +15,7 @@ from regolithd.calibration.mismatch.report.figures import curve_figure, fit_figu
 from regolithd.calibration.mismatch.report.labels import capital
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.answer import Answer, Curve, Effect, Evidence, Unexplained
+    from regolithd.calibration.mismatch.answer import Answer, Change, Curve, Effect, Evidence, Unexplained
     from regolithd.calibration.mismatch.report.labels import Labels
 
 MOST_CURVES, MOST_OTHER_CURVES = 3, 8
@@ -115,6 +115,7 @@ def residual_map(answer: Answer, evidence: Evidence, labels: Labels) -> Markup:
 def curves(answer: Answer, evidence: Evidence, labels: Labels) -> tuple[Figure, ...]:
     """Return the residual against the covariate of everything that was found; else the curve that stands out most."""
     places = [_effect_place(found, labels) for found in answer.effects]
+    places += [_change_place(change, evidence, labels) for change in answer.changes]
     places += [_unexplained_place(place, evidence) for place in answer.unexplained]
     found = (curve_of(evidence, name, wheels, along_motion=along) for name, wheels, along in dict.fromkeys(places))
     drawn = [curve for curve in found if curve is not None] or list(evidence.curves[:1])
@@ -128,6 +129,15 @@ def _effect_place(found: Effect, labels: Labels) -> tuple[str, tuple[int | str, 
     return found.covariate, found.wheels, along
 
 
+def _change_place(change: Change, evidence: Evidence, labels: Labels) -> tuple[str, tuple[int | str, ...], bool]:
+    """Return the same of an effect that has changed: the wheels that have it."""
+    candidate = labels.candidates.get(change.name)
+    covariate = candidate.covariate if candidate else "time"
+    wheels = [each.wheels for each in evidence.contributions if each.name == change.name]
+    along = (candidate is None or candidate.along_motion) and covariate != "direction"
+    return covariate, wheels[0] if wheels else evidence.wheels, along
+
+
 def _unexplained_place(place: Unexplained, evidence: Evidence) -> tuple[str, tuple[int | str, ...], bool]:
     """Return the same of a structure that no candidate explains: as its clearest curve has it."""
     couplings = (curve.coupling for curve in evidence.curves if curve.covariate == place.covariate)
@@ -135,7 +145,7 @@ def _unexplained_place(place: Unexplained, evidence: Evidence) -> tuple[str, tup
 
 
 def _curve(curve: Curve, answer: Answer, evidence: Evidence, labels: Labels) -> Figure:
-    svg = _safe(curve_figure(curve, evidence.unit, labels, corrected=bool(answer.effects)))
+    svg = _safe(curve_figure(curve, evidence.unit, labels, corrected=bool(answer.effects or answer.changes)))
     return Figure(svg, labels.covariate(curve.covariate), labels.wheels(curve.wheels, evidence.wheels))
 
 
@@ -205,7 +215,7 @@ def fit(answer: Answer, evidence: Evidence, labels: Labels) -> FitSection:
 def confusions(answer: Answer, labels: Labels) -> tuple[ConfusionRow, ...]:
     """Return what this recording cannot tell apart."""
     return tuple(
-        ConfusionRow(listed([labels.effect(name) for name in one.effects]), one.experiment)
+        ConfusionRow(capital(listed([labels.effect(name) for name in one.effects])), one.experiment)
         for one in answer.indistinguishable
     )
 
@@ -220,7 +230,8 @@ def sensitivity(answer: Answer, evidence: Evidence, labels: Labels) -> tuple[Sen
             size = number(labels.scaled(one.unit)[0] * one.smallest_detectable, 2)
             share = f"{100 * one.smallest_detectable / mean:.1f} %" if mean > 0 else "–"
             rows.append(SensitivityRow(capital(labels.effect(one.name)), size, share))
-    return tuple(rows)
+    # An effect and a change of it on other wheels have one name.
+    return tuple({row.label: row for row in rows}.values())
 
 
 def undetectable(answer: Answer, labels: Labels) -> str:
@@ -238,7 +249,12 @@ def other_curves(answer: Answer, evidence: Evidence, labels: Labels) -> tuple[Fi
     others = [c for c in evidence.curves if first.get(c.covariate) is c and c.covariate not in shown]
     drawings = [
         curve_figure(
-            curve, evidence.unit, labels, corrected=bool(answer.effects), width=SMALL_WIDTH, height=SMALL_HEIGHT
+            curve,
+            evidence.unit,
+            labels,
+            corrected=bool(answer.effects or answer.changes),
+            width=SMALL_WIDTH,
+            height=SMALL_HEIGHT,
         )
         for curve in others[:MOST_OTHER_CURVES]
     ]

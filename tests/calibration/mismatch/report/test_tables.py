@@ -51,8 +51,9 @@ def test_the_page_shows_parameters_changes_and_what_is_left_out() -> None:
     assert all(heading in page for heading in headings)
     assert "1,200" in page
     assert "left its prior" in page
+    assert "with the effects added" in page
     plain = render_report(CONSISTENT, evidence(1800.0), FROM)
-    assert not any(heading in plain for heading in headings)
+    assert not any(heading in plain for heading in (*headings, "with the effects added"))
 
 
 def test_each_of_several_channels_has_its_own_drawings_and_findings() -> None:
