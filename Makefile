@@ -16,7 +16,7 @@ help:
 
 ## Use and development
 
-demo: $(DEMO) ## virtual rover, daemon and broker for half a minute; no hardware, no root
+demo: $(DEMO) ## a virtual rover drives onto weak soil, then a comparison with a simulation; two minutes, no root
 	$(BIN)/regolithd demo
 
 test: $(DEV) ## all tests and checks (installs Debian packages for some of them, where permitted)

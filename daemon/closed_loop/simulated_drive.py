@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.daemon.closed_loop.pdo_frames import frames
 from regolithd.daemon.pipeline.onnx_models import OnnxModels, load_posterior
 from regolithd.daemon.pipeline.pipeline import Chain
 from regolithd.daemon.recording.recorder import Recorder
+from regolithd.daemon.simulator.pdo_frames import frames
 from regolithd.daemon.simulator.virtual_rover import GroundTruth, VirtualWorld
 
 if TYPE_CHECKING:

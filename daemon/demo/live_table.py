@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from rich import box
-from rich.console import Group
+from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
@@ -19,8 +19,12 @@ from regolithd.daemon.demo.interval_bar import SCALES, interval_bar
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from regolithd.daemon.simulator.virtual_rover import VirtualWorld
+
 PLACES = ("front left", "front right", "middle left", "middle right", "rear left", "rear right")
 HISTORY = 12
+ALARM_WIDTH = 80
+_CONSOLE = Console(width=ALARM_WIDTH)
 BLOCKS = "▁▂▃▄▅▆▇█"
 LEGEND = "outside: load W, slip i or current I is not in the network's training range"
 SYMBOLS = {"load_N": "W", "slip": "i", "motor_current_A": "I", "wheel_torque_Nm": "T", "wheel_speed_rad_s": "ω"}
@@ -28,9 +32,14 @@ SYMBOLS = {"load_N": "W", "slip": "i", "motor_current_A": "I", "wheel_torque_Nm"
 
 @dataclass(slots=True)
 class LiveTable:
-    """The newest message of each wheel, the recent torques, posterior and alarms, and the number of messages."""
+    """The newest message of each wheel, the recent torques, posterior and alarms, and the number of messages.
+
+    `world` is the simulator, which alone knows the true soil; `paper` adds the paper's network, as a comparison.
+    """
 
     prefix: str
+    world: VirtualWorld | None = None
+    paper: bool = False
     wheels: dict[int, dict[str, Any]] = field(default_factory=dict)
     torque: dict[int, deque[float]] = field(default_factory=dict)
     state: str = "offline"
@@ -73,13 +82,16 @@ class LiveTable:
         for name in ("load\nN", "slip\n%", "torque\nN·m"):
             table.add_column(name, justify="right", no_wrap=True)
         table.add_column("", no_wrap=True)
-        for name in ("c\nkPa", "φ\n°"):
-            table.add_column(name, justify="right", no_wrap=True)
-        table.add_column("\nestimate", no_wrap=True)
+        table.add_column("true soil\n(simulator)", no_wrap=True)
+        if self.paper:
+            for name in ("paper: c\nkPa", "φ\n°"):
+                table.add_column(name, justify="right", no_wrap=True)
+            table.add_column("\ninputs", no_wrap=True)
         top = max([0.1, *(max(values) for values in self.torque.values() if values)])
         for wheel in range(1, 7):
             table.add_row(*self._row(wheel, top))
-        return Group(table, Text(LEGEND, style="dim"), Text(), *self._posterior_lines(), Text(), self._footer())
+        legend = [Text(LEGEND, style="dim")] if self.paper else []
+        return Group(table, *legend, Text(), *self._posterior_lines(), Text(), *self._alarm_lines(), self._footer())
 
     def _posterior_lines(self) -> list[Text]:
         """Return title and one interval bar for each quantity of the posterior."""
@@ -95,37 +107,58 @@ class LiveTable:
         name = Text.assemble((f"{wheel} ", "bold"), (PLACES[wheel - 1], "dim"))
         message = self.wheels.get(wheel)
         if message is None:
-            return (name, *[Text("–", style="dim")] * 3, "", "–", "–", Text("waiting", style="dim"))
+            return (name, *[Text("–", style="dim")] * 3, "", Text("waiting", style="dim"), *["–"] * 3 * self.paper)
         history = Text(sparkline(self.torque.get(wheel, ()), top).ljust(HISTORY), style="cyan")
-        angle = message["friction_angle_rad"]
-        colour = "bold green" if message["valid"] and not message["outside_training_range"] else "yellow"
         return (
             name,
             _number(message["smoothed_load_N"], 1),
             _number(message["slip"], 1, 100),
             _number(message["smoothed_torque_Nm"], 2, style="bold cyan"),
             history,
-            _number(message["cohesion_Pa"], 2, 1e-3, style=colour),
-            _number(math.degrees(angle) if angle is not None else None, 1, style=colour),
-            _verdict(message),
+            self._soil(wheel),
+            *(_paper_cells(message) if self.paper else ()),
         )
+
+    def _soil(self, wheel: int) -> Text:
+        """Return the true soil under a wheel; the second one that was driven on is marked."""
+        truth = self.world.truth if self.world is not None else None
+        if truth is None or self.world is None:
+            return Text("–", style="dim")
+        soil = truth.soils[wheel - 1]
+        first = self.world.scenario.ground.stretches[0].name
+        return Text(soil, style="dim" if soil == first else "bold yellow")
+
+    def _alarm_lines(self) -> list[Text]:
+        """Return the first alarm, in four lines, so that the picture does not move."""
+        lines = [Text()] * 4
+        if self.alarms:
+            text = Text("▲ ALARM " + next(iter(self.alarms.values())), style="bold red")
+            lines = [*text.wrap(_CONSOLE, ALARM_WIDTH), *lines][:4]
+        return lines
 
     def _footer(self) -> Text:
         style = "green" if self.state == "online" else "red"
         text = Text.assemble(
             ("● ", style), (f"{self.prefix} {self.state}", style), (f" · {self.messages} messages", "dim")
         )
-        if self.alarms:
-            text.append(f" · {next(iter(self.alarms.values()))}", style="bold red")
-        else:
-            text.append(" · no alarm", style="dim")
-        text.truncate(79, overflow="ellipsis")
+        text.append("" if self.alarms else " · no alarm", style="dim")
         return text
 
 
 def sparkline(values: Any, top: float) -> str:  # noqa: ANN401  # any numbers in a row
     """Return values between 0 and `top` as a row of block characters."""
     return "".join(BLOCKS[min(len(BLOCKS) - 1, max(0, int(value / top * len(BLOCKS))))] for value in values)
+
+
+def _paper_cells(message: dict[str, Any]) -> tuple[Text, Text, Text]:
+    """Return cohesion and friction angle of the paper's network, and whether its inputs lie in the training range."""
+    angle = message["friction_angle_rad"]
+    colour = "green" if message["valid"] and not message["outside_training_range"] else "yellow"
+    return (
+        _number(message["cohesion_Pa"], 2, 1e-3, style=colour),
+        _number(math.degrees(angle) if angle is not None else None, 1, style=colour),
+        _verdict(message),
+    )
 
 
 def _number(value: float | None, digits: int, factor: float = 1.0, style: str = "") -> Text:

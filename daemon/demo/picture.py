@@ -24,8 +24,8 @@ POSTERIOR_COLOUR = "#7b4b94"
 Records = list[tuple["Estimate", "GroundTruth"]]
 
 
-def draw(records: Records, path: Path) -> None:
-    """Write the picture as PNG."""
+def draw(records: Records, path: Path, *, paper: bool = True) -> None:
+    """Write the picture as PNG; `paper` adds what the paper's network makes of each wheel."""
     import matplotlib as mpl  # noqa: PLC0415  # only the demo has it
 
     mpl.use("Agg")
@@ -36,7 +36,7 @@ def draw(records: Records, path: Path) -> None:
     _soil_quantity(
         cohesion,
         records,
-        [estimate.cohesion_Pa / 1000 for estimate, _ in records],
+        [estimate.cohesion_Pa / 1000 for estimate, _ in records] if paper else [],
         [truth.cohesion_Pa / 1000 for _, truth in records],
         [(estimate.posterior.cohesion_Pa if estimate.posterior else None) for estimate, _ in records],
         1e-3,
@@ -44,7 +44,7 @@ def draw(records: Records, path: Path) -> None:
     _soil_quantity(
         angle,
         records,
-        [np.degrees(estimate.friction_angle_rad) for estimate, _ in records],
+        [np.degrees(estimate.friction_angle_rad) for estimate, _ in records] if paper else [],
         [np.degrees(truth.friction_angle_rad) for _, truth in records],
         [(estimate.posterior.friction_angle_rad if estimate.posterior else None) for estimate, _ in records],
         float(np.degrees(1)),
@@ -111,8 +111,9 @@ def _soil_quantity(
             at, band["low_50"], band["high_50"], color=POSTERIOR_COLOUR, alpha=0.22, linewidth=0, label="50 %"
         )
         axis.plot(at, band["median"], color=POSTERIOR_COLOUR, linewidth=2, label="median")
-    axis.plot(seconds, np.stack(alone), color="#888888", linewidth=0.6, alpha=0.7)
-    axis.plot([], [], color="#888888", linewidth=0.8, label="each wheel alone, the paper's network")
+    if alone:
+        axis.plot(seconds, np.stack(alone), color="#888888", linewidth=0.6, alpha=0.7)
+        axis.plot([], [], color="#888888", linewidth=0.8, label="each wheel alone, the paper's network")
     for first, second, colour, name in (
         (0, 1, COLOURS[0], "front"),
         (2, 3, COLOURS[2], "middle"),

@@ -12,29 +12,30 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from regolithd.daemon.demo.run import run_demo
+from regolithd.daemon.demo.run import Show, run_demo
 from regolithd.daemon.demo.screen import frame
+from regolithd.daemon.demo.story import LIVE_S
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from regolithd.daemon.demo.live_table import LiveTable
 
-SECONDS = 30.0
-AT_S = 20.0
+ALARM_FROM_S, AT_S = 10.0, 36.0
+"""The screen is drawn when the alarm is raised, at the latest after `AT_S`."""
 COLUMNS = 84
 
 
 def screenshot(to: Path) -> None:
-    """Run the demo, and write its screen after 20 s as an SVG without web fonts."""
+    """Run the demo, and write its screen once the alarm is raised as an SVG without web fonts."""
     frames: list[RenderableType] = []
 
     def show(table: LiveTable, elapsed: float) -> None:
-        if elapsed >= AT_S and not frames:
-            frames.append(frame(table, elapsed, SECONDS))
+        if (table.alarms or elapsed >= AT_S) and elapsed >= ALARM_FROM_S and not frames:
+            frames.append(frame(table, elapsed, LIVE_S))
 
     with tempfile.TemporaryDirectory() as folder:
-        asyncio.run(run_demo(Path(folder), SECONDS, show))
+        asyncio.run(run_demo(Path(folder), LIVE_S, Show(lambda _done, _all: None, show)))
     console = Console(record=True, width=COLUMNS, force_terminal=True, file=io.StringIO())
     console.print(frames[0])
     svg = console.export_svg(title="make demo")

@@ -16,7 +16,6 @@ from regolithd.calibration.parameters import SOILS, Drivetrain
 from regolithd.daemon.closed_loop import case as case_module
 from regolithd.daemon.closed_loop import picture, run, summary
 from regolithd.daemon.closed_loop.case import Case, cases, first_scenario, rover_toml, second_scenario, sim_toml
-from regolithd.daemon.closed_loop.pdo_frames import FRAME_NS, frames
 from regolithd.daemon.closed_loop.run import DriveLengths, LoopResult, run_case
 from regolithd.daemon.closed_loop.simulated_drive import START_NS, estimates, record, simulate
 from regolithd.daemon.closed_loop.soil_estimates import SoilEstimates, figures, soil_estimates, with_posterior_enabled
@@ -24,6 +23,7 @@ from regolithd.daemon.closed_loop.speed_profile import SpeedProfile, traverse
 from regolithd.daemon.config.configuration import Configuration
 from regolithd.daemon.config.reader import read_configuration
 from regolithd.daemon.pipeline.onnx_models import load_models
+from regolithd.daemon.simulator.pdo_frames import FRAME_NS, frames
 from regolithd.drivers.devices.decoding.decoder import Decoder
 from regolithd.drivers.devices.decoding.signals import Reading
 from regolithd.drivers.virtual.plant import Measurement

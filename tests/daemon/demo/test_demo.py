@@ -23,6 +23,7 @@ from regolithd.daemon.demo.ground_truth_log import GroundTruthLog, posteriors_on
 from regolithd.daemon.demo.interval_bar import SCALES, interval_bar
 from regolithd.daemon.demo.live_table import LiveTable, sparkline
 from regolithd.daemon.demo.result_tables import posterior_table, wheel_table
+from regolithd.daemon.demo.story import LIVE_S
 from regolithd.daemon.messages.channels import CHANNELS
 from regolithd.daemon.messages.examples import example
 from regolithd.drivers.master.status import NodePhase
@@ -61,7 +62,7 @@ def wheel(number: int, **changes: Any) -> tuple[str, bytes]:
 
 def filled() -> LiveTable:
     """Return a table with a message of each kind, five wheels in different states, and one that has sent nothing."""
-    table = LiveTable(PREFIX)
+    table = LiveTable(PREFIX, paper=True)
     for torque in (0.2, 0.5, 1.0, 1.9):
         table.take(*wheel(1, smoothed_torque_Nm=torque))
     table.take(
@@ -95,17 +96,17 @@ def test_an_empty_table_waits() -> None:
     assert_golden(printed(table.render()), GOLDEN / "empty-table.txt")
 
 
-def test_the_footer_has_the_oldest_present_alarm() -> None:
-    """An alarm that is no longer active is removed; the line is cut off at 79 characters."""
+def test_the_oldest_present_alarm_is_shown() -> None:
+    """An alarm that is no longer active is removed; a long text is broken into at most four lines."""
     table = filled()
     for name, active in (("bus", True), ("clock", True), ("bus", False)):
         payload = json.dumps({"active": active, "text": f"text of {name}"}).encode()
         table.take(f"{PREFIX}/alarm/{name}", payload)
     assert table.alarms == {"clock": "text of clock"}
-    assert "· 15 messages · text of clock" in plain(table.render())
-    table.alarms["clock"] = "x" * 100
-    assert table._footer().plain.endswith("x…")
-    assert len(table._footer().plain) == 79
+    assert "▲ ALARM text of clock" in plain(table.render())
+    table.alarms["clock"] = "word " * 100
+    assert len(table._alarm_lines()) == 4
+    assert max(len(line) for line in table._alarm_lines()) <= 80
 
 
 def test_twelve_torques_are_kept() -> None:
@@ -244,19 +245,24 @@ def test_the_picture_shows_estimates_and_truth(tmp_path: Path, monkeypatch: pyte
     assert not drawn[1].axes[1].collections
 
 
-def test_the_screen_is_redrawn_on_a_terminal_and_printed_every_5_s_elsewhere() -> None:
-    """Title, progress and table; without a terminal the first table comes after 5 s."""
+def test_the_screen_is_redrawn_on_a_terminal_and_printed_every_10_s_elsewhere() -> None:
+    """Title, progress and table; without a terminal the first table comes after 10 s."""
     assert_golden(printed(screen.frame(filled(), 12.4, 30.0)), GOLDEN / "screen.txt")
     out = io.StringIO()
     with screen.screen(Console(file=out, width=100), 30.0) as show:
         assert out.getvalue().strip() == screen.TITLE
-        for elapsed in (0.0, 4.9, 5.0, 5.3, 9.9, 10.0, 30.0):
-            show(LiveTable(PREFIX), elapsed)
+        for computed in (0.0, 60.0, 600.0):
+            show.computing(computed, 600.0)
+        for elapsed in (0.0, 9.9, 10.0, 10.3, 19.9, 20.0, 30.0):
+            show.driving(LiveTable(PREFIX), elapsed)
+    assert out.getvalue().count(f"{screen.COMPUTING}: 10 min") == 1
     times = [line for line in out.getvalue().splitlines() if " of 30 s" in line]
-    assert times == ["5 of 30 s", "10 of 30 s", "30 of 30 s"]
+    assert times == ["10 of 30 s", "20 of 30 s", "30 of 30 s"]
     out = io.StringIO()
     with screen.screen(Console(file=out, width=100, force_terminal=True), 30.0) as show:
-        show(LiveTable(PREFIX), 3.0)
+        show.computing(120.0, 600.0)
+        show.driving(LiveTable(PREFIX), 3.0)
+    assert "2 of 10 min" in out.getvalue()
     assert "3 of 30 s" in out.getvalue()
 
 
@@ -277,10 +283,11 @@ async def test_the_log_keeps_estimates_once_there_is_a_truth() -> None:
 
 
 def test_the_demo_is_configured_for_one_process(tmp_path: Path) -> None:
-    """An in-process bus at 10 Hz, a calibrated drivetrain, and files in the two folders."""
+    """An in-process bus, a drivetrain without the concealed drag, and files in the two folders."""
     configuration = run.demo_configuration(tmp_path / "out", tmp_path / "temporary", 1883)
     assert (configuration.bus.interface, configuration.bus.channel) == ("virtual", "demo")
-    assert configuration.sync.rate_Hz == 10.0
+    assert configuration.sync.rate_Hz == run.RATE_HZ
+    assert configuration.drivetrain.viscous_current_A_s_per_rad == (0.0,) * 6
     assert (configuration.nodes.inclinometer, configuration.nodes.ground_speed) == (21, 22)
     assert configuration.nodes.motor_diagnostics
     assert configuration.drivetrain.gain_relative_std == 0.03
@@ -291,7 +298,6 @@ def test_the_demo_is_configured_for_one_process(tmp_path: Path) -> None:
     assert (configuration.mqtt.host, configuration.mqtt.port) == ("127.0.0.1", 1883)
     assert configuration.mqtt.spool_directory == tmp_path / "temporary" / "spool"
     assert configuration.control.socket == tmp_path / "temporary" / "control.sock"
-    assert (run.SPEED_M_S, run.SOIL_CHANGE_M, run.BOOT_TIMEOUT_S) == (0.05, 0.75, 20.0)
 
 
 async def test_the_demo_waits_until_every_node_is_operational() -> None:
@@ -341,21 +347,26 @@ async def test_the_subscriber_fills_the_table_from_the_embedded_broker() -> None
         assert probe.connect_ex(("127.0.0.1", port)) != 0
 
 
-def test_the_screenshot_is_the_first_screen_after_20_s(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_screenshot_is_the_first_screen_with_the_alarm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """84 columns, without web fonts, with the elapsed time of that screen."""
     from regolithd.daemon.demo import screenshot  # noqa: PLC0415  # only here
 
     async def run_demo(_folder: Path, seconds: float, show: Any) -> None:
-        assert seconds == 30.0
-        for elapsed in (0.0, 19.9, 20.4, 25.0, 30.0):
-            show(filled(), elapsed)
+        assert seconds == LIVE_S
+        show.computing(1.0, 2.0)
+        for elapsed in (0.0, 5.0, 20.4, 25.0, 30.0):
+            table = filled()
+            if elapsed > 20:
+                table.alarms["soil-change"] = "the soil is weaker"
+            show.driving(table, elapsed)
 
     monkeypatch.setattr(screenshot, "run_demo", run_demo)
     screenshot.screenshot(tmp_path / "demo.svg")
     svg = (tmp_path / "demo.svg").read_text()
     text = svg.replace("&#160;", " ")
-    assert "20 of 30 s" in text
-    assert "25 of 30 s" not in text
+    assert "20 of 44 s" in text
+    assert "ALARM the soil is weaker" in text
+    assert "25 of 44 s" not in text
     assert "make demo" in text
     assert "@font-face" not in svg
     assert screenshot.COLUMNS == 84
