@@ -283,6 +283,19 @@ async def test_who_may_command_is_reported(tmp_path: Path) -> None:
         assert await running_daemon(configuration) is None
 
 
+async def test_what_answers_in_another_language_is_no_daemon(tmp_path: Path) -> None:
+    """Another program's socket."""
+    configuration = Configuration(control=Control(socket=tmp_path / "control.sock"))
+
+    def greet(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b"220 ready\n")
+        writer.close()
+
+    other = await asyncio.start_unix_server(greet, configuration.control.socket)
+    async with other:
+        assert await running_daemon(configuration) is None
+
+
 async def test_a_drivetrain_that_nobody_calibrated_means_no_intervals_and_a_known_one_does() -> None:
     """Without calibration there is a warning, with it none, and a posterior for another wheel is wrong."""
     known = {"no_load_current_A": 0.037}

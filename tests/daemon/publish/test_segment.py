@@ -89,6 +89,14 @@ def test_a_whole_segment_gives_all_its_records(data: bytes) -> None:
     assert (contents.end, contents.damaged, contents.torn) == (9, 0, False)
 
 
+def test_a_copy_of_an_earlier_record_is_passed_over() -> None:
+    """What a write that was repeated has left; the records behind it are delivered, and none is counted as damaged."""
+    records = [pack(5 + k, *message) for k, message in enumerate(MESSAGES)]
+    contents = unpack(MAGIC + records[0] + records[1] + records[0] + records[2] + records[3], 5)
+    assert messages(contents) == MESSAGES
+    assert (contents.end, contents.damaged, contents.torn) == (9, 0, False)
+
+
 def test_any_flipped_bit_costs_one_record_at_most() -> None:
     """All others are delivered unaltered with their indices, and the lost one is counted."""
     data = written()

@@ -101,6 +101,24 @@ def test_an_nmt_command_is_for_one_node_or_all(alone: Alone, data: bytes, state:
     assert alone.node.counts["nmt"] == (data[1:] in (b"\x0b", b"\x00"))
 
 
+def test_a_node_counts_what_it_receives_and_sends() -> None:
+    """Each request, SYNC, PDO and EMCY message, since it was made."""
+    master = Master()
+    node = master.node(NODE)
+    before = dict(node.counts)
+    master.write(NODE, 0x1017, 0, 0, 2)
+    assert node.counts["sdo"] == before.get("sdo", 0) + 1
+    master.configure(NODE, tpdo=LOAD_CELL_TPDO, kind=1)
+    master.nmt(1)
+    for _ in range(3):
+        master.sync()
+    node.report(0x5000)
+    found = {
+        name: node.counts[name] - before.get(name, 0) for name in ("boot_up", "nmt", "sync", "tpdo", "emcy", "rpdo")
+    }
+    assert found == {"boot_up": 0, "nmt": 1, "sync": 3, "tpdo": 3, "emcy": 1, "rpdo": 0}
+
+
 @pytest.mark.parametrize(("command", "kept"), [(0x81, False), (0x82, True)])
 def test_resetting_communication_keeps_the_application_objects(alone: Alone, command: int, kept: bool) -> None:
     """Objects from 0x2000 on keep their values; those of 0x1000 to 0x1FFF return to the EDS's in either case."""

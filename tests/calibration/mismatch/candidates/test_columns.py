@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
+from golden import assert_golden
 
 from regolithd.calibration.mismatch.candidates.candidate import growth, onset_grid
 from regolithd.calibration.mismatch.candidates.library import library
@@ -154,6 +156,22 @@ def test_a_column_is_its_law(name: str, shape: Shape, law: Array) -> None:
     """One column per law, with the coefficient 1."""
     (column,) = CANDIDATES[name].columns(P, shape)
     np.testing.assert_allclose(column, law, rtol=1e-9, atol=1e-12)
+
+
+def shown(value: object) -> str:
+    """Return a shape's value with six digits."""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def test_the_grids_of_shapes_are_those_that_were_reviewed() -> None:
+    """Each candidate's shapes and their penalties, in order: a change of a grid is seen in the difference."""
+    lines = []
+    for name, candidate in CANDIDATES.items():
+        lines += [f"{name} of {candidate.shape_count(P)} shapes"]
+        for shape in candidate.shapes(P):
+            values = " ".join(f"{key}={shown(value)}" for key, value in shape.items())
+            lines.append(f"  {values} penalty {candidate.prior_penalty(P, shape):.6g}")
+    assert_golden("\n".join(lines) + "\n", Path(__file__).with_name("golden") / "shapes.txt")
 
 
 def test_turning_has_a_drag_and_a_moment_relative_to_the_reference_turn() -> None:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
-from linear_machine import NOISE, equations_of, problem_of, table, term_of
+from linear_machine import NOISE, Power, equations_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch.inference.intervals import normal_draws, parameters_of, unit_of
 from regolithd.calibration.mismatch.inference.parameter_interval import interval
 from regolithd.calibration.mismatch.inference.sandwich import block_sums, linearised, sandwich
+from regolithd.calibration.mismatch.inference.size_interval import _over_kinds_of_shape, _rms
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
 from regolithd.calibration.mismatch.signal.noise import NoiseModel
@@ -97,6 +98,24 @@ def test_a_shape_parameter_has_its_interval() -> None:
     (found,) = parameters_of(equations, equations.fit([term]), blocks_of_time(equations.problem, WHITE))
     assert found["power"].low <= 1.5 <= found["power"].high
     assert found["power"].high - found["power"].low < 0.6
+
+
+class Bent(Power):
+    """A power of the speed whose power is one of two kinds, not a continuous parameter."""
+
+    free: ClassVar = {}
+
+
+def test_kinds_of_shape_count_where_they_are_likely() -> None:
+    """A power that the data exclude has no draws, unless every kind is to count: then one at least."""
+    equations = equations_of(problem_of(table(factor=0.8, power=2.0)), (Bent(),))
+    fit = equations.fit([term_of(equations, "power", place=1)])
+    sizes, value = np.linspace(0.9, 1.1, 100), _rms(equations, fit, 0)
+    (drawn,) = _over_kinds_of_shape(equations, fit, 0, sizes, value)
+    np.testing.assert_allclose(drawn, sizes)
+    every = replace(equations.problem, thresholds=replace(equations.thresholds, least_likelihood_ratio=0.0))
+    equations = replace(equations, design=replace(equations.design, problem=every))
+    assert sorted(map(len, _over_kinds_of_shape(equations, fit, 0, sizes, value))) == [1, 100]
 
 
 def test_an_onset_has_bounds_on_both_sides_within_the_recording() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from rover_drives import TABLES, columns, recording, simulation
@@ -93,3 +95,19 @@ def test_tables_come_back_with_the_calibrated_values() -> None:
     assert isinstance(load_simulation({**TABLES}), RoverWheel)
     with pytest.raises(SimulationError, match=r"soil\.cohesion_Pa"):
         RoverWheel.from_tables({**TABLES, "soil": {**TABLES["soil"], "cohesion_Pa": "much"}})
+
+
+@pytest.mark.parametrize(
+    ("misspelt", "keys", "meant"),
+    [
+        ({"drivetran": {}}, ("drivetran",), "drivetrain"),
+        ({"soil": {**TABLES["soil"], "cohesion_pa": 1}}, ("soil", "cohesion_pa"), "cohesion_Pa"),
+    ],
+)
+def test_a_misspelt_table_or_key_is_told_with_what_it_may_mean(
+    misspelt: dict[str, Any], keys: tuple[str, ...], meant: str
+) -> None:
+    """In one message, with its place."""
+    with pytest.raises(SimulationError, match=rf"{'[.]'.join(keys)}: .*; did you mean {meant}") as caught:
+        RoverWheel.from_tables({**TABLES, **misspelt})
+    assert caught.value.keys == keys

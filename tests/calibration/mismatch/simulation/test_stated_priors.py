@@ -45,6 +45,8 @@ def test_parameters_win_over_other_tables() -> None:
         ({"parameters": {"area_m2": {"value": "x"}}}, "[parameters.area_m2] value: a finite number"),
         ({"parameters": {"volume": {}}}, "[parameters]: the simulation has no parameter volume"),
         ({"area_m2": 3}, "a parameter stands in a table"),
+        ({"tank": {"area_m2_std": -0.1}}, "[tank] area_m2_std: a standard deviation is 0 (exact) or more, not -0.1"),
+        ({"parameters": {"area_m2": {"std": -1}}}, "[parameters.area_m2] std: a standard deviation is 0"),
     ],
 )
 def test_a_mistake_names_table_key_and_cure(tables: dict[str, Any], told: str) -> None:
