@@ -64,6 +64,12 @@ class Thresholds:
         "Share of the compared readings at which a covariate must be known; else it is left out, not the readings.",
         f"{CHOICE}: half of the recording is the most that one covariate may cost",
     )
+    carried_share: float = _threshold(
+        0.1,
+        "Difference between two predictions, with blanks of an input bridged in two ways, as a share of the residual's "
+        "standard deviation, from which a reading after a blank is not compared.",
+        f"{CHOICE}: it adds a hundredth to the residual's power at most",
+    )
     furthest_prior_stds: float = _threshold(
         3.0,
         "Standard deviations of its prior beyond which a calibrated parameter is a finding of its own.",

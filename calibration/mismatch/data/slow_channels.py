@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.data.recording import Recording
 
@@ -44,6 +44,40 @@ def filled_between(recording: Recording, predicted: str, between: Mapping[str, B
             word = "held" if how == "hold" else "interpolated on straight lines"
             told.append(f"{name} is measured less often than the other channels; between its readings it is {word}.")
     return recording.with_channels(**filled).with_notes(*told) if filled else recording
+
+
+def bridged(
+    recording: Recording, names: Sequence[str], between: Mapping[str, Between], *, other_way: bool = False
+) -> tuple[Recording, dict[str, NDArray[np.bool_]]]:
+    """Return the recording with blanks of these channels filled in, and where they were blank, by channel.
+
+    Within a run, between readings: on a straight line or held, as `between` says, or the other way; the ends of a run
+    are held. A column that is to stay blank does, and a run without a reading.
+    """
+    filled, blanks = {}, {}
+    for name in names:
+        values, how = recording.channel(name), between.get(name, "linear")
+        blank = ~np.isfinite(values)
+        if name not in recording.channels or how == "blank" or not blank.any() or blank.all():
+            continue
+        held = (how == "hold") != other_way
+        filled[name] = np.stack([_bridged(recording, values[:, k], held=held) for k in range(values.shape[1])], axis=1)
+        blanks[name] = blank & np.isfinite(filled[name])
+    return recording.with_channels(**filled), {name: blank for name, blank in blanks.items() if blank.any()}
+
+
+def _bridged(recording: Recording, column: Array, *, held: bool) -> Array:
+    """Return one wheel's readings with every blank between and beside readings of its run filled in."""
+    found = column.copy()
+    for run in np.unique(recording.run):
+        here = np.flatnonzero(recording.run == run)
+        known = here[np.isfinite(column[here])]
+        if known.size and held:
+            last = np.searchsorted(known, here, side="right") - 1
+            found[here] = column[known[np.maximum(last, 0)]]
+        elif known.size:
+            found[here] = np.interp(recording.time_s[here], recording.time_s[known], column[known])
+    return found
 
 
 def _filled(recording: Recording, column: Array, how: Between) -> Array | None:

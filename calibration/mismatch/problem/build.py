@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.data.slow_channels import filled_between
 from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.problem.compared import blanks_of, isolated_outliers, left_out
 from regolithd.calibration.mismatch.problem.covariates import covariates_of
-from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.problem import Problem
+from regolithd.calibration.mismatch.problem.simulated import simulated
 from regolithd.calibration.mismatch.problem.words import labels_of
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
@@ -37,15 +36,14 @@ def build_problem(
     RecordingError
         When the predicted channel or an input is missing, or too little can be compared.
     """
-    prepared = _prepared(recording, simulation)
     chosen = dict(values or {name: prior.value for name, prior in simulation.parameters.items()})
-    inputs = complete_inputs(prepared)
-    prediction = simulation.predict(inputs, {**simulation.variants(), **chosen})
+    run = simulated(recording, simulation, {**simulation.variants(), **chosen}, thresholds)
+    prepared, prediction = run.recording, run.prediction
     measured = prepared.channel(simulation.channel)
-    compared = np.isfinite(prediction) & np.isfinite(measured)
+    compared = run.known & np.isfinite(measured)
     residual = np.where(compared, measured - prediction, np.nan)
     outliers = isolated_outliers(residual, recording.run, thresholds)
-    found, constants = covariates_of(prepared, simulation, inputs, prediction)
+    found, constants = covariates_of(prepared, simulation, complete_inputs(prepared), prediction)
     covariates, blanks = blanks_of(found, simulation.undefined_at_times, compared, thresholds)
     mask = compared & ~outliers
     for blank in blanks.values():
@@ -67,15 +65,6 @@ def build_problem(
         labels=labels_of(simulation.covariate_labels, {**constants, **covariates}, recording.channels),
         side=simulation.side(recording.wheels),
         row=simulation.row(recording.wheels),
-        left_out=left_out(simulation.channel, measured, prediction, outliers, blanks),
+        left_out=left_out(simulation.channel, measured, run, outliers, blanks),
         thresholds=thresholds,
     )
-
-
-def _prepared(recording: Recording, simulation: Predictor) -> Recording:
-    """Return the recording with derived channels, and inputs replaced by their conditional expectation."""
-    derived = simulation.prepare(filled_between(recording, simulation.channel, simulation.between_readings))
-    needed = (simulation.channel, *simulation.inputs)
-    if missing := [name for name in needed if not np.isfinite(derived.channel(name)).any()]:
-        raise RecordingError(f"the simulation needs {', '.join(missing)}, which the recording does not have")
-    return expected_inputs(derived, simulation.sensors)

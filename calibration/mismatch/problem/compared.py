@@ -8,17 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.problem.problem import LeftOut
+from regolithd.calibration.mismatch.signal.robust import robust_std
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from regolithd.calibration.mismatch.problem.simulated import Simulated
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-MAD_TO_STD = 1.4826
-"""Standard deviation of a normal density over its median absolute deviation."""
 
 
 def isolated_outliers(residual: Array, run: NDArray[np.int64], thresholds: Thresholds) -> Mask:
@@ -34,7 +33,7 @@ def isolated_outliers(residual: Array, run: NDArray[np.int64], thresholds: Thres
         if not known.any():
             continue
         middle = float(np.median(residual[known, k]))
-        deviation = MAD_TO_STD * float(np.median(np.abs(residual[known, k] - middle)))
+        deviation = robust_std(residual[known, k])
         far = np.zeros(len(known), np.bool_)
         far[known] = (np.abs(residual[known, k] - middle) > thresholds.outlier_deviations * deviation) & (deviation > 0)
         before = np.concatenate(([False], far[:-1])) & same_run[:-1]
@@ -67,12 +66,14 @@ def blanks_of(
 
 
 def left_out(
-    channel: str, measured: Array, prediction: Array, outliers: Mask, blanks: Mapping[str, Mask]
+    channel: str, measured: Array, run: Simulated, outliers: Mask, blanks: Mapping[str, Mask]
 ) -> tuple[LeftOut, ...]:
-    """Return what was measured and is not compared, each with its reason."""
-    silent = np.isfinite(measured) & ~np.isfinite(prediction)
+    """Return what was measured and is not compared, each with its reason; `blanks` are those of covariates."""
+    silent, known = ~np.isfinite(run.prediction), np.isfinite(measured)
     reasons = [
-        (silent, "the simulation predicts nothing there"),
+        (known & silent, "the simulation predicts nothing there"),
+        *((known & ~silent & blank, f"{name} was not measured there") for name, blank in run.blanks.items()),
+        (known & run.carried, f"the prediction depends on {', '.join(run.blanks)}, which was not measured before"),
         (outliers, "single, isolated readings far outside all others"),
         *((blank, f"{name} was not measured there") for name, blank in blanks.items()),
     ]

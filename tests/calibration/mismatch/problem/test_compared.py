@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.compared import blanks_of, isolated_outliers, left_out
+from regolithd.calibration.mismatch.problem.simulated import Simulated
 from regolithd.calibration.mismatch.thresholds import Thresholds
 
 LIMITS = Thresholds()
@@ -104,7 +106,8 @@ def test_what_is_left_out_is_counted_with_its_reason() -> None:
     prediction[:2] = np.nan
     none, blank = np.zeros((10, 1), np.bool_), np.zeros((10, 1), np.bool_)
     blank[5:8] = True
-    told = left_out("current_A", measured, prediction, none, {"yaw_rate": blank})
+    run = Simulated(from_columns({"t_s": np.arange(len(measured))}), prediction, {}, none)
+    told = left_out("current_A", measured, run, none, {"yaw_rate": blank})
     assert [(each.channel, each.readings) for each in told] == [("current_A", 2), ("current_A", 3)]
     assert "predicts nothing" in told[0].reason
     assert "yaw_rate" in told[1].reason

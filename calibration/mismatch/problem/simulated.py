@@ -1,0 +1,99 @@
+"""One run of the simulation over a recording whose inputs have blanks.
+
+A blank input is "not measured": nothing is compared there. A simulation that integrates over time would carry the blank
+on to the end of its run, so it gets a value between the readings, as the column says: on a straight line, or the last
+one held. What still depends on the choice between these two after the blank is known no better than that, and is not
+compared either. A simulation without a state depends on nothing but its instant, and loses the blanks alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.data.slow_channels import bridged, filled_between
+from regolithd.calibration.mismatch.errors import RecordingError
+from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
+from regolithd.calibration.mismatch.problem.predictor import complete_inputs
+from regolithd.calibration.mismatch.signal.robust import robust_std
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.problem.predictor import Predictor
+    from regolithd.calibration.mismatch.thresholds import Thresholds
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """A prediction and what it was made from.
+
+    Attributes
+    ----------
+    recording: with derived channels, and inputs replaced by their conditional expectation
+    prediction: shape (time, wheel), NaN where the simulation says nothing
+    blanks: where each input was not measured
+    carried: where the prediction depends on an input that was not measured earlier
+    """
+
+    recording: Recording
+    prediction: Array
+    blanks: Mapping[str, Mask]
+    carried: Mask
+
+    @property
+    def known(self) -> Mask:
+        """Where the prediction is made from what was measured."""
+        unknown = np.any([self.carried, *self.blanks.values()], axis=0)
+        return np.asarray(np.isfinite(self.prediction) & ~unknown)
+
+
+def simulated(
+    recording: Recording, simulation: Predictor, values: Mapping[str, float], thresholds: Thresholds
+) -> Simulated:
+    """Run the simulation with these parameters; twice where an input has blanks.
+
+    Raises
+    ------
+    RecordingError
+        When the predicted channel or an input is missing.
+    """
+    prepared, blanks = _prepared(recording, simulation)
+    prediction = simulation.predict(complete_inputs(prepared), values)
+    carried = np.zeros(prediction.shape, np.bool_)
+    if blanks:
+        other, _ = _prepared(recording, simulation, other_way=True)
+        apart = np.abs(simulation.predict(complete_inputs(other), values) - prediction)
+        blank = np.any(list(blanks.values()), axis=0)
+        residual = (prepared.channel(simulation.channel) - prediction)[~blank]
+        residual = residual[np.isfinite(residual)]
+        least = max(
+            thresholds.carried_share * robust_std(residual), 1e-9 * float(np.max(np.abs(residual), initial=0.0))
+        )
+        carried = np.isfinite(prediction) & ~blank & ~(apart <= least)
+    return Simulated(prepared, prediction, blanks, carried)
+
+
+def _prepared(
+    recording: Recording, simulation: Predictor, *, other_way: bool = False
+) -> tuple[Recording, dict[str, Mask]]:
+    """Return the recording as the simulation gets it, and where inputs are bridged.
+
+    Columns are bridged before the simulation derives others from them, and derived inputs after.
+    """
+    between = simulation.between_readings
+    filled = filled_between(recording, simulation.channel, between)
+    filled, recorded = bridged(filled, simulation.inputs, between, other_way=other_way)
+    derived = simulation.prepare(filled)
+    needed = (simulation.channel, *simulation.inputs)
+    if missing := [name for name in needed if not np.isfinite(derived.channel(name)).any()]:
+        raise RecordingError(f"the simulation needs {', '.join(missing)}, which the recording does not have")
+    derived, more = bridged(derived, simulation.inputs, between, other_way=other_way)
+    return expected_inputs(derived, simulation.sensors), {**more, **recorded}
