@@ -9,6 +9,7 @@ export PYTHON
 RECORDINGS ?= ../shared/recordings
 
 .PHONY: help demo test check docs clean install uninstall
+.PHONY: interop
 .PHONY: sizing reproduce evaluate loop prove prove-machines real scaling thresholds mutations mutants frames pictures picture screenshots
 
 help:
@@ -77,6 +78,10 @@ mutations: $(DEV) ## `regolithd mismatch` on a thousand damaged files of each ki
 
 mutants: $(DEV) ## mutation testing on a random sample (SEED=… COUNT=… ONLY=drivers/can)
 	$(BIN)/python tests/mutation/sample.py --seed $(or $(SEED),1) --count $(or $(COUNT),200) $(if $(ONLY),--only $(ONLY))
+
+interop: $(DEV) ## slaves of other stacks, from CANOPENLINUX=FOLDER and LELY=FOLDER; docs/reference/interop.md
+	PYTHONPATH=src:tests/bench tests/bench/with-vcan $(BIN)/python tests/interop/run.py \
+		$(if $(CANOPENLINUX),--canopenlinux $(CANOPENLINUX)) $(if $(LELY),--lely $(LELY))
 
 frames: $(DEV) ## time per frame beside python-can and canopen, on vcan; docs/bus.md
 	tests/bench/with-vcan $(BIN)/python -m regolithd.drivers.benchmark

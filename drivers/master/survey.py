@@ -7,7 +7,7 @@ or sends is asked for its identity (0x1018), name (0x1008), error register (0x10
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from regolithd.drivers.canopen import cob_id
@@ -51,16 +51,15 @@ class FoundNode:
         return None if self.identity is None else self.identity.device_type & 0xFFFF
 
 
-@dataclass(slots=True)
 class Survey:
-    """Asks and listens. The bus must have no other reader in this program."""
+    """Asks and listens. The bus must have no other reader in this program; times in seconds."""
 
-    bus: Bus
-    sdo_timeout_s: float = 0.3
-    listen_s: float = 1.0
-    found: dict[int, FoundNode] = field(default_factory=dict)
-    syncs: int = 0
-    _clients: dict[int, SdoClient] = field(default_factory=dict)
+    def __init__(self, bus: Bus, *, sdo_timeout_s: float = 0.3, listen_s: float = 1.0) -> None:
+        self._bus = bus
+        self._sdo_timeout_s = sdo_timeout_s
+        self._listen_s = listen_s
+        self._found: dict[int, FoundNode] = {}
+        self._clients: dict[int, SdoClient] = {}
 
     async def run(self) -> list[FoundNode]:
         """Return every node on the bus, by node-ID.
@@ -72,26 +71,25 @@ class Survey:
         """
         async with asyncio.TaskGroup() as tasks:
             reader = tasks.create_task(self._read())
-            end = asyncio.get_running_loop().time() + self.listen_s
+            end = asyncio.get_running_loop().time() + self._listen_s
             for first in NODE_IDS[::_AT_ONCE]:
                 await asyncio.gather(*(self._probe(each) for each in range(first, min(first + _AT_ONCE, 128))))
             await asyncio.sleep(max(0.0, end - asyncio.get_running_loop().time()))
-            await asyncio.gather(*(self._ask(node) for node in self.found.values() if node.identity))
+            await asyncio.gather(*(self._ask(node) for node in self._found.values() if node.identity))
             reader.cancel()
-        return [self.found[node_id] for node_id in sorted(self.found)]
+        return [self._found[node_id] for node_id in sorted(self._found)]
 
     async def _read(self) -> None:
-        async for batch in self.bus:
+        async for batch in self._bus:
             for frame in batch:
                 if frame.ordinary and not frame.sent:
                     self._take(frame)
 
     def _take(self, frame: Frame) -> None:
-        self.syncs += frame.can_id == cob_id.SYNC
         node_id = sender(frame.can_id)
         if not node_id:
             return
-        node = self.found.setdefault(node_id, FoundNode(node_id))
+        node = self._found.setdefault(node_id, FoundNode(node_id))
         node.frames += 1
         if frame.can_id == cob_id.ERROR_CONTROL + node_id:
             state = parse_state(frame.data)
@@ -103,15 +101,15 @@ class Survey:
 
     async def _probe(self, node_id: int) -> None:
         """Read device type and identity; a node that does not answer is none, unless it sends."""
-        sdo = self._clients[node_id] = SdoClient(self.bus, node_id, timeout_s=self.sdo_timeout_s)
+        sdo = self._clients[node_id] = SdoClient(self._bus, node_id, timeout_s=self._sdo_timeout_s)
         try:
             device_type = await sdo.read_number(0x1000)
         except SdoError:
             return
         await asyncio.sleep(_SECOND_ANSWER_S)
-        shared = node_id in self.found and self.found[node_id].sdo_answers > 1
+        shared = node_id in self._found and self._found[node_id].sdo_answers > 1
         rest = [await self._number(sdo, 0x1018, subindex) or 0 for subindex in (1, 2, 3, 4)]
-        node = self.found.setdefault(node_id, FoundNode(node_id))
+        node = self._found.setdefault(node_id, FoundNode(node_id))
         node.identity, node.shared = Identity(device_type, *rest), shared
 
     async def _ask(self, node: FoundNode) -> None:
