@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import tracemalloc
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from regolithd.calibration.mismatch import Simulation
 from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import WheelAngleRipple
@@ -69,3 +71,13 @@ def test_an_order_is_found_with_as_few_bins_as_the_readings_resolve(order: float
     problem, ripple = spun(20.0, 0.01, order)
     found = [float(shape["order"]) for shape in WheelAngleRipple().propose_shapes(problem, ripple)]
     assert any(each == pytest.approx(order, abs=0.02) for each in found)
+
+
+@pytest.mark.parametrize("wheels", [1, 4])
+def test_white_noise_has_an_autocorrelation_time_of_one(wheels: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The power of white noise, summed over the wheels, has the median of χ² with two degrees of freedom a wheel."""
+    candidate, order = WheelAngleRipple(), np.linspace(0.0, 20.0, 2001)
+    power = np.full(order.shape, 0.5 * chi2.median(2 * wheels))
+    monkeypatch.setattr(candidate, "_spectrum", lambda *_: (order, power))
+    problem = SimpleNamespace(mask=np.ones((10, wheels), np.bool_))
+    assert candidate._autocorrelation_time(problem, power, 10.0) == pytest.approx(1.0, rel=0.02)
