@@ -76,10 +76,11 @@ def score(results: Sequence[Result], seed: int, words: Words) -> dict[str, Any]:
 
 def line_of(figures: Mapping[str, Any]) -> str:
     """Return the figures as one line."""
+    since = figures["killed"] + figures["test_added"]
     return (
         f"Seed {figures['seed']}: {figures['killed']} of {figures['mutants']} mutants killed "
-        f"({100 * figures['share_killed']:.1f} %). Of the survivors, {figures['equal']} are equal programs, and for "
-        f"{figures['test_added']} a test was added."
+        f"({100 * figures['share_killed']:.0f} %), {since} ({100 * since / max(figures['mutants'], 1):.0f} %) with the "
+        f"tests that were added for survivors since; {figures['equal']} are equal programs."
     )
 
 

@@ -147,7 +147,8 @@ def test_the_page_tells_seed_share_and_words(tmp_path: Path) -> None:
     words = Words({("daemon/a.py", "+ 9"): "equal: the same"})
     figures = score([KILLED, KILLED, KILLED, lived], 7, words)
     assert line_of(figures) == (
-        "Seed 7: 3 of 4 mutants killed (75.0 %). Of the survivors, 1 are equal programs, and for 0 a test was added."
+        "Seed 7: 3 of 4 mutants killed (75 %), 3 (75 %) with the tests that were added for survivors since; "
+        "1 are equal programs."
     )
     write_page(figures, 6.0, tmp_path / "page.md")
     page = (tmp_path / "page.md").read_text()
