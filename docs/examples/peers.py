@@ -71,13 +71,13 @@ def frols(features: Array, residual: Array) -> Callable[[Array], Array]:
         n_info_values=15,
         info_criteria="bic",
     )
-    # Its smallest lag is one row: the inputs are moved up by one, so that a row is modelled from itself.
-    model.fit(X=_one_ahead(features), y=residual[:, None])
-    return lambda rows: np.ravel(model.predict(X=_one_ahead(rows), y=np.zeros((len(rows), 1))))
+    # Its smallest lag is one row: the output is given a row later than the input that it belongs to.
+    model.fit(X=_one_more(features), y=np.concatenate([[0.0], residual])[:, None])
+    return lambda rows: np.ravel(model.predict(X=_one_more(rows), y=np.zeros((len(rows) + 1, 1))))[1:]
 
 
-def _one_ahead(rows: Array) -> Array:
-    return np.concatenate([rows[1:], rows[-1:]])
+def _one_more(rows: Array) -> Array:
+    return np.concatenate([rows, rows[-1:]])
 
 
 def stepwise(features: Array, residual: Array) -> Callable[[Array], Array]:
