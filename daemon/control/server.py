@@ -13,6 +13,7 @@ import asyncio
 import logging
 import socket
 import struct
+import time
 from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
@@ -36,6 +37,7 @@ from regolithd.daemon.control.protocol import (
 )
 from regolithd.daemon.control.socket import ControlSocketError, open_control_socket
 from regolithd.daemon.control.traverse import Clock, Outcome, Plan, Traverse, TraverseError, Wheels, plan_traverse
+from regolithd.daemon.control.traversed import Traversed
 from regolithd.drivers.errors import DriverError
 from regolithd.drivers.master.events import MotionStopped
 
@@ -229,14 +231,25 @@ class ControlSink:
         return Accepted(duration_s=plan.duration_s, wheel_speed_rad_s=plan.wheel_speed_rad_s)
 
     async def _drive(self, traverse: Traverse, writer: asyncio.StreamWriter) -> None:
+        begun_ns = time.time_ns()
         try:
             outcome = await traverse.run()
         finally:
             self._traverse = self._owner = self._progress = None
+        self._note_end(Traversed(from_ns=begun_ns, to_ns=time.time_ns(), ending=outcome.ending.value))
         _log.info("traverse %s after %.2f s: %s", outcome.ending.value, outcome.elapsed_s, outcome.text)
         _send(writer, _ended(outcome, traverse.plan))
         with suppress(ConnectionError):
             await writer.drain()
+
+    def _note_end(self, traversed: Traversed) -> None:
+        """Note the end beside the recordings; without recordings there is nothing to compare."""
+        recording = self._configuration.recording
+        if recording.enabled:
+            try:
+                traversed.write(recording.directory)
+            except OSError as error:
+                _log.warning("the end of the traverse could not be noted in %s: %s", recording.directory, error)
 
     def _report_progress(self, elapsed_s: float, plan: Plan, writer: asyncio.StreamWriter) -> None:
         self._progress = Progress(elapsed_s=elapsed_s, turned_m=elapsed_s * abs(plan.speed_m_s))

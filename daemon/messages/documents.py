@@ -31,6 +31,7 @@ _PARAMETERS = {
     "name": {"description": "Name of the alarm."},
     "rover": {"description": "[rover] name in rover.toml."},
 }
+_WHILE_AWAY = {"state": "sent at the next birth", "mismatch": "tried again"}
 _QOS_WORDS = {QoS.AT_MOST_ONCE: "0, at most once", QoS.AT_LEAST_ONCE: "1, acknowledged"}
 
 
@@ -125,7 +126,7 @@ def table() -> str:
         "|---|---|---|---|---|---|",
     ]
     for channel in CHANNELS:
-        away = "stored, sent late" if channel.stored else "sent at the next birth" if channel.retain else "not sent"
+        away = "stored, sent late" if channel.stored else _WHILE_AWAY.get(channel.name, "not sent")
         rows.append(
             f"| [`{channel.address.replace('{', '<').replace('}', '>')}`]({channel.name}.schema.json) "
             f"| {_summary(channel)} | {channel.when} | {_QOS_WORDS[channel.qos]} "

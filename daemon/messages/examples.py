@@ -124,6 +124,24 @@ _POSTERIOR = {
     "wheels": 6,
     "instants": 20,
 }
+_EFFECT = {
+    "name": "viscous-friction",
+    "where": "all wheels",
+    "statement": "Drag that grows with speed",
+    "size": 4.1e-05,
+    "unit": "A s/rad",
+    "low": 3.6e-05,
+    "high": 4.5e-05,
+}
+_MISMATCH = {
+    "verdict": "missing-physics",
+    "text": "The simulation leaves out: viscous-friction.",
+    "effects": [_EFFECT],
+    "changes": [],
+    "recording": "traverse-20130611T140722Z.csv",
+    "simulation": "SIM.toml",
+    "report": "/var/lib/regolithd/recordings/comparisons/traverse-20130611T140722Z.html",
+}
 _FIELDS: dict[str, dict[str, Any]] = {
     "state": {"sequence": 1, "state": "online", "reason": "connected", "software_version": "0.2.0"},
     "snapshot": _SNAPSHOT,
@@ -134,6 +152,7 @@ _FIELDS: dict[str, dict[str, Any]] = {
     "emcy": {"sequence": 0, **_EMERGENCY},
     "event": {"sequence": 12, "kind": "node-lost", "node_id": 13, "text": _NODE["text"]},
     "alarm": {"sequence": 1, **_ALARM},
+    "mismatch": {"sequence": 0, **_MISMATCH},
     "health": {"sequence": 250, **_HEALTH},
 }
 

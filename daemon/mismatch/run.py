@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from regolithd.calibration.mismatch.answer import Answer
+
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
@@ -40,8 +42,8 @@ class Outputs:
                 raise MismatchError(f"{path} cannot be written: there is no folder {path.parent}")
 
 
-def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs) -> None:
-    """Compare, write the outputs and print the answer.
+def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs) -> Answer:
+    """Compare, write the outputs, print the answer and return it.
 
     Raises
     ------
@@ -63,3 +65,4 @@ def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs) -> None:
     if outputs.report:
         write_page(outputs.report, found, recordings, simulation)
     print_answer(Console(), found.answer)
+    return found.answer

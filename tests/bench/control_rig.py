@@ -14,7 +14,7 @@ import numpy as np
 from estimates import estimate
 from subscriber import until
 
-from regolithd.daemon.config.configuration import Configuration, Control
+from regolithd.daemon.config.configuration import Configuration, Control, Recording
 from regolithd.daemon.control.protocol import REPLY, Ended, Progress
 from regolithd.daemon.control.server import ControlSink
 from regolithd.daemon.pipeline.snapshot import Snapshot
@@ -69,7 +69,10 @@ class Rover:
 async def serving(folder: Path, rover: Rover | None, **control: Any) -> AsyncIterator[tuple[ControlSink, Path]]:
     """Serve a rover whose wheels stand still."""
     path = folder / "control.sock"
-    configuration = Configuration(control=Control.model_validate({"socket": path, "group": GROUP} | control))
+    configuration = Configuration(
+        control=Control.model_validate({"socket": path, "group": GROUP} | control),
+        recording=Recording(directory=folder),
+    )
     sink = ControlSink(configuration, lambda: rover)
     task = asyncio.create_task(sink.run())
 

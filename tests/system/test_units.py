@@ -13,6 +13,8 @@ import aiomqtt
 import pytest
 from broker import Mosquitto, mosquitto_program
 
+from regolithd.daemon.config.configuration import Recording
+from regolithd.daemon.control.traversed import NAME
 from regolithd.drivers.can import socketcan
 
 if TYPE_CHECKING:
@@ -22,7 +24,10 @@ SYSTEMD = Path(__file__).resolve().parents[2] / "systemd"
 EXPOSURE = re.compile(r"Overall exposure level for \S+: ([\d.]+)")
 
 
-@pytest.mark.parametrize(("unit", "highest"), [("regolithd.service", 2.0), ("regolithd-can@.service", 3.0)])
+@pytest.mark.parametrize(
+    ("unit", "highest"),
+    [("regolithd.service", 2.0), ("regolithd-can@.service", 3.0), ("regolithd-compare.service", 2.0)],
+)
 def test_a_unit_exposes_little(unit: str, highest: float) -> None:
     """The exposure level of `systemd-analyze security` stays below its limit."""
     if shutil.which("systemd-analyze") is None:
@@ -32,6 +37,13 @@ def test_a_unit_exposes_little(unit: str, highest: float) -> None:
     exposure = EXPOSURE.search(done.stdout)
     assert exposure, done.stderr
     assert float(exposure[1]) <= highest
+
+
+def test_the_comparison_starts_when_the_daemon_notes_the_end_of_a_traverse() -> None:
+    """The path unit watches the file that the daemon writes beside its recordings."""
+    watched = re.search(r"^PathChanged=(.*)$", (SYSTEMD / "regolithd-compare.path").read_text(), flags=re.MULTILINE)
+    assert watched
+    assert Path(watched[1]) == Recording().directory / NAME
 
 
 @pytest.fixture

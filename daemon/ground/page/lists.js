@@ -1,6 +1,6 @@
 // Nodes, events, the last comparison with the simulation, and downloads.
 import { content, el, replace } from "./dom.js";
-import { moment, number, PLACES } from "./format.js";
+import { moment, PLACES } from "./format.js";
 
 const KINDS = ["snapshot", "posterior", "odometry", "alarm", "event", "emcy", "node"];
 
@@ -30,21 +30,26 @@ export function showLog(lines) {
   });
 }
 
+function figures(value) {
+  return Number(value.toPrecision(3)).toString().replace("-", "−");
+}
+
 function effectRow(effect) {
-  const interval = effect.low === null ? "" : `${number(effect.low, 3)} to ${number(effect.high, 3)}`;
+  const interval = `${figures(effect.low)} to ${figures(effect.high)}`;
   return el("tr", {}, el("th", { scope: "row" }, effect.name), el("td", {}, effect.where),
-    el("td", {}, `${number(effect.size, 3)} ${effect.unit}`), el("td", {}, interval));
+    el("td", {}, `${figures(effect.size)} ${effect.unit}`), el("td", {}, interval));
 }
 
 export function showComparison(message) {
   replace(content("comparison"), JSON.stringify(message ?? null), () => {
     if (!message) return [el("p", { class: "none" }, "None yet: it is made after each traverse.")];
     const names = ["effect", "where", "size", "90 % interval"];
+    const found = [...message.effects, ...message.changes];
     return [
       el("p", { class: `verdict ${message.verdict}` }, el("b", {}, message.verdict), ` ${message.text}`),
-      message.effects.length ? el("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Table of effects" },
+      found.length ? el("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Table of effects" },
         el("table", {}, el("thead", {}, el("tr", {}, ...names.map((name) => el("th", { scope: "col" }, name)))),
-          el("tbody", {}, ...message.effects.map(effectRow)))) : null,
+          el("tbody", {}, ...found.map(effectRow)))) : null,
       el("p", { class: "history" }, `${message.recording} · ${moment(message.time)} · report: ${message.report}`),
     ].filter(Boolean);
   });

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 DEFAULTS: dict[str, dict[str, Any]] = {
     "bench": {"channel": "vcan0", "interface": "socketcan", "seed": None, "no_noise": False, "seconds": 0.0},
     "check": {"config": Path("/etc/regolithd/rover.toml"), "syntax": False, "json": False},
-    "demo": {"out": Path("build/demo"), "seconds": 30.0},
+    "demo": {"out": Path("build/demo"), "seconds": 44.0},
     "evaluate": {"rovers": 10_000, "drives": 400, "hours": 1.0, "part": "all", "seed": 31_907_442},
     "loop": {"seed": 1, "out": Path("build/loop"), "case": None, "short": False, "picture": None},
     "prove": {"recordings": 200, "seed": None, "jobs": 0, "solver": "", "keep": False, "duration": 1800.0},

@@ -21,6 +21,7 @@ from regolithd.daemon.control.client import ControlError, control_connection
 from regolithd.daemon.control.protocol import LINE_LIMIT, REPLY, Accepted, Ended, Progress, Refused, StatusRequest
 from regolithd.daemon.control.server import ControlSink
 from regolithd.daemon.control.socket import ControlSocketError, open_control_socket
+from regolithd.daemon.control.traversed import Traversed
 from regolithd.drivers.master.events import MotionStopped
 from regolithd.drivers.master.status import NodePhase
 
@@ -67,6 +68,9 @@ async def test_a_traverse_is_driven_and_its_end_is_reported(tmp_path: Path) -> N
         end = await client.hear_end()
         assert (end.ending, end.turned_m) == ("finished", pytest.approx(0.04))
     assert rover.told == ["enable", "speed 0.667", "speed 0.000", "disable"]
+    noted = Traversed.read(tmp_path)
+    assert noted.ending == "finished"
+    assert 0.8e9 <= noted.to_ns - noted.from_ns < 20e9
 
 
 async def test_the_client_that_commanded_it_disconnects(tmp_path: Path) -> None:

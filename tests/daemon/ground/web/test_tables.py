@@ -62,7 +62,7 @@ def test_the_evidence_of_an_alarm_is_in_columns(writer: sqlite3.Connection, hist
         assert table.loc[0, ["evidence_onset", "evidence_friction_angle_fell"]].isna().all()
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "mismatch"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_has_the_same_columns_in_both_formats(
     kind: str, writer: sqlite3.Connection, history: History, tmp_path: Path
 ) -> None:

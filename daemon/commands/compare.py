@@ -1,0 +1,84 @@
+"""`regolithd compare`: compare the last traverse with the simulation, and publish the result."""
+
+from __future__ import annotations
+
+from pathlib import Path  # noqa: TC003  # typer reads it at run time
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from regolithd.daemon.config.configuration import Configuration
+    from regolithd.daemon.messages.mismatch import ComparisonResult
+    from regolithd.daemon.mismatch.traverse import TraverseFiles
+
+EXIT_DATA = 65
+EXIT_BROKER = 69
+"""EX_UNAVAILABLE: the comparison is written, and could not be published; systemd tries again."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command."""
+    app.command("compare")(compare)
+
+
+def compare(
+    *,
+    config: Annotated[Path | None, typer.Option(help="The rover.toml of the daemon.")] = None,
+    simulation: Annotated[
+        Path | None, typer.Option(help="SIM.toml; by default that beside rover.toml, or one made from rover.toml.")
+    ] = None,
+    publish: Annotated[bool, typer.Option(help="Publish the result, and an alarm, over MQTT.")] = True,
+) -> None:
+    """Compare the recording of the last traverse with the simulation, and publish the result.
+
+    A process of its own, never in the daemon; `regolithd-compare.path` starts it after each traverse. The report is
+    written to `comparisons`, beside the recordings. The alarm `mismatch` is raised when the simulation lacks physics,
+    or when an effect of a corrected simulation has changed.
+    """
+    from regolithd.calibration.mismatch.errors import MismatchError
+    from regolithd.daemon.mismatch.result import comparison_result
+    from regolithd.daemon.mismatch.run import Outputs, run
+    from regolithd.daemon.mismatch.traverse import extract_last_traverse
+    from regolithd.daemon.setup import configuration_or_exit
+
+    configuration = configuration_or_exit(config)
+    try:
+        files = extract_last_traverse(configuration.recording.directory)
+        used = _simulation(configuration, config, simulation, files)
+        answer = run([files.recording], used, Outputs(json=files.answer, report=files.report))
+    except (MismatchError, OSError) as error:
+        typer.echo(f"regolithd compare: {error}", err=True)
+        raise typer.Exit(EXIT_DATA) from error
+    typer.echo(f"report     {files.report}")
+    if publish:
+        _publish(configuration, comparison_result(answer, files, used))
+
+
+def _simulation(configuration: Configuration, config: Path | None, given: Path | None, files: TraverseFiles) -> Path:
+    """Return the path of SIM.toml: the given one, that beside rover.toml, or one made from rover.toml."""
+    from regolithd.daemon.mismatch.traverse import simulation_toml
+
+    beside = config.with_name("SIM.toml") if config is not None else None
+    if given is not None:
+        return given
+    if beside is not None and beside.exists():
+        return beside
+    made = files.recording.with_suffix(".SIM.toml")
+    made.write_text(simulation_toml(configuration), encoding="utf-8")
+    return made
+
+
+def _publish(configuration: Configuration, result: ComparisonResult) -> None:
+    import asyncio
+
+    from aiomqtt import MqttError
+
+    from regolithd.daemon.publish.comparison import publish_comparison
+    from regolithd.daemon.publish.connection_errors import reason_of
+
+    try:
+        asyncio.run(publish_comparison(configuration, result))
+    except (MqttError, OSError) as error:
+        typer.echo(f"not published: {reason_of(error, configuration.mqtt)}", err=True)
+        raise typer.Exit(EXIT_BROKER) from error

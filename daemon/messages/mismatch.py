@@ -1,0 +1,51 @@
+"""The `mismatch` message: the last comparison of a traverse with the simulation."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from regolithd.daemon.messages.header import Header
+
+
+class EffectReport(BaseModel):
+    """An effect that the simulation leaves out, or a corrected one that has changed."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    name: str
+    where: str
+    """The wheels, as text: `all wheels`, `wheel 4`."""
+    statement: str
+    """The effect in a sentence."""
+    size: float
+    unit: str
+    low: float
+    """Lower bound of the 90 % interval."""
+    high: float
+
+
+class ComparisonResult(BaseModel):
+    """The result of a comparison."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+
+    verdict: Literal["consistent", "missing-physics", "unexplained"]
+    text: str
+    effects: tuple[EffectReport, ...]
+    """What the simulation leaves out."""
+    changes: tuple[EffectReport, ...]
+    """Effects that a corrected simulation has, and that are of another size now."""
+    recording: str
+    """Name of the compared file."""
+    simulation: str
+    report: str
+    """Path of the report, on the computer that compared."""
+
+
+class MismatchMessage(ComparisonResult, Header):
+    """The result of the last comparison of a traverse with the simulation, by `regolithd compare`.
+
+    Not sent by the daemon but by a process of its own, which has a session of its own for each comparison.
+    """
