@@ -16,6 +16,8 @@ ENGINE_TABLES = ("simulation", "effects")
 """Tables that are no parameters."""
 FIELDS = ("value", "std", "unit")
 """Keys of `[parameters.NAME]`."""
+LEAST_NUMBER = 1e-100
+"""Size below which a number is 0."""
 
 
 def stated_priors(
@@ -95,12 +97,12 @@ def _known(parameter: str, parameters: Mapping[str, Prior], where: str, keys: tu
 
 
 def finite_number(value: object, keys: tuple[str, ...]) -> float:
-    """Return a number; a standard deviation is not negative."""
+    """Return a number; a standard deviation is not negative, and one whose square has no digits is 0."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not _is_finite(value):
         raise SimulationError(f"{_shown(keys)}: a finite number is needed, not {value!r}", keys)
     if value < 0 and (keys[-1] == "std" or keys[-1].endswith("_std")):
         raise SimulationError(f"{_shown(keys)}: a standard deviation is 0 (exact) or more, not {value!r}", keys)
-    return float(value)
+    return float(value) if abs(value) >= LEAST_NUMBER else 0.0
 
 
 def _is_finite(value: float) -> bool:

@@ -54,3 +54,9 @@ def test_a_mistake_names_table_key_and_cure(tables: dict[str, Any], told: str) -
     with pytest.raises(SimulationError) as caught:
         stated(**tables)
     assert told in str(caught.value)
+
+
+def test_a_spread_whose_square_has_no_digits_is_exact() -> None:
+    """Its precision would be infinite."""
+    found = stated_priors({"parameters": {"area_m2": {"value": 0.5, "std": 1e-308}}}, {"area_m2": Prior(0.4, 0.1)}, ())
+    assert found["area_m2"] == Prior(0.5, 0.0)
