@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from regolithd.daemon.health.liveness import TaskLiveness
 from regolithd.daemon.health.sd_notify import READY, STOPPING, WATCHDOG, notify, watchdog_period_s
 from regolithd.daemon.pipeline.pipeline import Chain
+from regolithd.daemon.recording.eds_files import eds_metadata
 from regolithd.daemon.recording.recorder import FLUSH_S, Recorder
 from regolithd.drivers.can.open_bus import open_bus
 from regolithd.drivers.errors import BusOpenError
@@ -249,5 +250,6 @@ def _recorder(
         "configuration": configuration.model_dump_json(),
         "model_version": terrain.card.version,
         "started_ns": str(time.time_ns()),
+        **eds_metadata(configuration),
     }
     return Recorder(configuration.recording, configuration.bus.channel, metadata, preamble=preamble)

@@ -11,6 +11,7 @@ from regolithd.calibration.models.onnx_session import ModelError
 from regolithd.daemon.config.configuration import Configuration
 from regolithd.daemon.config.reader import EXIT_STATUS, ConfigurationError, read_configuration
 from regolithd.daemon.pipeline.onnx_models import OnnxModels, load_models
+from regolithd.drivers.devices.profiles.compose import DescriptionError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -39,16 +40,22 @@ def recorded_configuration(recording: Path) -> Configuration:
 
     Prints why and exits where it is damaged.
     """
+    from regolithd.daemon.recording.eds_files import with_recorded_eds  # noqa: PLC0415
     from regolithd.daemon.recording.mcap_file import (  # noqa: PLC0415  # only few commands read recordings
         DamagedRecordingError,
         read_metadata,
     )
 
     try:
-        content = read_metadata(recording).get("configuration") if recording.is_file() else None
-        return Configuration.model_validate_json(content) if content else Configuration()
-    except (DamagedRecordingError, ValidationError) as error:
+        metadata = read_metadata(recording) if recording.is_file() else {}
+        content = metadata.get("configuration")
+        if not content:
+            return Configuration()
+        configuration = with_recorded_eds(Configuration.model_validate_json(content), metadata)
+        configuration.described()
+    except (DamagedRecordingError, ValidationError, DescriptionError) as error:
         _end([f"{recording}: its configuration cannot be read; give one with --config. {error}"])
+    return configuration
 
 
 def _end(problems: list[str]) -> NoReturn:

@@ -59,7 +59,7 @@ FIXED_UNITS = MappingProxyType(
 )
 """Names in `rover.toml`: the ending of the quantities that may have the unit, and the factor to SI."""
 
-COARSEST_STEP = MappingProxyType({"A": 1.0, "rad_s": 100 * RAD_S_PER_RPM, "N": 10.0, "V": 5.0, "degC": 10.0})
+COARSEST_STEP = MappingProxyType({"A": 1.0, "rad_s": 10 * RAD_S_PER_RPM, "N": 10.0, "V": 5.0, "degC": 10.0})
 """Largest plausible step between two raw values; a larger one means a unit that was not set, or mistaken."""
 SMALLEST_RANGE = MappingProxyType({"A": 0.1, "rad_s": 10 * RAD_S_PER_RPM, "N": 1.0, "V": 5.0, "degC": 20.0})
 """Smallest plausible range of an object: its highest raw value times the step."""
@@ -175,7 +175,8 @@ def process_unit(channel: int, *, fixed_point: bool = True) -> StatedUnit:
     """Return the unit of a CiA 404 channel; a REAL32 process value (0x6130) has no decimal digits."""
     if fixed_point:
         return StatedUnit("process-unit", "N", ((0x6131, channel), (0x6132, channel)), _process)
-    return StatedUnit("process-unit", "N", ((0x6131, channel),), lambda values: _process((*values, 0)))
+    # No dimension: a floating-point number has no step that could be implausible.
+    return StatedUnit("process-unit", "", ((0x6131, channel),), lambda values: _process((*values, 0)))
 
 
 STATED_UNITS = MappingProxyType(

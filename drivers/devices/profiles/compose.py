@@ -142,14 +142,15 @@ class _Composition:
             raise DictionaryError(
                 f"may not be mapped to a PDO, according to {self._eds.name}", index=entry.index, subindex=entry.subindex
             )
-        bits = 8 * struct.calcsize("<" + struct_code(entry))
+        code = struct_code(entry)
+        bits = 8 * struct.calcsize("<" + code)
         scale, dimension = candidate.scale, _dimension(candidate.quantity)
         if isinstance(scale, StatedUnit):
             for index, subindex in scale.objects:
                 variable(self._eds, index, subindex)
         elif scale == _UNNAMED:
             raise DictionaryError("its unit is not known", index=entry.index, subindex=entry.subindex)
-        elif problem := implausible(dimension, scale, bits):
+        elif problem := implausible("" if code in "fd" else dimension, scale, bits):
             raise DictionaryError(f"absurd scale: {problem}", index=entry.index, subindex=entry.subindex)
 
     def _with_status(self, candidate: Measured, source: Source) -> tuple[PdoObject, ...]:
