@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,10 +59,11 @@ class HeldOutErrors:
 
 def held_out_errors(
     equations: NormalEquations, named: Fit, groups: Sequence[Group], entry_threshold: float
-) -> HeldOutErrors:
+) -> tuple[NormalEquations, HeldOutErrors]:
     """Choose, optimise and fit on all folds but one, measure on that one, for each fold in turn.
 
-    `groups` are those to choose from: the grid as it was before any data optimised its shapes.
+    `groups` are those to choose from: the grid as it was before any data optimised its shapes. The equations that come
+    back have the columns of what the folds optimised, so that none of them has to copy the others.
     """
     wheels = len(equations.weights)
     before, after = np.zeros(wheels), np.zeros(wheels)
@@ -72,6 +73,7 @@ def held_out_errors(
         chosen = chosen_effects(train.with_groups(groups), entry_threshold)
         train, chosen = with_optimised_shapes(train, chosen)
         design = train.design
+        equations = equations.over(design.with_groups(equations.design.groups))
         before += squares_on_fold(design, train.fit(()), fold)
         after += squares_on_fold(design, train.fit(chosen), fold)
         for index, term in enumerate(named.terms):
@@ -79,7 +81,7 @@ def held_out_errors(
             without[index] += squares_on_fold(design, train.fit(rest), fold)
     counts = equations.design.counts.sum(axis=0)
     on = [list(term.wheels) for term in named.terms]
-    return HeldOutErrors(
+    return equations, HeldOutErrors(
         before=_rms(before, counts),
         after=_rms(after, counts),
         without=tuple(_rms(squares[w], counts[w]) for squares, w in zip(without, on, strict=True)),
@@ -130,11 +132,11 @@ def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOut
     equations, threshold = decision.equations, decision.entry_threshold
     problem, kept = equations.problem, set(map(id, grid))
     choice = [group for group in equations.design.groups if id(group) in kept or _only_proposed(problem, group)]
-    held_out = held_out_errors(equations, decision.named, choice, threshold)
+    equations, held_out = held_out_errors(equations, decision.named, choice, threshold)
     while (idle := held_out.without_gain()) is not None:
-        decision = without_name(decision, idle)
-        held_out = held_out_errors(equations, decision.named, choice, threshold)
-    return decision, held_out
+        decision = without_name(replace(decision, equations=equations), idle)
+        equations, held_out = held_out_errors(equations, decision.named, choice, threshold)
+    return replace(decision, equations=equations), held_out
 
 
 def _only_proposed(problem: Problem, group: Group) -> bool:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 
-FIRST_CAPACITY = 640
+FIRST_CAPACITY = 960
 """Columns allocated at first: about what a rover's library needs."""
 
 

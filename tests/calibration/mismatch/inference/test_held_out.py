@@ -13,7 +13,7 @@ def test_errors_fall_from_the_effect_to_the_noise() -> None:
     """Without the drag the error is the noise and the drag together, with it the noise."""
     equations = equations_of(problem_of(table(drag=0.4)))
     named = equations.fit([term_of(equations, "drag")])
-    found = held_out_errors(equations, named, equations.design.groups, 8.0)
+    _, found = held_out_errors(equations, named, equations.design.groups, 8.0)
     assert found.after == pytest.approx(NOISE, rel=0.05)
     assert found.before == pytest.approx(np.hypot(NOISE, 0.4), rel=0.1)
     assert found.without == pytest.approx((found.before,))
@@ -26,7 +26,7 @@ def test_an_effect_on_one_axis_is_measured_there() -> None:
     columns["reading_V"] = columns["reading_V"] + 0.4 * np.sign(columns["speed_rad_s"]) * (columns["axis"] == 2)
     equations = equations_of(problem_of(columns))
     named = equations.fit([term_of(equations, "drag", (1,))])
-    found = held_out_errors(equations, named, equations.design.groups, 8.0)
+    _, found = held_out_errors(equations, named, equations.design.groups, 8.0)
     assert found.without[0] == pytest.approx(np.hypot(NOISE, 0.4), rel=0.1)
     assert found.without[0] > found.before > found.after
 
@@ -34,7 +34,7 @@ def test_an_effect_on_one_axis_is_measured_there() -> None:
 def test_without_effects_before_and_after_are_the_same() -> None:
     """Noise chooses nothing on any fold."""
     equations = equations_of(problem_of(table()))
-    found = held_out_errors(equations, equations.fit(()), equations.design.groups, 8.0)
+    _, found = held_out_errors(equations, equations.fit(()), equations.design.groups, 8.0)
     assert found.before == found.after
     assert found.without == found.with_it == ()
 
