@@ -17,21 +17,31 @@ def export(
     recordings: Annotated[
         list[Path], typer.Argument(help="MCAP files, in chronological order.", exists=True, dir_okay=False)
     ],
-    to: Annotated[Path, typer.Option(help="Output file: .csv or .parquet.")],
+    to: Annotated[Path, typer.Option(help="Output file: .csv or .parquet; .nc (NetCDF) has everything.")],
+    *,
+    everything: Annotated[
+        bool, typer.Option("--everything", help="Also the estimates: torque, slip, c, φ, posterior, alarms, UTC.")
+    ] = False,
 ) -> None:
-    """Write a recording as one table, CSV or Parquet, with one row for each instant and wheel.
+    """Write a recording as one table, CSV or Parquet, with one row for each instant and wheel; or as NetCDF.
 
-    The columns are those that `regolithd mismatch` and `regolithd calibrate` read. What is damaged is left out and
-    named on the standard error; the exit status is 1 then, and if there is no row.
+    The columns are those that `regolithd mismatch` and `regolithd calibrate` read; with `--everything`, and in NetCDF,
+    all that was estimated from them as well. What is damaged is left out and named on the standard error; the exit
+    status is 1 then, and if there is no row.
     """
     from regolithd.daemon.recording.export import ExportError
-    from regolithd.daemon.recording.export import export as write
+    from regolithd.daemon.recording.export import export as measured
+    from regolithd.daemon.recording.export_results import export_results
     from regolithd.daemon.recording.mcap_file import is_closed
     from regolithd.daemon.recording.progress import open_binary
+    from regolithd.daemon.recording.results import read_results
 
     gaps: list[str] = []
     try:
-        count = write(recordings, to, open_binary, gaps.append)
+        if everything or to.suffix == ".nc":
+            count = export_results(read_results(recordings, open_binary, gaps.append), to)
+        else:
+            count = measured(recordings, to, open_binary, gaps.append)
     except (ExportError, OSError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error
@@ -41,6 +51,6 @@ def export(
     for recording in recordings:
         if not is_closed(recording):
             typer.echo(f"{recording}: was not closed; what was recorded last may be missing.", err=True)
-    typer.echo(f"{to}: {count} rows")
+    typer.echo(f"{to}: {count} {'instants' if everything or to.suffix == '.nc' else 'rows'}")
     if gaps:
         raise typer.Exit(1)
