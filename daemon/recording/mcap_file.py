@@ -33,10 +33,13 @@ class DamagedRecordingError(Exception):
 
 
 class McapFile:
-    """An MCAP file being written; `stream` is closed with it."""
+    """An MCAP file being written; `stream` is closed with it. `schema` returns the JSON Schema of a topic."""
 
-    def __init__(self, stream: IO[bytes], metadata: Mapping[str, str]) -> None:
+    def __init__(
+        self, stream: IO[bytes], metadata: Mapping[str, str], schema: Callable[[str], bytes] = lambda _topic: _SCHEMA
+    ) -> None:
         self._stream = stream
+        self._schema = schema
         self._writer = Writer(stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
         self._writer.start(profile="regolithd")
         self._writer.add_metadata("regolithd", {**metadata, _CHECKSUM: _checksum(metadata)})
@@ -46,7 +49,7 @@ class McapFile:
         """Append one JSON message."""
         channel = self._channels.get(topic)
         if channel is None:
-            schema = self._writer.register_schema(topic, "jsonschema", _SCHEMA)
+            schema = self._writer.register_schema(topic, "jsonschema", self._schema(topic))
             channel = self._channels[topic] = self._writer.register_channel(topic, "json", schema)
         self._writer.add_message(channel, time_ns, content, time_ns, sequence)
 

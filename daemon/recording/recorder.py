@@ -23,6 +23,7 @@ from typing import IO, TYPE_CHECKING
 from regolithd.daemon.recording.candump import frame_line
 from regolithd.daemon.recording.content import ESTIMATE, EVENT, SNAPSHOT, estimate_json, snapshot_json
 from regolithd.daemon.recording.mcap_file import McapFile
+from regolithd.daemon.recording.schemas import schema
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -156,7 +157,7 @@ class Recorder:
         stem = _next_stem(folder, self._now_ns())
         log = stem.with_suffix(".log").open("x", encoding="ascii")
         log.writelines(frame_line(frame, self._interface) for frame in self._preamble())
-        mcap = McapFile(stem.with_suffix(".mcap").open("xb"), self._metadata)
+        mcap = McapFile(stem.with_suffix(".mcap").open("xb"), self._metadata, schema)
         self._pair = _Pair(mcap, log, stem.with_suffix(".mcap"), stem.with_suffix(".log"), self._monotonic_ns())
         self.problem = None
 

@@ -163,6 +163,18 @@ def test_a_latching_alarm_of_another_rover_shows_its_evidence_and_needs_a_reset(
     expect(alarm).to_have_count(0)
 
 
+def test_the_last_comparison_is_on_the_page(page: Page, rig: GroundRig) -> None:
+    """Verdict, effect, wheels, size with interval and report of the newest comparison."""
+    expect(page.locator("#comparison")).to_contain_text("None yet")
+    rig.publish("mismatch", "mismatch", rover="kapvik", sequence=0)
+    comparison = page.locator("#comparison")
+    expect(comparison).to_contain_text("missing-physics The simulation leaves out: viscous-friction.")
+    row = comparison.locator("tbody tr")
+    for text in ("viscous-friction", "all wheels", "0.000041 A s/rad", "0.000036 to 0.000045"):
+        expect(row).to_contain_text(text)
+    expect(comparison).to_contain_text("traverse-20130611T140722Z.html")
+
+
 def test_an_outage_of_the_broker_is_back_filled_and_marked(page: Page, rig: GroundRig) -> None:
     """Without the broker the page says so; afterwards the gap is filled, marked, and each snapshot stored once."""
     expect(page.locator("#presence")).to_contain_text("online", timeout=PATIENCE_MS)
@@ -229,6 +241,7 @@ def test_the_page_is_accessible(browser: Browser, rig: GroundRig, look: str) -> 
     rig.publish(
         "alarm/bus", "alarm", rover=look, name="bus", severity="critical", active=True, text="bus-off", sequence=1
     )
+    until(lambda: look in rig.get("/api/state")["rovers"], "the rover is known")
     width = 390 if look == "phone" else 1400
     page = browser.new_page(
         viewport={"width": width, "height": 844}, color_scheme="dark" if look == "dark" else "light"
