@@ -57,10 +57,10 @@ def test_a_recording_is_cut_into_what_is_compared_and_what_is_unseen(
 def test_a_method_predicts_a_residual_that_its_library_holds(modules: dict[str, Any], method: str) -> None:
     """A parabola under noise, on rows that it has not seen."""
     rng = np.random.default_rng(1)
-    features = rng.uniform(-1, 1, (400, 2))
+    features = rng.uniform(-1, 1, (240, 2))
     true = 0.3 * features[:, 0] ** 2 - 0.2 * features[:, 1]
-    residual = true + rng.normal(0, 0.02, 400)
-    found = modules["peers"].predicted_residual(method, (features[:300], residual[:300]), features[300:])
+    residual = true + rng.normal(0, 0.02, 240)
+    found = modules["peers"].predicted_residual(method, (features[:160], residual[:160]), features[160:])
     if isinstance(found, str):
         pytest.skip(found)
-    assert np.sqrt(np.mean((found - true[300:]) ** 2)) < 0.02
+    assert np.sqrt(np.mean((found - true[160:]) ** 2)) < 0.02
