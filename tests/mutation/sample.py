@@ -10,10 +10,11 @@ sample of all rooms, `docs/explanation/mutation-testing.md`.
 from __future__ import annotations
 
 import argparse
+import fcntl
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from checkout import copy_of
 from coverage_map import coverage_map
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "explanation" / "mutation-testing.md"
-SMALLEST = 100
+SMALLEST = 50
 """Mutants of a sample that the documentation shows."""
 
 
@@ -35,6 +36,17 @@ def read_results(path: Path) -> dict[tuple[str, int, int, str], Result]:
     """Return the results so far, by file, line, column and operator."""
     rows = [Result(**json.loads(line)) for line in path.read_text().splitlines()] if path.exists() else []
     return {(row.file, row.line, row.column, row.operator): row for row in rows}
+
+
+def alone_in(folder: Path) -> IO[str]:
+    """Return the open lock of a folder; a second run there would restore the first one's mutants."""
+    folder.mkdir(parents=True, exist_ok=True)
+    lock = (folder / "lock").open("w")
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        raise SystemExit(f"another run works in {folder}") from error
+    return lock
 
 
 def drawn(root: Path, count: int, seed: int, only: str) -> list[Mutation]:
@@ -60,6 +72,7 @@ def main() -> None:
     parser.add_argument("--only", default="", help="a folder, for instance drivers/can")
     given = parser.parse_args()
     folder = ROOT / "build" / "mutants" / f"seed-{given.seed}"
+    lock = alone_in(folder)
     checkout, words = copy_of(ROOT, folder / "copy"), read_words()
     chosen, log = drawn(checkout.root, given.count, given.seed, given.only), folder / "results.jsonl"
     known, results = read_results(log), []
@@ -80,6 +93,7 @@ def main() -> None:
     if not given.only and len(decided) >= SMALLEST:
         write_page(figures, FAST_S, PAGE)
     print(line_of(figures))
+    lock.close()
 
 
 if __name__ == "__main__":

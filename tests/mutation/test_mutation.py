@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import signal
 import tomllib
 from dataclasses import replace
@@ -166,3 +167,15 @@ def test_every_survivor_is_equal_or_has_a_test(survivor: dict[str, str]) -> None
     if kind == "test":
         path, _, name = rest.partition("::")
         assert f"def {name.partition('[')[0]}(" in (ROOT / path).read_text()
+
+
+def test_every_mutant_of_the_page_is_killed_noticed_now_or_equal() -> None:
+    """The page is of a sample whose survivors all have a word."""
+    page = (ROOT / "docs/explanation/mutation-testing.md").read_text(encoding="utf-8")
+    told = re.search(r"(\d+) of (\d+) mutants killed \(\d+ %\), (\d+) \(\d+ %\) with .*?; (\d+) are equal", page)
+    assert told
+    killed, mutants, since, equal = map(int, told.groups())
+    assert killed <= since
+    assert since + equal == mutants
+    rows = re.findall(r"^\| `[a-z/]+` \| (\d+) \| (\d+) \|$", page, flags=re.MULTILINE)
+    assert (sum(int(row[0]) for row in rows), sum(int(row[1]) for row in rows)) == (mutants, killed)

@@ -8,6 +8,7 @@ import subprocess
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -355,3 +356,14 @@ def test_waiting_doubles_is_bounded_and_differs_from_rover_to_rover() -> None:
     assert delays != [Backoff(first=1.0, longest=20.0).next() for _ in range(8)]
     backoff.reset()
     assert backoff.next() <= 1.0
+
+
+async def test_a_pause_ends_with_its_time() -> None:
+    """A pause of no length beats not once; a stop ends any."""
+    beats: list[int] = []
+    waiting: Any = SimpleNamespace(_stop=asyncio.Event(), _beat=lambda: beats.append(1))
+    await Publisher._pause(waiting, 0.0)
+    assert beats == []
+    waiting._stop.set()
+    await Publisher._pause(waiting, 60.0)
+    assert beats == []

@@ -12,6 +12,7 @@ from golden import assert_golden
 
 from regolithd.calibration.mismatch.candidates.candidate import growth, onset_grid
 from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.candidates.load_cell_drift import OFFSETS, LoadCellDrift
 from regolithd.calibration.mismatch.data.recording import Recording
 from regolithd.calibration.mismatch.problem.prior import Prior
 from regolithd.calibration.mismatch.problem.problem import Problem
@@ -167,7 +168,7 @@ def test_the_grids_of_shapes_are_those_that_were_reviewed() -> None:
     """Each candidate's shapes and their penalties, in order: a change of a grid is seen in the difference."""
     lines = []
     for name, candidate in CANDIDATES.items():
-        lines += [f"{name} of {candidate.shape_count(P)} shapes"]
+        lines += [f"{name} of {candidate.shape_count(P):.6g} shapes"]
         for shape in candidate.shapes(P):
             values = " ".join(f"{key}={shown(value)}" for key, value in shape.items())
             lines.append(f"  {values} penalty {candidate.prior_penalty(P, shape):.6g}")
@@ -210,6 +211,16 @@ def test_a_load_cell_s_offset_takes_the_current_of_that_load_away() -> None:
     candidate = CANDIDATES["load-cell-drift"]
     first, second = (candidate.columns(P, {"relative_offset": offset})[0] for offset in (0.15, 0.35))
     np.testing.assert_allclose(second - first, -0.05 * SIGN * 0.2 * np.mean(LOAD, axis=0), rtol=1e-6)
+
+
+def test_a_load_cell_s_drift_is_exact_where_the_simulation_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At each offset of the grid, the first and the last included; between them a parabola is close to the curve."""
+    monkeypatch.setattr(
+        LoadCellDrift, "_simulated", lambda _, problem, offset: np.full(problem.mask.shape, np.exp(offset))
+    )
+    for offset in (*OFFSETS, 0.6, -0.3):
+        (column,) = LoadCellDrift().columns(P, {"relative_offset": offset})
+        np.testing.assert_allclose(column, np.exp(offset), rtol=1e-9 if offset in OFFSETS else 0.01)
 
 
 def beginning(whole: Problem, count: int) -> Problem:

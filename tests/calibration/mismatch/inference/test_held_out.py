@@ -46,3 +46,11 @@ def test_only_the_groups_that_are_given_are_chosen_from() -> None:
     without = [group for group in equations.design.groups if group.name != "drag"]
     assert "drag" not in {term.name for term in chosen_effects(equations.with_groups(without), 8.0)}
     assert chosen_effects(equations, 1e6) == ()
+
+
+def test_three_effects_at_once_are_chosen() -> None:
+    """A drag, a curve over the speed and a step."""
+    columns = table(drag=0.4, factor=0.3)
+    columns["reading_V"] = columns["reading_V"] + 0.5 * (columns["t_s"] >= 200)
+    found = chosen_effects(equations_of(problem_of(columns)), 8.0)
+    assert {term.name for term in found} == {"drag", "power", "step"}

@@ -9,6 +9,7 @@ import pytest
 from linear_machine import equations_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
+from regolithd.calibration.mismatch.selection import smooth_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.smooth_terms import (
     drop_transients,
@@ -67,6 +68,17 @@ def test_what_one_curve_explains_needs_no_names_of_other_covariates() -> None:
     kept, (curve,) = weigh_against_smooth_terms(equations, imitators, (), 8.0)
     assert curve.name == "wheel_speed"
     assert "step" not in {term.name for term in kept.terms}
+
+
+def test_a_curve_that_effects_imitate_goes_before_what_they_leave(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Even where the effects score better with a further curve than the curve does with what is left of them."""
+    equations = equations_with(bump, drag=0.4)
+    named = equations.fit([term_of(equations, "drag")])
+    monkeypatch.setattr(smooth_terms, "_imitates_a_curve", lambda *_: True)
+    monkeypatch.setattr(smooth_terms, "_effects_beside_curve", lambda equations, *_: equations.fit(()))
+    kept, curves = weigh_against_smooth_terms(equations, named, (), 8.0)
+    assert kept.terms == ()
+    assert curves == (best_of_each_smooth_term(equations, ())[0][1],)
 
 
 def test_a_change_that_comes_and_goes_loses_its_name() -> None:

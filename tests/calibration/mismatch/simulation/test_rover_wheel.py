@@ -111,3 +111,12 @@ def test_a_misspelt_table_or_key_is_told_with_what_it_may_mean(
     with pytest.raises(SimulationError, match=rf"{'[.]'.join(keys)}: .*; did you mean {meant}") as caught:
         RoverWheel.from_tables({**TABLES, **misspelt})
     assert caught.value.keys == keys
+
+
+def test_the_place_of_a_wheel_is_what_was_driven_and_where_its_axle_stands() -> None:
+    """At a constant speed, in steps of 0.2 s: the front axle is half a wheelbase ahead."""
+    posed = build_problem(recording(speed=0.3, noise=0.0), simulation())
+    place, wheel = posed.covariates["place"], simulation().tables
+    hub_m_s = wheel.wheel.radius_m * 0.3 * (1 - posed.covariates["slip"][0, 0])
+    np.testing.assert_allclose(place[:, 2], hub_m_s * posed.time_s[:, 0], rtol=0.01, atol=0.01)
+    np.testing.assert_allclose(place[:, 0] - place[:, 4], wheel.rover.wheelbase_m)
