@@ -8,6 +8,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.inference.collinearity import collinear_sets, parameters_like
 from regolithd.calibration.mismatch.inference.experiment import with_experiment
+from regolithd.calibration.mismatch.regression.candidate_groups import implausibility
 from regolithd.calibration.mismatch.regression.residuals import relative_size
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
@@ -91,7 +92,7 @@ def _could_be_true(equations: NormalEquations, named: Fit, rival: Fit, index: in
     limits, own = equations.thresholds, rival.terms[-1]
     candidate = own.group.candidate
     # What speaks against a rival beforehand is not what the recording says against it.
-    beforehand = candidate.prior_penalty(equations.problem, own.group.shape) if candidate else 0.0
+    beforehand = implausibility(equations.problem, candidate, own.group.shape) if candidate else 0.0
     lead = max(equations.score(named) - equations.score(rival) - beforehand - limits.lead_margin, 0.0)
     _, complement = equations.own_and_complement((*named.without(index), named.terms[index]), own)
     values = rival.coefficients[rival.of_term(len(rival.terms) - 1)]

@@ -25,7 +25,7 @@ def coefficient_signs(candidate: Candidate, count: int) -> tuple[int, ...]:
     return declared + (0,) * (count - len(declared))
 
 
-def _implausibility(problem: Problem, candidate: Candidate, shape: Shape) -> float:
+def implausibility(problem: Problem, candidate: Candidate, shape: Shape) -> float:
     """Return the Δχ² that a candidate must gain for being hardly possible on this machine, or in this shape."""
     unlikely = candidate.name in problem.simulation.unlikely_effects
     return candidate.prior_penalty(problem, shape) + (problem.thresholds.unlikely_penalty if unlikely else 0.0)
@@ -51,7 +51,7 @@ def with_candidate(
                 columns=tuple(range(first, first + len(found))),
                 signs=coefficient_signs(candidate, len(found)),
                 sharing=candidate.sharing,
-                selection_penalty=selected_from_many + _implausibility(problem, candidate, shape),
+                selection_penalty=selected_from_many + implausibility(problem, candidate, shape),
                 candidate=candidate,
                 shape=shape,
                 noise_reduction=reduction,
