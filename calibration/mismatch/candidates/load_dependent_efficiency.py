@@ -27,7 +27,7 @@ POWERS, LIGHT_LOADS, SLOPES = (0.0, 0.5, 1.0, 2.0, 3.5), (0.5, 1.0), (-0.2, 0.0,
 
 
 class LoadDependentEfficiency(Candidate):
-    """An efficiency that varies with torque, in one of three forms.
+    """An efficiency that varies with torque, in one of three forms. What is lost is lost against the motion.
 
     The torque is taken relative to a reference, the predicted channel's mean magnitude in the recording in which the
     effect is identified; it is part of the shape (`reference_size`, in the channel's unit), so that the law holds for
@@ -41,7 +41,7 @@ class LoadDependentEfficiency(Candidate):
 
     name = "load-dependent-efficiency"
     covariate = "torque"
-    equation = "ΔI = a I_sim |I_sim/I_ref|^p,  or I_sim (1/(1 − a x) − 1) with x = |I_sim|/I_ref − 1"
+    equation = "ΔI = a |I_sim| |I_sim/I_ref|^p sign(ω), or |I_sim| (1/(1 − a x) − 1) sign(ω), x = |I_sim|/I_ref − 1"
     words = "a loss that depends on the transmitted torque"
     signature = "a residual along the predicted current, curved against it"
     experiment = "run at one {wheel_speed} with at least three different loads"
@@ -71,16 +71,23 @@ class LoadDependentEfficiency(Candidate):
         return UNLIKELY_SHAPE_PENALTY if shape.get("power") == 0.0 else 0.0
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return the loss as a multiple of the prediction."""
-        relative = _relative(problem, shape)
+        """Return the loss as a multiple of the predicted size, against the motion."""
+        relative, lost = _relative(problem, shape), _against_motion(problem)
         if "bent" in shape:
             above = relative - 1
             # At torques beyond those of the identification, the line ends where a third of the efficiency is left.
             left = np.maximum(1 - float(shape["bent"]) * above, 1 - LARGEST_LOSS)
-            return (problem.filled * above / left)[None]
+            return (lost * above / left)[None]
         if "light" in shape:
-            return (problem.filled * np.exp(-relative / float(shape["light"])))[None]
-        return (problem.filled * relative ** float(shape["power"]))[None]
+            return (lost * np.exp(-relative / float(shape["light"])))[None]
+        return (lost * relative ** float(shape["power"]))[None]
+
+
+def _against_motion(problem: Problem) -> Array:
+    """Return the predicted size with the sign of a loss: a load that drives the motor loses as well."""
+    if "direction" not in problem.covariates:
+        return problem.filled
+    return np.asarray(np.abs(problem.filled) * np.nan_to_num(problem.covariates["direction"]))
 
 
 def _relative(problem: Problem, shape: Shape) -> Array:

@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.candidates.candidate import growth, onset_gr
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.candidates.load_cell_drift import OFFSETS, LoadCellDrift
 from regolithd.calibration.mismatch.data.recording import Recording
+from regolithd.calibration.mismatch.problem.covariates import direction_of
 from regolithd.calibration.mismatch.problem.prior import Prior
 from regolithd.calibration.mismatch.problem.problem import Problem
 from regolithd.calibration.mismatch.simulation.simulation import Simulation
@@ -299,3 +300,22 @@ def test_onsets_leave_both_ends_of_the_recording_out() -> None:
     """From 3 to 95 % of its length."""
     found = onset_grid(P, 5)
     assert found == pytest.approx([1.8, 15.6, 29.4, 43.2, 57.0])
+
+
+def test_a_loss_is_against_the_motion_also_where_the_load_drives() -> None:
+    """A share of the size, with the direction of motion, and none at standstill."""
+    standing, lowered = P.covariates["direction"].copy(), SPEED.copy()
+    standing[10:20] = 0.0
+    driven = replace(P, covariates={**P.covariates, "direction": standing}, prediction=-np.abs(P.prediction))
+    (column,) = CANDIDATES["load-dependent-efficiency"].columns(driven, {"power": 0.0, "reference_size": 1.0})
+    np.testing.assert_allclose(column, np.abs(P.prediction) * np.where(standing == 0, 0.0, np.sign(lowered)))
+
+
+def test_what_stands_still_has_no_direction() -> None:
+    """The direction is the sign of the speed, in proportion to it below a hundredth of the usual top speed."""
+    speed = np.concatenate((np.linspace(-1, 1, 2001), [np.nan]))[:, None]
+    found = direction_of(speed)
+    assert found[1000, 0] == 0.0
+    np.testing.assert_allclose(found[[0, 500, 1500, 2000], 0], [-1, -1, 1, 1])
+    assert 0 < found[1002, 0] < 1
+    assert np.isnan(found[-1, 0])
