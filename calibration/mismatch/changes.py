@@ -78,9 +78,9 @@ class ChangedSize(Candidate):
 
     coefficients: ClassVar = (Coefficient(RELATIVE_CHANGE, "1", 0),)
 
-    def __init__(self, stated: Stated) -> None:
+    def __init__(self, stated: Stated, place: int) -> None:
         of = stated.candidate
-        self.stated = stated
+        self.stated, self._place = stated, place
         for name in ("name", "covariate", "equation", "signature", "experiment", "source", "label", "along_motion"):
             setattr(self, name, getattr(of, name))
         self.vary, self.run_unloaded = of.vary, of.run_unloaded  # type: ignore[misc]
@@ -90,15 +90,15 @@ class ChangedSize(Candidate):
 
     def applies(self, problem: Problem) -> bool:
         """Return whether the effect can act in this recording at all."""
-        return bool(np.any(self.stated.column(problem)))
+        return bool(np.any(problem.stated[self._place].column))
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
         """Return the shape that was corrected, alone."""
         return [dict(self.stated.contribution.shape)]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002
-        """Return the effect as it was corrected."""
-        return self.stated.column(problem)[None]
+        """Return the effect as the prediction has it: computed from the prediction without any stated effect."""
+        return problem.stated[self._place].column[None]
 
 
 def stated_in(
@@ -162,7 +162,7 @@ def with_changes(problem: Problem, candidates: Sequence[Candidate], stated: Sequ
     measured = {name for k, name in enumerate(problem.recording.wheels) if problem.mask[:, k].any()}
     covered = {each.candidate.name for each in stated if measured <= set(each.contribution.wheels)}
     kept = [candidate for candidate in candidates if candidate.name not in covered]
-    return (*kept, *(ChangedSize(each) for each in stated))
+    return (*kept, *(ChangedSize(each, place) for place, each in enumerate(stated)))
 
 
 def contribution_of_change(change: ChangedSize, relative_change: float) -> Contribution:
