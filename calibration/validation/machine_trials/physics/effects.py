@@ -58,9 +58,10 @@ def proportional(name: str, channel: str, column: str, covariate: str) -> Maker:
     """Return an effect proportional to a column: viscous drag to speed, inertia to acceleration, weight to slope."""
 
     def make(_: Generator, world: World) -> Effect:
-        shape = world.drive.columns[column] / np.abs(world.drive.columns[column]).max()
+        # Not over the recording's own largest value: the same size must be the same physics in a later recording.
+        shape = world.drive.columns[column]
         axes = world.machine.every_axis
-        largest = 5 * world.mean_size(channel)
+        largest = 5 * world.mean_size(channel) / float(np.abs(shape).max())
         return Effect(
             name, name, channel, covariate, axes, added=lambda size: size * shape, largest=largest, needs=(column,)
         )
