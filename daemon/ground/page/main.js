@@ -22,6 +22,7 @@ const byId = (id) => document.getElementById(id);
 
 const rovers = {}; // name → {latest, alarms, received_ms, data_ms}
 let selected = null;
+let wanted = decodeURIComponent(location.hash.slice(1)); // the rover in the address; it may publish only later
 let span_s = 240;
 let end_s = null; // end of the range that is shown; null: now
 let offset_ms = 0; // the server's clock minus this computer's
@@ -86,7 +87,7 @@ function showRovers() {
   for (const name of Object.keys(rovers).sort()) {
     let button = place.querySelector(`[data-rover="${name}"]`);
     if (!button) {
-      button = el("button", { type: "button", "data-rover": name, onclick: () => select(name) }, el("i", { "aria-hidden": "true" }), el("b", {}, name), " ", el("span", {}));
+      button = el("button", { type: "button", "data-rover": name, onclick: () => choose(name) }, el("i", { "aria-hidden": "true" }), el("b", {}, name), " ", el("span", {}));
       place.append(button);
     }
     const [kind, text] = presence(rovers[name]);
@@ -146,11 +147,16 @@ function soon(name, job, wait) {
 function select(name) {
   selected = name;
   refusal = "";
-  location.hash = name;
   for (const each of Object.values(series)) each.clear();
   show();
   readHistory().catch(() => {});
   readLog().catch(() => {});
+}
+
+function choose(name) {
+  wanted = name;
+  location.hash = name;
+  select(name);
 }
 
 function setSpan(seconds) {
@@ -168,13 +174,9 @@ async function readState() {
   byId("who").parentElement.hidden = Boolean(user);
   setText(byId("user"), user ?? "");
   Object.assign(rovers, state.rovers);
-  const wanted = decodeURIComponent(location.hash.slice(1));
-  if (selected === null) {
-    const first = rovers[wanted] ? wanted : Object.keys(rovers).sort()[0];
-    if (first) return select(first);
-  } else {
-    await Promise.all([readHistory(), readLog()]);
-  }
+  const first = rovers[wanted] ? wanted : selected ?? Object.keys(rovers).sort()[0];
+  if (first && first !== selected) return select(first);
+  if (selected !== null) await Promise.all([readHistory(), readLog()]);
   show();
 }
 
@@ -191,7 +193,7 @@ function take(update) {
       if (text) setText(byId("announcement"), `${name}: ${text}`);
       rover.alarms = changed.alarms;
     }
-    if (selected === null) select(name);
+    if (selected === null || (name === wanted && selected !== name)) select(name);
     else if (name === selected) takeSelected(changed);
   }
   show();
