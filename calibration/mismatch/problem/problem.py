@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -97,7 +98,7 @@ class Problem:
         """From the first instant to the last [s]."""
         return float(self.time_s[-1, 0] - self.time_s[0, 0])
 
-    @property
+    @cached_property
     def mean_size(self) -> float:
         """The predicted channel's mean magnitude: what effects are measured against.
 
@@ -107,12 +108,12 @@ class Problem:
         centre = np.nanmean(known, axis=0) if self.simulation.arbitrary_zero else 0.0
         return float(np.nanmean(np.abs(known - centre)))
 
-    @property
+    @cached_property
     def filled(self) -> Array:
         """The prediction, 0 where there is none."""
         return np.where(self.mask, self.prediction, 0.0)
 
-    @property
+    @cached_property
     def added(self) -> Array:
         """What stated effects add on the output of the simulation, shape (time, wheel)."""
         columns = [effect.column for effect in self.stated if not effect.in_simulation]
