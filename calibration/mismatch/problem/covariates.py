@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 KEPT_WHERE_CONSTANT = frozenset({"wheel_speed", "direction", "wheel_acceleration", "wheel_angle", "time", "torque"})
 """Covariates that candidates need even where they are constant."""
-STANDSTILL_SHARE, USUAL_TOP = 0.01, 0.95
+STANDSTILL_SHARE, USUAL_TOP = 0.001, 0.95
 """Speed below which something stands still, as a share of the speed that is exceeded a twentieth of the time (a choice:
 resolution and noise of a speed are usually less; Coulomb friction is regularised in the same way in simulations)."""
 UNIT_WORD = re.compile(r"[munkM]?(A|V|N|Nm|W|J|m|s|g|Pa|Hz|bar|l)[23]?|K|deg[CF]?|rad[2]?|min|h|rpm|per|percent")

@@ -312,10 +312,10 @@ def test_a_loss_is_against_the_motion_also_where_the_load_drives() -> None:
 
 
 def test_what_stands_still_has_no_direction() -> None:
-    """The direction is the sign of the speed, in proportion to it below a hundredth of the usual top speed."""
-    speed = np.concatenate((np.linspace(-1, 1, 2001), [np.nan]))[:, None]
+    """The direction is the sign of the speed, in proportion to it below a thousandth of the usual top speed."""
+    speed = np.concatenate((np.linspace(-1, 1, 20001), [np.nan]))[:, None]
     found = direction_of(speed)
-    assert found[1000, 0] == 0.0
-    np.testing.assert_allclose(found[[0, 500, 1500, 2000], 0], [-1, -1, 1, 1])
-    assert 0 < found[1002, 0] < 1
+    assert found[10000, 0] == 0.0
+    np.testing.assert_allclose(found[[0, 5000, 15000, 20000], 0], [-1, -1, 1, 1])
+    assert 0 < found[10002, 0] < 1
     assert np.isnan(found[-1, 0])

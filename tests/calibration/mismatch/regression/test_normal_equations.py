@@ -152,7 +152,9 @@ def test_a_term_s_contribution_is_coefficient_times_column(equations: NormalEqua
     fit = equations.fit([term_of(equations, "drag", (1,))])
     added = contribution(equations, fit, 0)
     assert not added[:, 0].any()
-    np.testing.assert_allclose(np.abs(added[:, 1]), 0.3, atol=0.03)
+    direction = equations.problem.covariates["direction"][:, 1]
+    np.testing.assert_allclose(added[:, 1], added[:, 1].max() * direction, atol=1e-6)
+    assert added[:, 1].max() == pytest.approx(0.3, abs=0.03)
     mean = float(np.mean(np.abs(equations.problem.measured)))
     assert relative_size(equations, fit, 0) == pytest.approx(np.abs(added[:, 1]).mean() / mean, rel=1e-3)
 
