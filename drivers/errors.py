@@ -11,6 +11,7 @@
     │   ├── SdoInterruptedError (ConnectionResetError)   the node restarted in the middle of the transfer
     │   ├── SdoAbortError                    the node (or we) aborted the transfer; carries the abort code
     │   └── SdoProtocolError (ValueError)    the node answered something that CiA 301 does not allow
+    │       └── SdoBlockOfferedError         it answered a segmented upload with a block upload
     └── DriveError (RuntimeError)            a drive did not reach the state, or must not be commanded now
 
 For example, reading 0x1018:01 of a node that is switched off raises
@@ -111,6 +112,10 @@ class SdoAbortError(SdoError):
 
 class SdoProtocolError(SdoError, ValueError):
     """A node's SDO answer is not what CiA 301 allows at this point of the transfer."""
+
+
+class SdoBlockOfferedError(SdoProtocolError):
+    """A node answered the request of a segmented upload with a block upload."""
 
 
 class DriveError(DriverError, RuntimeError):

@@ -8,6 +8,9 @@ answer. `drivers.canopen.sdo_client` runs it.
 
 The first byte of each is the command specifier (3 bits) and its flags; in initiate frames index, subindex and 4
 bytes of data or the size follow. Either side may answer `abort` with a code of 32 bits.
+
+Block transfers (7.2.4.2.9) are not used. A server that answers an upload request with a block upload breaks the
+standard; the client aborts that and asks once more.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Generator
 
-from regolithd.drivers.errors import SdoAbortError, SdoProtocolError
+from regolithd.drivers.errors import SdoAbortError, SdoBlockOfferedError, SdoProtocolError
 
 Transfer = Generator[
     bytes | None, bytes, bytes
@@ -36,6 +39,7 @@ _UPLOAD_INITIATED = 0x40
 _UPLOAD_SEGMENT = 0x60
 _UPLOADED_SEGMENT = 0x00
 _ABORT = 0x80
+_BLOCK_UPLOAD_INITIATED = 0xC0
 _SPECIFIER = 0xE0
 _TOGGLE = 0x10
 _EXPEDITED = 0x02
@@ -147,6 +151,9 @@ def _initiate(command: int, index: int, subindex: int, data: bytes, expected: in
     while _length_checked(answer, index, subindex)[1:4] != struct.pack("<HB", index, subindex):
         answer = yield None
     _raise_abort(answer, index, subindex)
+    if expected == _UPLOAD_INITIATED and answer[0] & _SPECIFIER == _BLOCK_UPLOAD_INITIATED:
+        what = "answered a segmented upload with a block upload"
+        raise SdoBlockOfferedError(what, index=index, subindex=subindex, remedy=_FIRMWARE)
     if answer[0] & _SPECIFIER != expected:
         raise _unexpected(answer, index, subindex)
     return answer

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from typing import TYPE_CHECKING
 
 from regolithd.drivers.can.frame import Frame
 from regolithd.drivers.canopen import cob_id
 from regolithd.drivers.canopen.sdo import ABORT_COMMAND, ABORT_TIMEOUT, Transfer, abort_request, download, upload
-from regolithd.drivers.errors import BusError, SdoError, SdoInterruptedError, SdoProtocolError, SdoTimeoutError
+from regolithd.drivers.errors import (
+    BusError,
+    SdoBlockOfferedError,
+    SdoError,
+    SdoInterruptedError,
+    SdoProtocolError,
+    SdoTimeoutError,
+)
 
 if TYPE_CHECKING:
     from regolithd.drivers.can.bus import Bus
@@ -37,7 +45,7 @@ class SdoClient:
             self._answers.put_nowait(None)
 
     async def read(self, index: int, subindex: int = 0) -> bytes:
-        """Return an object's bytes.
+        """Return an object's bytes; a block upload in answer is aborted, and the object asked for once more.
 
         Raises
         ------
@@ -46,6 +54,8 @@ class SdoClient:
         BusError
             The request could not be sent.
         """
+        with contextlib.suppress(SdoBlockOfferedError):
+            return await self._run(upload(index, subindex), index, subindex)
         return await self._run(upload(index, subindex), index, subindex)
 
     async def read_number(self, index: int, subindex: int = 0, *, signed: bool = False) -> int:

@@ -6,7 +6,7 @@ python-canopen has no boot-up after a remote reset, no PDOs that follow a remote
 consumer that acts; they are here, and share no code with regolithd. A COB-ID is not changed while it is valid, and no
 mapping while its PDO is (CiA 301): both are refused, as CANopenNode does. A line on standard input is a command:
 `fault ID`, `die ID`, `current ID RAW`. Oddities: `late` (boots up 1.5 s after the reset), `elsewhere` (EMCY at
-0x0C0 + ID, valid).
+0x0C0 + ID, valid), `blocks` (answers an upload of more than four bytes with a block upload, until that is aborted).
 """
 
 from __future__ import annotations
@@ -20,18 +20,42 @@ from typing import Self
 
 import canopen
 from canopen.objectdictionary import ODVariable, datatypes
-from canopen.sdo import SdoAbortedError
+from canopen.sdo import SdoAbortedError, SdoServer
 
 DISABLED = 0x8000_0000
 IDENTIFIER = 0x7FF
 LATE_S = 1.5
 STATES = {"disabled": 0x40, "ready": 0x21, "on": 0x23, "enabled": 0x27, "stopping": 0x07, "fault": 0x08}
+BLOCK_UPLOAD_INITIATED = 0xC2  # with the size (CiA 301, 7.2.4.3.14)
 RAMP = 20_000.0  # units of 0x606C per second
 CURRENT_OBJECTS = ((0x6078, 0), (0x30D1, 2), (0x2027, 0))
 CURRENT, IDLE_CURRENT = 55, 0
 """Raw value of the current while enabled, and otherwise."""
 LOAD = 4725
 """Raw value of the load."""
+
+
+class BlockOffering(SdoServer):
+    """Answers an upload of more than four bytes with a block upload; after an abort, once with a segmented one."""
+
+    offered = 0
+    refused = False
+
+    def init_upload(self, request: bytes) -> None:
+        """Answer an upload request."""
+        self._index, self._subindex = request[1] | request[2] << 8, request[3]
+        size = len(self._node.get_data(self._index, self._subindex, check_readable=True))
+        if size <= 4 or self.refused:
+            self.refused = False
+            super().init_upload(request)
+            return
+        self.offered += 1
+        self.send_response(bytes((BLOCK_UPLOAD_INITIATED,)) + bytes(request[1:4]) + size.to_bytes(4, "little"))
+
+    def request_aborted(self, data: bytes) -> None:
+        """Take the client's abort."""
+        self.refused = True
+        super().request_aborted(data)
 
 
 @dataclass
@@ -52,6 +76,11 @@ class Stranger:
     def __post_init__(self) -> None:
         """Join the network, as after power-on."""
         self.node = self.network.create_node(self.node_id, self.eds)
+        if "blocks" in self.oddities:
+            self.node.sdo.__class__ = BlockOffering
+            name = ODVariable("Manufacturer device name", 0x1008)
+            name.data_type, name.default = datatypes.VISIBLE_STRING, "a name of more than seven bytes"
+            self.node.object_dictionary.add_object(name)
         self.controlword = 0
         self.master_heard: float | None = None
         self.lost_master = 0

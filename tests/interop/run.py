@@ -3,7 +3,8 @@
     make interop CANOPENLINUX=FOLDER LELY=FOLDER
 
 CANOPENLINUX is a checkout of CANopenNode/CANopenLinux with its sub-module CANopenNode; LELY one of
-lely-industries/lely-core. A stack without sources is left out of the run, and keeps its column.
+lely-industries/lely-core. A stack without sources is left out of the run, and keeps its column. The exit
+status is 1 where a scenario failed.
 """
 
 from __future__ import annotations
@@ -32,12 +33,15 @@ def main() -> None:
     if sys.argv[1:2] == ["drive"]:
         asyncio.run(scenarios.drive(sys.argv[2]))
         return
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--canopenlinux", type=Path)
     parser.add_argument("--lely", type=Path)
     parser.add_argument("--channel", default="vcan0")
     chosen = parser.parse_args()
     results = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    for name, folder in (("CANOPENLINUX", chosen.canopenlinux), ("LELY", chosen.lely)):
+        if folder is None:
+            say(f"{name}=FOLDER is not given: this stack is left out, and keeps its column")
     for stack in available(chosen.canopenlinux, chosen.lely):
         results[stack.name] = asyncio.run(outcomes(stack, chosen.channel))
     RESULTS.write_text(json.dumps(results, indent=2) + "\n")
@@ -49,8 +53,10 @@ def available(canopenlinux: Path | None, lely: Path | None) -> list[Stack]:
     """Return the stacks whose sources are given, built, with the versions of the sources."""
     found = [stacks.python_canopen()]
     if canopenlinux:
+        say("building CANopenNode …")
         found.append(stacks.canopennode(canopenlinux.resolve(), BUILD / "canopennode"))
     if lely:
+        say("building Lely core …")
         found.append(stacks.lely(lely.resolve(), BUILD / "lely"))
     return found
 
@@ -60,9 +66,14 @@ async def outcomes(stack: Stack, channel: str) -> dict[str, str]:
     found = {}
     async for name, said in scenarios.run_all(stack, channel):
         found[name] = said
-        sys.stdout.write(f"{stack.name:24} {name:16} {said}\n")
-        sys.stdout.flush()
+        say(f"{stack.name:24} {name:16} {said}")
     return found
+
+
+def say(line: str) -> None:
+    """Print a line at once."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
 
 
 def page(results: dict[str, dict[str, str]]) -> str:
@@ -83,7 +94,12 @@ def page(results: dict[str, dict[str, str]]) -> str:
         f"| scenario | what must happen | {' | '.join(names)} |\n|---|---|{'---|' * len(names)}\n"
         + "\n".join(rows)
         + "\n\n"
-        "`make interop CANOPENLINUX=… LELY=…` builds the slaves from sources that you point to, and writes this page.\n"
+        "To repeat it, with the sources in folders of your choice (needs gcc; a stack whose folder is not given keeps"
+        " its column):\n\n"
+        f"```sh\n{stacks.LINUX_SOURCES}\n{stacks.LELY_SOURCES}\n"
+        "make interop CANOPENLINUX=CANopenLinux LELY=lely-core       # some minutes; writes this page\n```\n\n"
+        "Where the kernel has no vcan, it runs in User Mode Linux: "
+        "`sudo apt-get install user-mode-linux iproute2 kmod hostname`.\n"
     )
 
 

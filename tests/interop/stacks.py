@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +17,8 @@ HERE = Path(__file__).parent
 STRANGERS = HERE.parent / "bench" / "strangers.py"
 IDENTITY = "o1018_1=0xFB:o1018_2=0x62100000:o1018_3=0x21100000"
 SHEETS = {"motor": EDS_FOLDER / "motor.eds", "load": EDS_FOLDER / "load-cell.eds"}
+LINUX_SOURCES = "git clone --recurse-submodules https://github.com/CANopenNode/CANopenLinux"
+LELY_SOURCES = "git clone https://github.com/lely-industries/lely-core"
 _LELY_OPTIONS = "-DLELY_NO_CXX=1 -DLELY_NO_CO_WTM=1 -DLELY_NO_CO_GW=1 -DLELY_NO_CO_GW_TXT=1 -DLELY_NO_CO_LSS=1"
 _CANOPENNODE = "301/*.c 303/CO_LEDs.c 304/*.c 305/*.c 309/*.c storage/CO_storage.c extra/CO_trace.c CANopen.c"
 _CANOPENLINUX = "CO_driver.c CO_error.c CO_epoll_interface.c CO_storageLinux.c CO_main_basic.c"
@@ -91,6 +94,8 @@ def python_canopen() -> Stack:
 def canopennode(linux: Path, build: Path) -> Stack:
     """Build CANopenNode's slaves; `linux`: CANopenLinux, with CANopenNode in its folder of that name."""
     core = linux / "CANopenNode"
+    need(linux / "CO_driver.c", LINUX_SOURCES)
+    need(core / "CANopen.c", f"git -C {linux} submodule update --init")
     sources = [linux / name for name in _CANOPENLINUX.split()]
     sources += [path for pattern in _CANOPENNODE.split() for path in sorted(core.glob(pattern))]
     build.mkdir(parents=True, exist_ok=True)
@@ -110,6 +115,7 @@ def canopennode(linux: Path, build: Path) -> Stack:
 
 def lely(source: Path, build: Path) -> Stack:
     """Build Lely core's slave: its C sources for CAN and CANopen, without the C++ parts."""
+    need(source / "include/lely/co/nmt.h", LELY_SOURCES)
     build.mkdir(parents=True, exist_ok=True)
     files = [path for part in ("util", "can", "co") for path in sorted((source / "src" / part).glob("*.c"))]
     folders = [f"-I{source / folder}" for folder in ("include", "src", "src/util", "src/can", "src/co")]
@@ -129,6 +135,14 @@ def lely(source: Path, build: Path) -> Stack:
         "-lpthread",
     )
     return Stack("Lely core", {kind: f"{program} {{channel}} {{node_id}} {{eds}} {kind}" for kind in SHEETS})
+
+
+def need(file: Path, cure: str) -> None:
+    """End with one sentence where a file of the sources, or the compiler, is not there."""
+    if not file.exists():
+        sys.exit(f"{file}: no such file. Get the sources, and give their folder: {cure}")
+    if shutil.which("gcc") is None:
+        sys.exit("gcc: not found. Debian and Ubuntu: sudo apt-get install gcc libc6-dev")
 
 
 def run(*command: object) -> None:

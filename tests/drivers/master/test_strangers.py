@@ -229,6 +229,16 @@ async def test_an_emcy_identifier_in_use_is_switched_off_before_it_is_changed() 
         assert b.strangers.nodes[1].get(0x1014) == 0x081
 
 
+async def test_a_block_upload_in_answer_is_aborted_and_the_object_read_in_segments() -> None:
+    """A server that offers a block upload where a segmented one was asked for is read all the same."""
+    async with bench([motor(DeviceChoice("epos4"), 1, 0)], {1: ("blocks",)}) as b:
+        await b.booted(1)
+        name = await b.network._drives[1].remote.sdo.read(0x1008)
+        assert name == b"a name of more than seven bytes"
+        assert b.strangers.nodes[1].node.sdo.offered == 1
+        await b.drive(1)
+
+
 async def test_a_late_boot_up_is_awaited_for_the_configured_time() -> None:
     """A device that takes 1.5 s to boot is booted with 3 s, and named with less."""
     async with bench([motor(DeviceChoice("epos4"), 1, 0)], {1: ("late",)}) as b:
