@@ -22,9 +22,10 @@ FADES: dict[str, Callable[[Array], Array]] = {
 """Share of the extra drag that is left, as a function of speed over the Stribeck speed."""
 SPEED_COUNT = 7
 """Stribeck speeds that are searched, in geometric steps (a choice)."""
-SLOWEST, FASTEST = (0.5, 0.02), (1.0, 0.98)
+SLOWEST, FASTEST = (0.5, 0.02), (0.5, 0.98)
 """Ends of their range, as a factor on a quantile of the speed (a choice): below the first the effect decays before the
-slowest reading, above the second it does not decay within the recording."""
+slowest reading; above the second more than a fifth of it is left at the highest speed, where it and viscous drag
+together pass for Coulomb friction."""
 
 
 class StribeckFriction(Candidate):
@@ -45,7 +46,7 @@ class StribeckFriction(Candidate):
     free: ClassVar = {"stribeck_speed_rad_s": (0.0, np.inf)}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """Return Stribeck speeds between the slowest and the highest speed, in three forms."""
+        """Return Stribeck speeds between the slowest and half of the highest speed, in three forms."""
         return [
             {"stribeck_speed_rad_s": float(speed), "fades": fades}
             for fades in FADES

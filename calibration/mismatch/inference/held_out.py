@@ -40,7 +40,7 @@ class HeldOutErrors:
 
     Attributes
     ----------
-    before, after: of the calibrated simulation, and of it with the effects that the other blocks chose
+    before, after: of the calibrated simulation, and of it with those named effects that the other blocks chose too
     without, with_it: for each named term, on its wheels
     """
 
@@ -70,7 +70,7 @@ def held_out_errors(
     without = np.zeros((len(named.terms), wheels))
     for fold in range(len(equations.design.gram)):
         train = training_equations(equations, fold)
-        chosen = chosen_effects(train.with_groups(groups), entry_threshold)
+        chosen = of_names(chosen_effects(train.with_groups(groups), entry_threshold), named)
         train, chosen = with_optimised_shapes(train, chosen)
         design = train.design
         equations = equations.over(design.with_groups(equations.design.groups))
@@ -87,6 +87,12 @@ def held_out_errors(
         without=tuple(_rms(squares[w], counts[w]) for squares, w in zip(without, on, strict=True)),
         with_it=tuple(_rms(after[w], counts[w]) for w in on),
     )
+
+
+def of_names(chosen: tuple[Term, ...], named: Fit) -> tuple[Term, ...]:
+    """Return those of the effects chosen on some folds that the answer names: the errors are of its names alone."""
+    names = {term.name for term in named.terms}
+    return tuple(term for term in chosen if term.name in names)
 
 
 def with_optimised_shapes(train: NormalEquations, chosen: tuple[Term, ...]) -> tuple[NormalEquations, tuple[Term, ...]]:

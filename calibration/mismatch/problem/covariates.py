@@ -18,9 +18,6 @@ Array = NDArray[np.float64]
 
 KEPT_WHERE_CONSTANT = frozenset({"wheel_speed", "direction", "wheel_acceleration", "wheel_angle", "time", "torque"})
 """Covariates that candidates need even where they are constant."""
-STANDSTILL_SHARE, USUAL_TOP = 0.001, 0.95
-"""Speed below which something stands still, as a share of the speed that is exceeded a twentieth of the time (a choice:
-resolution and noise of a speed are usually less; Coulomb friction is regularised in the same way in simulations)."""
 UNIT_WORD = re.compile(r"[munkM]?(A|V|N|Nm|W|J|m|s|g|Pa|Hz|bar|l)[23]?|K|deg[CF]?|rad[2]?|min|h|rpm|per|percent")
 """A part of a column's name that is of its unit: `A` of `current_A`, `m` and `s` of `flow_m_s`."""
 LONGEST_STEP = 3.0
@@ -38,22 +35,12 @@ def covariates_of(
         found.setdefault("torque" if "wheel_speed" in found else quantity(simulation.channel), np.abs(prediction))
     if "wheel_speed" in found:
         speed = found["wheel_speed"]
-        found["direction"] = direction_of(speed)
+        found["direction"] = np.sign(speed)
         found["wheel_acceleration"] = _derivative(speed, recording)
         found["wheel_angle"] = _integral(speed, recording)
     measured = {name: values for name, values in found.items() if np.isfinite(values).any()}
     varying = {name: values for name, values in found.items() if name in KEPT_WHERE_CONSTANT or _varies(values)}
     return varying, {name: values for name, values in measured.items() if name not in varying}
-
-
-def direction_of(speed: Array) -> Array:
-    """Return the direction of motion, −1 to 1: the sign of the speed, in proportion to it about standstill.
-
-    What stands still has no direction, and the sign of a measured speed of zero is noise.
-    """
-    known = np.abs(speed[np.isfinite(speed)])
-    slow = STANDSTILL_SHARE * float(np.quantile(known, USUAL_TOP)) if known.size else 0.0
-    return np.clip(speed / slow, -1.0, 1.0) if slow > 0 else np.sign(speed)
 
 
 def quantity(channel: str) -> str:

@@ -14,7 +14,6 @@ from regolithd.calibration.mismatch.candidates.candidate import growth, onset_gr
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.candidates.load_cell_drift import OFFSETS, LoadCellDrift
 from regolithd.calibration.mismatch.data.recording import Recording
-from regolithd.calibration.mismatch.problem.covariates import direction_of
 from regolithd.calibration.mismatch.problem.prior import Prior
 from regolithd.calibration.mismatch.problem.problem import Problem
 from regolithd.calibration.mismatch.simulation.simulation import Simulation
@@ -309,13 +308,3 @@ def test_a_loss_is_against_the_motion_also_where_the_load_drives() -> None:
     driven = replace(P, covariates={**P.covariates, "direction": standing}, prediction=-np.abs(P.prediction))
     (column,) = CANDIDATES["load-dependent-efficiency"].columns(driven, {"power": 0.0, "reference_size": 1.0})
     np.testing.assert_allclose(column, np.abs(P.prediction) * np.where(standing == 0, 0.0, np.sign(lowered)))
-
-
-def test_what_stands_still_has_no_direction() -> None:
-    """The direction is the sign of the speed, in proportion to it below a thousandth of the usual top speed."""
-    speed = np.concatenate((np.linspace(-1, 1, 20001), [np.nan]))[:, None]
-    found = direction_of(speed)
-    assert found[10000, 0] == 0.0
-    np.testing.assert_allclose(found[[0, 5000, 15000, 20000], 0], [-1, -1, 1, 1])
-    assert 0 < found[10002, 0] < 1
-    assert np.isnan(found[-1, 0])

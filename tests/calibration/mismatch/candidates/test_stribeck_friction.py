@@ -36,7 +36,7 @@ class Hoist(Simulation):
         return {"wheel_speed": inputs["rope_speed_m_s"], "time": inputs["t_s"]}
 
 
-@pytest.mark.parametrize("decay_m_s", [0.6, 1.3])
+@pytest.mark.parametrize("decay_m_s", [0.45, 0.7])
 def test_drag_that_decays_above_the_median_speed_is_stribeck_friction_alone(decay_m_s: float) -> None:
     """No constant drag beside it makes up for a range that ends too soon; the size holds the truth."""
     generator = np.random.default_rng(3)
