@@ -229,6 +229,7 @@ def network_settings(configuration: Configuration) -> NetworkSettings:
         node_lost_after_s=nodes.heartbeat_timeout_ms / 1000,
         sdo_timeout_s=nodes.sdo_timeout_s,
         boot_up_timeout_s=nodes.boot_timeout_s,
+        other_node_ids=frozenset(map(int, configuration.brakes)),
     )
 
 

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.daemon.config.configuration import Configuration
+    from regolithd.daemon.simulator.brake import Brakes
     from regolithd.daemon.simulator.scenario import Scenario
+    from regolithd.daemon.simulator.virtual_rover import VirtualWorld
+    from regolithd.drivers.devices.node import NodeDescription
     from regolithd.drivers.virtual import VirtualRover
 
 _CONTROL = Path(tempfile.gettempdir()) / "regolithd-bench.sock"
@@ -46,26 +52,30 @@ def bench(
 ) -> None:
     """Run the virtual rover on a CAN bus: six drives, six load cells, inclinometer, ground-speed sensor.
 
-    With --nodes, real nodes take the places of the others: hardware in the loop.
+    With --nodes, real nodes take the places of the others: hardware in the loop. A brake of --config ([brakes.ID])
+    loads the real motor of its wheel with the torque of the virtual soil.
 
     Prints `ready` once all nodes are on the bus. At its end it prints each node's counters as one line of JSON.
     """
     import asyncio
     import json
 
+    from regolithd.daemon.config.configuration import Configuration
     from regolithd.daemon.setup import configuration_or_exit
     from regolithd.daemon.simulator.virtual_rover import VirtualWorld
     from regolithd.drivers.errors import BusError
     from regolithd.drivers.virtual import KAPVIK, VirtualRover
     from regolithd.drivers.virtual.fault_socket import FaultSocketError
 
+    configuration = Configuration() if config is None else configuration_or_exit(config)
     settings = _scenario(scenario, soil or [], seed, no_noise=no_noise)
-    described = KAPVIK if config is None else configuration_or_exit(config).described()
+    described = KAPVIK if config is None else configuration.described()
     virtual = None if nodes is None else _chosen(nodes, [node.node_id for node in described])
     world = VirtualWorld(settings)
-    rover = VirtualRover(world, described, virtual=virtual, follow_loads=world.follow_loads)
+    brakes = brakes_of(configuration, described, virtual, world)
+    rover = VirtualRover(world, described, virtual=virtual, follow_loads=world.follow_loads, on_frame=brakes.take)
     try:
-        counts = asyncio.run(_run(interface, channel, rover, control, seconds))
+        counts = asyncio.run(_run(interface, channel, rover, brakes, control, seconds))
     except (BusError, FaultSocketError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error
@@ -130,8 +140,37 @@ def _scenario(path: Path | None, soils: list[str], seed: int | None, *, no_noise
     raise typer.Exit(78)
 
 
+def brakes_of(
+    configuration: Configuration, described: Sequence[NodeDescription], virtual: set[int] | None, world: VirtualWorld
+) -> Brakes:
+    """Return the brakes of the wheels whose motors are real; say which brakes are left alone."""
+    import numpy as np
+
+    from regolithd.daemon.simulator.brake import BrakeDescription, Brakes, HeartbeatWatch
+    from regolithd.drivers.virtual.real_nodes import MISSING_SYNCS
+
+    here = {node.node_id for node in described} if virtual is None else virtual
+    real = [node for node in described if node.device.commanded and node.node_id not in here]
+    wheels = {node.wheel for node in real}
+    chosen = []
+    for key, brake in configuration.brakes.items():
+        if brake.wheel - 1 in wheels:
+            chosen.append(BrakeDescription(int(key), brake.wheel - 1, brake.gear_ratio, brake.mirrored))
+        else:
+            typer.echo(f"brake: node {key} is left alone: the motor of wheel {brake.wheel} is virtual", err=True)
+    lost_after_s = configuration.nodes.heartbeat_timeout_ms / 1000
+    return Brakes(
+        chosen,
+        real,
+        lambda: np.zeros(6) if world.truth is None else world.truth.torque_Nm,
+        stale_after_s=MISSING_SYNCS / configuration.sync.rate_Hz,
+        watch=HeartbeatWatch(min(here), lost_after_s) if here else None,
+        report=lambda text: typer.echo(text, err=True),
+    )
+
+
 async def _run(
-    interface: str, channel: str, rover: VirtualRover, control: Path, seconds: float
+    interface: str, channel: str, rover: VirtualRover, brakes: Brakes, control: Path, seconds: float
 ) -> dict[str, dict[str, int]]:
     import asyncio
     import signal
@@ -143,12 +182,14 @@ async def _run(
     for number in (signal.SIGINT, signal.SIGTERM):
         asyncio.get_running_loop().add_signal_handler(number, ended.set)
     async with open_bus(interface, channel) as bus, fault_socket(rover, control), asyncio.TaskGroup() as tasks:
-        running = tasks.create_task(rover.run(bus))
+        running, braking = tasks.create_task(rover.run(bus)), tasks.create_task(brakes.run(bus))
         typer.echo(f"ready: {len(rover.nodes)} nodes on {interface} {channel}; commands at {control}")
         try:
             async with asyncio.timeout(seconds or None):
                 await ended.wait()
         except TimeoutError:
             pass
+        braking.cancel()
+        await asyncio.wait([braking])  # the rover's task still takes the answers to the last writes
         running.cancel()
     return rover.counts()

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 NodeId = Annotated[int, Field(ge=1, le=126, strict=True)]
 WheelNumber = Annotated[int, Field(ge=1, le=6, strict=True)]
+NodeKey = Annotated[str, Field(pattern=r"^([1-9]|[1-9][0-9]|1[01][0-9]|12[0-6])$")]
 SixNodes = Annotated[tuple[NodeId, ...], Field(min_length=6, max_length=6)]
 MASTER_NODE = 127
 """The daemon's own node-ID: the drives consume its heartbeat, and stop without it."""
@@ -106,6 +107,17 @@ class Nodes(_NodeIds):
         )
 
 
+class Brake(Table):
+    """`[brakes.ID]`: a drive in torque mode that `regolithd bench` gives the torque of the virtual soil.
+
+    `gear_ratio` is in turns of the brake per turn of the wheel. The daemon only knows that the node is there.
+    """
+
+    wheel: WheelNumber
+    gear_ratio: Positive = 1.0
+    mirrored: bool = False
+
+
 class Slip(Table):
     """`[slip]`: the slip where the ground speed is not measured, and the speed below which a wheel stands still."""
 
@@ -184,6 +196,7 @@ class Configuration(Table):
     sync: SyncTiming = SyncTiming()
     nodes: Nodes = Nodes()
     devices: dict[str, DeviceTable] = Field(default_factory=dict)
+    brakes: dict[NodeKey, Brake] = Field(default_factory=dict)
     wheel: Wheel = Wheel()
     load_cells: LoadCells = LoadCells()
     drivetrain: Drivetrain = Drivetrain()

@@ -193,6 +193,7 @@ def _problems_together(found: Iterable[tuple[str, str, str, str]], text: str, pa
 def _checks_together(configuration: Configuration) -> Iterator[tuple[str, str, str, str]]:
     nodes = configuration.nodes
     yield from _shared_node_ids(nodes)
+    yield from _shared_by_brakes(configuration)
     if nodes.heartbeat_timeout_ms < 2 * nodes.heartbeat_ms:
         yield (
             "nodes.heartbeat_timeout_ms",
@@ -254,6 +255,23 @@ def _shared_node_ids(nodes: Nodes) -> Iterator[tuple[str, str, str, str]]:
                 "Give every node its own id.",
             )
         taken.setdefault(node, name)
+
+
+def _shared_by_brakes(configuration: Configuration) -> Iterator[tuple[str, str, str, str]]:
+    taken = {str(node.node_id): name for name, node in configuration.nodes.by_key()}
+    braked: dict[int, str] = {}
+    for key, brake in configuration.brakes.items():
+        if key in taken:
+            yield (
+                f"brakes.{key}",
+                "a node id of its own",
+                f"{key}, which is {taken[key]}'s",
+                "Give the brake its own id.",
+            )
+        if brake.wheel in braked:
+            found = f"{brake.wheel}, which brake {braked[brake.wheel]} has"
+            yield f"brakes.{key}.wheel", "a wheel of its own", found, "One brake loads one wheel."
+        braked.setdefault(brake.wheel, key)
 
 
 def _with_absolute_paths(configuration: Model, folder: Path) -> Model:

@@ -100,7 +100,9 @@ class Network:
         self.bus = bus
         self.settings = settings
         self.decoder = Decoder(settings.nodes, master_id=settings.master_id)
-        self.intruders = IntruderWatch((node.node_id for node in settings.nodes), master_id=settings.master_id)
+        self.intruders = IntruderWatch(
+            {node.node_id for node in settings.nodes} | settings.other_node_ids, master_id=settings.master_id
+        )
         self._counters = NetworkCounters()
         self._on_frames = on_frames
         self._on_signals = on_signals

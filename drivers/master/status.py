@@ -55,6 +55,7 @@ class NetworkSettings:
     node_lost_after_s: float = 0.7
     sdo_timeout_s: float = 1.0
     boot_up_timeout_s: float = 3.0
+    other_node_ids: frozenset[int] = frozenset()  # on the bus, and nobody's to boot: no intruders
     retry_after_s: float = 5.0  # of a node that could not be booted and sends nothing; doubles up to `retry_at_most_s`
     retry_at_most_s: float = 30.0
 

@@ -64,6 +64,8 @@ class VirtualRover:
         Node-IDs of those that are virtual; None: all. The plant follows what the others, real ones, report.
     follow_loads
         Called before each measurement with the loads [N] of real load cells, shape (6,), NaN where there is none.
+    on_frame
+        Called with each frame that another node sent.
     monotonic_ns, wall_ns
         Clocks for deadlines, and for the frames' kernel times.
     """
@@ -75,6 +77,7 @@ class VirtualRover:
         *,
         virtual: Collection[int] | None = None,
         follow_loads: Callable[[Array], None] = lambda _load_N: None,
+        on_frame: Callable[[Frame], None] = lambda _frame: None,
         monotonic_ns: Callable[[], int] = time.monotonic_ns,
         wall_ns: Callable[[], int] = time.time_ns,
     ) -> None:
@@ -89,6 +92,7 @@ class VirtualRover:
         self.nodes = {each.node_id: VirtualNode(each, self._emit) for each in described if each.node_id in ids}
         self._real = RealNodes(each for each in described if each.node_id not in ids)
         self._follow_loads = follow_loads
+        self._on_frame = on_frame
         self._drives = [node.device for node in self.nodes.values() if isinstance(node.device, VirtualMotorController)]
         self._time_s = 0.0
         self._advanced_ns: int | None = None  # by the wall clock, as is `_sync_ns`
@@ -108,6 +112,7 @@ class VirtualRover:
         if frame.sent or frame.error:
             return
         self._real.take(frame)
+        self._on_frame(frame)
         if any(frame.can_id == node.sync_cob_id for node in self.nodes.values()):
             self._bus_counts["sync"] += 1
             self._step(frame.time_ns, now)

@@ -16,17 +16,21 @@ import sys
 import threading
 import time
 from dataclasses import dataclass, field
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import canopen
 from canopen.objectdictionary import ODVariable, datatypes
 from canopen.sdo import SdoAbortedError, SdoServer
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 DISABLED = 0x8000_0000
 IDENTIFIER = 0x7FF
 LATE_S = 1.5
 STATES = {"disabled": 0x40, "ready": 0x21, "on": 0x23, "enabled": 0x27, "stopping": 0x07, "fault": 0x08}
 BLOCK_UPLOAD_INITIATED = 0xC2  # with the size (CiA 301, 7.2.4.3.14)
+TORQUE_OBJECTS = {0x6071: 0x3, 0x6072: 0x6, 0x6076: 0x7, 0x6502: 0x7}  # with data types of CiA 301
 RAMP = 20_000.0  # units of 0x606C per second
 CURRENT_OBJECTS = ((0x6078, 0), (0x30D1, 2), (0x2027, 0))
 CURRENT, IDLE_CURRENT = 55, 0
@@ -269,7 +273,8 @@ class Strangers:
         self.lock = threading.Lock()
         self._ended = threading.Event()
         self.network.subscribe(0x080, lambda *_: self._sync())
-        self.network.subscribe(0x700 + 127, lambda *_: self._heartbeat())
+        for node_id in range(1, 128):
+            self.network.subscribe(0x700 + node_id, self._heartbeat)
         for base in (0x200, 0x300, 0x400, 0x500):
             for node_id in range(1, 127):
                 self.network.subscribe(base + node_id, self._receive)
@@ -298,9 +303,10 @@ class Strangers:
         for each in list(self.nodes.values()):
             each.sync()
 
-    def _heartbeat(self) -> None:
+    def _heartbeat(self, can_id: int, _data: bytes, _time: float) -> None:
         for each in self.nodes.values():
-            each.master_heard = time.monotonic()
+            if each.get(0x1016, 1) >> 16 & 0x7F == can_id & 0x7F:
+                each.master_heard = time.monotonic()
 
     def _receive(self, can_id: int, data: bytes, _time: float) -> None:
         if node := self.nodes.get(can_id & 0x7F):
@@ -313,6 +319,20 @@ class Strangers:
             for each in list(self.nodes.values()):
                 each.tick(now - before)
             before = now
+
+
+def torque_eds(folder: Path) -> Path:
+    """Write the EDS file of a CiA 402 drive with torque modes, and return its path."""
+    from regolithd.drivers.devices.eds import EDS_FOLDER  # noqa: PLC0415  # the slaves share no code with regolithd
+
+    sections = [
+        f"[{index:04X}]\nParameterName=Torque object\nObjectType=0x7\nDataType=0x{kind:04X}\nAccessType=rw\n"
+        "DefaultValue=0\nPDOMapping=1\n"
+        for index, kind in TORQUE_OBJECTS.items()
+    ]
+    path = folder / "brake.eds"
+    path.write_text((EDS_FOLDER / "cia402.eds").read_text() + "\n" + "\n".join(sections))
+    return path
 
 
 def obey(strangers: Strangers, line: str) -> None:

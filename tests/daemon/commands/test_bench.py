@@ -125,3 +125,15 @@ def test_some_nodes_may_be_real(tmp_path: Path) -> None:
         wrong = subprocess.run([*line, "--nodes", nodes], capture_output=True, text=True, check=False, timeout=60)
         assert wrong.returncode == 78
         assert said in wrong.stderr
+
+
+def test_a_brake_loads_a_real_motor_alone(tmp_path: Path) -> None:
+    """The brake of a virtual motor is left alone, and one that does not answer is named."""
+    config = tmp_path / "rover.toml"
+    config.write_text("[brakes.31]\nwheel = 1\n[brakes.32]\nwheel = 2\n")
+    line = command("bench", "--interface", "virtual", "--channel", "brake", "--control", str(tmp_path / "brake.sock"))
+    line += ["--config", str(config), "--nodes", "2,11-16", "--seconds", "2"]
+    ended = subprocess.run(line, capture_output=True, text=True, check=True, timeout=60)
+    left_alone, absent = ended.stderr.splitlines()
+    assert left_alone == "brake: node 32 is left alone: the motor of wheel 2 is virtual"
+    assert absent.startswith("brake: node 31, object 0x1000:00: no answer within 1 s")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.config.configuration import Brake, Configuration
 from regolithd.daemon.config.devices import DeviceTable
 from regolithd.daemon.config.reader import ConfigurationError, parse_configuration, read_configuration
 
@@ -16,6 +16,9 @@ def problems_of(text: str) -> dict[str, str]:
     with pytest.raises(ConfigurationError) as caught:
         parse_configuration(text, Path("rover.toml"))
     return {problem.key: str(problem) for problem in caught.value.problems}
+
+
+OPTIONAL_TABLES = {"devices": (DeviceTable, "# [devices.motors]"), "brakes": (Brake, "# [brakes.31]")}
 
 
 def test_the_shipped_file_is_the_defaults_with_both_body_sensors() -> None:
@@ -30,11 +33,8 @@ def test_every_key_of_the_model_is_shown_in_the_shipped_file() -> None:
     """Each table and each key of the model is in `rover.toml`."""
     text = ROVER.read_text()
     for name, field in Configuration.model_fields.items():
-        if name == "devices":
-            assert "# [devices.motors]" in text
-        else:
-            assert f"[{name}]" in text
-        table = DeviceTable if name == "devices" else field.annotation
+        table, header = OPTIONAL_TABLES.get(name, (field.annotation, f"[{name}]"))
+        assert header in text
         for key in table.model_fields:  # type: ignore[union-attr]
             if key == "objects":
                 continue
@@ -63,6 +63,18 @@ port = "1883a"
     assert found["wheel.widht_m"].startswith("rover.toml:7: ")
     assert "Did you mean width_m?" in found["wheel.widht_m"]
     assert found["mqtt.port"].endswith("Change it, or leave it out for 1883.")
+
+
+def test_a_brake_has_a_node_and_a_wheel_of_its_own() -> None:
+    """Node-IDs that are taken, two brakes of one wheel, and what is no node-ID are problems."""
+    found = problems_of("[brakes.3]\nwheel = 1\n[brakes.32]\nwheel = 1\n[brakes.33]\nwheel = 7\n")
+    assert "brakes.33.wheel" in found
+    found = problems_of("[brakes.3]\nwheel = 1\n[brakes.32]\nwheel = 1\n")
+    assert found["brakes.3"].startswith(
+        "rover.toml:1: brakes.3: expected a node id of its own, found 3, which is motors[2]"
+    )
+    assert found["brakes.32.wheel"].startswith("rover.toml:4: ")
+    assert any("127" in text for text in problems_of("[brakes.127]\nwheel = 1\n").values())
 
 
 def test_a_toml_mistake_is_reported_with_its_line() -> None:
@@ -100,7 +112,7 @@ def test_every_path_of_the_model_is_in_the_list_of_path_keys() -> None:
     found = {
         f"{name}.{key}"
         for name, table in Configuration.model_fields.items()
-        if name != "devices"
+        if name not in OPTIONAL_TABLES
         for key, field in table.annotation.model_fields.items()  # type: ignore[union-attr]
         if "Path" in str(field.annotation)
     }

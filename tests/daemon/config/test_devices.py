@@ -143,3 +143,9 @@ def test_all_mistakes_are_reported_together() -> None:
     password_file = "x"
     """
     assert len(problems(text)) == 3
+
+
+def test_a_brake_is_no_intruder() -> None:
+    """The master knows that the node is there."""
+    settings = network_settings(parse_configuration("[brakes.31]\nwheel = 1\n", ROVER))
+    assert settings.other_node_ids == {31}

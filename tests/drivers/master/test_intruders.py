@@ -61,12 +61,12 @@ def test_a_second_master_is_told_with_what_it_does(frame: Frame, service: Servic
 
 
 async def test_intruders_on_the_bus_are_events_of_the_network() -> None:
-    """A foreign node, SYNC and NMT command are seen among the frames; our own are not taken for foreign ones."""
-    async with rig([CELL]) as r:
+    """A foreign node, SYNC and NMT command are seen among the frames; our own and named nodes are not foreign."""
+    async with rig([CELL], other_node_ids=frozenset({0x21})) as r:
         await r.wait_for_event(NodeBooted)
         assert r.network.intruders.present(r.frames[-1].time_ns) == Intruders()
         async with open_bus("virtual", r.bus.channel) as other:
-            for can_id, data in ((0x722, b"\x7f"), (0x080, b""), (0x000, b"\x01\x63")):
+            for can_id, data in ((0x721, b"\x7f"), (0x722, b"\x7f"), (0x080, b""), (0x000, b"\x01\x63")):
                 await other.send(Frame(0, can_id, data))
             await until(lambda: len(r.events_of(UnexpectedMaster)) == 2, "SYNC and NMT of another master")
         assert [event.node_id for event in r.events_of(UnexpectedNode)] == [0x22]
