@@ -77,7 +77,8 @@ class Thresholds:
     )
     furthest_linearisation_stds: float = _threshold(
         8.0,
-        "Standard deviations of its prior beyond which no parameter is moved to linearise the simulation there.",
+        "Standard deviations of its prior beyond which no parameter is moved to linearise the simulation there, nor "
+        "explains what is left.",
         f"{CHOICE}: further away a simulation may leave the range in which it can be run",
     )
     linearisation_share: float = _threshold(

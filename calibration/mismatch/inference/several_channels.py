@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -37,8 +39,14 @@ def merged_answers(answers: Sequence[Answer]) -> Answer:
 
 
 def combined(*found: CalibratedParameter) -> CalibratedParameter:
-    """Return a parameter's posterior from independent channels: precisions add, the prior's counted once."""
+    """Return a parameter's posterior from independent channels: precisions add, the prior's counted once.
+
+    Where a channel shows that the prior is wrong, it was left, and the value is that channel's own.
+    """
     prior_std = found[0].prior_std
+    left = [each for each in found if abs(each.value - each.prior) > THRESHOLDS.furthest_prior_stds * prior_std > 0]
+    if left:
+        return min(left, key=lambda each: each.high - each.low)
     stds = [(each.high - each.low) / (2 * NINETY_PERCENT_STDS) for each in found]
     if prior_std == 0 or min(stds) == 0:
         return found[0]

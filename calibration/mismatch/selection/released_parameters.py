@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 def released(equations: NormalEquations, named: Fit) -> NormalEquations | None:
     """Return equations with the priors of those parameters widened that would have to leave them.
 
-    None where no parameter would, or where something stays unexplained all the same.
+    None where no parameter would, where one would go further than a wrong statement explains
+    (`furthest_linearisation_stds`), or where something stays unexplained all the same.
     """
     limits, nuisance = equations.thresholds, equations.nuisance
     fit = equations.fit(named.terms)
@@ -36,4 +37,10 @@ def released(equations: NormalEquations, named: Fit) -> NormalEquations | None:
         wide = nuisance.precision[place] / limits.furthest_linearisation_stds**2
         nuisance = nuisance.with_precision(int(place), float(wide))
     freed = equations.with_nuisance(nuisance)
-    return freed if unexplained_beside(freed, freed.fit(named.terms)) is None else None
+    fit = freed.fit(named.terms)
+    moved = np.abs(fit.coefficients[leaving] - nuisance.centre[leaving]) * np.sqrt(
+        equations.nuisance.precision[leaving]
+    )
+    if np.any(moved > limits.furthest_linearisation_stds) or unexplained_beside(freed, fit) is not None:
+        return None
+    return freed
