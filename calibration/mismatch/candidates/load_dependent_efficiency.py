@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.problem.problem import Problem
 
+SAME_AS_GAIN = 0.95
+"""Cosine between a loss in proportion to the torque and the torque itself, above which it is a wrong gain (a choice:
+the load drives the motor for a fortieth of the torque's energy at most)."""
 LARGEST_LOSS = 2 / 3
 """Largest share of the stated efficiency that may be lost at any torque (a choice: a third is left)."""
 POWERS, LIGHT_LOADS, SLOPES = (0.0, 0.5, 1.0, 2.0, 3.5), (0.5, 1.0), (-0.2, 0.0, 0.3)
@@ -66,9 +69,13 @@ class LoadDependentEfficiency(Candidate):
         bent = float(np.clip(values[0], least, most))
         return shape if abs(bent - float(shape["bent"])) <= SHAPE_TOLERANCE * abs(bent) else {**shape, "bent": bent}
 
-    def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
-        """Charge a loss proportional to torque: it contradicts the stated gain's standard deviation."""
-        return UNLIKELY_SHAPE_PENALTY if shape.get("power") == 0.0 else 0.0
+    def prior_penalty(self, problem: Problem, shape: Shape) -> float:
+        """Charge a loss proportional to torque where the load never drives: there it contradicts the stated gain."""
+        if shape.get("power") != 0.0:
+            return 0.0
+        lost, torque = _against_motion(problem)[problem.mask], problem.filled[problem.mask]
+        alike = float(lost @ torque) / max(float(np.linalg.norm(lost) * np.linalg.norm(torque)), 1e-300)
+        return UNLIKELY_SHAPE_PENALTY if alike > SAME_AS_GAIN else 0.0
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the loss as a multiple of the predicted size, against the motion."""
