@@ -67,8 +67,10 @@ def until(condition: Callable[[], bool], what: str, seconds: float = TIMEOUT_s) 
 
 
 def set_line(key: str, value: str) -> None:
-    """Set a key of the configuration, which may be commented out."""
-    text, changes = re.subn(rf"(?m)^#? ?{key} = .*$", f"{key} = {value}", CONFIGURATION.read_text())
+    """Set a key of the configuration; where it only stands in a comment, there."""
+    before = CONFIGURATION.read_text()
+    stated = re.findall(rf"(?m)^{key} = .*$", before)
+    text, changes = re.subn(rf"(?m)^{'' if stated else '# ?'}{key} = .*$", f"{key} = {value}", before)
     assert changes == 1, key
     CONFIGURATION.write_text(text)
 
