@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from winch import Winch
 
-from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch import compare
 from regolithd.calibration.mismatch.data.recording import from_columns
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
 
     from regolithd.calibration.mismatch.answer import Answer
@@ -22,22 +21,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 ROWS = 1500
-
-
-class Winch(Simulation):
-    """Current of a winch with two drums: in proportion to the pull."""
-
-    channel, unit, wheel_column = "current_A", "A", "drum"
-    inputs = ("pull_N", "speed")
-    parameters: ClassVar = {"gain_A_N": Prior(0.02, 0.0004, "A/N")}
-
-    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
-        """Return the current that the pull needs."""
-        return values["gain_A_N"] * inputs["pull_N"]
-
-    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
-        """Return speed and time."""
-        return {"wheel_speed": inputs["speed"], "time": inputs["t_s"]}
 
 
 def wound(step_s: float) -> dict[str, Array]:

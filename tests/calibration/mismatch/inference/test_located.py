@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from winch import Winch
 
-from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch import compare
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.inference.located import largest_stretch
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -22,22 +21,6 @@ ROWS, DRUMS, STEP_S = 4000, 3, 0.5
 TIME_S = STEP_S * np.arange(ROWS)
 PHASE = np.stack([TIME_S / 20 + drum for drum in range(DRUMS)], axis=1)
 SPEED, PULL = np.sin(PHASE) + 0.5 * np.sin(2.7 * PHASE), 40 + 15 * np.sin(PHASE / 3)
-
-
-class Winch(Simulation):
-    """Current of a winch with three drums: in proportion to the pull."""
-
-    channel, unit, wheel_column = "current_A", "A", "drum"
-    inputs = ("pull_N", "speed")
-    parameters: ClassVar = {"gain_A_N": Prior(0.02, 0.0004, "A/N")}
-
-    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
-        """Return the current that the pull needs."""
-        return values["gain_A_N"] * inputs["pull_N"]
-
-    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
-        """Return speed and time."""
-        return {"wheel_speed": inputs["speed"], "time": inputs["t_s"]}
 
 
 def recorded(seed: int, effect: Array, drums: list[int]) -> tuple[Recording, float]:

@@ -10,11 +10,12 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+import sample_answer
+from sample_answer import FROM
 
 from regolithd.calibration.mismatch.answer import (
     Answer,
     Curve,
-    Effect,
     Evidence,
     FitImprovement,
     Indistinguishable,
@@ -29,20 +30,12 @@ from regolithd.calibration.mismatch.report.axes import number, ticks
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.labels import Labels, verdict_sentence
 from regolithd.calibration.mismatch.report.notebook import notebook_html
-from regolithd.calibration.mismatch.report.page import Provenance, equation, render_report
+from regolithd.calibration.mismatch.report.page import equation, render_report
 
-FROM = Provenance("drive.csv", "SIM.toml", "ab" * 32, "cd" * 32, "regolithd mismatch drive.csv --simulation SIM.toml")
-WORN = Effect(
-    name="bearing-drag",
-    channel="motor_current_A",
-    wheels=(4,),
-    covariate="time",
-    onset_s=612.0,
-    equation="ΔI = I_b g(t − t_0) sign(ω)",
+WORN = replace(
+    sample_answer.WORN,
     statement="drag on wheel 4 <from> 612 s on",
     parameters={"drag_current": Parameter(0.0077, 0.0071, 0.0083, "A")},
-    rmse_before=0.0069,
-    rmse_after=0.0048,
 )
 VOID = {"img", "meta", "link", "br", "path", "rect", "circle"}
 
