@@ -11,6 +11,7 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     Shape,
     growth,
     onset_grid,
+    onset_range,
 )
 
 if TYPE_CHECKING:
@@ -23,8 +24,6 @@ RISES = (0.03, 0.15)
 POWERS, FURTHER_POWERS = (0.25, 0.5, 2.0), (0.12, 0.18, 0.35, 0.7, 1.4)
 """Powers of the time since the onset that are searched, and those that its interval takes in too (a choice: running-in
 wear slows down, spalling accelerates)."""
-FIRST_ONSET, LAST_ONSET = 0.01, 0.97
-"""Range of the optimised onset, as shares of the recording (a choice)."""
 
 
 class BearingDrag(Candidate):
@@ -61,7 +60,7 @@ class BearingDrag(Candidate):
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Return the recording without its ends: drag must be seen without and with the fault."""
-        return {"onset_s": (FIRST_ONSET * problem.length_s, LAST_ONSET * problem.length_s)}
+        return {"onset_s": onset_range(problem)}
 
 
 def _wear(problem: Problem, power: float) -> Shape:

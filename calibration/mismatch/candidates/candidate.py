@@ -29,6 +29,8 @@ ONSET_COUNT = 24
 """Onsets in the grid of a candidate (a choice: one in each 4 % of the recording, refined later)."""
 EARLIEST_ONSET, LATEST_ONSET = 0.03, 0.95
 """Ends of that grid, as shares of the recording: what is before and after an onset must both be seen (a choice)."""
+FIRST_ONSET, LAST_ONSET = 0.01, 0.97
+"""Range of the optimised onset, as shares of the recording (a choice)."""
 Shape = dict[str, float | str]
 """Values of the shape parameters by name. Numbers may be continuous (`free`), strings are kinds."""
 Sharing = Literal["all", "one"]
@@ -221,6 +223,11 @@ class Candidate:
 def onset_grid(problem: Problem, count: int = ONSET_COUNT) -> list[float]:
     """Return times at which something may begin [s], evenly spread over the recording without its ends."""
     return [float(t) for t in problem.length_s * np.linspace(EARLIEST_ONSET, LATEST_ONSET, count)]
+
+
+def onset_range(problem: Problem) -> tuple[float, float]:
+    """Return the times between which an onset is optimised [s]: what was before it and after it must be seen."""
+    return FIRST_ONSET * problem.length_s, LAST_ONSET * problem.length_s
 
 
 def growth(problem: Problem, shape: Shape) -> Array:

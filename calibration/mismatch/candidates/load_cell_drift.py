@@ -13,6 +13,7 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     Shape,
     growth,
     onset_grid,
+    onset_range,
 )
 from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.signal.hat_basis import hat_functions
@@ -37,8 +38,6 @@ LEAST_READINGS = 10
 """Readings below which no posture is fitted: as many as the regression has columns."""
 RISES = (0.05, 0.15)
 """Time constants of a predicted load's creep, as shares of the recording (a choice: quick and slow)."""
-FIRST_ONSET, LAST_ONSET = 0.01, 0.97
-"""Range of the optimised onset, as shares of the recording (a choice)."""
 
 
 class LoadCellDrift(Candidate):
@@ -146,11 +145,11 @@ class DriftOfPredictedLoad(LoadCellDrift):
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return g(t − t_0), 0 before the onset."""
-        return (growth(problem, shape) + 0.0 * problem.filled)[None]
+        return np.broadcast_to(growth(problem, shape), problem.mask.shape)[None]
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Return the recording without its ends: the reading must be seen before the drift and with it."""
-        return {"onset_s": (FIRST_ONSET * problem.length_s, LAST_ONSET * problem.length_s)}
+        return {"onset_s": onset_range(problem)}
 
     def own_channel_evidence(self, problem: Problem, shape: Shape) -> None:  # noqa: ARG002
         """Return nothing: the predicted channel is the cell's own."""

@@ -11,12 +11,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.selection.smooth_terms import unexplained_beside
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+    from regolithd.calibration.mismatch.regression.nuisance import Nuisance
+
+Array = NDArray[np.float64]
 
 
 def released(equations: NormalEquations, named: Fit) -> NormalEquations | None:
@@ -26,21 +30,22 @@ def released(equations: NormalEquations, named: Fit) -> NormalEquations | None:
     (`furthest_linearisation_stds`), or where something stays unexplained all the same.
     """
     limits, nuisance = equations.thresholds, equations.nuisance
-    fit = equations.fit(named.terms)
-    base = len(nuisance.columns)
-    away = np.abs(fit.coefficients[:base] - nuisance.centre) * np.sqrt(nuisance.precision)
     own = [name in equations.problem.simulation.parameters for name in nuisance.names]
+    away = _prior_stds_away(nuisance, equations.fit(named.terms))
     leaving = np.flatnonzero((away > limits.furthest_prior_stds) & own)
     if not leaving.size:
         return None
+    wider = nuisance
     for place in leaving:
         wide = nuisance.precision[place] / limits.furthest_linearisation_stds**2
-        nuisance = nuisance.with_precision(int(place), float(wide))
-    freed = equations.with_nuisance(nuisance)
+        wider = wider.with_precision(int(place), float(wide))
+    freed = equations.with_nuisance(wider)
     fit = freed.fit(named.terms)
-    moved = np.abs(fit.coefficients[leaving] - nuisance.centre[leaving]) * np.sqrt(
-        equations.nuisance.precision[leaving]
-    )
-    if np.any(moved > limits.furthest_linearisation_stds) or unexplained_beside(freed, fit) is not None:
-        return None
-    return freed
+    too_far = np.any(_prior_stds_away(nuisance, fit)[leaving] > limits.furthest_linearisation_stds)
+    return None if too_far or unexplained_beside(freed, fit) is not None else freed
+
+
+def _prior_stds_away(nuisance: Nuisance, fit: Fit) -> Array:
+    """Return how far each parameter is from its prior in a fit, in the prior's standard deviations."""
+    fitted = fit.coefficients[: len(nuisance.columns)]
+    return np.asarray(np.abs(fitted - nuisance.centre) * np.sqrt(nuisance.precision))
