@@ -10,6 +10,7 @@ RECORDINGS ?= ../shared/recordings
 
 .PHONY: help demo test check docs clean install uninstall
 .PHONY: interop
+.PHONY: figures
 .PHONY: sizing reproduce evaluate loop prove prove-machines real scaling thresholds mutations mutants frames pictures picture screenshots
 
 help:
@@ -82,6 +83,9 @@ mutants: $(DEV) ## mutation testing on a random sample (SEED=… COUNT=… ONLY=
 interop: $(DEV) ## slaves of other stacks, from CANOPENLINUX=FOLDER and LELY=FOLDER; docs/reference/interop.md
 	PYTHONPATH=src:tests/bench tests/bench/with-vcan $(BIN)/python tests/interop/run.py \
 		$(if $(CANOPENLINUX),--canopenlinux $(CANOPENLINUX)) $(if $(LELY),--lely $(LELY))
+
+figures: $(DEV) ## docs/reference/figures.md from build/figures/{chaos,holds,fuzz,bench,audit}.json, those that are there
+	$(BIN)/python tests/bench/figures_page.py
 
 frames: $(DEV) ## time per frame beside python-can and canopen, on vcan; docs/bus.md
 	tests/bench/with-vcan $(BIN)/python -m regolithd.drivers.benchmark
