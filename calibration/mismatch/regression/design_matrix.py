@@ -1,7 +1,8 @@
 """The design matrix: every column of every group, with sums of products for each wheel and each fold.
 
-A term on any set of wheels, fitted on any set of folds, needs only those sums: time is walked through once for each
-column. A design matrix is immutable; `extended` returns one with further columns.
+A term on any set of wheels, fitted on any set of folds, needs only those sums. They are computed when they are first
+asked for, of all columns at once that came since: products of a few columns with many cost as much as reading the many.
+A design matrix is immutable; `extended` returns one with further columns.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ class _Storage:
 
     def __init__(self, folds: int, wheels: int, instants: int) -> None:
         self.used = 0
+        self.summed = 0
         self.columns: Single = np.zeros((0, wheels, instants), np.float32)
         self.gram: Array = np.zeros((folds, wheels, 0, 0))
         self.moment: Array = np.zeros((folds, wheels, 0))
@@ -38,7 +40,7 @@ class _Storage:
     def branched(self, used: int) -> _Storage:
         """Return a copy with the first `used` columns."""
         copy = _Storage(self.gram.shape[0], *self.columns.shape[1:])
-        copy.used = used
+        copy.used, copy.summed = used, min(used, self.summed)
         copy.columns = self.columns[:used].copy()
         copy.gram, copy.moment = self.gram[:, :, :used, :used].copy(), self.moment[:, :, :used].copy()
         return copy
@@ -99,11 +101,13 @@ class DesignMatrix:
     @property
     def gram(self) -> Array:
         """Sums of products of columns, shape (fold, wheel, column, column)."""
+        self._sum_products()
         return self._storage.gram[:, :, : self.size, : self.size]
 
     @property
     def moment(self) -> Array:
         """Sums of products of columns and residual, shape (fold, wheel, column)."""
+        self._sum_products()
         return self._storage.moment[:, :, : self.size]
 
     def with_groups(self, groups: Sequence[Group]) -> DesignMatrix:
@@ -120,23 +124,28 @@ class DesignMatrix:
         scale = np.where(scale > 0, scale, 1.0)
         fresh /= scale[:, None, None].astype(np.float32)
         storage = self._storage if self._storage.used == self.size else self._storage.branched(self.size)
-        self._store(storage, fresh)
+        storage.reserve(storage.used + len(fresh))
+        storage.columns[storage.used : storage.used + len(fresh)] = fresh
+        storage.used += len(fresh)
         grown = replace(self, scale=np.concatenate((self.scale, scale)), _storage=storage)
         return grown, tuple(range(self.size, grown.size))
 
-    def _store(self, storage: _Storage, fresh: Single) -> None:
-        """Write columns and their products with all columns up to them behind those that are there."""
-        old, new = storage.used, storage.used + len(fresh)
-        storage.reserve(new)
-        storage.columns[old:new] = fresh
-        storage.used = new
-        parts = (_folds_of(values, self.cuts) for values in (storage.columns[:new], fresh, self.residual))
-        for fold, (part, added, residual) in enumerate(zip(*parts, strict=True)):
+    def _sum_products(self) -> None:
+        """Compute the products of the columns that came since the last time with all columns up to them."""
+        storage = self._storage
+        old, new = storage.summed, storage.used
+        if old == new:
+            return
+        parts = (_folds_of(values, self.cuts) for values in (storage.columns[:new], self.residual))
+        for fold, (part, residual) in enumerate(zip(*parts, strict=True)):
             for wheel in range(part.shape[1]):
-                cross = added[:, wheel] @ part[:, wheel].T
-                storage.gram[fold, wheel, old:new, :new] = cross
-                storage.gram[fold, wheel, :new, old:new] = cross.T
-                storage.moment[fold, wheel, old:new] = added[:, wheel] @ residual[wheel]
+                before, fresh = part[:old, wheel], part[old:, wheel]
+                cross = fresh @ before.T
+                storage.gram[fold, wheel, old:new, :old] = cross
+                storage.gram[fold, wheel, :old, old:new] = cross.T
+                storage.gram[fold, wheel, old:new, old:new] = fresh @ fresh.T
+                storage.moment[fold, wheel, old:new] = fresh @ residual[wheel]
+        storage.summed = new
 
     def in_time(self, values: NDArray[Any]) -> Array:
         """Return (…, wheel, time in the order of folds) as (…, time, wheel) in the order of time."""
