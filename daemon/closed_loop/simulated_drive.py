@@ -36,14 +36,16 @@ class SimulatedDrive:
     truth: tuple[GroundTruth, ...]
 
 
-def simulate(scenario: Scenario, configuration: Configuration, profile: SpeedProfile) -> SimulatedDrive:
+def simulate(
+    scenario: Scenario, configuration: Configuration, profile: SpeedProfile, start_ns: int = START_NS
+) -> SimulatedDrive:
     """Drive the speed profile in the scenario; the configuration says which nodes answer."""
     world, nodes = VirtualWorld(scenario), configuration.described()
     batches, truth = [], []
     for time_s, wheel_speed in zip(profile.time_s.tolist(), profile.wheel_speed_rad_s.tolist(), strict=True):
         speed = np.full(6, wheel_speed * scenario.drivetrain.ratio)
         read = world.measure(time_s, speed)
-        batches.append(tuple(frames(nodes, START_NS + round(time_s * 1e9), speed, read)))
+        batches.append(tuple(frames(nodes, start_ns + round(time_s * 1e9), speed, read)))
         if world.truth is not None:
             truth.append(world.truth)
     return SimulatedDrive(tuple(batches), tuple(truth))

@@ -33,8 +33,8 @@ def compare(
     """Compare the recording of the last traverse with the simulation, and publish the result.
 
     A process of its own, never in the daemon; `regolithd-compare.path` starts it after each traverse. The report is
-    written to `comparisons`, beside the recordings. The alarm `mismatch` is raised when the simulation lacks physics,
-    or when an effect of a corrected simulation has changed.
+    written to `comparisons`, beside the recordings, with the corrected simulation. The alarm `mismatch` is raised when
+    the simulation lacks physics, or when an effect of a corrected simulation has changed.
     """
     from regolithd.calibration.mismatch.errors import MismatchError
     from regolithd.daemon.mismatch.result import comparison_result
@@ -46,11 +46,14 @@ def compare(
     try:
         files = extract_last_traverse(configuration.recording.directory)
         used = _simulation(configuration, config, simulation, files)
-        answer = run([files.recording], used, Outputs(json=files.answer, report=files.report))
+        answer = run([files.recording], used, Outputs(files.answer, files.report, files.corrected))
     except (MismatchError, OSError) as error:
         typer.echo(f"regolithd compare: {error}", err=True)
         raise typer.Exit(EXIT_DATA) from error
     typer.echo(f"report     {files.report}")
+    if answer.effects or answer.changes:
+        typer.echo(f"corrected  {files.corrected}")
+        typer.echo("           Copy it to SIM.toml, beside rover.toml: the next traverse is compared with it.")
     if publish:
         _publish(configuration, comparison_result(answer, files, used))
 

@@ -14,7 +14,7 @@ from regolithd.daemon.messages.alarm import AlarmMessage
 from regolithd.daemon.messages.bus import EmergencyMessage, EventMessage, NodeMessage
 from regolithd.daemon.messages.health import HealthMessage
 from regolithd.daemon.messages.measurements import SnapshotMessage, WheelMessage
-from regolithd.daemon.messages.mismatch import MismatchMessage
+from regolithd.daemon.messages.mismatch import MismatchMessage, ReportMessage
 from regolithd.daemon.messages.odometry import OdometryMessage
 from regolithd.daemon.messages.posterior import PosteriorMessage
 from regolithd.daemon.messages.state import StateMessage
@@ -72,5 +72,6 @@ CHANNELS = (
     Channel("event", "event", EventMessage, _ACKNOWLEDGED, False, True, "when it happens"),
     Channel("alarm", "alarm/{name}", AlarmMessage, _ACKNOWLEDGED, True, True, "when it begins and ends"),
     Channel("mismatch", "mismatch", MismatchMessage, _ACKNOWLEDGED, True, False, "after each traverse, if set up"),
+    Channel("report", "report", ReportMessage, _ACKNOWLEDGED, True, False, "after each traverse, if set up"),
     Channel("health", "health", HealthMessage, _ONCE, False, False, "once a second, while connected"),
 )

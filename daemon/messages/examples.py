@@ -142,6 +142,10 @@ _MISMATCH = {
     "simulation": "SIM.toml",
     "report": "/var/lib/regolithd/recordings/comparisons/traverse-20130611T140722Z.html",
 }
+_REPORT = {
+    "recording": "traverse-20130611T140722Z.csv",
+    "html_gzip": "H4sIAAAAAAACA7NRTMlPLqksSFXIKMnNsQMASOy5hw8AAAA=",
+}
 _FIELDS: dict[str, dict[str, Any]] = {
     "state": {"sequence": 1, "state": "online", "reason": "connected", "software_version": "0.2.0"},
     "snapshot": _SNAPSHOT,
@@ -153,6 +157,7 @@ _FIELDS: dict[str, dict[str, Any]] = {
     "event": {"sequence": 12, "kind": "node-lost", "node_id": 13, "text": _NODE["text"]},
     "alarm": {"sequence": 1, **_ALARM},
     "mismatch": {"sequence": 0, **_MISMATCH},
+    "report": {"sequence": 0, **_REPORT},
     "health": {"sequence": 250, **_HEALTH},
 }
 

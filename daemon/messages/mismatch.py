@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import Base64Bytes, BaseModel, ConfigDict
 
 from regolithd.daemon.messages.header import Header
 
@@ -49,3 +49,12 @@ class MismatchMessage(ComparisonResult, Header):
 
     Not sent by the daemon but by a process of its own, which has a session of its own for each comparison.
     """
+
+
+class ReportMessage(Header):
+    """The report of the last comparison with the simulation, by `regolithd compare`: one page of HTML, compressed."""
+
+    recording: str
+    """Name of the compared file, as in `mismatch`."""
+    html_gzip: Base64Bytes
+    """The page: gzip, then base64. It has neither scripts nor references to other files."""

@@ -34,6 +34,7 @@ class TraverseFiles:
     recording: Path
     report: Path
     answer: Path
+    corrected: Path
 
 
 def extract_last_traverse(recordings: Path) -> TraverseFiles:
@@ -53,7 +54,7 @@ def extract_last_traverse(recordings: Path) -> TraverseFiles:
     folder = recordings / "comparisons"
     folder.mkdir(exist_ok=True)
     stem = folder / f"traverse-{stamp}Z"
-    files = TraverseFiles(stem.with_suffix(".csv"), stem.with_suffix(".html"), stem.with_suffix(".json"))
+    files = TraverseFiles(*(stem.with_suffix(suffix) for suffix in (".csv", ".html", ".json", ".corrected.toml")))
     if not _write_rows(_snapshots(recordings, traversed), files.recording):
         raise RecordingError(
             f"{recordings}: no snapshot of the traverse of {stamp}Z is recorded. Look at the alarm recording"

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from broker import Mosquitto, mosquitto_program
-from ground_rig import GroundRig, chromium, until
-from playwright.sync_api import expect, sync_playwright
+from ground_rig import GroundRig, until
+from playwright.sync_api import expect
 
 from regolithd.daemon.ground.web.users import add_user
 
@@ -36,18 +36,6 @@ EVIDENCE = {
     "friction_angle_fell": 0.6,
     "drawbar_margin_fell": 0.71,
 }
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """Chromium."""
-    program = chromium()
-    if program is None:
-        pytest.skip("no browser here: apt-get install chromium")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")

@@ -40,8 +40,8 @@ function effectRow(effect) {
     el("td", {}, `${figures(effect.size)} ${effect.unit}`), el("td", {}, interval));
 }
 
-export function showComparison(message) {
-  replace(content("comparison"), JSON.stringify(message ?? null), () => {
+export function showComparison(rover, message) {
+  replace(content("comparison"), JSON.stringify([rover, message ?? null]), () => {
     if (!message) return [el("p", { class: "none" }, "None yet: it is made after each traverse.")];
     const names = ["effect", "where", "size", "90 % interval"];
     const found = [...message.effects, ...message.changes];
@@ -50,7 +50,8 @@ export function showComparison(message) {
       found.length ? el("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Table of effects" },
         el("table", {}, el("thead", {}, el("tr", {}, ...names.map((name) => el("th", { scope: "col" }, name)))),
           el("tbody", {}, ...found.map(effectRow)))) : null,
-      el("p", { class: "history" }, `${message.recording} · ${moment(message.time)} · report: ${message.report}`),
+      el("p", { class: "history" }, `${message.recording} · ${moment(message.time)} · `,
+        el("a", { href: `/report/${encodeURIComponent(rover)}`, target: "_blank" }, "report"), ` · on the rover: ${message.report}`),
     ].filter(Boolean);
   });
 }

@@ -119,7 +119,7 @@ function show() {
   showAlarms(rover.alarms, act);
   showWheels(rover.latest.snapshot);
   showNodes(rover.latest);
-  showComparison(rover.latest.mismatch);
+  showComparison(selected, rover.latest.mismatch);
 }
 
 async function readHistory() {

@@ -17,6 +17,7 @@ from starlette.staticfiles import StaticFiles
 from regolithd.daemon.ground.web.api import Api
 from regolithd.daemon.ground.web.login import LoginPages
 from regolithd.daemon.ground.web.protection import Protection
+from regolithd.daemon.ground.web.reports import ReportPages
 from regolithd.daemon.ground.web.users import Logins, read_users
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ def application(ground: Ground) -> Starlette:
     users = ground.settings.page.users
     logins = Logins(read_users(users), ground.connection, time.time) if users else None
     routes = [Route("/", _index), Route("/favicon.ico", _icon), *Api(ground).routes]
+    routes += ReportPages(ground.settings.store.database).routes
     routes += LoginPages(logins, PAGE / "login.html").routes if logins else []
     static = Mount("/static", StaticFiles(directory=PAGE))
     return Starlette(routes=[*routes, static], middleware=[Middleware(Protection, logins=logins)])

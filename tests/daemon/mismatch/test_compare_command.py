@@ -2,54 +2,33 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import tomllib
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
+from recorded_traverse import ROVER, drive_traverse
 from subscriber import Subscriber, listening, until
 from typer.testing import CliRunner
 
 from regolithd.calibration.mismatch.answer import Answer, Change, Effect, FitImprovement, Parameter
 from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel
-from regolithd.calibration.parameters import Drivetrain
 from regolithd.daemon.cli import app
-from regolithd.daemon.closed_loop.simulated_drive import START_NS, record, simulate
-from regolithd.daemon.closed_loop.speed_profile import shuttle
+from regolithd.daemon.closed_loop.simulated_drive import START_NS
 from regolithd.daemon.config.configuration import Configuration
-from regolithd.daemon.config.reader import read_configuration
 from regolithd.daemon.control.traversed import Traversed
+from regolithd.daemon.ground.web.reports import html
 from regolithd.daemon.mismatch.result import comparison_result
 from regolithd.daemon.mismatch.traverse import TraverseFiles, extract_last_traverse, simulation_toml
-from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.publish.comparison import publish_comparison
-from regolithd.daemon.simulator.scenario import Hidden, Scenario
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from broker import Mosquitto
 
-SECOND = 1_000_000_000
-ROVER = """
-[nodes]
-inclinometer = 21
-ground_speed = 22
-[drivetrain]
-no_load_current_A = 0.037
-no_load_current_std_A = 0.001
-gain_relative_std = 0.03
-[posterior]
-soil = "sandy-loam"
-[recording]
-directory = "recordings"
-[mqtt]
-host = "127.0.0.1"
-port = {port}
-"""
 DRAG = Effect(
     name="viscous-friction",
     channel="motor_current_A",
@@ -67,24 +46,9 @@ MISSING = replace(QUIET, verdict="missing-physics", effects=(DRAG,))
 CHANGED = replace(QUIET, changes=(Change("viscous-friction", "coefficient", 4e-5, 8e-5, 7e-5, 9e-5),))
 
 
-def driven(folder: Path, port: int, duration_s: float, viscous: float) -> Configuration:
-    """Record a drive with a concealed drag, whose middle part is the traverse; return the rover's configuration."""
-    (folder / "rover.toml").write_text(ROVER.format(port=port))
-    configuration = read_configuration(folder / "rover.toml")
-    drivetrain = Drivetrain(no_load_current_A=(0.037,) * 6, viscous_current_A_s_per_rad=(viscous,) * 6)
-    scenario = Scenario(hidden=Hidden(grade_resistance=0.0), drivetrain=drivetrain)
-    drive = simulate(scenario, configuration, shuttle(3, duration_s, configuration.sync.rate_Hz))
-    recordings = configuration.recording.directory
-    recordings.mkdir()
-    record(drive, configuration, load_models(configuration).terrain, recordings)
-    to_ns = START_NS + int((duration_s - 10) * SECOND)
-    Traversed(from_ns=START_NS + 10 * SECOND, to_ns=to_ns, ending="finished").write(recordings)
-    return configuration
-
-
 def test_the_rows_of_the_last_traverse_are_compared_and_no_others(tmp_path: Path) -> None:
     """The file begins with the traverse and ends with it; without any row there is nothing to compare."""
-    recordings = driven(tmp_path, 1, 60.0, 0.0).recording.directory
+    recordings = drive_traverse(tmp_path, 1, 60.0, 0.0).recording.directory
     files = extract_last_traverse(recordings)
     lines = files.recording.read_text().splitlines()
     assert len(lines) == 1 + 6 * (40 * 2 + 1)
@@ -129,36 +93,16 @@ def test_the_simulation_has_what_rover_toml_states(soil: str | None) -> None:
 async def test_the_alarm_is_active_where_physics_is_missing_or_has_changed(
     answer: Answer, active: bool, text: str, tmp_path: Path, mosquitto: Mosquitto
 ) -> None:
-    """Result and alarm are retained: a subscriber that comes later gets both."""
-    files = TraverseFiles(tmp_path / "a.csv", tmp_path / "a.html", tmp_path / "a.json")
+    """Result, report and alarm are retained: a subscriber that comes later gets all three."""
+    (tmp_path / "a.html").write_text("<h1>found</h1>")
+    files = TraverseFiles(tmp_path / "a.csv", tmp_path / "a.html", tmp_path / "a.json", tmp_path / "a.toml")
     configuration = Configuration.model_validate({"mqtt": {"host": "127.0.0.1", "port": mosquitto.port}})
     await publish_comparison(configuration, comparison_result(answer, files, tmp_path / "SIM.toml"))
     async with listening(Subscriber(mosquitto.port)) as subscriber:
-        await until(lambda: subscriber.of("alarm/mismatch") and subscriber.of("mismatch"))
+        await until(lambda: all(subscriber.of(topic) for topic in ("alarm/mismatch", "mismatch", "report")))
     (alarm,), (result,) = subscriber.of("alarm/mismatch"), subscriber.of("mismatch")
+    assert html(json.dumps(subscriber.of("report")[0]).encode()) == b"<h1>found</h1>"
     assert (alarm["active"], alarm["text"]) == (active, text)
     assert result["text"] == text
     assert len(result["effects"]) == len(answer.effects)
     assert len(result["changes"]) == len(answer.changes)
-
-
-@pytest.mark.timeout(400)
-def test_a_concealed_drag_is_found_after_the_traverse_and_published(tmp_path: Path, mosquitto: Mosquitto) -> None:
-    """From a recording and rover.toml alone: report, answer, message and alarm; without a broker the status is 69."""
-    driven(tmp_path, mosquitto.port, 420.0, 1.2e-4)
-    command = ["compare", "--config", str(tmp_path / "rover.toml")]
-    done = CliRunner().invoke(app, command)
-    assert done.exit_code == 0, done.output
-
-    async def retained() -> dict[str, Any]:
-        async with listening(Subscriber(mosquitto.port)) as subscriber:
-            await until(lambda: subscriber.of("alarm/mismatch") and subscriber.of("mismatch"))
-        return {"alarm": subscriber.of("alarm/mismatch")[0], "result": subscriber.of("mismatch")[0]}
-
-    told = asyncio.run(retained())
-    assert told["alarm"]["active"]
-    assert "viscous-friction" in [each["name"] for each in told["result"]["effects"]], told
-    (report,) = (tmp_path / "recordings/comparisons").glob("*.html")
-    assert told["result"]["report"] == str(report)
-    answer = json.loads(report.with_suffix(".json").read_text())
-    assert answer["verdict"] == told["result"]["verdict"]
