@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import json
 import math
-from typing import TYPE_CHECKING
+import socket
+import sys
+from contextlib import asynccontextmanager
+from typing import TYPE_CHECKING, Self
 
+import can
 import pytest
 
 from regolithd.drivers import benchmark
@@ -14,6 +19,7 @@ from regolithd.drivers.benchmark import DATA, LAST, DecodedValues, check, compar
 from regolithd.drivers.can.frame import Frame
 
 if TYPE_CHECKING:
+    from collections.abc import AsyncIterator
     from pathlib import Path
 
 
@@ -118,3 +124,89 @@ async def test_a_link_that_is_not_there_is_said(capsys: pytest.CaptureFixture[st
     """The decoders alone are compared then."""
     assert await benchmark.reachable("no-such-link") is None
     assert capsys.readouterr().err.endswith("\nThe decoders alone:\n")
+
+
+class Sender:
+    """A raw CAN socket whose frames the reader under test decodes at the loop's next turn."""
+
+    def __init__(self) -> None:
+        self.decoded, self.bound, self.sent = DecodedValues(), "", 0
+        self._values = our_decoder()
+
+    def opened(self, *kind: int) -> Self:
+        """Return it in the place of socket.socket()."""
+        assert kind == (socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+        return self
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing is open."""
+
+    def bind(self, address: tuple[str]) -> None:
+        """Note the channel."""
+        (self.bound,) = address
+
+    def send(self, data: bytes) -> None:
+        """Decode struct can_frame: identifier, length, padding, data."""
+        can_id, length = int.from_bytes(data[:4], sys.byteorder), data[4]
+        assert (can_id, length, len(data)) == (0x181, 8, 16)
+        self.sent += 1
+        asyncio.get_running_loop().call_soon(self.decoded.take, self._values(Frame(0, can_id, data[8:])))
+
+
+async def test_a_burst_and_single_frames_are_timed_per_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two hundred frames at once, then one by one, in microseconds: the clock advances by 2 ms between two looks."""
+    sender = Sender()
+    ticks = itertools.count(0.0, 0.002)
+
+    @asynccontextmanager
+    async def way(channel: str) -> AsyncIterator[DecodedValues]:
+        assert channel == "vcan7"
+        yield sender.decoded
+
+    monkeypatch.setattr(benchmark.socket, "socket", sender.opened)
+    monkeypatch.setattr(benchmark.time, "perf_counter", lambda: next(ticks))
+    burst_us, single_us = await benchmark.reading_time(way, "vcan7")
+    assert burst_us == pytest.approx(2000 / 200)
+    assert single_us == pytest.approx(2000)
+    assert (sender.bound, sender.sent, sender.decoded.count) == ("vcan7", 400, 400)
+
+
+async def test_our_reader_decodes_every_frame_of_every_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the bus gives them."""
+    batches = [[Frame(0, 0x181, data) for data in DATA[:150]], [Frame(0, 0x181, data) for data in DATA[150:]]]
+
+    async def reading() -> AsyncIterator[list[Frame]]:
+        for batch in batches:
+            yield batch
+        await asyncio.sleep(60)
+
+    @asynccontextmanager
+    async def opened(interface: str, channel: str) -> AsyncIterator[AsyncIterator[list[Frame]]]:
+        assert (interface, channel) == ("socketcan", "vcan7")
+        yield reading()
+
+    monkeypatch.setattr(benchmark, "open_bus", opened)
+    async with asyncio.timeout(20), benchmark.ours("vcan7") as decoded:
+        await decoded.more(200)
+        assert decoded.last == pytest.approx(LAST)
+
+
+async def test_their_reader_is_python_can_s_notifier(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a virtual link here; it hears its own frames, as ours does."""
+    given: list[tuple[str, dict[str, object]]] = []
+
+    def opened(channel: str, **options: object) -> can.BusABC:
+        given.append((channel, options))
+        return can.interface.Bus(channel, interface="virtual", receive_own_messages=True)
+
+    monkeypatch.setattr(benchmark.can, "Bus", opened)
+    async with asyncio.timeout(20), benchmark.theirs("benchmark") as decoded:
+        with can.interface.Bus("benchmark", interface="virtual") as other:
+            for data in DATA[-3:]:
+                other.send(can.Message(0, 0x181, is_extended_id=False, data=data))
+            await decoded.more(3)
+        assert decoded.last == pytest.approx(LAST)
+    assert given == [("benchmark", {"interface": "socketcan", "receive_own_messages": True})]

@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import os
 import re
-import resource
+import select
 import shutil
 import signal
 import subprocess
 import sys
 import venv
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
-    from pathlib import Path
 
 CLOCK_TIMEOUT_S = 1800.0
 """Time on the clock after which a run is ended without a result: far beyond every limit of CPU time."""
+ENDED = -1000
+"""Status of a run that was ended after that time."""
 NO_TEST, USAGE_ERROR = 5, 4
 """pytest's exit statuses where every test is left out, and where a test is not found."""
 
@@ -99,36 +102,43 @@ class Checkout:
 
     def pytest(self, arguments: Iterable[str], cpu_s: int, environment: Mapping[str, str] | None = None) -> Run:
         """Run pytest; `cpu_s` limits the CPU time of each of its processes."""
-        command = [str(self.python), "-m", "pytest", "-p", "no:cacheprovider", "-q"]
-        command += ["-m", "not vcan and not systemd", *arguments]
-        settings = {"OPENBLAS_NUM_THREADS": "1", "CI": "", "COLUMNS": "400", **(environment or {})}
-        process = subprocess.Popen(
-            command,
-            cwd=self.root,
-            env=os.environ | settings,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            start_new_session=True,
-            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s + 5)),  # noqa: PLW1509  # no threads
-        )
-        try:
-            output, _ = process.communicate(timeout=CLOCK_TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            return Run(-signal.SIGKILL, "", ended=True)
-        finally:
-            _end(process)
-        return Run(process.returncode, output)
+        output = self.root / ".pytest-output.txt"
+        output.unlink(missing_ok=True)
+        order = {
+            "arguments": ["-p", "no:cacheprovider", "-q", "-m", "not vcan and not systemd", *arguments],
+            "cpu_s": cpu_s,
+            "environment": dict(environment or {}),
+            "output": str(output),
+        }
+        status = _status(_server(self.python, self.root), json.dumps(order))
+        return Run(status, output.read_text(errors="replace") if output.exists() else "", ended=status == ENDED)
 
 
-def _end(process: subprocess.Popen[str]) -> None:
-    """End what a run has left behind."""
-    try:
-        os.killpg(process.pid, signal.SIGKILL)
-    except ProcessLookupError:
-        return
-    process.wait()
+@functools.cache
+def _server(python: Path, root: Path) -> subprocess.Popen[str]:
+    """Start the process whose forks run pytest; it ends with this one, which closes its input."""
+    return subprocess.Popen(
+        [str(python), str(Path(__file__).with_name("fork_server.py"))],
+        cwd=root,
+        env=os.environ | {"OPENBLAS_NUM_THREADS": "1", "CI": "", "COLUMNS": "400"},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+def _status(server: subprocess.Popen[str], order: str) -> int:
+    """Return the exit status of a run, or minus the signal that ended it."""
+    assert server.stdin
+    assert server.stdout
+    server.stdin.write(order + "\n")
+    server.stdin.flush()
+    pid = int(json.loads(server.stdout.readline())["pid"])
+    ended, _, _ = select.select([server.stdout], [], [], CLOCK_TIMEOUT_S)
+    with contextlib.suppress(ProcessLookupError):  # also what the run has left behind
+        os.killpg(pid, signal.SIGKILL)
+    status = int(json.loads(server.stdout.readline())["status"])
+    return status if ended else ENDED
 
 
 def copy_of(source: Path, folder: Path) -> Checkout:

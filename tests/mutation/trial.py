@@ -31,9 +31,9 @@ ONLY_COMPUTES = "calibration/mismatch"
 """The room whose tests wait for nothing, so that a busy machine makes none of them fail."""
 REPETITIONS = 4
 """Runs at most of the tests of one mutant, each without those that a busy machine made late before."""
-EVERYWHERE = ("tests/test_dataclasses.py",)
-"""Rules for every file of the rooms, which no line of them executes."""
-ALSO = {"daemon/demo": ("tests/system/test_demo.py",)}
+OF_DECORATORS = ("tests/test_dataclasses.py",)
+"""Rules for the dataclasses of every file of the rooms, which no line of them executes."""
+ALSO = {"daemon/demo/": ("tests/system/test_demo.py",)}
 """Fast tests outside the mirrored room that exercise a folder."""
 OWN_PROCESS = ("daemon/commands/", "daemon/demo/")
 """Folders that tests run in processes of their own, of which coverage knows nothing."""
@@ -82,9 +82,10 @@ def selected_tests(mutation: Mutation, root: Path, found: CoverageMap) -> list[s
     return kept
 
 
-def outside_the_room(file: str) -> tuple[str, ...]:
-    """Return further tests, by file."""
-    return (*EVERYWHERE, *(path for part, paths in ALSO.items() if file.startswith(part + "/") for path in paths))
+def outside_the_room(mutation: Mutation, original: str) -> tuple[str, ...]:
+    """Return further tests, by what is changed and in which file."""
+    of_decorators = OF_DECORATORS if original.splitlines()[mutation.line - 1].lstrip().startswith("@") else ()
+    return (*of_decorators, *(path for part, paths in ALSO.items() if mutation.file.startswith(part) for path in paths))
 
 
 def try_mutant(mutation: Mutation, checkout: Checkout, found: CoverageMap) -> Result:
@@ -95,7 +96,7 @@ def try_mutant(mutation: Mutation, checkout: Checkout, found: CoverageMap) -> Re
     cpu_s = STARTING_CPU_S + math.ceil(SLOWER * sum(found.seconds[test] for test in tests))
     started = time.monotonic()
     with checkout.changed(mutation.file, mutated):
-        every = [*tests, *outside_the_room(mutation.file)]
+        every = [*tests, *outside_the_room(mutation, original)]
         run, failed = _failing_run(checkout, every, cpu_s, repeated=room_of(mutation.file) != ONLY_COMPUTES)
     verdict: Verdict = "survived" if run is None else "killed"
     if run is not None and run.timed_out and not _run(checkout, failed, cpu_s).passed:
