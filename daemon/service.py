@@ -25,6 +25,7 @@ from dataclasses import asdict
 from enum import Enum
 from typing import TYPE_CHECKING, Any, Protocol
 
+from regolithd.daemon.health.event_throttle import EventThrottle
 from regolithd.daemon.health.liveness import TaskLiveness
 from regolithd.daemon.health.sd_notify import READY, STOPPING, WATCHDOG, notify, watchdog_period_s
 from regolithd.daemon.pipeline.pipeline import Chain
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
     from regolithd.daemon.pipeline.onnx_models import OnnxModels
     from regolithd.daemon.pipeline.snapshot import Estimate
-    from regolithd.daemon.pipeline.terrain_network import TerrainNetwork
     from regolithd.drivers.can.bus import Bus
     from regolithd.drivers.can.frame import Frame
     from regolithd.drivers.devices.decoding.signals import Signal
@@ -91,8 +91,11 @@ class Service:
         self.models = models
         self.chain = Chain(configuration, models)
         self.recorder = (
-            _recorder(configuration, models.terrain, self._unit_frames) if configuration.recording.enabled else None
+            _recorder(configuration, models.terrain.card.version, self._unit_frames)
+            if configuration.recording.enabled
+            else None
         )
+        self._recorded_events = EventThrottle()
         self.liveness = TaskLiveness()
         self.bus_problem = ""
         self.sinks: list[Sink] = []
@@ -125,6 +128,7 @@ class Service:
                         task.cancel()
         finally:
             if self.recorder:
+                self._record_summaries(self.recorder)
                 self.recorder.close()
 
     async def _run_network(self) -> None:
@@ -173,14 +177,20 @@ class Service:
                 sink.estimate(estimate)
 
     def _take_event(self, event: NetworkEvent) -> None:
-        if self.recorder:
+        if self.recorder and self._recorded_events.admits(event, time.monotonic_ns()):
             self.recorder.event(event.time_ns, event_json(event))
         for sink in self.sinks:
             sink.event(event)
 
+    def _record_summaries(self, recorder: Recorder) -> None:
+        """Record the newest of the events that came too often; the frames of all are in the log."""
+        for event, withheld in self._recorded_events.summaries():
+            recorder.event(event.time_ns, event_json(event, suppressed=withheld - 1))
+
     async def _record(self, recorder: Recorder) -> None:
         self.liveness.expect(RECORDING, TASK_TIMEOUT_S)
         while True:
+            self._record_summaries(recorder)
             recorder.flush()
             self.liveness.beat(RECORDING)
             await asyncio.sleep(FLUSH_S)
@@ -233,9 +243,12 @@ def network_settings(configuration: Configuration) -> NetworkSettings:
     )
 
 
-def event_json(event: NetworkEvent) -> bytes:
-    """Return an event as JSON: the name of its class, and its fields."""
-    return json.dumps({"event": type(event).__name__, **asdict(event)}, default=_plain).encode()
+def event_json(event: NetworkEvent, suppressed: int = 0) -> bytes:
+    """Return an event as JSON: name of its class, its fields, and how many before it were not recorded, if any."""
+    content = {"event": type(event).__name__, **asdict(event)}
+    if suppressed:
+        content["suppressed"] = suppressed
+    return json.dumps(content, default=_plain).encode()
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401  # any field of an event
@@ -244,12 +257,10 @@ def _plain(value: Any) -> Any:  # noqa: ANN401  # any field of an event
     return value.value if isinstance(value, Enum) else str(value)
 
 
-def _recorder(
-    configuration: Configuration, terrain: TerrainNetwork, preamble: Callable[[], Sequence[Frame]]
-) -> Recorder:
+def _recorder(configuration: Configuration, model_version: str, preamble: Callable[[], Sequence[Frame]]) -> Recorder:
     metadata = {
         "configuration": configuration.model_dump_json(),
-        "model_version": terrain.card.version,
+        "model_version": model_version,
         "started_ns": str(time.time_ns()),
         **eds_metadata(configuration),
     }

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from regolithd.daemon.control.server import ControlSink
 from regolithd.daemon.publish.mqtt_sink import PUBLISHING, MqttSink
 from regolithd.daemon.publish.publisher import Publisher
-from regolithd.daemon.publish.spool import Spool, SpoolUnusableError
+from regolithd.daemon.publish.spool import SpoolUnusableError
+from regolithd.daemon.publish.stores import Stores
 
 if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Mqtt
@@ -32,7 +33,7 @@ def connect_sinks(service: Service) -> None:
     """
     configuration, liveness = service.configuration, service.liveness
     mqtt = configuration.mqtt
-    publisher = Publisher(configuration, open_spool(mqtt), beat=lambda: liveness.beat(PUBLISHING))
+    publisher = Publisher(configuration, open_stores(mqtt), beat=lambda: liveness.beat(PUBLISHING))
     control = ControlSink(
         configuration,
         lambda: service.network,
@@ -43,10 +44,10 @@ def connect_sinks(service: Service) -> None:
     service.sinks += [MqttSink(service, publisher, control_problem=lambda: control.problem), control]
 
 
-def open_spool(mqtt: Mqtt) -> Spool:
-    """Return the store of `[mqtt] spool_directory`; where it cannot be used, log why and keep messages in memory."""
+def open_stores(mqtt: Mqtt) -> Stores:
+    """Return the stores in `[mqtt] spool_directory`; where one cannot be used, log why and keep messages in memory."""
     try:
-        return Spool(mqtt.spool_directory, int(mqtt.spool_limit_MB * _MEGABYTE))
+        return Stores.open(mqtt.spool_directory, int(mqtt.spool_limit_MB * _MEGABYTE))
     except SpoolUnusableError as error:
         _log.warning("%s Messages are kept in memory only.", error)
-        return Spool.memory_only(mqtt.spool_directory, str(error))
+        return Stores.memory_only(mqtt.spool_directory, str(error))

@@ -16,7 +16,7 @@ ROOMS = ("drivers", "daemon", "calibration/mismatch")
 STATE = {
     *("BusCounters", "SyncCounters", "NetworkCounters", "SpoolCounters"),
     *("Faults", "EnabledPdo", "_Transfer", "Traverse", "LiveTable", "_PdoCount", "Backoff", "_Bucket", "_Flight"),
-    *("Outbox", "_Scan", "_Pair", "FoundNode", "Replayed", "_Changes"),
+    *("Outbox", "_Scan", "_Pair", "_Rise", "FoundNode", "Replayed", "_Changes"),
 }
 """Counters and running state of one owner: changed in place."""
 BY_IDENTITY = {"Quantity", "Device", "LoopResult", "SimulatedDrive"}

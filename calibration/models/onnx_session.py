@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import onnxruntime
 
+from regolithd.calibration.models.digest import is_damaged
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -20,16 +22,22 @@ def open_session(path: Path, remedy: str) -> onnxruntime.InferenceSession:
     Raises
     ------
     ModelError
-        There is no such file, or it is not an ONNX model; the message ends with `remedy`.
+        The file cannot be read, is damaged, or is not an ONNX model; the message ends with `remedy`.
     """
     if not path.is_file():
         raise ModelError(f"{path}: no such file. {remedy}")
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ModelError(f"{path}: cannot be read: {error.strerror}. {remedy}") from error
+    if is_damaged(content):
+        raise ModelError(f"{path}: damaged, or changed by another program: its digest does not match. {remedy}")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = 3
     try:
-        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # onnxruntime's errors have no common base class
         raise ModelError(f"{path}: damaged, or not an ONNX model ({error}). {remedy}") from error

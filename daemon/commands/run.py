@@ -30,15 +30,21 @@ def run(
     import asyncio
     import logging
 
-    from regolithd.daemon.setup import configuration_or_exit, models_or_exit
+    from regolithd.daemon.pipeline.onnx_models import load_usable_models
+    from regolithd.daemon.setup import configuration_or_exit
 
     logging.basicConfig(level=logging.DEBUG if verbose else logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     configuration = configuration_or_exit(config)
-    asyncio.run(_run(configuration, models_or_exit(configuration)))
+    models = load_usable_models(configuration)
+    if models.problem:
+        logging.getLogger(__name__).error("%s Acquisition goes on without it.", models.problem)
+    asyncio.run(_run(configuration, models))
 
 
 async def _run(configuration: Configuration, models: OnnxModels) -> None:
     import asyncio
+    import logging
+    import os
     import signal
 
     from regolithd.daemon.publish.spool import SpoolError
@@ -57,3 +63,7 @@ async def _run(configuration: Configuration, models: OnnxModels) -> None:
     await asyncio.wait([task])
     if not task.cancelled():
         task.result()  # raises after a bug: the traceback goes to the journal, and systemd restarts the daemon
+    logging.shutdown()
+    # Everything is closed. The thread that resolves the broker's name may still block for half a minute, and asyncio
+    # would wait for it.
+    os._exit(0)

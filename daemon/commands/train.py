@@ -29,9 +29,9 @@ def train(
     import tomllib
 
     import numpy as np
-    import onnx
     from rich.progress import track
 
+    from regolithd.calibration.models.digest import with_digest
     from regolithd.calibration.paper import backpropagation
     from regolithd.calibration.paper.onnx_export import export_onnx, model_card
     from regolithd.calibration.paper.training_set import training_set
@@ -47,7 +47,7 @@ def train(
     ]
     best = min(done, key=lambda training: training.mse)
     out.parent.mkdir(parents=True, exist_ok=True)
-    onnx.save(export_onnx(best.perceptron, pairs), out)
+    out.write_bytes(with_digest(export_onnx(best.perceptron, pairs).SerializeToString()))
     mean = float(np.mean([training.mse for training in done]))
     typer.echo(f"{model_card(best.perceptron, pairs).version}: MSE {best.mse:.4f} after {best.epochs} epochs")
     typer.echo(f"mean MSE of {trainings}: {mean:.4f} (the paper: 0.0251). Wrote {out}.")

@@ -23,9 +23,9 @@ def train_posterior(
 ) -> None:
     """Train the posterior network on simulated rovers, and write it as ONNX. Takes some minutes on two cores."""
     import numpy as np
-    import onnx
     from rich.progress import Progress
 
+    from regolithd.calibration.models.digest import with_digest
     from regolithd.calibration.parameters import Wheel
     from regolithd.calibration.posterior.onnx_export import export_onnx
     from regolithd.calibration.posterior.training import fit
@@ -43,5 +43,6 @@ def train_posterior(
 
         parameters, standardisation = fit(examples, seed, steps, progress=show)
     out.parent.mkdir(parents=True, exist_ok=True)
-    onnx.save(export_onnx(parameters, standardisation, Wheel().radius_m), out)
+    model = export_onnx(parameters, standardisation, Wheel().radius_m)
+    out.write_bytes(with_digest(model.SerializeToString()))
     typer.echo(f"Wrote {out}.")

@@ -1,1 +1,1 @@
-"""Alarms, task liveness, stuck sensors, and systemd's notification protocol."""
+"""Alarms, throttling of events, task liveness, stuck sensors, and systemd's notification protocol."""

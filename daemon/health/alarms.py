@@ -57,6 +57,9 @@ class AlarmInputs:
     store_torn: int = 0
     recording_problem: str = ""
     control_problem: str = ""
+    broker_problem: str = ""
+    model_problem: str = ""
+    undecodable: tuple[str, ...] = ()
     clock_jump_s: float = 0.0
     soil_change: SoilChange | None = None
     stuck: tuple[tuple[Quantity, int], ...] = ()
@@ -69,6 +72,7 @@ def current_alarms(inputs: AlarmInputs) -> dict[str, Alarm]:
         *_node_alarms(inputs.nodes.values()),
         *_bus_alarms(inputs),
         *_intruder_alarms(inputs),
+        *_undecodable_alarms(inputs),
         *_daemon_alarms(inputs),
     ]
     return {alarm.name: alarm for alarm in found}
@@ -82,8 +86,11 @@ def alarm_names(node_ids: Iterable[int]) -> tuple[str, ...]:
         "node-id",
         "master",
         "unexpected-node",
+        "undecodable",
         "store",
         "recording",
+        "broker",
+        "model",
         "control",
         "clock",
         "sensor",
@@ -116,6 +123,13 @@ def _bus_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
         yield Alarm("kernel", Severity.ERROR, f"the kernel dropped {inputs.kernel_drops} frames in this run", remedy)
 
 
+def _undecodable_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
+    if inputs.undecodable:
+        text = f"frames keep coming that cannot be decoded: {', '.join(inputs.undecodable)}"
+        remedy = "Compare the node's PDO mapping with [devices] (`regolithd check`); `candump -e` shows the frames."
+        yield Alarm("undecodable", Severity.WARNING, text, remedy)
+
+
 def _intruder_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
     if inputs.shared_node_ids:
         which = ", ".join(map(str, inputs.shared_node_ids))
@@ -145,6 +159,12 @@ def _daemon_alarms(inputs: AlarmInputs) -> Iterable[Alarm]:
             inputs.recording_problem,
             "Free space on the disk, or correct [recording] directory.",
         )
+    if inputs.broker_problem:
+        remedy = "Messages are stored meanwhile, and sent, marked late, once there is a connection."
+        yield Alarm("broker", Severity.WARNING, inputs.broker_problem, remedy)
+    if inputs.model_problem:
+        remedy = "Measurements are published without estimates until the daemon is restarted with a model that fits."
+        yield Alarm("model", Severity.ERROR, inputs.model_problem, remedy)
     if inputs.control_problem:
         yield Alarm(
             "control",

@@ -101,6 +101,7 @@ _HEALTH = {
         "missing": 0,
         "doubtful": 0,
     },
+    "undecodable": {"wrong-length": 2},
     "events_withheld": 0,
     "publishing": {
         "connections": 1,

@@ -75,6 +75,8 @@ class HealthMessage(Header):
     """Counts of the bus: frames, frames dropped by the kernel, error frames, …"""
     sync: SyncReport | None
     acquisition: AcquisitionReport | None
+    undecodable: dict[str, int]
+    """Frames that could not be decoded, by reason; the alarm `undecodable` names the nodes when it lasts."""
     events_withheld: int
     """Events and EMCY messages that came too often and were summarised (`suppressed`)."""
     publishing: PublishingReport

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.models import POSTERIOR_MODEL, TERRAIN_MODEL
+from regolithd.calibration.models.onnx_session import ModelError
 from regolithd.calibration.posterior.estimator import PosteriorEstimator, PosteriorModelError
-from regolithd.daemon.pipeline.terrain_network import TerrainNetwork
+from regolithd.daemon.pipeline.terrain_network import AbsentTerrainNetwork, TerrainNetwork
 
 if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
@@ -18,10 +19,15 @@ RADIUS_TOLERANCE = 0.02
 
 @dataclass(frozen=True, slots=True)
 class OnnxModels:
-    """The models of one rover. `posterior` is None where no posterior is to be computed."""
+    """The models of one rover.
 
-    terrain: TerrainNetwork
+    `posterior` is None where no posterior is to be computed. `problem` says which model cannot be used, and why; empty
+    where both can.
+    """
+
+    terrain: TerrainNetwork | AbsentTerrainNetwork
     posterior: PosteriorEstimator | None
+    problem: str = ""
 
 
 def load_models(configuration: Configuration) -> OnnxModels:
@@ -33,6 +39,22 @@ def load_models(configuration: Configuration) -> OnnxModels:
         A file is missing, damaged, or does not fit this rover.
     """
     return OnnxModels(load_terrain_network(configuration), load_posterior(configuration))
+
+
+def load_usable_models(configuration: Configuration) -> OnnxModels:
+    """Return the models that a configuration names, without those that cannot be used; `problem` says why."""
+    problems: list[str] = []
+    terrain: TerrainNetwork | AbsentTerrainNetwork = AbsentTerrainNetwork()
+    posterior = None
+    try:
+        terrain = load_terrain_network(configuration)
+    except ModelError as error:
+        problems.append(str(error))
+    try:
+        posterior = load_posterior(configuration)
+    except ModelError as error:
+        problems.append(str(error))
+    return OnnxModels(terrain, posterior, " ".join(problems))
 
 
 def load_terrain_network(configuration: Configuration) -> TerrainNetwork:

@@ -76,6 +76,19 @@ class TerrainNetwork:
             raise TerrainModelError(f"{self.path}: gives no finite numbers in the middle of its own training range")
 
 
+class AbsentTerrainNetwork:
+    """Stands in for a network that cannot be used: every estimate is missing (NaN)."""
+
+    def __init__(self) -> None:
+        self.card = ModelCard("none", (), (), gain_Nm_per_A=1.0)
+        self.input_names: tuple[str, ...] = ()
+
+    def estimate(self, _inputs: Mapping[str, Array]) -> Terrain:
+        """Return no estimate for six wheels."""
+        missing = np.full(WHEELS, np.nan)
+        return Terrain(missing, missing, np.zeros((0, WHEELS), np.bool_))
+
+
 def _card(path: Path, session: onnxruntime.InferenceSession) -> ModelCard:
     try:
         card = read_card(session.get_modelmeta().custom_metadata_map)

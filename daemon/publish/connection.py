@@ -2,7 +2,7 @@
 
 | task | does |
 |---|---|
-| `_send_stored` | sends stored messages in order, at most `WINDOW` unacknowledged |
+| `_send_stored`, for each store | sends its messages in order, at most `WINDOW` or `OTHERS_WINDOW` unacknowledged |
 | `_send_live` | sends live messages |
 | `_wait_for_loss` | raises `MqttError` when the connection is lost |
 | `_beat` | reports that the publishing task runs |
@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import socket
 import ssl
 from contextlib import suppress
@@ -30,7 +31,10 @@ if TYPE_CHECKING:
     from regolithd.daemon.publish.outbox import Outbox, OutgoingMessage
 
 WINDOW = 64
-"""Stored messages that may be unacknowledged at a time: 1280 a second at a round-trip time of 50 ms."""
+"""Snapshots that may be unacknowledged at a time: 1280 a second at a round-trip time of 50 ms."""
+
+OTHERS_WINDOW = 16
+"""Other stored messages that may be unacknowledged at a time. Snapshots do not wait for them."""
 
 MAX_LATE_PER_S = 1000.0
 """Rate limit for late messages. A broker drops messages that a slow subscriber does not take (mosquitto: over 1000)."""
@@ -38,7 +42,8 @@ MAX_LATE_PER_S = 1000.0
 ACKNOWLEDGE_TIMEOUT_S = 5.0
 """A publish that is not acknowledged for this long: the broker hangs. Shorter than MQTT's keepalive."""
 
-DEATH_TIMEOUT_S = 2.0
+DEATH_TIMEOUT_S = 0.5
+"""Time for the death message, and as much for the DISCONNECT, of a connection that has failed or was cancelled."""
 
 SOCKET_OPTIONS = ((socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),)
 """Without it a message waits until the one before it is acknowledged by TCP (Nagle's algorithm): up to 40 ms."""
@@ -57,18 +62,34 @@ class StateMessages(Protocol):
         """Return `offline`."""
 
 
+class _Way:
+    """The way out of one store: what waits, and how much may be unacknowledged."""
+
+    def __init__(self, outbox: Outbox, window: int) -> None:
+        self.outbox = outbox
+        self.window = asyncio.Semaphore(window)
+
+
 class Connection:
     """One connection. `run` returns once `stop` is set and everything is sent; it raises `MqttError` if it is lost."""
 
     def __init__(
-        self, settings: Mqtt, root: str, outbox: Outbox, state_messages: StateMessages, stop: asyncio.Event
+        self,
+        settings: Mqtt,
+        root: str,
+        outboxes: tuple[Outbox, Outbox],
+        state_messages: StateMessages,
+        stop: asyncio.Event,
     ) -> None:
         self._settings = settings
         self._root = root
-        self._outbox = outbox
+        snapshots, others = outboxes
+        self._ways = (_Way(snapshots, WINDOW), _Way(others, OTHERS_WINDOW))
+        self._live = others
         self._state_messages = state_messages
         self._stop = stop
-        self._window = asyncio.Semaphore(WINDOW)
+        self._late = 0
+        self._limiting = asyncio.Lock()
         self.up = False
 
     async def run(self, on_connected: Callable[[], None], beat: Callable[[], None]) -> None:
@@ -102,18 +123,19 @@ class Connection:
             clean_session=True,
             keepalive=settings.keepalive_s,
             timeout=ACKNOWLEDGE_TIMEOUT_S,
-            max_inflight_messages=WINDOW,
+            max_inflight_messages=WINDOW + OTHERS_WINDOW,
             tls_context=tls_context(settings),
             socket_options=SOCKET_OPTIONS,
             logger=_aiomqtt_log,
         )
-        client.pending_calls_threshold = 2 * WINDOW
+        client.pending_calls_threshold = 2 * (WINDOW + OTHERS_WINDOW)
         return client
 
     async def _publish_birth(self, client: Client) -> None:
         await self._publish(client, "state", self._state_messages.birth(), retain=True)
-        for topic, payload in self._outbox.connected().items():
-            await self._publish(client, topic, payload, retain=True)
+        for way in self._ways:
+            for topic, payload in way.outbox.connected().items():
+                await self._publish(client, topic, payload, retain=True)
 
     async def _send(self, client: Client, beat: Callable[[], None]) -> None:
         """Send until everything is sent after `stop`, or until the connection is lost."""
@@ -125,7 +147,7 @@ class Connection:
                     tasks.create_task(self._send_live(client)),
                     tasks.create_task(self._beat(beat)),
                 ]
-                await self._send_stored(client, tasks)
+                await asyncio.wait([tasks.create_task(self._send_stored(client, tasks, way)) for way in self._ways])
                 for task in background:
                     task.cancel()
         except* MqttError as group:
@@ -145,35 +167,40 @@ class Connection:
             beat()
             await asyncio.sleep(0.5)
 
-    async def _send_stored(self, client: Client, tasks: asyncio.TaskGroup) -> None:
-        late = 0
-        while not (self._stop.is_set() and not self._outbox.spool.queued):
-            for message in self._outbox.waiting():
-                await self._window.acquire()
-                self._outbox.sent(message)
-                tasks.create_task(self._deliver(client, message))
-                late += message.late
-                if late >= _LATE_BATCH:
-                    late = 0
-                    await asyncio.sleep(_LATE_BATCH / MAX_LATE_PER_S)
-            await self._outbox.arrived.wait()
+    async def _send_stored(self, client: Client, tasks: asyncio.TaskGroup, way: _Way) -> None:
+        outbox = way.outbox
+        while not (self._stop.is_set() and not outbox.spool.queued):
+            for message in outbox.waiting():
+                await way.window.acquire()
+                outbox.sent(message)
+                tasks.create_task(self._deliver(client, way, message))
+                if message.late:
+                    await self._limit_late()
+            await outbox.arrived.wait()
 
-    async def _deliver(self, client: Client, message: OutgoingMessage) -> None:
+    async def _limit_late(self) -> None:
+        """Wait so that both ways together keep to `MAX_LATE_PER_S`."""
+        self._late += 1
+        if self._late % _LATE_BATCH == 0:
+            async with self._limiting:
+                await asyncio.sleep(_LATE_BATCH / MAX_LATE_PER_S)
+
+    async def _deliver(self, client: Client, way: _Way, message: OutgoingMessage) -> None:
         try:
             await self._publish(client, message.topic, message.payload, retain=message.retain)
-            self._outbox.acknowledged(message)
+            way.outbox.acknowledged(message)
         except ValueError as error:  # the client refuses it, whatever is tried: it must not block those behind it
             _log.error("a message on %s cannot be published and is discarded: %s", message.topic, error)
-            self._outbox.acknowledged(message)
+            way.outbox.acknowledged(message)
         finally:
-            self._window.release()
+            way.window.release()
         if self._stop.is_set():
-            self._outbox.arrived.set()  # the last acknowledgement ends the loop
+            way.outbox.arrived.set()  # the last acknowledgement ends the loop
 
     async def _send_live(self, client: Client) -> None:
         while True:
-            await self._outbox.live_arrived.wait()
-            messages = self._outbox.take_live()
+            await self._live.live_arrived.wait()
+            messages = self._live.take_live()
             # All at once, so that they go out in one write; the next are taken once these are sent.
             await asyncio.gather(*(client.publish(f"{self._root}/{topic}", messages[topic]) for topic in messages))
 
@@ -181,9 +208,11 @@ class Connection:
         await client.publish(f"{self._root}/{topic}", payload, qos=_AT_LEAST_ONCE, retain=retain)
 
     async def _publish_death(self, client: Client, reason: str) -> None:
+        client.timeout = DEATH_TIMEOUT_S  # also of the DISCONNECT that follows
         with suppress(MqttError, TimeoutError):
-            async with asyncio.timeout(DEATH_TIMEOUT_S):
-                await self._publish(client, "state", self._state_messages.death(reason), retain=True)
+            async with asyncio.timeout(DEATH_TIMEOUT_S if reason == "failed" else ACKNOWLEDGE_TIMEOUT_S):
+                payload = self._state_messages.death(reason)
+                await client.publish(f"{self._root}/state", payload, qos=_AT_LEAST_ONCE, retain=True, timeout=math.inf)
 
 
 def password_of(settings: Mqtt) -> str | None:

@@ -11,6 +11,8 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from regolithd.daemon.health.alarms import NO_INTRUDERS, Alarm, AlarmInputs, alarm_names, current_alarms
+from regolithd.daemon.health.event_throttle import EventThrottle
+from regolithd.daemon.health.rising_counts import RisingCounts
 from regolithd.daemon.health.stuck_sensor import StuckSensorDetector
 from regolithd.daemon.messages.alarm import AlarmMessage, Severity
 from regolithd.daemon.messages.bus import EmergencyMessage, EventMessage, IdentityReport, NodeMessage
@@ -20,9 +22,9 @@ from regolithd.daemon.messages.odometry import OdometryMessage
 from regolithd.daemon.messages.posterior import PosteriorMessage
 from regolithd.daemon.pipeline.dead_reckoning import DeadReckoning
 from regolithd.daemon.pipeline.soil_change import soil_change_text
-from regolithd.daemon.publish.event_throttle import EventThrottle
 from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.canopen.emcy import register_bits
+from regolithd.drivers.devices.decoding.decoder import Undecodable
 from regolithd.drivers.master.events import NodeEmergency
 
 if TYPE_CHECKING:
@@ -32,6 +34,7 @@ if TYPE_CHECKING:
     from regolithd.daemon.publish.publisher import Publisher
     from regolithd.daemon.service import Service
     from regolithd.drivers.master.events import NetworkEvent
+    from regolithd.drivers.master.network import Network
     from regolithd.drivers.master.status import NodeStatus
 
 HEALTH_PERIOD_S = 1.0
@@ -39,6 +42,8 @@ CLOCK_JUMP_NS = 500_000_000
 """A change of CLOCK_REALTIME against CLOCK_MONOTONIC by more than this within a second: the clock was set."""
 CLOCK_JUMP_ALARM_S = 60.0
 SOIL_CHANGE_ALARM_S = 120.0
+BROKER_ALARM_S = 10.0
+"""A broker that has not been reached for this long is an alarm: shorter losses happen on a radio link."""
 PUBLISHING = "publishing"
 PUBLISHING_TIMEOUT_S = 10.0
 _PAGE_MB = resource.getpagesize() / 1e6
@@ -82,6 +87,8 @@ class MqttSink:
         self._last_alarms: dict[str, Alarm] = {}
         self._soil_change_until_ns = 0
         self._stuck_sensors = StuckSensorDetector()
+        self._undecodable = RisingCounts()
+        self._connected_ns = self._started_ns
         self._throttle = EventThrottle()
         self._changes_scheduled = False
 
@@ -137,6 +144,7 @@ class MqttSink:
     async def _report_periodically(self) -> None:
         while True:
             self._detect_clock_jump()
+            self._note_lasting_problems()
             self._publish_summaries()
             self._publish_changes()
             self.publisher.publish("health", HealthMessage, **self._health())
@@ -181,6 +189,18 @@ class MqttSink:
             self._jump_s = 0.0
         self._offset_ns = offset
 
+    def _note_lasting_problems(self) -> None:
+        """Note what is a problem only when it lasts: frames that cannot be decoded, a broker that is away."""
+        network, now = self._service.network, self._monotonic_ns()
+        if network is not None:
+            self._undecodable.step(_undecodable(network), now)
+        if not self.publisher.problem:
+            self._connected_ns = now
+
+    def _broker_problem(self) -> str:
+        away = self._monotonic_ns() - self._connected_ns > BROKER_ALARM_S * 1e9
+        return self.publisher.problem if away else ""
+
     def _alarm_inputs(self) -> AlarmInputs:
         service = self._service
         network, recorder, report = service.network, service.recorder, self.publisher.report
@@ -198,6 +218,9 @@ class MqttSink:
             store_torn=report.torn,
             recording_problem=(recorder.problem or "") if recorder is not None else "",
             control_problem=self._control_problem(),
+            broker_problem=self._broker_problem(),
+            model_problem=service.models.problem,
+            undecodable=self._undecodable.lasting(self._monotonic_ns()),
             clock_jump_s=self._jump_s,
             soil_change=self._soil_change if self._monotonic_ns() < self._soil_change_until_ns else None,
             stuck=self._stuck_sensors.stuck,
@@ -215,6 +238,7 @@ class MqttSink:
             "bus": network.bus.counters.as_dict() if network is not None else {},
             "sync": _sync_report(service),
             "acquisition": AcquisitionReport(**asdict(service.chain.acquisition.counters)),
+            "undecodable": {} if network is None else dict(network.decoder.undecodable),
             "events_withheld": self._throttle.withheld,
             "publishing": self.publisher.report,
             "recording": _recording_report(service),
@@ -235,6 +259,18 @@ class MqttSink:
             "cleared": emergency.cleared,
             "text": emergency.text,
         }
+
+
+def _undecodable(network: Network) -> dict[str, int]:
+    """Return the counts of frames that should have been decoded, by reason and node.
+
+    Those with an unknown identifier are left out: nodes that nobody expects have an alarm of their own, and other
+    services (time stamp, LSS) are no error.
+    """
+    decoder = network.decoder
+    of_nodes = {f"{reason} of node {node_id}": count for (reason, node_id), count in decoder.malformed.items()}
+    foreign = {reason: decoder.undecodable[reason] for reason in (Undecodable.EXTENDED, Undecodable.REMOTE)}
+    return of_nodes | {str(reason): count for reason, count in foreign.items() if count}
 
 
 def event_fields(event: NetworkEvent) -> dict[str, Any]:

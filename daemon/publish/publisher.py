@@ -1,6 +1,6 @@
 """The MQTT publisher: takes messages without waiting, and delivers the stored ones at least once, in order.
 
-    publisher = Publisher(configuration, spool)
+    publisher = Publisher(configuration, stores)
     publisher.estimate(estimate)        # from the pipeline; returns at once, whatever the broker does
     await publisher.run()               # connects and reconnects until cancelled; then publishes `offline`
 
@@ -38,9 +38,13 @@ if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
     from regolithd.daemon.pipeline.snapshot import Estimate
     from regolithd.daemon.publish.spool import Spool
+    from regolithd.daemon.publish.stores import Stores
 
-STOP_TIMEOUT_S = 4.0
-"""Time for the delivery of waiting messages when the daemon stops; the others stay in the store."""
+STOP_TIMEOUT_S = 1.5
+"""Time for the delivery of waiting messages when the daemon stops; the others stay in the store.
+
+With the time to stop the drives before it, and two `DEATH_TIMEOUT_S` after it, SIGTERM is obeyed within 5 s.
+"""
 
 STABLE_CONNECTION_S = 5.0
 """A shorter connection counts as a failed attempt: a broker disconnects a second client with the same identifier."""
@@ -72,8 +76,8 @@ class Publisher:
     ----------
     configuration
         `[rover] name` and `[mqtt]`.
-    spool
-        The store on disk; this publisher is its only user.
+    stores
+        The stores on disk; this publisher is their only user.
     backoff
         Delays between attempts to connect.
     beat
@@ -83,7 +87,7 @@ class Publisher:
     def __init__(
         self,
         configuration: Configuration,
-        spool: Spool,
+        stores: Stores,
         *,
         backoff: Backoff | None = None,
         beat: Callable[[], None] = lambda: None,
@@ -91,8 +95,8 @@ class Publisher:
     ) -> None:
         self._settings = configuration.mqtt
         self._root = f"{configuration.mqtt.prefix}/{configuration.rover.name}"
-        self._spool = spool
-        self._outbox = Outbox(spool)
+        self._stores = stores
+        self._snapshots, self._others = (Outbox(store) for store in stores.both)
         self._backoff = backoff or Backoff()
         self._beat = beat
         self._clock_ns = clock_ns
@@ -119,38 +123,38 @@ class Publisher:
     @property
     def store_problem(self) -> str:
         """Why messages are kept in memory only; empty while they are stored."""
-        return self._spool.problem
+        return self._stores.problem
 
     @property
     def report(self) -> PublishingReport:
         """Counts of the stored messages, for the `health` message."""
-        counters = self._spool.counters
+        counters = [store.counters for store in self._stores.both]
         return PublishingReport(
             connections=self._connections,
-            queued=self._spool.queued,
-            queued_MB=self._spool.size_bytes / 1e6,
-            acknowledged=counters.acknowledged,
-            repeated=self._outbox.repeated,
-            dropped=counters.dropped,
-            unstored=counters.unstored,
-            damaged=counters.damaged,
-            torn=counters.torn,
+            queued=self._stores.queued,
+            queued_MB=sum(store.size_bytes for store in self._stores.both) / 1e6,
+            acknowledged=sum(each.acknowledged for each in counters),
+            repeated=self._snapshots.repeated + self._others.repeated,
+            dropped=sum(each.dropped for each in counters),
+            unstored=sum(each.unstored for each in counters),
+            damaged=sum(each.damaged for each in counters),
+            torn=sum(each.torn for each in counters),
         )
 
     def estimate(self, estimate: Estimate) -> None:
         """Publish the estimate of one SYNC: `snapshot` stored, and the six `wheel/…` live."""
         snapshot, wheels = encode(estimate, self.session)
-        self._outbox.store("snapshot", snapshot)
+        self._snapshots.store("snapshot", snapshot)
         if self.connected:
-            self._outbox.add_live({f"wheel/{k + 1}": payload for k, payload in enumerate(wheels)})
+            self._others.add_live({f"wheel/{k + 1}": payload for k, payload in enumerate(wheels)})
 
     def publish(self, topic: str, message: type[Header], *, time_ns: int | None = None, **fields: Any) -> None:  # noqa: ANN401  # the model checks them
         """Publish another message on a topic below `<prefix>/<rover>/`, stored or live as its channel says."""
         payload = self._write(topic, message, time_ns, fields)
         if _STORED[topic.split("/", 1)[0]]:
-            self._outbox.store(topic, payload)
+            self._others.store(topic, payload)
         elif self.connected:
-            self._outbox.add_live({topic: payload})
+            self._others.add_live({topic: payload})
 
     def _write(self, topic: str, message: type[Header], time_ns: int | None, fields: dict[str, Any]) -> bytes:
         sequence = self._sequences[topic]
@@ -183,13 +187,14 @@ class Publisher:
     async def run(self) -> None:
         """Deliver until cancelled; then deliver waiting messages for a bounded time, and publish `offline`."""
         async with asyncio.TaskGroup() as tasks:
-            keeper = tasks.create_task(self._sync_to_disk())
+            keepers = [tasks.create_task(self._sync_to_disk(store)) for store in self._stores.both]
             delivery = tasks.create_task(self._deliver())
             try:
                 await asyncio.shield(delivery)
             except asyncio.CancelledError:
                 self._stop.set()
-                self._outbox.arrived.set()
+                self._snapshots.arrived.set()
+                self._others.arrived.set()
                 if not self.connected:
                     delivery.cancel()
                 with suppress(TimeoutError):
@@ -197,13 +202,15 @@ class Publisher:
                         await delivery
                 raise
             finally:
-                keeper.cancel()
+                for keeper in keepers:
+                    keeper.cancel()
 
     async def _deliver(self) -> None:
         """Connect, and reconnect after each loss; return once stopped."""
         while not self._stop.is_set():
             self._connections += 1
-            self._connection = Connection(self._settings, self._root, self._outbox, self, self._stop)
+            outboxes = (self._snapshots, self._others)
+            self._connection = Connection(self._settings, self._root, outboxes, self, self._stop)
             try:
                 await self._connection.run(self._on_connected, self._beat)
             except (MqttError, OSError) as error:  # OSError: the password file, the certificates
@@ -224,7 +231,7 @@ class Publisher:
             "connected to the MQTT broker %s:%d; %d messages are waiting",
             self._settings.host,
             self._settings.port,
-            self._spool.queued,
+            self._stores.queued,
         )
 
     def _on_disconnected(self, error: Exception) -> None:
@@ -241,16 +248,16 @@ class Publisher:
         _log.log(logging.DEBUG if problem in self._logged else logging.WARNING, "%s", problem)
         self._logged.add(problem)
 
-    async def _sync_to_disk(self) -> None:
+    async def _sync_to_disk(self, store: Spool) -> None:
         """Sync to the disk what has waited for a second; while the broker acknowledges in time, nothing is synced."""
         first = -1
         while True:
-            waits = self._spool.queued and self._spool.first == first
-            first = self._spool.first
+            waits = store.queued and store.first == first
+            first = store.first
             if waits:
                 # fsync blocks for as long as the disk takes: hence a thread, the only one here.
                 try:
-                    await asyncio.to_thread(self._spool.begin_sync())
+                    await asyncio.to_thread(store.begin_sync())
                 except OSError as error:
                     self._log_once(f"the store could not be synced to the disk: {error}")
             await asyncio.sleep(DISK_SYNC_PERIOD_S)

@@ -48,7 +48,7 @@ SCHEMAS = {
         posterior=_object(**dict.fromkeys(POSTERIOR, _INTERVAL), wheels=_INTEGER, instants=_INTEGER),
         soil_change=_object(alarm=_ALARM, fall=_FALL),
     ),
-    EVENT: _object(event=_TEXT, time_ns=_INTEGER, node_id=_INTEGER, text=_TEXT),
+    EVENT: _object(event=_TEXT, time_ns=_INTEGER, node_id=_INTEGER, text=_TEXT, suppressed=_INTEGER),
 }
 """Topic → schema. `outside`, a list of lists, is in the messages and not in the schema."""
 

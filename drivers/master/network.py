@@ -56,7 +56,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Network", "NetworkCounters", "NetworkSettings", "NodePhase", "NodeStatus"]
 
-_LEAVE_TIMEOUT_S = 5.0  # after it the program ends, even if the stop is not confirmed
+_LEAVE_TIMEOUT_S = 2.0
+"""Time to stop and disable the drives at the end; they have been told to stop even where they do not confirm it."""
+_LAST_COMMANDS_TIMEOUT_S = 0.4  # where the transmit queue is full, or the link down, commands would wait for each node
 _BUS_STATES = {
     BusState.ACTIVE: "the bus is error active",
     BusState.WARNING: "many errors on the bus: check the terminators (60 Ω between the wires), cable length and plugs",
@@ -307,6 +309,8 @@ class Network:
                 finally:
                     live = [drive.remote for drive in self._motion.live() if monitors_master(drive.remote.node)]
                     await each(remote.sdo.write(CONSUMER_HEARTBEAT, 1, bytes(4)) for remote in live)
-        for supervisor in self._supervisors.values():
-            with suppress(DriverError):
-                await supervisor.remote.send_command(NmtCommand.ENTER_PRE_OPERATIONAL)
+        with suppress(TimeoutError):
+            async with asyncio.timeout(_LAST_COMMANDS_TIMEOUT_S):
+                for supervisor in self._supervisors.values():
+                    with suppress(DriverError):
+                        await supervisor.remote.send_command(NmtCommand.ENTER_PRE_OPERATIONAL)

@@ -18,6 +18,7 @@ from regolithd.daemon.config.configuration import Configuration, Mqtt
 from regolithd.daemon.publish.encode import encode
 from regolithd.daemon.publish.publisher import Publisher
 from regolithd.daemon.publish.spool import Spool
+from regolithd.daemon.publish.stores import Stores
 from tests.bench.broker import Mosquitto
 from tests.bench.estimates import estimate
 
@@ -51,8 +52,8 @@ async def measure(rate_Hz: float, seconds: float) -> dict[str, float | int]:
         broker = Mosquitto(place)
         broker.start()
         configuration = Configuration(mqtt=Mqtt(host=broker.host, port=broker.port, spool_directory=place / "spool"))
-        spool = Spool(configuration.mqtt.spool_directory, 100_000_000)
-        publisher = Publisher(configuration, spool)
+        stores = Stores.open(configuration.mqtt.spool_directory, 100_000_000)
+        publisher = Publisher(configuration, stores)
         task = asyncio.create_task(publisher.run())
         while not publisher.connected:  # noqa: ASYNC110  # the publisher has no event for it
             await asyncio.sleep(0.05)
@@ -78,7 +79,7 @@ async def measure(rate_Hz: float, seconds: float) -> dict[str, float | int]:
         task.cancel()
         await asyncio.wait([task])
         broker.stop()
-        for each in (spool, other):
+        for each in (stores, other):
             each.close()
         return figures
 

@@ -38,11 +38,20 @@ class Undecodable(StrEnum):
 
 
 class Decoder:
-    """Decodes the frames of these nodes; `undecodable` counts what it could not, by reason."""
+    """Decodes the frames of these nodes.
+
+    Attributes
+    ----------
+    undecodable
+        Frames that it could not decode, by reason.
+    malformed
+        Those of configured nodes among them, by reason and node-ID.
+    """
 
     def __init__(self, nodes: Iterable[NodeDescription], *, master_id: int = cob_id.MASTER_NODE_ID) -> None:
         self.nodes = tuple(nodes)
         self.undecodable: Counter[Undecodable] = Counter()
+        self.malformed: Counter[tuple[Undecodable, int]] = Counter()
         self._handlers: dict[int, _Handler] = {cob_id.NMT: _nothing, cob_id.SYNC: _sync}
         self._handlers[cob_id.ERROR_CONTROL + master_id] = _nothing
         self._units: list[StatedUnits] = []
@@ -74,6 +83,10 @@ class Decoder:
             return None
         return handler(frame)
 
+    def _count_malformed(self, reason: Undecodable, node_id: int) -> None:
+        self.undecodable[reason] += 1
+        self.malformed[reason, node_id] += 1
+
     def _add(self, node: NodeDescription) -> None:
         handlers, node_id = self._handlers, node.node_id
         units = StatedUnits(node.device)
@@ -94,7 +107,7 @@ class Decoder:
         def decode(frame: Frame) -> Emergency | None:
             emergency = parse(frame, node.node_id, node.device.error_texts)
             if emergency is None:
-                self.undecodable[Undecodable.WRONG_LENGTH] += 1
+                self._count_malformed(Undecodable.WRONG_LENGTH, node.node_id)
             return emergency
 
         return decode
@@ -104,7 +117,8 @@ class Decoder:
             state = parse_state(frame.data)
             if state is None:
                 known_length = len(frame.data) == 1
-                self.undecodable[Undecodable.UNKNOWN_STATE if known_length else Undecodable.WRONG_LENGTH] += 1
+                reason = Undecodable.UNKNOWN_STATE if known_length else Undecodable.WRONG_LENGTH
+                self._count_malformed(reason, node_id)
                 return None
             return NodeState(frame.time_ns, node_id, state)
 
@@ -124,7 +138,7 @@ class Decoder:
 
         def decode(frame: Frame) -> Reading | None:
             if len(frame.data) != size:
-                self.undecodable[Undecodable.WRONG_LENGTH] += 1
+                self._count_malformed(Undecodable.WRONG_LENGTH, node_id)
                 return None
             raw = unpack(frame.data)
             for place, mask in masks:

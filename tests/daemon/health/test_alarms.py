@@ -33,6 +33,9 @@ TROUBLES = [
     ("store_torn", 1, "store", Severity.WARNING),
     ("recording_problem", "no room", "recording", Severity.ERROR),
     ("control_problem", "no such group", "control", Severity.WARNING),
+    ("broker_problem", "connection refused", "broker", Severity.WARNING),
+    ("model_problem", "no such file", "model", Severity.ERROR),
+    ("undecodable", ("wrong-length of node 13",), "undecodable", Severity.WARNING),
     ("summarised", ("node-emergency of node 13",), "event-rate", Severity.WARNING),
     ("clock_jump_s", -3.0, "clock", Severity.WARNING),
 ]

@@ -24,11 +24,12 @@ from regolithd.daemon.messages.header import iso_time, time_fields
 from regolithd.daemon.messages.health import PublishingReport
 from regolithd.daemon.pipeline.acquire import Acquisition
 from regolithd.daemon.pipeline.snapshot import SoilChange
-from regolithd.daemon.publish.connection import WINDOW, Connection
+from regolithd.daemon.publish.connection import OTHERS_WINDOW, WINDOW, Connection
 from regolithd.daemon.publish.mqtt_sink import MqttSink
 from regolithd.daemon.publish.outbox import Outbox
 from regolithd.daemon.publish.publisher import Publisher
 from regolithd.daemon.publish.spool import Spool
+from regolithd.daemon.publish.stores import Stores
 from regolithd.drivers.canopen.emcy import Emergency
 from regolithd.drivers.master.events import NodeEmergency
 
@@ -37,12 +38,16 @@ NO_MESSAGES = PublishingReport(
 )
 
 
+NO_PROBLEM = SimpleNamespace(problem="")  # of the models
+
+
 @dataclass
 class Recorder:
     """A publisher that keeps topic and fields of each message."""
 
     report: PublishingReport = NO_MESSAGES
     store_problem: str = ""
+    problem: str = ""
     published: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
 
     def publish(self, topic: str, message: type, *, time_ns: int, **fields: Any) -> None:
@@ -60,7 +65,9 @@ class Recorder:
 def service() -> Any:
     """A service whose bus is not open yet, without problems."""
     chain = SimpleNamespace(acquisition=Acquisition((), (), 1))
-    return SimpleNamespace(configuration=Configuration(), network=None, recorder=None, bus_problem="", chain=chain)
+    return SimpleNamespace(
+        configuration=Configuration(), network=None, recorder=None, bus_problem="", chain=chain, models=NO_PROBLEM
+    )
 
 
 def test_at_the_start_every_alarm_is_published_once_as_not_active(service: Any) -> None:
@@ -144,13 +151,14 @@ async def test_a_connection_takes_two_windows_of_publishes_without_a_warning(tmp
         def death(self, reason: str) -> bytes:
             return reason.encode()
 
-    outbox = Outbox(Spool(tmp_path, 1_000_000))
-    connection = Connection(Configuration().mqtt, "regolith/kapvik", outbox, NoMessages(), asyncio.Event())
+    stores = Stores.open(tmp_path, 1_000_000)
+    outboxes = Outbox(stores.snapshots), Outbox(stores.others)
+    connection = Connection(Configuration().mqtt, "regolith/kapvik", outboxes, NoMessages(), asyncio.Event())
     client = connection._client()
     assert client._socket_options == ((socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),)
-    assert client.pending_calls_threshold == 2 * WINDOW
+    assert client.pending_calls_threshold == 2 * (WINDOW + OTHERS_WINDOW)
     assert client.identifier == "regolithd-regolith-kapvik"
-    outbox.spool.close()
+    stores.close()
 
 
 BABBLE_HZ = 1100
@@ -165,9 +173,9 @@ def emergency(number: int, node_id: int = 13) -> NodeEmergency:
 
 async def test_a_babbling_node_delays_no_snapshot_and_is_summarised(service: Any, tmp_path: Path) -> None:
     """1100 EMCY a second for 10 s: every snapshot is queued; EMCY are few, and all are counted; an alarm is active."""
-    spool = Spool(tmp_path, 100_000_000)
+    stores = Stores.open(tmp_path, 100_000_000)
     now_ns = 0
-    publisher = Publisher(service.configuration, spool)
+    publisher = Publisher(service.configuration, stores)
     sink = MqttSink(service, publisher, monotonic_ns=lambda: now_ns)
     used = time.process_time()
     for millisecond in range(10_000):
@@ -180,7 +188,7 @@ async def test_a_babbling_node_delays_no_snapshot_and_is_summarised(service: Any
             sink._publish_summaries()
             sink._publish_changes()
     assert time.process_time() - used < 5.0  # half of the time that it has
-    records = [*stored(spool)]
+    records = [*stored(stores.snapshots), *stored(stores.others)]
     snapshots = [json.loads(payload)["sequence"] for topic, payload in records if topic == "snapshot"]
     emcy = [json.loads(payload) for topic, payload in records if topic == "emcy"]
     assert snapshots == list(range(400))
@@ -193,10 +201,10 @@ async def test_a_babbling_node_delays_no_snapshot_and_is_summarised(service: Any
     assert "node-emergency of node 13" in alarms[0]["text"]
     now_ns += 11_000_000_000
     sink._publish_changes()
-    assert [json.loads(payload)["active"] for topic, payload in stored(spool) if topic == "alarm/event-rate"][
+    assert [json.loads(payload)["active"] for topic, payload in stored(stores.others) if topic == "alarm/event-rate"][
         -1
     ] is False
-    spool.close()
+    stores.close()
 
 
 def stored(spool: Spool) -> list[tuple[str, bytes]]:
@@ -212,8 +220,8 @@ def stored(spool: Spool) -> list[tuple[str, bytes]]:
 async def test_a_babbling_node_does_not_delay_the_end(service: Any, mosquitto: Mosquitto, tmp_path: Path) -> None:
     """While EMCY messages keep coming, the sink ends soon after its cancellation, with everything delivered."""
     mqtt = Mqtt(spool_directory=tmp_path, host="127.0.0.1", port=mosquitto.port)
-    spool = Spool(tmp_path, 100_000_000)
-    publisher = Publisher(Configuration(mqtt=mqtt), spool)
+    stores = Stores.open(tmp_path, 100_000_000)
+    publisher = Publisher(Configuration(mqtt=mqtt), stores)
     service.liveness = SimpleNamespace(expect=lambda *_: None, ages_s=dict)
     sink = MqttSink(service, publisher)
 
@@ -234,4 +242,4 @@ async def test_a_babbling_node_does_not_delay_the_end(service: Any, mosquitto: M
         await running
     assert time.monotonic() - begun < 3.0
     babbling.cancel()
-    spool.close()
+    stores.close()

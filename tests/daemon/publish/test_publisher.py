@@ -20,8 +20,8 @@ from regolithd.daemon.config.configuration import Configuration, Mqtt
 from regolithd.daemon.messages.bus import EventMessage, NodeMessage
 from regolithd.daemon.publish.backoff import Backoff
 from regolithd.daemon.publish.publisher import Publisher
-from regolithd.daemon.publish.spool import Spool
-from regolithd.daemon.wiring import open_spool
+from regolithd.daemon.publish.stores import Stores
+from regolithd.daemon.wiring import open_stores
 
 QUICK = {"first": 0.05, "longest": 0.2}
 
@@ -47,7 +47,7 @@ async def running(publisher: Publisher) -> AsyncIterator[asyncio.Task[None]]:
 def new_publisher(folder: Path, port: int, **mqtt: Any) -> Publisher:
     """Return a publisher that reconnects after a short delay."""
     settings = configuration(folder, port, **mqtt)
-    return Publisher(settings, Spool(folder, 10_000_000), backoff=Backoff(**QUICK))
+    return Publisher(settings, Stores.open(folder, 10_000_000), backoff=Backoff(**QUICK))
 
 
 async def test_every_snapshot_and_every_wheel_arrives_live(mosquitto: Mosquitto, tmp_path: Path) -> None:
@@ -169,7 +169,7 @@ async def test_the_next_start_delivers_what_the_last_one_could_not(mosquitto: Mo
         for sequence in range(10):
             first.estimate(estimate(sequence))
         first.publish("event", EventMessage, kind="node-lost", node_id=3, text="node 3 is silent")
-    first._spool.close()
+    first._stores.close()
     second = new_publisher(tmp_path / "spool", mosquitto.port)
     async with listening(Subscriber(mosquitto.port)) as subscriber, running(second):
         await until(lambda: subscriber.of("event"))
@@ -259,7 +259,7 @@ async def test_messages_are_delivered_without_a_store(mosquitto: Mosquitto, tmp_
     """A folder that cannot be written ends nothing; the reason is given for the alarm."""
     (tmp_path / "file").touch()
     settings = configuration(tmp_path / "file" / "spool", mosquitto.port)
-    publisher = Publisher(settings, open_spool(settings.mqtt), backoff=Backoff(**QUICK))
+    publisher = Publisher(settings, open_stores(settings.mqtt), backoff=Backoff(**QUICK))
     assert "[mqtt] spool_directory" in publisher.store_problem
     async with listening(Subscriber(mosquitto.port)) as subscriber, running(publisher):
         for sequence in range(5):

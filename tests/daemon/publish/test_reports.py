@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,6 +22,7 @@ from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.can.counters import BusCounters
 from regolithd.drivers.canopen.emcy import Emergency
 from regolithd.drivers.canopen.nmt import NmtState
+from regolithd.drivers.devices.decoding.decoder import Decoder, Undecodable
 from regolithd.drivers.devices.ground_speed import GROUND_SPEED_SENSOR
 from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
 from regolithd.drivers.devices.node import NodeDescription
@@ -43,6 +45,7 @@ class Publisher:
 
     report: PublishingReport = REPORT
     store_problem: str = ""
+    problem: str = ""
     published: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
 
     def publish(self, topic: str, message: type, *, time_ns: int = T_NS, **fields: Any) -> None:
@@ -75,12 +78,19 @@ def service(clock: Clock, tmp_path: Path) -> Any:
     counters.sync.produced, counters.sync.skipped, counters.sync.failed = 10, 2, 1
     counters.sync.worst_late_ns, counters.sync.mean_late_ns = 1_500_000, 250_000.0
     bus = SimpleNamespace(state=BusState.PASSIVE, counters=BusCounters(kernel_drops=4))
-    network = SimpleNamespace(bus=bus, counters=counters, status={}, intruders=IntruderWatch((), master_id=127))
+    network = SimpleNamespace(
+        bus=bus,
+        counters=counters,
+        status={},
+        intruders=IntruderWatch((), master_id=127),
+        decoder=SimpleNamespace(undecodable=Counter({"wrong-length": 3}), malformed={("wrong-length", 3): 3}),
+    )
     return SimpleNamespace(
         configuration=configuration,
         network=network,
         recorder=SimpleNamespace(paths=(tmp_path / "a.mcap", tmp_path / "a.log"), problem=None),
         bus_problem="",
+        models=SimpleNamespace(problem=""),
         chain=SimpleNamespace(acquisition=Acquisition((), (), 1)),
         liveness=TaskLiveness(clock),
     )
@@ -166,6 +176,7 @@ def test_health_has_the_counters_of_every_part(service: Any, clock: Clock) -> No
     assert found["recording"].file.endswith("a.mcap")
     assert found["recording"].free_MB > 1.0
     assert found["recording"].problem is None
+    assert found["undecodable"] == {"wrong-length": 3}
     assert 5.0 < found["memory_MB"] < 100_000.0
     service.network = service.recorder = None
     empty = sink._health()
@@ -199,6 +210,34 @@ def test_alarm_inputs_come_from_every_part(service: Any, clock: Clock) -> None:
     service.network = service.recorder = None
     empty = sink._alarm_inputs()
     assert (empty.bus_state, empty.kernel_drops, empty.recording_problem, empty.nodes) == (BusState.ACTIVE, 0, "", {})
+
+
+async def test_frames_that_cannot_be_decoded_are_an_alarm_when_they_last(service: Any, clock: Clock) -> None:
+    """After ten seconds the alarm names reason and node; it ends when no more come; foreign identifiers are none."""
+    sink = MqttSink(service, Publisher(), monotonic_ns=clock)  # type: ignore[arg-type]
+    decoder = service.network.decoder = Decoder(())
+    for second in range(20):
+        clock.now_s += 1.0
+        decoder.undecodable[Undecodable.UNKNOWN_COB_ID] += 1
+        decoder.malformed[Undecodable.WRONG_LENGTH, 13] += second <= 12
+        sink._note_lasting_problems()
+        expected = ("wrong-length of node 13",) if 10 <= second <= 17 else ()
+        assert sink._alarm_inputs().undecodable == expected, second
+
+
+async def test_a_broker_that_stays_away_is_an_alarm(service: Any, clock: Clock) -> None:
+    """The reason is told after ten seconds, until there is a connection again."""
+    publisher = Publisher(problem="the password file is not UTF-8")
+    sink = MqttSink(service, publisher, monotonic_ns=clock)  # type: ignore[arg-type]
+    clock.now_s += 9.0
+    sink._note_lasting_problems()
+    assert sink._alarm_inputs().broker_problem == ""
+    clock.now_s += 2.0
+    assert sink._alarm_inputs().broker_problem == "the password file is not UTF-8"
+    publisher.problem = ""
+    sink._note_lasting_problems()
+    publisher.problem = "no answer"
+    assert sink._alarm_inputs().broker_problem == ""
 
 
 @pytest.mark.parametrize(("jump_s", "noticed"), [(0.4, False), (0.6, True), (-0.6, True)])

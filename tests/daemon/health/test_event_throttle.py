@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from regolithd.daemon.publish.event_throttle import BURST, REFILL_PER_S, SUMMARISING_HOLD_NS, EventThrottle
+from regolithd.daemon.health.event_throttle import BURST, REFILL_PER_S, SUMMARISING_HOLD_NS, EventThrottle
 from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.master.events import BusStateChanged, MotionStopped, NetworkEvent
 
