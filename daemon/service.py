@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
     from regolithd.daemon.pipeline.onnx_models import OnnxModels
     from regolithd.daemon.pipeline.snapshot import Estimate
+    from regolithd.daemon.pipeline.terrain_network import AbsentTerrainNetwork, TerrainNetwork
     from regolithd.drivers.can.bus import Bus
     from regolithd.drivers.can.frame import Frame
     from regolithd.drivers.devices.decoding.signals import Signal
@@ -91,9 +92,7 @@ class Service:
         self.models = models
         self.chain = Chain(configuration, models)
         self.recorder = (
-            _recorder(configuration, models.terrain.card.version, self._unit_frames)
-            if configuration.recording.enabled
-            else None
+            _recorder(configuration, models.terrain, self._unit_frames) if configuration.recording.enabled else None
         )
         self._recorded_events = EventThrottle()
         self.liveness = TaskLiveness()
@@ -257,10 +256,14 @@ def _plain(value: Any) -> Any:  # noqa: ANN401  # any field of an event
     return value.value if isinstance(value, Enum) else str(value)
 
 
-def _recorder(configuration: Configuration, model_version: str, preamble: Callable[[], Sequence[Frame]]) -> Recorder:
+def _recorder(
+    configuration: Configuration,
+    terrain: TerrainNetwork | AbsentTerrainNetwork,
+    preamble: Callable[[], Sequence[Frame]],
+) -> Recorder:
     metadata = {
         "configuration": configuration.model_dump_json(),
-        "model_version": model_version,
+        "model_version": terrain.card.version,
         "started_ns": str(time.time_ns()),
         **eds_metadata(configuration),
     }
