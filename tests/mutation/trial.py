@@ -96,7 +96,7 @@ def try_mutant(mutation: Mutation, checkout: Checkout, found: CoverageMap) -> Re
     cpu_s = STARTING_CPU_S + math.ceil(SLOWER * sum(found.seconds[test] for test in tests))
     started = time.monotonic()
     with checkout.changed(mutation.file, mutated):
-        every = [*tests, *outside_the_room(mutation, original)]
+        every = [*outside_the_room(mutation, original), *tests]
         run, failed = _failing_run(checkout, every, cpu_s, repeated=room_of(mutation.file) != ONLY_COMPUTES)
     verdict: Verdict = "survived" if run is None else "killed"
     if run is not None and run.timed_out and not _run(checkout, failed, cpu_s).passed:

@@ -223,6 +223,17 @@ def test_a_load_cell_s_drift_is_exact_where_the_simulation_runs(monkeypatch: pyt
         np.testing.assert_allclose(column, np.exp(offset), rtol=1e-9 if offset in OFFSETS else 0.01)
 
 
+def test_a_load_is_taken_relative_to_its_mean_and_a_cell_that_reads_zero_has_no_drift() -> None:
+    """Another unit of the load changes nothing, and a dead cell divides nothing by zero."""
+    load = LOAD.copy()
+    load[:, 1], load[:, 3] = 0.0, LOAD[:, 3] / 1000
+    dead = replace(P, covariates={**P.covariates, "load": load}, made={})
+    left, before = LoadCellDrift()._unexplained_load(dead), LoadCellDrift()._unexplained_load(replace(P, made={}))
+    assert not left[:, 1].any()
+    np.testing.assert_allclose(left[:, [0, 2, 3]], before[:, [0, 2, 3]], atol=1e-12)
+    assert np.std(before[:, 3]) > 1e-3
+
+
 def beginning(whole: Problem, count: int) -> Problem:
     """Return the problem of the first instants alone."""
     recording = whole.recording
