@@ -34,13 +34,23 @@ def main() -> None:
     for name in LIBRARIES:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
-    for line in sys.stdin:
-        pid = os.fork()
-        if pid == 0:
-            _run(**json.loads(line))
+    with contextlib.suppress(BrokenPipeError, KeyboardInterrupt):
+        for line in sys.stdin:
+            _serve(line)
+
+
+def _serve(order: str) -> None:
+    """Fork for one run and wait for it; where the caller has gone meanwhile, end the run."""
+    pid = os.fork()
+    if pid == 0:
+        _run(**json.loads(order))
+    try:
         print(json.dumps({"pid": pid}), flush=True)
         _, status = os.waitpid(pid, 0)
         print(json.dumps({"status": os.waitstatus_to_exitcode(status)}), flush=True)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(pid, signal.SIGKILL)
 
 
 def _run(arguments: list[str], cpu_s: int, environment: dict[str, str], output: str) -> NoReturn:

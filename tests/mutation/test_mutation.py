@@ -5,12 +5,13 @@ from __future__ import annotations
 import ast
 import re
 import signal
+import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from checkout import Checkout, Run
+from checkout import USAGE_ERROR, Checkout, Run
 from coverage_map import CoverageMap, statement_lines
 from figures import SURVIVORS, Words, line_of, score, write_page
 from mutants import Mutation, left_out, mutations, sample
@@ -140,6 +141,26 @@ def test_a_killed_run_leaves_no_mutant_behind(root: Path) -> None:
     Checkout(root).restore()
     assert (root / FILE).read_text() == SOURCE
     assert (root / FILE).stat().st_mtime_ns == before
+
+
+def test_each_run_imports_anew_and_has_its_own_limits(root: Path) -> None:
+    """A fork of one process knows what a file holds now, what failed, and when a test computes for too long."""
+    (root / ".venv").symlink_to(sys.prefix)
+    (root / "value.py").write_text("VALUE = 1\n")
+    (root / "test_value.py").write_text(
+        "import os\nfrom value import VALUE\n\n"
+        "def test_one():\n    assert VALUE == 1 and os.environ['GIVEN'] == 'yes'\n\n"
+        "def test_long():\n    while VALUE:\n        pass\n"
+    )
+    checkout, given = Checkout(root), {"GIVEN": "yes", "PYTHONDONTWRITEBYTECODE": "1"}
+    assert checkout.pytest(["test_value.py::test_one"], 60, given).passed
+    with checkout.changed("value.py", "VALUE = 0\n"):
+        failed = checkout.pytest(["test_value.py"], 60, given)
+    assert (failed.passed, failed.failed) == (False, ("test_value.py::test_one",))
+    endless = checkout.pytest(["test_value.py::test_long"], 2, given)
+    assert (endless.passed, endless.cpu_exceeded, endless.timed_out) == (False, True, False)
+    assert checkout.pytest(["test_value.py::test_one"], 60, given).passed
+    assert checkout.pytest(["test_value.py::test_none"], 60, given).status == USAGE_ERROR
 
 
 def test_the_page_tells_seed_share_and_words(tmp_path: Path) -> None:

@@ -4,12 +4,17 @@ import asyncio
 import socket
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
-from control_rig import LONG, Client, Rover, serving
+from control_rig import GROUP, LONG, Client, Rover, serving
+from subscriber import until
 
+from regolithd.daemon.config.configuration import Configuration, Control
+from regolithd.daemon.control import server
 from regolithd.daemon.control.protocol import Accepted
-from regolithd.daemon.control.server import MAX_CLIENTS
+from regolithd.daemon.control.server import MAX_CLIENTS, ControlSink
+from regolithd.daemon.control.socket import ControlSocketError
 
 
 async def test_stop_gets_through_a_thousand_half_sent_lines(tmp_path: Path) -> None:
@@ -59,3 +64,48 @@ async def test_a_line_that_is_not_finished_in_time_ends_its_connection(
             assert await slow.reader.read() == b""
         assert slow.reader.at_eof() or slow.writer.is_closing()
         assert (await silent.ask({"command": "status"})).rover == "kapvik"
+
+
+def pauses_of(sink: ControlSink, beats: list[int], monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, float]]:
+    """Let the server sleep no longer than a turn of the loop; return beats so far and seconds of each sleep."""
+    pauses: list[tuple[int, float]] = []
+
+    async def slept(seconds: float) -> None:
+        pauses.append((len(beats), seconds))
+        await asyncio.sleep(0)
+
+    sink._beat = lambda: beats.append(0)
+    monkeypatch.setattr(server, "asyncio", SimpleNamespace(**vars(asyncio) | {"sleep": slept}))
+    return pauses
+
+
+async def test_the_task_beats_twice_a_second_while_it_serves(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The supervisor expects a beat each second."""
+    control = Control(socket=tmp_path / "control.sock", group=GROUP)
+    sink, beats = ControlSink(Configuration(control=control), lambda: None), list[int]()
+    pauses = pauses_of(sink, beats, monkeypatch)
+    task = asyncio.create_task(sink.run())
+    await until(lambda: len(pauses) >= 5)
+    task.cancel()
+    assert pauses[:5] == [(number, 0.5) for number in range(1, 6)]
+
+
+async def test_a_socket_that_cannot_be_made_is_tried_every_five_seconds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With beats meanwhile, and the reason in the status."""
+    control = Control(socket=tmp_path / "absent" / "folder" / "control.sock", group="no-such-group")
+    sink, beats = ControlSink(Configuration(control=control), lambda: None), list[int]()
+    pauses, tried = pauses_of(sink, beats, monkeypatch), list[int]()
+
+    def refused(*_: object) -> None:
+        tried.append(len(pauses))
+        raise ControlSocketError("no such group")
+
+    monkeypatch.setattr(server, "open_control_socket", refused)
+    task = asyncio.create_task(sink.run())
+    await until(lambda: len(tried) >= 3)
+    task.cancel()
+    assert tried[:3] == [0, 10, 20]
+    assert pauses[:10] == [(number, 0.5) for number in range(1, 11)]
+    assert sink.problem == "no such group"

@@ -109,6 +109,19 @@ def test_the_oldest_present_alarm_is_shown() -> None:
     assert max(len(line) for line in table._alarm_lines()) <= 80
 
 
+def test_the_soil_under_a_wheel_is_marked_where_it_is_not_the_first() -> None:
+    """The simulator alone knows it; before the first snapshot nobody does."""
+    stretches = [SimpleNamespace(name="loose sand"), SimpleNamespace(name="crust"), SimpleNamespace(name="gravel")]
+    scenario = SimpleNamespace(ground=SimpleNamespace(stretches=stretches))
+    soils = ("loose sand", "crust", "loose sand", "gravel", "crust", "crust")
+    world: Any = SimpleNamespace(scenario=scenario, truth=SimpleNamespace(soils=soils))
+    shown = [LiveTable(PREFIX, world)._soil(number) for number in range(1, 7)]
+    assert tuple(text.plain for text in shown) == soils
+    assert [number for number, text in enumerate(shown, 1) if text.style == "dim"] == [1, 3]
+    world.truth = None
+    assert LiveTable(PREFIX, world)._soil(1).plain == "–"
+
+
 def test_twelve_torques_are_kept() -> None:
     """The history drops the oldest; a missing torque is not kept."""
     table = LiveTable(PREFIX)

@@ -1,0 +1,71 @@
+"""What connects the service to its sinks: the stores' limit, and what the status says of the broker."""
+
+from __future__ import annotations
+
+import logging
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from regolithd.daemon import wiring
+from regolithd.daemon.config.configuration import Configuration, Mqtt
+from regolithd.daemon.control.server import ControlSink
+from regolithd.daemon.publish.mqtt_sink import MqttSink
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def test_the_stores_have_the_limit_in_megabytes(tmp_path: Path) -> None:
+    """A megabyte has a million bytes; snapshots have nine tenths of the limit."""
+    stores = wiring.open_stores(Mqtt(spool_directory=tmp_path, spool_limit_MB=20))
+    try:
+        assert [store.limit_bytes for store in stores.both] == [18_000_000, 2_000_000]
+        assert stores.problem == ""
+    finally:
+        stores.close()
+
+
+def test_messages_are_kept_in_memory_where_no_store_can_be_opened(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The log says so, and the stores why."""
+    (tmp_path / "file").touch()
+    with caplog.at_level(logging.WARNING):
+        stores = wiring.open_stores(Mqtt(spool_directory=tmp_path / "file" / "spool"))
+    assert stores.problem
+    assert caplog.messages == [f"{stores.problem} Messages are kept in memory only."]
+    stores.close()
+
+
+@pytest.mark.parametrize(
+    ("problem", "connected", "told"),
+    [("", True, "connected"), ("", False, "connecting"), ("not authorised", False, "not authorised")],
+)
+def test_the_status_says_what_the_publisher_knows_of_the_broker(
+    problem: str, connected: bool, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Publisher and control socket are sinks, and the supervisor expects a beat of each."""
+    beats: list[str] = []
+    expected: list[tuple[str, float]] = []
+    publisher = SimpleNamespace(problem=problem, connected=connected)
+    given: dict[str, Any] = {}
+    monkeypatch.setattr(wiring, "Publisher", lambda *_, **options: given.update(options) or publisher)
+    service: Any = SimpleNamespace(
+        configuration=Configuration(mqtt=Mqtt(spool_directory=tmp_path)),
+        liveness=SimpleNamespace(beat=beats.append, expect=lambda *what: expected.append(what)),
+        network="the network",
+        sinks=[],
+        recorder=None,
+    )
+    wiring.connect_sinks(service)
+    mqtt, control = service.sinks
+    assert (type(mqtt), type(control)) == (MqttSink, ControlSink)
+    assert (control._broker(), control._rover()) == (told, "the network")
+    control._beat()
+    given["beat"]()
+    assert beats == ["control", "publishing"]
+    assert expected == [("control", 10.0)]
+    control.problem = "no socket"
+    assert mqtt._control_problem() == "no socket"
