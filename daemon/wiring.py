@@ -5,7 +5,9 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING
 
+from regolithd.daemon.control.protocol import CONNECTED
 from regolithd.daemon.control.server import ControlSink
+from regolithd.daemon.publish.comparison import publish_comparison
 from regolithd.daemon.publish.mqtt_sink import PUBLISHING, MqttSink
 from regolithd.daemon.publish.publisher import Publisher
 from regolithd.daemon.publish.spool import SpoolUnusableError
@@ -37,7 +39,8 @@ def connect_sinks(service: Service) -> None:
     control = ControlSink(
         configuration,
         lambda: service.network,
-        broker=lambda: publisher.problem or ("connected" if publisher.connected else "connecting"),
+        broker=lambda: publisher.problem or (CONNECTED if publisher.connected else "connecting"),
+        publish_comparison=lambda result: publish_comparison(publisher, result),
         beat=lambda: liveness.beat(CONTROL),
     )
     liveness.expect(CONTROL, CONTROL_TIMEOUT_S)

@@ -25,7 +25,7 @@ async def check_everything(configuration: Configuration) -> list[Finding]:
     parts = await asyncio.gather(
         check_bus(configuration, status),
         check_models(configuration),
-        check_broker(configuration),
+        check_broker(configuration, status),
         check_disks(configuration),
         check_clock(),
     )

@@ -9,18 +9,25 @@ from typing import TYPE_CHECKING
 from aiomqtt import Client, MqttError
 
 from regolithd.daemon.check.finding import Finding, good, wrong
-from regolithd.daemon.publish.connection import password_of, tls_context
-from regolithd.daemon.publish.connection_errors import reason_of
+from regolithd.daemon.control.protocol import CONNECTED
+from regolithd.daemon.publish.connection_errors import explain
+from regolithd.daemon.publish.credentials import password_of, tls_context
 
 if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
+    from regolithd.daemon.control.protocol import Status
 
 TIMEOUT_S = 5.0
 
 
-async def check_broker(configuration: Configuration) -> list[Finding]:
-    """Connect with a separate client identifier, and disconnect; nothing is published."""
+async def check_broker(configuration: Configuration, running: Status | None = None) -> list[Finding]:
+    """Connect and disconnect; nothing is published. Where a daemon runs, its connection counts: it must not be ended.
+
+    (A broker that takes the user name for the client identifier ends it when another client with this name connects.)
+    """
     mqtt = configuration.mqtt
+    if running is not None and running.broker == CONNECTED:
+        return [good("broker", f"{mqtt.host}:{mqtt.port}: the running daemon is connected")]
     began = time.monotonic()
     try:
         client = Client(
@@ -35,7 +42,7 @@ async def check_broker(configuration: Configuration) -> list[Finding]:
         async with asyncio.timeout(2 * TIMEOUT_S), client:
             took = time.monotonic() - began
     except (MqttError, OSError) as error:  # OSError: the password file, the certificate, no answer
-        place, _, rest = reason_of(error, mqtt).partition(": ")
+        place, _, rest = (await explain(error, mqtt)).partition(": ")
         text, _, remedy = rest.partition(". ")
         return [wrong("broker", f"{place.removeprefix('MQTT broker ')}: {text}", remedy)]
     secured = "TLS" if mqtt.tls else "no TLS"

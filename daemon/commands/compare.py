@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from regolithd.daemon.mismatch.traverse import TraverseFiles
 
 EXIT_DATA = 65
-EXIT_BROKER = 69
-"""EX_UNAVAILABLE: the comparison is written, and could not be published; systemd tries again."""
+EXIT_DAEMON = 69
+"""EX_UNAVAILABLE: the comparison is written, and no daemon publishes it; systemd tries again."""
 
 
 def register(app: typer.Typer) -> None:
@@ -28,7 +28,7 @@ def compare(
     simulation: Annotated[
         Path | None, typer.Option(help="SIM.toml; by default that beside rover.toml, or one made from rover.toml.")
     ] = None,
-    publish: Annotated[bool, typer.Option(help="Publish the result, and an alarm, over MQTT.")] = True,
+    publish: Annotated[bool, typer.Option(help="Have the daemon publish the result, and an alarm.")] = True,
 ) -> None:
     """Compare the recording of the last traverse with the simulation, and publish the result.
 
@@ -73,15 +73,21 @@ def _simulation(configuration: Configuration, config: Path | None, given: Path |
 
 
 def _publish(configuration: Configuration, result: ComparisonResult) -> None:
+    """Let the daemon publish a result: a second client of the rover would end the daemon's connection to the broker."""
     import asyncio
 
-    from aiomqtt import MqttError
+    from regolithd.daemon.control.client import ControlError, control_connection
+    from regolithd.daemon.control.protocol import Done, PublishComparisonRequest
 
-    from regolithd.daemon.publish.comparison import publish_comparison
-    from regolithd.daemon.publish.connection_errors import reason_of
+    async def publish() -> None:
+        async with control_connection(configuration.control.socket) as daemon:
+            daemon.send(PublishComparisonRequest(result=result))
+            reply = await daemon.reply()
+        if not isinstance(reply, Done):
+            raise ControlError(f"The daemon refused it: {getattr(reply, 'text', reply)}", EXIT_DAEMON)
 
     try:
-        asyncio.run(publish_comparison(configuration, result))
-    except (MqttError, OSError) as error:
-        typer.echo(f"not published: {reason_of(error, configuration.mqtt)}", err=True)
-        raise typer.Exit(EXIT_BROKER) from error
+        asyncio.run(publish())
+    except ControlError as error:
+        typer.echo(f"not published: {error}", err=True)
+        raise typer.Exit(EXIT_DAEMON) from error

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, create_model
 
 from regolithd.calibration.parameters import Drivetrain, LoadCells, Positive, Rover, Table, Wheel
+from regolithd.daemon.config.broker import BrokerSettings
 from regolithd.daemon.config.devices import DeviceTable  # noqa: TC001  # pydantic reads it at run time
 from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
 from regolithd.drivers.devices.node import NodeDescription
@@ -164,17 +165,9 @@ class Recording(Table):
     enabled: bool = True
 
 
-class Mqtt(Table):
+class Mqtt(BrokerSettings):
     """`[mqtt]`: the broker, and the store for messages that it has not acknowledged."""
 
-    host: Annotated[str, Field(min_length=1)] = "localhost"
-    port: Annotated[int, Field(ge=1, le=65_535)] = 1883
-    prefix: Annotated[str, Field(pattern=r"^[^#+\s]*[^#+/\s]$")] = "regolith"
-    username: str | None = None
-    password_file: Path | None = None
-    tls: bool = False
-    ca_file: Path | None = None
-    keepalive_s: Annotated[int, Field(ge=2, le=3600)] = 10
     spool_directory: Path = Path("/var/lib/regolithd/spool")
     spool_limit_MB: Positive = 200.0
 

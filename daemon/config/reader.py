@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
+from regolithd.daemon.config.broker import broker_contradictions
 from regolithd.daemon.config.configuration import MASTER_NODE, Configuration, Nodes
 from regolithd.drivers.devices.profiles.compose import DescriptionError, compose
 from regolithd.drivers.errors import DictionaryError
@@ -201,9 +202,7 @@ def _checks_together(configuration: Configuration) -> Iterator[tuple[str, str, s
             str(nodes.heartbeat_timeout_ms),
             "One late heartbeat would count as a lost node: raise it.",
         )
-    mqtt = configuration.mqtt
-    if mqtt.password_file is not None and mqtt.username is None:
-        yield ("mqtt.username", "a name beside password_file", "nothing", "Set it, or remove password_file.")
+    yield from broker_contradictions(configuration.mqtt)
 
 
 def _device_problems(configuration: Configuration, text: str, path: Path) -> Iterator[Problem]:

@@ -14,6 +14,9 @@ A client sends a request; the daemon replies with one line, or, during a travers
     → {"command": "status"}
     ← {"event": "status", "rover": "kapvik", "nodes": [{"node_id": 1, "phase": "operational", …}, …], …}
 
+    → {"command": "publish-comparison", "result": {"verdict": "consistent", "text": "…", …}}
+    ← {"event": "done", "text": "…"}
+
     → {"command": "dance"}
     ← {"event": "refused", "code": "bad-request", "text": "…", "remedy": "…"}
 
@@ -29,8 +32,11 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from regolithd.daemon.control.traverse import Ending  # noqa: TC001  # pydantic reads it at run time
+from regolithd.daemon.messages.mismatch import ComparisonResult  # noqa: TC001  # likewise
 
 LINE_LIMIT = 65_536
+CONNECTED = "connected"
+"""`Status.broker` while the daemon is connected to the broker."""
 
 
 class _Line(BaseModel):
@@ -60,6 +66,13 @@ class StatusRequest(_Line):
     """Request the status."""
 
     command: Literal["status"] = "status"
+
+
+class PublishComparisonRequest(_Line):
+    """Publish the result of a comparison: the daemon's connection to the broker is the rover's only one."""
+
+    command: Literal["publish-comparison"] = "publish-comparison"
+    result: ComparisonResult
 
 
 class Accepted(_Line):
@@ -137,7 +150,9 @@ class Status(_Line):
     nodes: tuple[NodeLine, ...]
 
 
-Request = Annotated[TraverseRequest | StopRequest | StatusRequest, Field(discriminator="command")]
+Request = Annotated[
+    TraverseRequest | StopRequest | StatusRequest | PublishComparisonRequest, Field(discriminator="command")
+]
 Reply = Annotated[Accepted | Progress | Ended | Done | Refused | Status, Field(discriminator="event")]
-REQUEST: TypeAdapter[TraverseRequest | StopRequest | StatusRequest] = TypeAdapter(Request)
+REQUEST: TypeAdapter[TraverseRequest | StopRequest | StatusRequest | PublishComparisonRequest] = TypeAdapter(Request)
 REPLY: TypeAdapter[Accepted | Progress | Ended | Done | Refused | Status] = TypeAdapter(Reply)

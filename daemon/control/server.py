@@ -15,6 +15,7 @@ import socket
 import struct
 import time
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -29,6 +30,7 @@ from regolithd.daemon.control.protocol import (
     Ended,
     NodeLine,
     Progress,
+    PublishComparisonRequest,
     Refused,
     Status,
     StatusRequest,
@@ -42,10 +44,11 @@ from regolithd.drivers.errors import DriverError
 from regolithd.drivers.master.events import MotionStopped
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Awaitable, Callable, Mapping
 
     from regolithd.daemon.config.configuration import Configuration
     from regolithd.daemon.control.protocol import _Line
+    from regolithd.daemon.messages.mismatch import ComparisonResult
     from regolithd.daemon.pipeline.snapshot import Estimate, Snapshot
     from regolithd.drivers.master.events import NetworkEvent
     from regolithd.drivers.master.status import NodeStatus
@@ -79,6 +82,8 @@ class ControlSink:
         Returns the network, or None while the bus is not open.
     broker
         Returns the state of the connection to the broker, as text.
+    publish_comparison
+        Publishes the result of a comparison, with its report.
     beat
         Called at least once a second while this task runs.
     """
@@ -89,12 +94,14 @@ class ControlSink:
         rover: Callable[[], Rover | None],
         *,
         broker: Callable[[], str] = lambda: "unknown",
+        publish_comparison: Callable[[ComparisonResult], Awaitable[None]] | None = None,
         beat: Callable[[], None] = lambda: None,
         clock: Clock | None = None,
     ) -> None:
         self._configuration = configuration
         self._rover = rover
         self._broker = broker
+        self._publish_comparison = publish_comparison
         self._beat = beat
         self._clock = clock or Clock()
         self._tasks: asyncio.TaskGroup | None = None
@@ -198,6 +205,19 @@ class ControlSink:
                 return await self._stop(request, writer)
             case StatusRequest():
                 return self._status()
+            case PublishComparisonRequest():
+                return await self._publish_result(request.result)
+
+    async def _publish_result(self, result: ComparisonResult) -> _Line:
+        """Publish a comparison whose report is below the recordings: no other file of the daemon's is published."""
+        recordings = self._configuration.recording.directory
+        if self._publish_comparison is None or not _is_below(result.report, recordings):
+            return Refused(code=Code.BAD_REQUEST, text=f"{result.report} is not below {recordings}.")
+        try:
+            await self._publish_comparison(result)
+        except OSError as error:
+            return Refused(code=Code.BAD_REQUEST, text=f"The report cannot be read: {error}.")
+        return Done(text="The result is published, as soon as the broker is connected.")
 
     def _begin(self, request: TraverseRequest, writer: asyncio.StreamWriter) -> _Line:
         settings = self._configuration.control
@@ -311,6 +331,10 @@ async def _read_line(reader: asyncio.StreamReader) -> bytes:
         return begin
     async with asyncio.timeout(LINE_TIMEOUT_S):
         return begin + await reader.readline()
+
+
+def _is_below(path: str, folder: Path) -> bool:
+    return Path(path).resolve().is_relative_to(folder.resolve())
 
 
 def _send(writer: asyncio.StreamWriter, reply: _Line) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import Field
 
 from regolithd.calibration.parameters import Positive, Table
-from regolithd.daemon.config.configuration import Mqtt
+from regolithd.daemon.config.broker import BrokerSettings, broker_contradictions
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -17,23 +17,10 @@ if TYPE_CHECKING:
 Port = Annotated[int, Field(ge=1, le=65_535)]
 
 
-class Broker(Table):
+class Broker(BrokerSettings):
     """`[mqtt]`: the broker to which the rovers publish."""
 
-    host: Annotated[str, Field(min_length=1)] = "localhost"
-    port: Port = 1883
-    prefix: Annotated[str, Field(pattern=r"^[^#+\s]*[^#+/\s]$")] = "regolith"
     client_id: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,64}$")] = "regolithd-ground"
-    username: str | None = None
-    password_file: Path | None = None
-    tls: bool = False
-    ca_file: Path | None = None
-    keepalive_s: Annotated[int, Field(ge=2, le=3600)] = 10
-
-    @property
-    def connection(self) -> Mqtt:
-        """The settings that the daemon's connection has as well."""
-        return Mqtt.model_validate(self.model_dump(exclude={"client_id"}))
 
 
 class Store(Table):
@@ -92,8 +79,7 @@ def checks_together(settings: GroundSettings) -> Iterator[tuple[str, str, str, s
         if page.certificate is None:
             remedy = "Set certificate and key; or set host to 127.0.0.1, behind a proxy that has them."
             yield "page.certificate", "a certificate, where others can reach the page", "none", remedy
-    if mqtt.password_file is not None and mqtt.username is None:
-        yield "mqtt.username", "a name beside password_file", "nothing", "Set it, or remove password_file."
+    yield from broker_contradictions(mqtt)
 
 
 _ADD_USER = "Set it, and add users with `regolithd ground --add-user NAME`; or set host to 127.0.0.1."

@@ -16,8 +16,9 @@ from aiomqtt import Client, Message, MqttError
 from regolithd.daemon.ground.received import STORED, MessageError, parse
 from regolithd.daemon.messages.channels import CHANNELS
 from regolithd.daemon.publish.backoff import Backoff
-from regolithd.daemon.publish.connection import SOCKET_OPTIONS, password_of, tls_context
-from regolithd.daemon.publish.connection_errors import reason_of
+from regolithd.daemon.publish.connection import SOCKET_OPTIONS
+from regolithd.daemon.publish.connection_errors import explain
+from regolithd.daemon.publish.credentials import password_of, tls_context
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 BATCH = 20
 """Messages of one transaction: mosquitto sends this many before it waits for acknowledgements."""
+TIMEOUT_S = 5.0
+"""A broker that does not answer for this long is not there."""
 LIVE_ONLY = "wheel"
 """`wheel/…` repeats what `snapshot` has, and is not subscribed."""
 
@@ -66,19 +69,20 @@ class Subscription:
                     self._backoff.reset()
                     await self._receive(client)
             except (MqttError, OSError) as error:
-                self._set_problem(reason_of(error, self._settings.connection))
+                self._set_problem(await explain(error, self._settings))
                 await asyncio.sleep(self._backoff.next())
 
     def _client(self) -> Client:
-        settings = self._settings.connection
+        settings = self._settings
         client = Client(
             settings.host,
             settings.port,
             username=settings.username,
             password=password_of(settings),
-            identifier=self._settings.client_id,
+            identifier=settings.client_id,
             clean_session=False,
             keepalive=settings.keepalive_s,
+            timeout=TIMEOUT_S,
             tls_context=tls_context(settings),
             socket_options=SOCKET_OPTIONS,
             logger=_aiomqtt_log,

@@ -71,7 +71,7 @@ CHANNELS = (
     Channel("emcy", "emcy", EmergencyMessage, _ACKNOWLEDGED, False, True, "when a node sends one"),
     Channel("event", "event", EventMessage, _ACKNOWLEDGED, False, True, "when it happens"),
     Channel("alarm", "alarm/{name}", AlarmMessage, _ACKNOWLEDGED, True, True, "when it begins and ends"),
-    Channel("mismatch", "mismatch", MismatchMessage, _ACKNOWLEDGED, True, False, "after each traverse, if set up"),
-    Channel("report", "report", ReportMessage, _ACKNOWLEDGED, True, False, "after each traverse, if set up"),
+    Channel("mismatch", "mismatch", MismatchMessage, _ACKNOWLEDGED, True, True, "after each traverse, if set up"),
+    Channel("report", "report", ReportMessage, _ACKNOWLEDGED, True, True, "after each traverse, if set up"),
     Channel("health", "health", HealthMessage, _ONCE, False, False, "once a second, while connected"),
 )

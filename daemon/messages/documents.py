@@ -31,7 +31,7 @@ _PARAMETERS = {
     "name": {"description": "Name of the alarm."},
     "rover": {"description": "[rover] name in rover.toml."},
 }
-_WHILE_AWAY = {"state": "sent at the next birth", "mismatch": "tried again", "report": "tried again"}
+_WHILE_AWAY = {"state": "sent at the next birth"}
 _QOS_WORDS = {QoS.AT_MOST_ONCE: "0, at most once", QoS.AT_LEAST_ONCE: "1, acknowledged"}
 
 

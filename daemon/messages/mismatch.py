@@ -45,10 +45,7 @@ class ComparisonResult(BaseModel):
 
 
 class MismatchMessage(ComparisonResult, Header):
-    """The result of the last comparison of a traverse with the simulation, by `regolithd compare`.
-
-    Not sent by the daemon but by a process of its own, which has a session of its own for each comparison.
-    """
+    """The result of the last comparison of a traverse with the simulation, by `regolithd compare`."""
 
 
 class ReportMessage(Header):

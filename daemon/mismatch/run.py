@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
+import typer
 from rich.console import Console
 
 from regolithd.calibration.mismatch.comparison import compare
@@ -51,7 +53,7 @@ def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs) -> Answe
         When recording or simulation cannot be used.
     """
     outputs.check()
-    simulated = load_simulation(simulation)
+    simulated = load_simulation(simulation, announce=partial(typer.echo, err=True))
     with Console(stderr=True).status("reading") as status:
         recorded = read_recordings(recordings, simulated.wheel_column)
         try:

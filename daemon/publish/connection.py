@@ -18,11 +18,13 @@ import asyncio
 import logging
 import math
 import socket
-import ssl
 from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
-from aiomqtt import Client, MqttError, Will
+from aiomqtt import MqttError, ProtocolVersion, Will
+
+from regolithd.daemon.publish.broker_client import BrokerClient
+from regolithd.daemon.publish.credentials import password_of, tls_context
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -80,7 +82,10 @@ class Connection:
         outboxes: tuple[Outbox, Outbox],
         state_messages: StateMessages,
         stop: asyncio.Event,
+        *,
+        protocol: ProtocolVersion = ProtocolVersion.V5,
     ) -> None:
+        self._protocol = protocol
         self._settings = settings
         self._root = root
         snapshots, others = outboxes
@@ -109,9 +114,9 @@ class Connection:
                 self.up = False
                 await self._publish_death(client, reason)
 
-    def _client(self) -> Client:
+    def _client(self) -> BrokerClient:
         settings = self._settings
-        client = Client(
+        client = BrokerClient(
             settings.host,
             settings.port,
             username=settings.username,
@@ -120,7 +125,8 @@ class Connection:
             will=Will(
                 f"{self._root}/state", self._state_messages.death("connection-lost"), qos=_AT_LEAST_ONCE, retain=True
             ),
-            clean_session=True,
+            protocol=self._protocol,
+            clean_session=True if self._protocol is ProtocolVersion.V311 else None,  # MQTT 5: a clean start
             keepalive=settings.keepalive_s,
             timeout=ACKNOWLEDGE_TIMEOUT_S,
             max_inflight_messages=WINDOW + OTHERS_WINDOW,
@@ -131,13 +137,13 @@ class Connection:
         client.pending_calls_threshold = 2 * (WINDOW + OTHERS_WINDOW)
         return client
 
-    async def _publish_birth(self, client: Client) -> None:
+    async def _publish_birth(self, client: BrokerClient) -> None:
         await self._publish(client, "state", self._state_messages.birth(), retain=True)
         for way in self._ways:
             for topic, payload in way.outbox.connected().items():
                 await self._publish(client, topic, payload, retain=True)
 
-    async def _send(self, client: Client, beat: Callable[[], None]) -> None:
+    async def _send(self, client: BrokerClient, beat: Callable[[], None]) -> None:
         """Send until everything is sent after `stop`, or until the connection is lost."""
         lost: MqttError | None = None
         try:
@@ -156,7 +162,7 @@ class Connection:
             raise lost
 
     @staticmethod
-    async def _wait_for_loss(client: Client) -> None:
+    async def _wait_for_loss(client: BrokerClient) -> None:
         """Wait until the connection is lost. No message comes: the daemon subscribes to nothing."""
         async for _ in client.messages:
             continue
@@ -167,7 +173,7 @@ class Connection:
             beat()
             await asyncio.sleep(0.5)
 
-    async def _send_stored(self, client: Client, tasks: asyncio.TaskGroup, way: _Way) -> None:
+    async def _send_stored(self, client: BrokerClient, tasks: asyncio.TaskGroup, way: _Way) -> None:
         outbox = way.outbox
         while not (self._stop.is_set() and not outbox.spool.queued):
             for message in outbox.waiting():
@@ -185,7 +191,7 @@ class Connection:
             async with self._limiting:
                 await asyncio.sleep(_LATE_BATCH / MAX_LATE_PER_S)
 
-    async def _deliver(self, client: Client, way: _Way, message: OutgoingMessage) -> None:
+    async def _deliver(self, client: BrokerClient, way: _Way, message: OutgoingMessage) -> None:
         try:
             await self._publish(client, message.topic, message.payload, retain=message.retain)
             way.outbox.acknowledged(message)
@@ -197,43 +203,22 @@ class Connection:
         if self._stop.is_set():
             way.outbox.arrived.set()  # the last acknowledgement ends the loop
 
-    async def _send_live(self, client: Client) -> None:
+    async def _send_live(self, client: BrokerClient) -> None:
         while True:
             await self._live.live_arrived.wait()
             messages = self._live.take_live()
             # All at once, so that they go out in one write; the next are taken once these are sent.
             await asyncio.gather(*(client.publish(f"{self._root}/{topic}", messages[topic]) for topic in messages))
 
-    async def _publish(self, client: Client, topic: str, payload: bytes, *, retain: bool) -> None:
-        await client.publish(f"{self._root}/{topic}", payload, qos=_AT_LEAST_ONCE, retain=retain)
+    async def _publish(self, client: BrokerClient, topic: str, payload: bytes, *, retain: bool) -> None:
+        await client.publish_acknowledged(f"{self._root}/{topic}", payload, retain=retain)
 
-    async def _publish_death(self, client: Client, reason: str) -> None:
+    async def _publish_death(self, client: BrokerClient, reason: str) -> None:
         client.timeout = DEATH_TIMEOUT_S  # also of the DISCONNECT that follows
         with suppress(MqttError, TimeoutError):
             async with asyncio.timeout(DEATH_TIMEOUT_S if reason == "failed" else ACKNOWLEDGE_TIMEOUT_S):
                 payload = self._state_messages.death(reason)
                 await client.publish(f"{self._root}/state", payload, qos=_AT_LEAST_ONCE, retain=True, timeout=math.inf)
-
-
-def password_of(settings: Mqtt) -> str | None:
-    """Return the content of `[mqtt] password_file`, or None where there is none.
-
-    Raises
-    ------
-    OSError
-        It cannot be read, or is not UTF-8.
-    """
-    if settings.password_file is None:
-        return None
-    try:
-        return settings.password_file.read_text(encoding="utf-8").strip()
-    except UnicodeDecodeError:
-        raise OSError(f"{settings.password_file} is not UTF-8. Write [mqtt] password_file again as text") from None
-
-
-def tls_context(settings: Mqtt) -> ssl.SSLContext | None:
-    """Return the TLS context of `[mqtt] tls` and `ca_file`; without a file it trusts the system's authorities."""
-    return ssl.create_default_context(cafile=settings.ca_file) if settings.tls else None
 
 
 def _first(group: BaseExceptionGroup[MqttError]) -> MqttError:

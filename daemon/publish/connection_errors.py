@@ -8,15 +8,52 @@ from typing import TYPE_CHECKING
 
 from aiomqtt import MqttCodeError
 
+from regolithd.daemon.publish.broker_client import PublishRefusedError
+from regolithd.daemon.publish.tls_probe import NO_TLS_THERE, tls_problem
+
 if TYPE_CHECKING:
-    from regolithd.daemon.config.configuration import Mqtt
+    from regolithd.daemon.config.broker import BrokerSettings
 
-_PASSWORD_CODES = (4, 5, 134, 135)  # CONNACK of MQTT 3.1.1, and what paho makes of it
+_CREDENTIALS_CODES = (4, 5, 134, 135)  # CONNACK of MQTT 3.1.1 and of MQTT 5
+_SESSION_TAKEN_OVER = 142
+_OF_ALERT = {
+    "CERTIFICATE_EXPIRED": "the client certificate has expired. Renew [mqtt] cert_file, or correct the broker's clock",
+    "UNKNOWN_CA": "the broker does not know the authority of the client certificate. Correct [mqtt] cert_file: it must"
+    " be issued by the authority in the broker's cafile",
+    "CERTIFICATE_REQUIRED": "the broker requires a client certificate. Set [mqtt] cert_file and key_file",
+    "HANDSHAKE_FAILURE": "the broker refuses this client's TLS. Set [mqtt] cert_file and key_file, if it requires them",
+    "CERTIFICATE_REVOKED": "the client certificate is revoked. Replace [mqtt] cert_file",
+}
+"""What the broker says of the client: the end of the alert's name in OpenSSL (RFC 8446, 6.2)."""
+_OF_VERIFICATION = {
+    9: "the broker's certificate is not valid yet. Set this computer's clock",
+    10: "the broker's certificate has expired. Renew it, or set this computer's clock",
+    18: "the broker's certificate is self-signed. Name it, or its authority, in [mqtt] ca_file",
+    19: "the authority of the broker's certificate is not known. Name it in [mqtt] ca_file",
+    20: "the authority of the broker's certificate is not known. Name it in [mqtt] ca_file",
+    62: "the broker's certificate is for another host name. Correct [mqtt] host, or issue it with"
+    " this name as subjectAltName",
+    64: "the broker's certificate is for another address. Correct [mqtt] host, or issue it with this address as"
+    " subjectAltName",
+}
+"""What this side finds wrong with the broker: OpenSSL's X509_V_ERR_… codes."""
 
 
-def reason_of(error: Exception, settings: Mqtt) -> str:
-    """Return what happened, and what to do where that is known."""
-    place = f"MQTT broker {settings.host}:{settings.port}"
+async def explain(error: Exception, settings: BrokerSettings) -> str:
+    """Return what happened, and what to do where that is known; tries TLS where the error itself does not say it."""
+    cause = _root(error)
+    if _may_be_tls(error, cause):
+        found = await tls_problem(settings)
+        if isinstance(found, str):
+            return f"{_place(settings)}: {found}."
+        if found is not None:
+            return f"{_place(settings)}: {_tls_text(found)}."
+    return reason_of(error, settings)
+
+
+def reason_of(error: Exception, settings: BrokerSettings) -> str:
+    """Return what happened by the error alone, and what to do where that is known."""
+    place = _place(settings)
     cause = _root(error)
     match cause:
         case socket.gaierror():
@@ -24,13 +61,23 @@ def reason_of(error: Exception, settings: Mqtt) -> str:
         case ConnectionRefusedError():
             return f"{place}: connection refused. Start the broker, or correct [mqtt] port."
         case ssl.SSLError():
-            return f"{place}: TLS failed: {cause.reason}. Correct [mqtt] tls and ca_file, or the broker's certificate."
+            return f"{place}: {_tls_text(cause)}."
         case TimeoutError():
             return f"{place}: no answer. Check the network, and that the broker responds."
         case OSError():
             return f"{place}: {cause}."
         case _:
-            return f"{place}: {_refusal(error)}"
+            return f"{place}: {_refusal(error, settings)}"
+
+
+def _place(settings: BrokerSettings) -> str:
+    return f"MQTT broker {settings.host}:{settings.port}"
+
+
+def _may_be_tls(error: Exception, cause: BaseException) -> bool:
+    """Return whether the connection ended without a reason."""
+    lost = isinstance(error, MqttCodeError) and not isinstance(error, PublishRefusedError) and _is_lost(error)
+    return isinstance(cause, TimeoutError | ConnectionResetError | BrokenPipeError) or lost
 
 
 def _root(error: Exception) -> BaseException:
@@ -41,11 +88,34 @@ def _root(error: Exception) -> BaseException:
     return found or error
 
 
-def _refusal(error: Exception) -> str:
-    if "Disconnected" in str(error) or "connection was lost" in str(error):
-        return "the connection was lost. If it repeats immediately, another client uses the same [rover] name."
+def _tls_text(error: ssl.SSLError) -> str:
+    if isinstance(error, ssl.SSLCertVerificationError):
+        other = f"TLS failed: {error.verify_message}. Correct [mqtt] ca_file, or the broker's certificate"
+        return _OF_VERIFICATION.get(error.verify_code, other)
+    reason = error.reason or ""
+    if isinstance(error, ssl.SSLEOFError) or reason == "WRONG_VERSION_NUMBER":
+        return NO_TLS_THERE
+    known = next((text for alert, text in _OF_ALERT.items() if reason.endswith(alert)), None)
+    return known or f"TLS failed: {reason}. Correct [mqtt] tls, the certificates, or the broker's settings"
+
+
+def _is_lost(error: Exception) -> bool:
+    return "Disconnected" in str(error) or "connection was lost" in str(error)
+
+
+def _refusal(error: Exception, settings: BrokerSettings) -> str:
+    if isinstance(error, PublishRefusedError):
+        return (
+            f"{settings.client} may not publish on {error.topic}. Correct [mqtt] username or cert_file, [rover] name,"
+            " or the broker's access rules."
+        )
     code = getattr(error.rc, "value", error.rc) if isinstance(error, MqttCodeError) else None
-    if code in _PASSWORD_CODES:
+    if code == _SESSION_TAKEN_OVER or _is_lost(error):
+        return "the connection was lost. If it repeats immediately, another client uses the same [rover] name."
+    if code in _CREDENTIALS_CODES and settings.username is None:
+        who = "the client certificate" if settings.cert_file else "a client without a user name"
+        return f"{who} is refused. Set [mqtt] username and password_file, or correct the broker's access rules."
+    if code in _CREDENTIALS_CODES:
         return (
             "user name or password refused. Correct [mqtt] username and password_file, or the broker's password file."
         )

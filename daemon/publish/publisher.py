@@ -20,15 +20,16 @@ from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
-from aiomqtt import MqttError
+from aiomqtt import MqttError, ProtocolVersion
 
 from regolithd.daemon.messages.channels import CHANNELS
 from regolithd.daemon.messages.header import Header, iso_time, time_fields
 from regolithd.daemon.messages.health import PublishingReport
 from regolithd.daemon.messages.state import Presence, StateMessage
 from regolithd.daemon.publish.backoff import Backoff
+from regolithd.daemon.publish.broker_client import lacks_mqtt_5
 from regolithd.daemon.publish.connection import Connection
-from regolithd.daemon.publish.connection_errors import reason_of
+from regolithd.daemon.publish.connection_errors import explain
 from regolithd.daemon.publish.encode import encode
 from regolithd.daemon.publish.outbox import Outbox
 
@@ -104,6 +105,7 @@ class Publisher:
         self._version = software_version()
         self._stop = asyncio.Event()
         self._connection: Connection | None = None
+        self._protocol = ProtocolVersion.V5
         self._connections = 0
         self._sequences: Counter[str] = Counter()
         self._problem = ""
@@ -210,11 +212,17 @@ class Publisher:
         while not self._stop.is_set():
             self._connections += 1
             outboxes = (self._snapshots, self._others)
-            self._connection = Connection(self._settings, self._root, outboxes, self, self._stop)
+            self._connection = Connection(
+                self._settings, self._root, outboxes, self, self._stop, protocol=self._protocol
+            )
             try:
                 await self._connection.run(self._on_connected, self._beat)
             except (MqttError, OSError) as error:  # OSError: the password file, the certificates
-                self._on_disconnected(error)
+                if lacks_mqtt_5(error) and self._protocol is ProtocolVersion.V5:
+                    self._protocol = ProtocolVersion.V311
+                    continue
+                self._beat()
+                self._on_disconnected(await explain(error, self._settings))
                 await self._pause(self._backoff.next())
 
     async def _pause(self, delay_s: float) -> None:
@@ -234,9 +242,8 @@ class Publisher:
             self._stores.queued,
         )
 
-    def _on_disconnected(self, error: Exception) -> None:
+    def _on_disconnected(self, reason: str) -> None:
         """Log why there is no connection: as a warning once, for repeated attempts at debug level."""
-        reason = reason_of(error, self._settings)
         if self._up_since is not None and time.monotonic() - self._up_since > STABLE_CONNECTION_S:
             self._backoff.reset()
         self._up_since = None

@@ -52,6 +52,7 @@ class Mosquitto:
     port: int = field(default_factory=unused_port)
     settings: str = "allow_anonymous true\n"
     host: str = "127.0.0.1"
+    own_listener: bool = True  # False: `settings` have the listener of `port`
     process: subprocess.Popen[bytes] | None = None
 
     @property
@@ -68,7 +69,8 @@ class Mosquitto:
         assert program is not None
         configuration = self.folder / "mosquitto.conf"
         # Started by root it would change to user mosquitto, who may not read the test's folder.
-        configuration.write_text(f"listener {self.port} {self.host}\nuser root\n{self.settings}")
+        listener = f"listener {self.port} {self.host}\n" if self.own_listener else ""
+        configuration.write_text(f"{listener}user root\n{self.settings}")
         with (self.folder / "mosquitto.log").open("ab") as log:
             self.process = subprocess.Popen(
                 [program, "-c", configuration], stdout=log, stderr=log, stdin=subprocess.DEVNULL

@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+import grp
+import os
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.parameters import Drivetrain
@@ -13,7 +20,7 @@ from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.simulator.scenario import Hidden, Scenario
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Iterator
 
     from regolithd.daemon.config.configuration import Configuration
 
@@ -29,12 +36,19 @@ no_load_current_std_A = 0.001
 gain_relative_std = 0.03
 [posterior]
 soil = "sandy-loam"
+[bus]
+interface = "virtual"
 [recording]
 directory = "recordings"
+[control]
+socket = "control.sock"
+group = "{grp.getgrgid(os.getgid()).gr_name}"
 [mqtt]
 host = "127.0.0.1"
 port = {{port}}
+spool_directory = "spool"
 """
+PROCESS_TIMEOUT_s = 30
 
 
 def drive_traverse(
@@ -55,3 +69,19 @@ def drive_traverse(
     to_ns = start_ns + int((duration_s - 10) * SECOND)
     Traversed(from_ns=start_ns + 10 * SECOND, to_ns=to_ns, ending="finished").write(recordings)
     return configuration
+
+
+@contextmanager
+def daemon(folder: Path) -> Iterator[None]:
+    """Run the daemon of this folder's `rover.toml`, without nodes, while the context lasts."""
+    program = Path(__file__).with_name("daemon_without_nodes.py")
+    with subprocess.Popen([sys.executable, program, folder / "rover.toml"]) as process:
+        deadline = time.monotonic() + PROCESS_TIMEOUT_s
+        try:
+            while not (folder / "control.sock").exists():
+                assert process.poll() is None
+                assert time.monotonic() < deadline
+                time.sleep(0.1)
+            yield
+        finally:
+            process.terminate()

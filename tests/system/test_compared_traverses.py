@@ -5,13 +5,14 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+import time
 from typing import TYPE_CHECKING
 
 import pytest
 from broker import mosquitto_program
 from ground_rig import GroundRig, until
 from playwright.sync_api import expect
-from recorded_traverse import drive_traverse
+from recorded_traverse import daemon, drive_traverse
 
 from regolithd.daemon.closed_loop.simulated_drive import START_NS
 
@@ -32,9 +33,19 @@ def traverse_and_compare(rig: GroundRig, number: int, drag: float) -> str:
     """Drive, compare as systemd does after a traverse, and return what the command prints."""
     drive_traverse(rig.folder, rig.broker.port, DURATION_S, drag, 3 + number, START_NS + number * HOUR_NS)
     command = [sys.executable, "-m", "regolithd", "compare", "--config", rig.folder / "rover.toml"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=200)
+    with daemon(rig.folder):
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=200)
+        until(lambda: done.returncode or is_stored(rig, number), "the ground has the result")
     assert done.returncode == 0, done.stderr
     return " ".join(done.stdout.split())
+
+
+def is_stored(rig: GroundRig, number: int) -> bool:
+    """Return whether the ground has the result of the traverse of this number."""
+    rovers = rig.get("/api/state")["rovers"]
+    result = rovers.get("kapvik", {"latest": {}})["latest"].get("mismatch")
+    stamp = time.strftime("%Y%m%dT%H%M", time.gmtime(START_NS // 1e9 + number * 3600 + 10))
+    return result is not None and stamp in result["recording"]
 
 
 def accept_corrected(folder: Path) -> None:

@@ -82,13 +82,13 @@ def _machine() -> Iterator[None]:
     for name, folder in (("conf", "/etc/mosquitto/conf.d"), ("acl", "/etc/mosquitto")):
         shutil.copy(ROOT / f"systemd/mosquitto/regolith.{name}", folder)
     passwords = Path("/etc/mosquitto/regolith.passwd")
-    run("mosquitto_passwd", "-c", "-b", passwords, "regolithd", PASSWORD)
+    run("mosquitto_passwd", "-c", "-b", passwords, "kapvik", PASSWORD)
     run("mosquitto_passwd", "-b", passwords, "operator", PASSWORD)
     for path in (passwords, Path("/etc/mosquitto/regolith.acl")):
         shutil.chown(path, "mosquitto")
     run("install", "-m", "640", "-g", "regolithd", "/dev/stdin", "/etc/regolithd/mqtt-password", text=PASSWORD)
     set_line("channel", '"vcan0"')
-    set_line("username", '"regolithd"')
+    set_line("username", '"kapvik"')
     set_line("password_file", '"/etc/regolithd/mqtt-password"')
     done = run("systemctl", "restart", "mosquitto", check=False)
     assert done.returncode == 0, journal("mosquitto") + Path("/var/log/mosquitto/mosquitto.log").read_text()

@@ -16,7 +16,7 @@ from regolithd.calibration.mismatch.simulation.toml_place import line_of
 from regolithd.calibration.mismatch.simulation.user_code import defined_at, user_line
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
 MODELS = 'model must be "rover-wheel", "package.module:ClassName" or "machine.fmu"'
 
@@ -40,7 +40,9 @@ def read_tables(path: Path) -> dict[str, Any]:
         raise SimulationError(f"{path} is not TOML: {error}.{cure}") from error
 
 
-def load_simulation(source: Path | Mapping[str, Any], *, beside: Path | None = None) -> Simulation:
+def load_simulation(
+    source: Path | Mapping[str, Any], *, beside: Path | None = None, announce: Callable[[str], None] = lambda _: None
+) -> Simulation:
     """Return the simulation that a SIM.toml, or its tables, name.
 
     A module or an FMU is looked for beside SIM.toml, or in `[simulation] path`, which is relative to SIM.toml.
@@ -49,6 +51,7 @@ def load_simulation(source: Path | Mapping[str, Any], *, beside: Path | None = N
     ----------
     source: path of SIM.toml, or its tables
     beside: the folder that `[simulation] path` is relative to; by default SIM.toml's own, or the current one
+    announce: called with a sentence before code that SIM.toml names is run: a Python module, or an FMU
 
     Raises
     ------
@@ -56,9 +59,9 @@ def load_simulation(source: Path | Mapping[str, Any], *, beside: Path | None = N
         When the model is unknown, cannot be loaded, or its tables are wrong; with file and line.
     """
     if not isinstance(source, Path):
-        return _loaded(source, beside or Path.cwd(), None)
+        return _loaded(source, beside or Path.cwd(), None, announce)
     try:
-        return _loaded(read_tables(source), beside or source.resolve().parent, source)
+        return _loaded(read_tables(source), beside or source.resolve().parent, source, announce)
     except SimulationError as error:
         if str(source) in str(error):
             raise
@@ -75,23 +78,26 @@ def model_folder(tables: Mapping[str, Any], beside: Path) -> Path:
     return beside / path
 
 
-def _loaded(tables: Mapping[str, Any], beside: Path, source: Path | None) -> Simulation:
+def _loaded(
+    tables: Mapping[str, Any], beside: Path, source: Path | None, announce: Callable[[str], None]
+) -> Simulation:
     table = tables.get("simulation", {})
     model = table.get("model") if isinstance(table, dict) else None
     if not isinstance(model, str):
         raise SimulationError(f"[simulation] {MODELS}, not {model!r}", ("simulation", "model"))
     _check_effects(tables.get("effects", []))
-    made = _of_model(model, tables, model_folder(tables, beside))
+    made = _of_model(model, tables, model_folder(tables, beside), announce)
     made.corrected_effects, made.source = stated_effects(tables), source
     return checked(made)
 
 
-def _of_model(model: str, tables: Mapping[str, Any], folder: Path) -> Simulation:
+def _of_model(model: str, tables: Mapping[str, Any], folder: Path, announce: Callable[[str], None]) -> Simulation:
     """Return the built-in simulation, an FMU, or a class of the user's own."""
     if model == "rover-wheel":
         from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel  # noqa: PLC0415  # soil physics
 
         return RoverWheel.from_tables(tables)
+    announce(f"running the code of {model} from {folder}, which SIM.toml names: use only files that you trust")
     if model.endswith(".fmu"):
         from regolithd.calibration.mismatch.simulation.fmu import FmuSimulation  # noqa: PLC0415  # needs FMPy
 

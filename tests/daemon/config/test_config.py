@@ -102,9 +102,20 @@ PATH_KEYS = (
     "recording.directory",
     "mqtt.password_file",
     "mqtt.ca_file",
+    "mqtt.cert_file",
+    "mqtt.key_file",
     "mqtt.spool_directory",
     "control.socket",
 )
+
+
+BESIDE = {
+    "password_file": 'username = "somebody"\n',
+    "ca_file": "tls = true\n",
+    "cert_file": 'tls = true\nkey_file = "key.pem"\n',
+    "key_file": 'tls = true\ncert_file = "cert.pem"\n',
+}
+"""What a key needs beside it."""
 
 
 def test_every_path_of_the_model_is_in_the_list_of_path_keys() -> None:
@@ -125,10 +136,9 @@ def test_a_relative_path_is_relative_to_the_folder_of_the_file(
 ) -> None:
     """The working directory does not matter, whichever key the path is under."""
     table, key = name.split(".")
-    username = 'username = "somebody"\n' if key == "password_file" else ""
     file = tmp_path / "rover" / "rover.toml"
     file.parent.mkdir()
-    file.write_text(f'[{table}]\n{key} = "below/mine"\n{username}')
+    file.write_text(f'[{table}]\n{key} = "below/mine"\n{BESIDE.get(key, "")}')
     monkeypatch.chdir(tmp_path)
     for given in (file, Path("rover/rover.toml")):
         assert getattr(getattr(read_configuration(given), table), key) == file.parent / "below" / "mine"
@@ -138,9 +148,24 @@ def test_a_relative_path_is_relative_to_the_folder_of_the_file(
 def test_an_absolute_path_is_not_changed(name: str) -> None:
     """The folder of the file does not matter for an absolute path."""
     table, key = name.split(".")
-    text = f'[{table}]\n{key} = "/some/where"\n' + ('username = "x"\n' if key == "password_file" else "")
+    text = f'[{table}]\n{key} = "/some/where"\n{BESIDE.get(key, "")}'
     read = parse_configuration(text, Path("/etc/regolithd/rover.toml"))
     assert getattr(getattr(read, table), key) == Path("/some/where")
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "found"),
+    [
+        ('tls = true\ncert_file = "a.pem"', "mqtt.key_file", "a file beside cert_file"),
+        ('tls = true\nkey_file = "a.key"', "mqtt.cert_file", "a file beside key_file"),
+        ('ca_file = "a.pem"', "mqtt.tls", "true beside ca_file"),
+        ('cert_file = "a.pem"\nkey_file = "a.key"', "mqtt.tls", "true beside cert_file"),
+        ('password_file = "a"', "mqtt.username", "a name beside password_file"),
+    ],
+)
+def test_credentials_of_which_a_part_is_missing_are_reported(text: str, key: str, found: str) -> None:
+    """A certificate needs its key, and both need TLS; otherwise a connection would be made without them."""
+    assert found in problems_of(f"[mqtt]\n{text}\n")[key]
 
 
 def test_only_the_motors_of_the_mirrored_wheels_are_mirrored() -> None:

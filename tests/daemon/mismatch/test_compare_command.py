@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import tomllib
+from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
-from recorded_traverse import ROVER, drive_traverse
+import typer
+from recorded_traverse import ROVER, daemon, drive_traverse
 from subscriber import Subscriber, listening, until
 from typer.testing import CliRunner
 
@@ -17,17 +20,24 @@ from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel
 from regolithd.daemon.cli import app
 from regolithd.daemon.closed_loop.simulated_drive import START_NS
+from regolithd.daemon.commands import compare
 from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.config.reader import read_configuration
 from regolithd.daemon.control.traversed import Traversed
 from regolithd.daemon.ground.web.reports import html
 from regolithd.daemon.mismatch.result import comparison_result
 from regolithd.daemon.mismatch.traverse import TraverseFiles, extract_last_traverse, simulation_toml
 from regolithd.daemon.publish.comparison import publish_comparison
+from regolithd.daemon.publish.publisher import Publisher
+from regolithd.daemon.publish.stores import Stores
 
 if TYPE_CHECKING:
+    from collections.abc import AsyncIterator
     from pathlib import Path
 
     from broker import Mosquitto
+
+    from regolithd.daemon.messages.mismatch import ComparisonResult
 
 DRAG = Effect(
     name="viscous-friction",
@@ -97,7 +107,10 @@ async def test_the_alarm_is_active_where_physics_is_missing_or_has_changed(
     (tmp_path / "a.html").write_text("<h1>found</h1>")
     files = TraverseFiles(tmp_path / "a.csv", tmp_path / "a.html", tmp_path / "a.json", tmp_path / "a.toml")
     configuration = Configuration.model_validate({"mqtt": {"host": "127.0.0.1", "port": mosquitto.port}})
-    await publish_comparison(configuration, comparison_result(answer, files, tmp_path / "SIM.toml"))
+    publisher = Publisher(configuration, Stores.open(tmp_path / "spool", 1_000_000))
+    async with delivering(publisher):
+        await publish_comparison(publisher, comparison_result(answer, files, tmp_path / "SIM.toml"))
+        await until(lambda: publisher.report.acknowledged == 3)
     async with listening(Subscriber(mosquitto.port)) as subscriber:
         await until(lambda: all(subscriber.of(topic) for topic in ("alarm/mismatch", "mismatch", "report")))
     (alarm,), (result,) = subscriber.of("alarm/mismatch"), subscriber.of("mismatch")
@@ -106,3 +119,41 @@ async def test_the_alarm_is_active_where_physics_is_missing_or_has_changed(
     assert result["text"] == text
     assert len(result["effects"]) == len(answer.effects)
     assert len(result["changes"]) == len(answer.changes)
+
+
+def comparison_of(folder: Path, report: Path) -> ComparisonResult:
+    """Return a result with this report."""
+    files = TraverseFiles(folder / "a.csv", report, folder / "a.json", folder / "a.toml")
+    return comparison_result(QUIET, files, folder / "SIM.toml")
+
+
+def test_without_a_daemon_the_result_is_not_published(tmp_path: Path) -> None:
+    """The status is that of an unavailable service, which systemd tries again."""
+    configuration = Configuration.model_validate({"control": {"socket": tmp_path / "none.sock"}})
+    with pytest.raises(typer.Exit) as ended:
+        compare._publish(configuration, comparison_of(tmp_path, tmp_path / "a.html"))
+    assert ended.value.exit_code == 69
+
+
+def test_no_file_outside_the_recordings_is_published(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A client of the control socket cannot have another file of the daemon's sent, and a report must be there."""
+    (tmp_path / "rover.toml").write_text(ROVER.format(port=1))
+    (tmp_path / "secret").write_text("secret")
+    configuration = read_configuration(tmp_path / "rover.toml")
+    with daemon(tmp_path):
+        for path, said in (("secret", "is not below"), ("recordings/none.html", "cannot be read")):
+            with pytest.raises(typer.Exit):
+                compare._publish(configuration, comparison_of(tmp_path, tmp_path / path))
+            assert said in capsys.readouterr().err
+
+
+@asynccontextmanager
+async def delivering(publisher: Publisher) -> AsyncIterator[None]:
+    """Run a publisher while the context lasts."""
+    runs = asyncio.create_task(publisher.run())
+    try:
+        yield
+    finally:
+        runs.cancel()
+        with suppress(asyncio.CancelledError):
+            await runs

@@ -1,0 +1,57 @@
+"""The settings of a connection to an MQTT broker: in `rover.toml` and in `ground.toml`."""
+
+from __future__ import annotations
+
+from pathlib import Path  # noqa: TC003  # pydantic reads it at run time
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field
+
+from regolithd.calibration.parameters import Table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+class BrokerSettings(Table):
+    """Address, topics, credentials and TLS of a connection.
+
+    `ca_file` holds the authorities whose broker certificates are accepted, by default those of the system. `cert_file`
+    and `key_file` are the client's own certificate and its private key, which must have no passphrase.
+    """
+
+    host: Annotated[str, Field(min_length=1)] = "localhost"
+    port: Annotated[int, Field(ge=1, le=65_535)] = 1883
+    prefix: Annotated[str, Field(pattern=r"^[^#+\s]*[^#+/\s]$")] = "regolith"
+    username: str | None = None
+    password_file: Path | None = None
+    tls: bool = False
+    ca_file: Path | None = None
+    cert_file: Path | None = None
+    key_file: Path | None = None
+    keepalive_s: Annotated[int, Field(ge=2, le=3600)] = 10
+
+    @property
+    def client(self) -> str:
+        """Whom the broker takes the client for: the user name, or the holder of the certificate."""
+        if self.username is not None:
+            return f"user {self.username!r}"
+        return f"the client of {self.cert_file}" if self.cert_file else "a client without a user name"
+
+
+def broker_contradictions(mqtt: BrokerSettings) -> Iterator[tuple[str, str, str, str]]:
+    """Yield key, expected value, found value and remedy of each contradiction between the settings."""
+    if mqtt.password_file is not None and mqtt.username is None:
+        yield "mqtt.username", "a name beside password_file", "nothing", "Set it, or remove password_file."
+    for given, missing in (("cert_file", "key_file"), ("key_file", "cert_file")):
+        if getattr(mqtt, given) is not None and getattr(mqtt, missing) is None:
+            yield f"mqtt.{missing}", f"a file beside {given}", "nothing", f"Set it, or remove {given}."
+    for key in ("ca_file", "cert_file", "key_file"):
+        if getattr(mqtt, key) is not None and not mqtt.tls:
+            yield (
+                "mqtt.tls",
+                f"true beside {key}",
+                "false",
+                f"Set it: certificates count with TLS only; or remove {key}.",
+            )
+            break

@@ -1,0 +1,69 @@
+"""aiomqtt's client with the broker's refusals: MQTT 5 acknowledges a message with a reason code.
+
+A broker whose access rules forbid a topic discards the message. To a client of MQTT 3.1.1 it acknowledges it all the
+same, so the message would be deleted from the store, and lost. Hence the daemon speaks MQTT 5, and 3.1.1 only with a
+broker that has no MQTT 5.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+from aiomqtt import Client, MqttCodeError
+
+if TYPE_CHECKING:
+    from paho.mqtt.client import Client as PahoClient
+    from paho.mqtt.properties import Properties
+    from paho.mqtt.reasoncodes import ReasonCode
+
+_UNSUPPORTED_PROTOCOL_VERSION = 132  # MQTT 5, 2.4; paho also gives it for return code 1 of MQTT 3.1.1
+_NOT_AUTHORIZED = 135
+_QUOTA_EXCEEDED = 151
+_log = logging.getLogger(__name__)
+
+
+class PublishRefusedError(MqttCodeError):
+    """The broker does not take messages of this client; it may do so later."""
+
+    def __init__(self, code: ReasonCode, topic: str) -> None:
+        super().__init__(code)
+        self.topic = topic
+
+
+class BrokerClient(Client):
+    """A client that notices when the broker refuses a message."""
+
+    def __init__(self, *arguments: Any, **keywords: Any) -> None:  # noqa: ANN401  # those of aiomqtt
+        super().__init__(*arguments, **keywords)
+        self._refusal: ReasonCode | None = None
+
+    def _on_publish(
+        self, client: PahoClient, userdata: object, mid: int, reason_code: ReasonCode, properties: Properties
+    ) -> None:
+        if reason_code.value in {_NOT_AUTHORIZED, _QUOTA_EXCEEDED}:
+            self._refusal = reason_code
+        elif reason_code.is_failure:  # it would be refused again: it must not block those behind it
+            _log.error("a message is refused by the broker, and lost: %s", reason_code)
+        super()._on_publish(client, userdata, mid, reason_code, properties)
+
+    async def publish_acknowledged(self, topic: str, payload: bytes, *, retain: bool) -> None:
+        """Publish at QoS 1, and return once the broker has acknowledged it.
+
+        Raises
+        ------
+        PublishRefusedError
+            The broker refused this message or, in the same connection, another one.
+        ValueError
+            No client can send this message.
+        MqttError
+            The connection is lost.
+        """
+        await self.publish(topic, payload, qos=1, retain=retain)
+        if self._refusal is not None:
+            raise PublishRefusedError(self._refusal, topic)
+
+
+def lacks_mqtt_5(error: Exception) -> bool:
+    """Return whether the broker refused the connection because of the protocol's version."""
+    return isinstance(error, MqttCodeError) and getattr(error.rc, "value", None) == _UNSUPPORTED_PROTOCOL_VERSION
