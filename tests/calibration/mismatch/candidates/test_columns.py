@@ -4,83 +4,38 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from golden import assert_golden
+from law_problem import (
+    CANDIDATES,
+    LOAD,
+    PREDICTED,
+    RELATIVE,
+    SIGN,
+    SPEED,
+    STEP_S,
+    TIME_S,
+    TIMES,
+    WARM,
+    WHEELS,
+    P,
+    problem,
+)
 
 from regolithd.calibration.mismatch.candidates.candidate import growth, onset_grid
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.candidates.load_cell_drift import OFFSETS, LoadCellDrift
-from regolithd.calibration.mismatch.data.recording import Recording
-from regolithd.calibration.mismatch.problem.prior import Prior
 from regolithd.calibration.mismatch.problem.problem import Problem
-from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
 
     Array = NDArray[np.float64]
-
-TIMES, WHEELS, STEP_S = 121, 4, 0.5
-CANDIDATES: dict[str, Candidate] = {candidate.name: candidate for candidate in library()}
-TIME_S = STEP_S * np.arange(TIMES)[:, None] * np.ones(WHEELS)
-SPEED = 0.3 * np.cos(TIME_S / 5) * np.array([1.0, 0.9, 1.1, 0.8]) + 0.01
-LOAD = 50.0 + 5 * np.sin(TIME_S / 7) + np.array([0.0, 2.0, -3.0, 1.0])
-
-
-class Linear(Simulation):
-    """current = (cohesion + friction angle × load) × strength of the soil's variants, against the motion."""
-
-    channel, unit = "current_A", "A"
-    parameters: ClassVar = {"cohesion_Pa": Prior(2.0, 0.1), "friction_angle_deg": Prior(0.05, 0.01)}
-
-    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
-        """Return a current that is linear in the parameters and in the load."""
-        soil = values["cohesion_Pa"] + values["friction_angle_deg"] * inputs["load_N"]
-        factor = values["stiffness_factor"] + 2 * values["shear_factor"] + 3 * values["slip_sinkage"]
-        return np.sign(inputs["speed"]) * soil * factor
-
-    def variants(self) -> Mapping[str, float]:
-        """Return a soil model's variants."""
-        return {"stiffness_factor": 1.0, "shear_factor": 0.0, "slip_sinkage": 0.0}
-
-
-def problem() -> Problem:
-    """Return a problem of a minute, four wheels in two rows, everything measured."""
-    recording = Recording(TIME_S[:, 0], np.zeros(TIMES, np.int64), (1, 2, 3, 4), {"load_N": LOAD, "speed": SPEED})
-    simulation = Linear()
-    values = {name: prior.value for name, prior in simulation.parameters.items()}
-    prediction = simulation.predict({"load_N": LOAD, "speed": SPEED}, {**simulation.variants(), **values})
-    covariates = {
-        "time": TIME_S,
-        "wheel_speed": SPEED,
-        "direction": np.sign(SPEED),
-        "wheel_acceleration": np.gradient(SPEED, STEP_S, axis=0),
-        "wheel_angle": np.cumsum(SPEED, axis=0) * STEP_S,
-        "torque": np.abs(prediction),
-        "temperature": -10 + TIME_S / 2 + np.arange(WHEELS),
-        "pitch": 0.1 * np.sin(TIME_S / 11),
-        "roll": 0.1 * np.cos(TIME_S / 13),
-        "yaw_rate": np.where(TIME_S > 30, 0.02, 0.0),
-        "slip": 0.1 + 0.05 * np.sin(TIME_S / 3),
-        "load": LOAD,
-        "place": 0.1 * TIME_S + np.array([0.3, 0.3, -0.3, -0.3]),
-    }
-    side, row = np.array([-1.0, 1.0, -1.0, 1.0]), np.array([0.0, 0.0, 1.0, 1.0])
-    mask = np.ones(SPEED.shape, np.bool_)
-    return Problem(recording, simulation, values, prediction, prediction, mask, covariates, side, row)
-
-
-P = problem()
-SIGN, PREDICTED = np.sign(SPEED), P.prediction
-RELATIVE = np.abs(PREDICTED) / 3.0
-WARM = P.covariates["temperature"]
 
 OF_ITS_OWN_RECORDING = {"load-cell-drift"}
 """Effects that are read from the recording itself: a cell's drift."""
@@ -232,6 +187,58 @@ def test_a_load_is_taken_relative_to_its_mean_and_a_cell_that_reads_zero_has_no_
     assert not left[:, 1].any()
     np.testing.assert_allclose(left[:, [0, 2, 3]], before[:, [0, 2, 3]], atol=1e-12)
     assert np.std(before[:, 3]) > 1e-3
+
+
+WARMEST_K = float(np.max(WARM)) - 20
+BELOW, ABOVE = (float(end(np.abs(PREDICTED))) / 4.5 - 1 for end in (np.min, np.max))
+AGREEING: list[tuple[str, Shape, str, dict[float, float]]] = [
+    (
+        "torque-constant-temperature",
+        {"reference_degC": 20.0},
+        "bent_per_K",
+        {0.004: 0.004, -0.1: 0.0, 9.0: 2 / 3 / WARMEST_K},
+    ),
+    ("torque-constant-temperature", {"reference_degC": 90.0}, "bent_per_K", {0.004: 0.004, 9.0: 9.0}),
+    (
+        "load-dependent-efficiency",
+        {"reference_size": 4.5},
+        "bent",
+        {0.3: 0.3, -0.3: -0.3, 9.0: 2 / 3 / ABOVE, -9.0: 2 / 3 / BELOW},
+    ),
+    ("sensor-delay", {"late": "current_A"}, "secant_s", {2.0: 2.0, 9.0: 6.0, 0.0: 0.05}),
+    ("sensor-delay", {"late": "speed"}, "input_secant_s", {2.0: 2.0, 9.0: 6.0, -1.0: 0.05}),
+]
+
+
+@pytest.mark.parametrize(("name", "shape", "key", "found"), AGREEING, ids=lambda value: str(value)[:30])
+def test_a_shape_follows_its_coefficient_until_both_agree(
+    name: str, shape: Shape, key: str, found: dict[float, float]
+) -> None:
+    """To two per cent, within what the law allows; then it is the same shape, and the engine stops."""
+    candidate = CANDIDATES[name]
+    assert BELOW < 0 < ABOVE
+    for value, expected in found.items():
+        moved = candidate.self_consistent_shape(P, {**shape, key: 0.7}, [value])
+        assert moved == {**shape, key: pytest.approx(expected)}
+        if expected:
+            near = {**shape, key: expected * 1.015}
+            assert candidate.self_consistent_shape(P, near, [value]) is near
+            assert candidate.self_consistent_shape(P, {**shape, key: expected * 0.97}, [value]) == moved
+    other: Shape = {"power": 1.0, "reference_size": 3.0}
+    assert CANDIDATES["load-dependent-efficiency"].self_consistent_shape(P, other, [0.5]) is other
+
+
+def test_a_delay_is_longer_than_sampling_leaves_open() -> None:
+    """A reading and a half at least; it is sought from half to twice the grid's, up to a tenth of the recording."""
+    delay = CANDIDATES["sensor-delay"]
+    shape: Shape = {"late": "current_A", "secant_s": 2.0}
+    assert [delay.plausible(P, shape, [seconds]) for seconds in (0.74, 0.75, 3.0)] == [False, True, True]
+    bounds = delay.bounds(P, shape)["secant_s"]
+    assert bounds == pytest.approx((0.05, 6.0))
+    assert delay.search_range(P, shape, "secant_s", bounds) == pytest.approx((1.0, 4.0))
+    assert delay.search_range(P, {**shape, "secant_s": 0.08}, "secant_s", bounds) == pytest.approx((0.05, 0.16))
+    assert delay.search_range(P, {**shape, "secant_s": 4.0}, "secant_s", bounds) == pytest.approx((2.0, 6.0))
+    assert delay.parameters(shape, [1.5]) == {"delay_s": 1.5}
 
 
 def beginning(whole: Problem, count: int) -> Problem:
