@@ -5,6 +5,8 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING
 
+from regolithd.daemon.control.metrics import NAME as METRICS
+from regolithd.daemon.control.metrics import MetricsSink
 from regolithd.daemon.control.protocol import CONNECTED
 from regolithd.daemon.control.server import ControlSink
 from regolithd.daemon.publish.comparison import publish_comparison
@@ -44,7 +46,9 @@ def connect_sinks(service: Service) -> None:
         beat=lambda: liveness.beat(CONTROL),
     )
     liveness.expect(CONTROL, CONTROL_TIMEOUT_S)
-    service.sinks += [MqttSink(service, publisher, control_problem=lambda: control.problem), control]
+    publishing = MqttSink(service, publisher, control_problem=lambda: control.problem)
+    metrics = MetricsSink(configuration.control.socket.with_name(METRICS), publishing.metrics)
+    service.sinks += [publishing, control, metrics]
 
 
 def open_stores(mqtt: Mqtt) -> Stores:

@@ -29,7 +29,18 @@ def group_id(group: str) -> int:
 
 def open_control_socket(path: Path, group: str) -> socket.socket:
     """Return a listening socket at `path`, which only the group's members (and root) may open."""
-    number = group_id(group)
+    remedy = f"The daemon's user must own the folder and be a member of {group!r}: [control] socket and group."
+    return open_socket(path, MODE, group_id(group), remedy)
+
+
+def open_socket(path: Path, mode: int, group: int | None = None, remedy: str = "") -> socket.socket:
+    """Return a listening socket at `path` with these permissions, and this group's number.
+
+    Raises
+    ------
+    ControlSocketError
+        It cannot be created; the message ends with `remedy`.
+    """
     _remove_stale(path)
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK | socket.SOCK_CLOEXEC)
     try:
@@ -39,14 +50,13 @@ def open_control_socket(path: Path, group: str) -> socket.socket:
             listener.bind(str(path))
         finally:
             os.umask(mask)
-        if path.stat().st_gid != number:
-            os.chown(path, -1, number)
-        path.chmod(MODE)
+        if group is not None and path.stat().st_gid != group:
+            os.chown(path, -1, group)
+        path.chmod(mode)
         listener.listen(8)
     except OSError as error:
         listener.close()
-        remedy = f"The daemon's user must own the folder and be a member of {group!r}: [control] socket and group."
-        raise ControlSocketError(f"{path}: {error.strerror or error}. {remedy}") from error
+        raise ControlSocketError(f"{path}: {error.strerror or error}. {remedy}".rstrip()) from error
     return listener
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from regolithd.daemon.messages.alarm import Severity, SoilChangeEvidence
+from regolithd.daemon.messages.alarm_guide import ALARM_GUIDE, NODE
 from regolithd.daemon.messages.header import iso_time
 from regolithd.daemon.pipeline.soil_change import soil_change_text, wheels_of
 from regolithd.drivers.can.bus import BusState
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from regolithd.drivers.master.status import NodeStatus
 
 NO_INTRUDERS = Intruders()
+_ELSEWHERE = {NODE, "mismatch"}
+"""Entries of the guide: nodes have one alarm each, and the comparison has its own."""
 _BUS_SEVERITY = {
     BusState.WARNING: Severity.WARNING,
     BusState.PASSIVE: Severity.ERROR,
@@ -79,25 +82,8 @@ def current_alarms(inputs: AlarmInputs) -> dict[str, Alarm]:
 
 
 def alarm_names(node_ids: Iterable[int]) -> tuple[str, ...]:
-    """Return the name of every alarm that there is."""
-    return (
-        "bus",
-        "kernel",
-        "node-id",
-        "master",
-        "unexpected-node",
-        "undecodable",
-        "store",
-        "recording",
-        "broker",
-        "model",
-        "control",
-        "clock",
-        "sensor",
-        "soil-change",
-        "event-rate",
-        *(f"node-{number}" for number in node_ids),
-    )
+    """Return the name of every alarm that is decided here."""
+    return (*(name for name in ALARM_GUIDE if name not in _ELSEWHERE), *(f"{NODE}-{number}" for number in node_ids))
 
 
 def _node_alarms(nodes: Iterable[NodeStatus]) -> Iterable[Alarm]:

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from regolithd.daemon.health.alarms import NO_INTRUDERS, Alarm, AlarmInputs, alarm_names, current_alarms
 from regolithd.daemon.health.event_throttle import EventThrottle
+from regolithd.daemon.health.prometheus import DaemonState, exposition
 from regolithd.daemon.health.rising_counts import RisingCounts
 from regolithd.daemon.health.stuck_sensor import StuckSensorDetector
 from regolithd.daemon.messages.alarm import AlarmMessage, Severity
 from regolithd.daemon.messages.bus import EmergencyMessage, EventMessage, IdentityReport, NodeMessage
-from regolithd.daemon.messages.header import iso_time
+from regolithd.daemon.messages.header import iso_time, time_fields
 from regolithd.daemon.messages.health import AcquisitionReport, HealthMessage, RecordingReport, SyncReport
 from regolithd.daemon.messages.odometry import OdometryMessage
 from regolithd.daemon.messages.posterior import PosteriorMessage
@@ -26,6 +27,7 @@ from regolithd.drivers.can.bus import BusState
 from regolithd.drivers.canopen.emcy import register_bits
 from regolithd.drivers.devices.decoding.decoder import Undecodable
 from regolithd.drivers.master.events import NodeEmergency
+from regolithd.drivers.master.status import NodePhase
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -244,6 +246,21 @@ class MqttSink:
             "recording": _recording_report(service),
             "tasks": service.liveness.ages_s(),
         }
+
+    def metrics(self) -> str:
+        """Return what `health` has, and the state of broker, nodes and alarms, as metrics of Prometheus."""
+        service, network = self._service, self._service.network
+        header = {"session": self.publisher.session, "sequence": 0, **time_fields(time.time_ns())}
+        nodes = network.status if network is not None else {}
+        return exposition(
+            DaemonState(
+                rover=service.configuration.rover.name,
+                health=HealthMessage.model_validate(header | self._health()),
+                connected=self.publisher.connected,
+                nodes={number: status.phase is NodePhase.OPERATIONAL for number, status in nodes.items()},
+                alarms={name: alarm is not None for name, alarm in self._published_alarms.items()},
+            )
+        )
 
     def _emergency_fields(self, event: NodeEmergency) -> dict[str, Any]:
         nodes = {node.node_id: node for node in self._service.configuration.described()}

@@ -61,7 +61,9 @@ function article(alarm, act) {
       ` ${alarm.name} `, el("span", { class: "severity" }, alarm.severity), " ",
       el("span", { class: "state" }, WORDS[alarm.state])),
     el("p", {}, alarm.text),
-    alarm.remedy ? el("p", { class: "remedy" }, alarm.remedy) : null,
+    el("p", { class: "remedy" }, alarm.remedy ? `${alarm.remedy} ` : "",
+      el("a", { href: `/alarms/${alarm.name}`, target: "_blank", "aria-label": `About the alarm ${alarm.name}` },
+        "What it means, and what to do")),
     evidence(alarm.evidence),
     el("p", { class: "history" }, history(alarm)),
     el("p", { class: "actions" }, ...buttons(alarm, act)));

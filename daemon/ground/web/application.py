@@ -14,6 +14,7 @@ from starlette.responses import FileResponse, RedirectResponse
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
+from regolithd.daemon.ground.web.alarm_pages import ALARM_ROUTES
 from regolithd.daemon.ground.web.api import Api
 from regolithd.daemon.ground.web.login import LoginPages
 from regolithd.daemon.ground.web.protection import Protection
@@ -41,6 +42,7 @@ def application(ground: Ground) -> Starlette:
     users = ground.settings.page.users
     logins = Logins(read_users(users), ground.connection, time.time) if users else None
     routes = [Route("/", _index), Route("/favicon.ico", _icon), *Api(ground).routes]
+    routes += ALARM_ROUTES
     routes += ReportPages(ground.settings.store.database).routes
     routes += LoginPages(logins, PAGE / "login.html").routes if logins else []
     static = Mount("/static", StaticFiles(directory=PAGE))
