@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
-from regolithd.calibration.mismatch.data.slow_channels import filled_between
+from regolithd.calibration.mismatch.data.slow_channels import bridged, filled_between
 
 TIME_S = 0.01 * np.arange(1000)
 
@@ -59,3 +59,39 @@ def test_the_predicted_channel_and_a_channel_declared_blank_are_left_alone() -> 
     found = filled_between(recorded(y=slow, x=slow), "y", {"x": "blank"})
     np.testing.assert_array_equal(found.channels["y"][:, 0], slow)
     np.testing.assert_array_equal(found.channels["x"][:, 0], slow)
+
+
+BLANKS = np.array([np.nan, 1.0, np.nan, np.nan, 4.0, np.nan, np.nan, 20.0, np.nan, 30.0])
+TWO_RUNS = np.repeat([0.0, 1.0], 5)
+TIMES = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 0.0, 1.0, 2.0, 3.0, 6.0])
+LINE = np.array([1.0, 1.0, 2.0, 3.0, 4.0, 20.0, 20.0, 20.0, 22.5, 30.0])
+HELD = np.array([1.0, 1.0, 1.0, 1.0, 4.0, 20.0, 20.0, 20.0, 20.0, 30.0])
+
+
+@pytest.mark.parametrize(
+    ("between", "other_way", "expected"),
+    [({}, False, LINE), ({"x": "linear"}, True, HELD), ({"x": "hold"}, False, HELD), ({"x": "hold"}, True, LINE)],
+)
+def test_blanks_are_bridged_within_a_run(between: dict[str, str], other_way: bool, expected: np.ndarray) -> None:
+    """By time on a straight line or held, and the ends of a run by the reading next to them."""
+    recording = from_columns({"t_s": TIMES, "run": TWO_RUNS, "x": BLANKS, "y": TIMES})
+    found, blanks = bridged(recording, ["x", "y", "absent"], between, other_way=other_way)  # type: ignore[arg-type]
+    np.testing.assert_allclose(found.channels["x"][:, 0], expected)
+    assert found.channels["y"] is recording.channels["y"]
+    assert set(found.channels) == {"x", "y"}
+    assert list(blanks) == ["x"]
+    np.testing.assert_array_equal(blanks["x"][:, 0], np.isnan(BLANKS))
+
+
+def test_what_stays_blank_is_not_said_to_be_bridged() -> None:
+    """A channel that is declared blank, one that was never measured, and a run or a wheel without a reading."""
+    half = np.where(TWO_RUNS == 1, np.nan, BLANKS)
+    recording = from_columns(
+        {"t_s": TIMES, "run": TWO_RUNS, "x": BLANKS, "half": half, "none": np.full(10, np.nan), "y": TIMES}
+    )
+    found, blanks = bridged(recording, ["x", "half", "none"], {"x": "blank"})
+    assert list(blanks) == ["half"]
+    np.testing.assert_array_equal(blanks["half"][:, 0], [True, False, True, True, False, *[False] * 5])
+    np.testing.assert_allclose(found.channels["half"][:, 0], [*LINE[:5], *[np.nan] * 5])
+    assert found.channels["x"] is recording.channels["x"]
+    assert found.channels["none"] is recording.channels["none"]

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
-from regolithd.calibration.mismatch.answer import Contribution
+from regolithd.calibration.mismatch.answer import Change, Contribution
 from regolithd.calibration.mismatch.candidates.library import library
-from regolithd.calibration.mismatch.changes import stated_in
+from regolithd.calibration.mismatch.changes import change_in_words, direction_of, stated_in
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.errors import SimulationError
 
@@ -128,3 +128,37 @@ def test_a_corrected_effect_whose_covariate_was_never_measured_is_one_message() 
         SimulationError, match="coulomb-friction depends on direction, which this recording does not have"
     ):
         compare(blank, WithoutDrag(), effects=[COULOMB])
+
+
+@pytest.mark.parametrize(
+    ("now", "low", "high", "direction"),
+    [
+        (0.05, -0.1, 0.2, "gone"),
+        (-0.05, -0.2, 0.1, "gone"),
+        (0.05, 0.0, 0.1, "gone"),
+        (-0.05, -0.1, 0.0, "gone"),
+        (0.05, 0.1, 0.0, "gone"),
+        (0.05, 0.02, 0.08, "smaller"),
+        (0.3, -0.1, 0.7, "smaller"),
+        (0.8, 0.7, 0.9, "smaller"),
+        (-0.8, -0.9, -0.7, "smaller"),
+        (1.2, 1.1, 1.3, "larger"),
+        (-1.2, -1.3, -1.1, "larger"),
+    ],
+)
+def test_an_effect_is_gone_where_it_is_small_and_may_be_zero(
+    now: float, low: float, high: float, direction: str
+) -> None:
+    """Below a tenth of what was corrected with 0 in its interval; else its size decides, whatever its sign."""
+    assert direction_of(Change("drag", "drag", 1.0, now, low, high)) == direction
+    assert direction_of(Change("drag", "drag", -2.0, -2 * now, -2 * low, -2 * high)) == direction
+
+
+def test_a_change_is_told_with_both_sizes_and_the_interval() -> None:
+    """In one sentence; an effect of size 0 can only have become larger."""
+    assert change_in_words(Change("drag", "drag_current", 0.62, 0.9137, 0.88, 0.94)) == (
+        "drag is larger than the corrected simulation has it: drag_current 0.9137 (90 % sure: 0.88 to 0.94), "
+        "corrected 0.62."
+    )
+    assert change_in_words(Change("drag", "d", 1.0, 0.01, -0.02, 0.04)).startswith("drag is gone: d 0.01 (90 % sure")
+    assert direction_of(Change("drag", "d", 0.0, 0.5, 0.4, 0.6)) == "larger"
