@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 Verdict = Literal["killed", "survived", "undecided"]
 
-LONGEST_S = 90.0
+LONGEST_S = 60.0
 """Time of the tests of one mutant, as measured without it: the nearest and quickest of them."""
 STARTING_CPU_S, SLOWER = 60, 5.0
 """Limit of CPU time: so much, and so many times what the tests took without the mutant."""

@@ -32,9 +32,11 @@ def even_edges(values: Array, bins: int) -> Array:
 
 
 def binned_means(values: Array, edges: Array, *quantities: Array) -> BinnedMeans:
-    """Return the means of quantities (n,) in bins of the values (n,); what is beyond the edges is in the outer bins."""
-    bins = len(edges) - 1
-    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
-    count = np.maximum(np.bincount(place, minlength=bins), 1)
-    at, *means = (np.bincount(place, quantity, bins) / count for quantity in (values, *quantities))
+    """Return the means of quantities (n,) in bins of the values (n,); what is beyond the edges is in the outer bins.
+
+    A bin without a value, between two that coincide with its edges, is left out.
+    """
+    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+    _, place, count = np.unique(place, return_inverse=True, return_counts=True)
+    at, *means = (np.bincount(place, quantity) / count for quantity in (values, *quantities))
     return BinnedMeans(at, count, tuple(means))

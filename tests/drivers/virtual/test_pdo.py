@@ -11,7 +11,7 @@ import pytest
 from virtual_master import LOAD_CELL_TPDO, MOTOR_TPDO, AbortedError, DriveUnderTest, Master
 
 from regolithd.drivers.virtual import Bench, Measurement
-from regolithd.drivers.virtual.pdo import EnabledPdo
+from regolithd.drivers.virtual.pdo import EnabledPdo, usable
 
 
 class Tilted(Bench):
@@ -169,3 +169,26 @@ def test_an_enabled_pdo_may_be_written_again_and_a_disabled_one_moved() -> None:
     master.write(11, 0x1800, 3, 100, 2)
     master.write(11, 0x1800, 1, 0x20B, 4)
     assert master.read(11, 0x1800, 1) == 0x20B
+
+
+RESTRICTED = [
+    (0x000, 0x000),  # NMT
+    (0x001, 0x07F),
+    (0x080, 0x080),  # SYNC
+    (0x101, 0x180),
+    (0x581, 0x5FF),  # SDO, server to client
+    (0x601, 0x67F),  # SDO, client to server
+    (0x6E0, 0x6FF),
+    (0x701, 0x77F),  # heartbeats
+    (0x780, 0x7FF),
+]
+"""CiA 301, table 39; 0x700 and what lies between them are left to PDOs there, here not."""
+
+
+def test_a_pdo_has_none_of_the_restricted_identifiers() -> None:
+    """Of all 2048; whether bit 31 disables it does not matter, and a 29-bit identifier is none of this node's."""
+    restricted = {number for first, last in RESTRICTED for number in range(first, last + 1)} | {0x700}
+    assert {number for number in range(0x800) if not usable(number)} == restricted
+    assert usable(0x8000_0181)
+    assert not usable(0x8000_0080)
+    assert not usable(0x2000_0181)
