@@ -225,3 +225,13 @@ async def test_what_cannot_brake_is_not_enabled(tmp_path: Path, sets: dict[str, 
         assert len(rig.reports) == 1
         assert said in rig.reports[0]
         assert rig.stranger.state == "disabled"
+
+
+def test_a_brake_without_a_gear_turns_with_its_wheel() -> None:
+    """Half of the rated torque against the wheel's is 500 per mille the other way; its limit is kept both ways."""
+    plain = BrakeDescription(NODE, wheel=0)
+    assert (plain.gear_ratio, plain.mirrored) == (1.0, False)
+    assert plain.target_permille(2.0, 4.0) == -500
+    assert plain.target_permille(-9.0, 4.0) == 1000
+    assert plain.target_permille(9.0, 4.0, limit_permille=300) == -300
+    assert plain.target_permille(float("nan"), 4.0) == 0
