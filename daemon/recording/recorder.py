@@ -22,6 +22,7 @@ from typing import IO, TYPE_CHECKING
 
 from regolithd.daemon.recording.candump import frame_line
 from regolithd.daemon.recording.content import ESTIMATE, EVENT, SNAPSHOT, estimate_json, snapshot_json
+from regolithd.daemon.recording.layout import write_layout
 from regolithd.daemon.recording.mcap_file import McapFile
 from regolithd.daemon.recording.schemas import schema
 
@@ -154,6 +155,7 @@ class Recorder:
         folder = self._settings.directory
         folder.mkdir(parents=True, exist_ok=True)
         self._make_room()
+        write_layout(folder)
         stem = _next_stem(folder, self._now_ns())
         log = stem.with_suffix(".log").open("x", encoding="ascii")
         log.writelines(frame_line(frame, self._interface) for frame in self._preamble())

@@ -8,7 +8,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 from regolithd.daemon.pipeline.pipeline import Chain
 from regolithd.daemon.recording.candump import open_log, read_log
-from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, estimate_json, snapshot_json, with_current_names
+from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, as_written_today, estimate_json, snapshot_json
 from regolithd.daemon.recording.digest import Digest
 from regolithd.daemon.recording.mcap_file import read_messages
 
@@ -70,7 +70,7 @@ def _recorded(mcap: Path) -> dict[tuple[str, int], dict[str, Any]]:
     if not mcap.is_file():
         return {}
     return {
-        (message.topic, message.content["sequence"]): with_current_names(message.content)
+        (message.topic, message.content["sequence"]): as_written_today(message.content)
         for message in read_messages(mcap)
         if message.topic in {SNAPSHOT, ESTIMATE}
     }

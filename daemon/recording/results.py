@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.daemon.pipeline.snapshot import BODY_QUANTITIES, WHEEL_QUANTITIES, WHEELS
-from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, with_current_names
+from regolithd.daemon.recording.content import ESTIMATE, ESTIMATED, SNAPSHOT, as_written_today, six
 from regolithd.daemon.recording.mcap_file import open_mcap, read_messages
 
 if TYPE_CHECKING:
@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-ESTIMATED = ("wheel_torque_Nm", "smoothed_torque_Nm", "smoothed_load_N", "slip", "cohesion_Pa", "friction_angle_rad")
-FLAGS = ("valid", "outside_training_range")
+OUTSIDE = "outside_training_range"
 POSTERIOR = ("cohesion_Pa", "friction_angle_rad", "drawbar_margin")
 LEVELS = ("mean", "low_90", "low_50", "median", "high_50", "high_90")
 ALARM = ("soil_change", "soil_change_torque_ratio", "soil_change_onset_s")
@@ -61,16 +60,17 @@ def read_results(
     """Read MCAP files in their order; `on_gap` and errors are those of `read_messages`."""
     instants = list(_instants(recordings, opening, on_gap))
     of_wheels = {
-        each.name: _six([instant.measured.get(each.name) for instant in instants])
+        each.name: _of_wheels(each.name, [instant.measured for instant in instants])
         for each in WHEEL_QUANTITIES
         if not each.flags
     }
-    of_wheels |= {name: _six([instant.estimated.get(name) for instant in instants]) for name in ESTIMATED}
-    of_wheels["valid"] = _six([instant.estimated.get("valid") for instant in instants])
-    outside = [[float(bool(names)) for names in instant.estimated.get("outside", [])] or None for instant in instants]
-    of_wheels["outside_training_range"] = _six(outside)
+    estimated = [instant.estimated for instant in instants]
+    of_wheels |= {name: _of_wheels(name, estimated) for name in (*ESTIMATED, "valid")}
+    outside = [{name: bool(each[name]) for name in six(OUTSIDE) if name in each} for each in estimated]
+    of_wheels[OUTSIDE] = _of_wheels(OUTSIDE, outside)
     of_rover = {
-        each.name: _six([instant.measured.get(each.name) for instant in instants])[:, 0] for each in BODY_QUANTITIES
+        each.name: np.array([instant.measured.get(each.name) for instant in instants], np.float64)
+        for each in BODY_QUANTITIES
     }
     of_rover |= _posterior(instants) | _alarm(instants)
     return Results(np.array([instant.time_ns for instant in instants], np.int64), of_wheels, of_rover)
@@ -88,18 +88,18 @@ def _instants(
             if message.topic == SNAPSHOT:
                 if measured is not None:
                     yield _Instant(measured["time_ns"], measured, {})
-                measured = message.content
+                measured = as_written_today(message.content)
             elif message.topic == ESTIMATE and measured is not None:
-                yield _Instant(measured["time_ns"], measured, with_current_names(message.content))
+                yield _Instant(measured["time_ns"], measured, as_written_today(message.content))
                 measured = None
         if measured is not None:
             yield _Instant(measured["time_ns"], measured, {})
 
 
-def _six(rows: list[Any]) -> Array:
-    """Return shape (time, 6); a missing row, or a missing value in it, is NaN."""
-    nothing = [None] * WHEELS
-    return np.array([nothing if row is None else row for row in rows], np.float64).reshape(len(rows), WHEELS)
+def _of_wheels(name: str, messages: list[dict[str, Any]]) -> Array:
+    """Return shape (time, 6); NaN where a message has no value."""
+    names = six(name)
+    return np.array([[message.get(each) for each in names] for message in messages], np.float64).reshape(-1, WHEELS)
 
 
 def _posterior(instants: list[_Instant]) -> dict[str, Array]:

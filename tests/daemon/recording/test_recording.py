@@ -3,10 +3,12 @@
 import json
 import math
 import os
+import re
 import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +19,7 @@ from regolithd.daemon.config.configuration import Configuration, Recording
 from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.pipeline.pipeline import Chain
 from regolithd.daemon.recording.candump import frame_line, parse_line, read_log
-from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, snapshot_from_json
+from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, six, snapshot_from_json
 from regolithd.daemon.recording.digest import Digest, _flattened
 from regolithd.daemon.recording.mcap_file import McapFile, read_messages, read_metadata
 from regolithd.daemon.recording.recorder import Recorder, _oldest_first
@@ -176,11 +178,11 @@ def test_a_disk_that_others_fill_costs_old_recordings_first(
 
     for hour in range(3):
         record(hour)
-    before = sorted(tmp_path.iterdir(), key=lambda path: (path.stat().st_mtime_ns, path.name))
+    before = sorted(tmp_path.glob("rover-*"), key=lambda path: (path.stat().st_mtime_ns, path.name))
     assert len(before) == 6
     monkeypatch.setattr(
         "regolithd.daemon.recording.recorder.shutil.disk_usage",
-        lambda folder: shutil._ntuple_diskusage(0, 0, 10**9 if len(list(folder.iterdir())) <= 4 else 0),
+        lambda folder: shutil._ntuple_diskusage(0, 0, 10**9 if len(list(folder.glob("rover-*"))) <= 4 else 0),
     )
     record(3)
     assert not before[0].exists()
@@ -252,7 +254,7 @@ def test_the_oldest_files_go_first_whatever_the_clock_says(
 
 def recorder_paths(folder: Path, known: list[Path]) -> list[Path]:
     """Return the two new files of a folder, the MCAP file first."""
-    return sorted(set(folder.iterdir()) - set(known), key=lambda path: path.suffix, reverse=True)
+    return sorted(set(folder.glob("rover-*")) - set(known), key=lambda path: path.suffix, reverse=True)
 
 
 def test_numbers_that_are_not_are_null(drive: Callable, configuration: Configuration, tmp_path: Path) -> None:
@@ -267,10 +269,19 @@ def test_numbers_that_are_not_are_null(drive: Callable, configuration: Configura
         )
 
 
+def as_lists(content: dict[str, Any]) -> dict[str, Any]:
+    """Return a snapshot or estimate with a list of six, and null, as version 0.1 wrote them."""
+    names = {match[1] for name in content if (match := re.fullmatch(r"(.+)_[1-6]", name))}
+    lists: dict[str, Any] = {name: [content.get(each) for each in six(name)] for name in names}
+    if outside := lists.pop("outside_training_range", None):
+        lists["outside"] = [text.split(", ") if text else [] for text in outside]
+    return {name: value for name, value in content.items() if name[:-2] not in names} | lists
+
+
 def test_a_recording_of_version_0_1_is_compared_under_todays_names(
     tmp_path: Path, drive: Callable, configuration: Configuration
 ) -> None:
-    """Its `belief` is compared with today's `posterior`, and a difference in the last bit is found."""
+    """Its lists of six and its `belief` are compared under today's names; a difference in the last bit is found."""
     calibrated = {"no_load_current_A": 0.037, "no_load_current_std_A": 0.001, "gain_relative_std": 0.03}
     configuration = Configuration.model_validate(configuration.model_dump() | {"drivetrain": calibrated})
     mcap, log, digest = recorded(tmp_path, list(drive(rate_Hz=2.0).frames(20)), configuration)
@@ -280,7 +291,7 @@ def test_a_recording_of_version_0_1_is_compared_under_todays_names(
         old = McapFile(mcap.open("wb"), {})
         posteriors = 0
         for message in messages:
-            content = dict(message.content)
+            content = as_lists(message.content)
             if posterior := content.pop("posterior", None):
                 posteriors += 1
                 interval = posterior["cohesion_Pa"] | {"mean": factor * posterior["cohesion_Pa"]["mean"]}

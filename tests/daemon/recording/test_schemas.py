@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any, get_args
 
+import jsonschema
 import pytest
 from estimates import estimate
 from mcap.reader import make_reader
@@ -16,10 +17,15 @@ from regolithd.daemon.config.configuration import Recording
 from regolithd.daemon.pipeline.snapshot import SoilChange
 from regolithd.daemon.recording.recorder import Recorder
 from regolithd.daemon.recording.schemas import SCHEMAS
+from regolithd.daemon.service import event_json
+from regolithd.drivers.canopen.emcy import Emergency
+from regolithd.drivers.master.events import Identity, NetworkEvent
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
+
+    from mcap.records import Schema
 
 SCALARS = {"number", "integer", "string", "boolean"}
 
@@ -62,12 +68,30 @@ def test_the_schema_in_the_file_names_every_field_of_the_messages(tmp_path: Path
     posterior = Posterior(interval, interval, interval, wheels=6, instants=20)
     recorder = Recorder(Recording(directory=tmp_path), "vcan0", {})
     recorder.estimate(replace(estimate(), posterior=posterior, soil_change=change))
+    recorder.estimate(estimate(missing_wheel=2))
     recorder.close()
     (path,) = tmp_path.glob("*.mcap")
     with path.open("rb") as stream:
-        found = {schema.name: (schema, message) for schema, _, message in make_reader(stream).iter_messages() if schema}
+        found: dict[str, tuple[Schema, list[Any]]] = {}
+        for schema, _, message in make_reader(stream).iter_messages():
+            if schema is not None:
+                found.setdefault(schema.name, (schema, []))[1].append(json.loads(message.data))
     for topic in ("snapshot", "estimate"):
-        schema, message = found[topic]
+        schema, messages = found[topic]
         told = names(json.loads(schema.data))
-        assert names(json.loads(message.data)) - told <= {"/outside"}
-    assert {"/posterior/cohesion_Pa/median", "/soil_change/alarm/torque_ratio"} <= told
+        for message in messages:
+            assert names(message) <= told
+            jsonschema.validate(message, json.loads(schema.data))
+        assert "null" not in json.dumps(messages)
+    assert {"/posterior/cohesion_Pa/median", "/soil_change/alarm/torque_ratio", "/outside_training_range_5"} <= told
+    first, second = found["snapshot"][1]
+    assert "load_N_3" in first
+    assert "load_N_3" not in second
+
+
+@pytest.mark.parametrize("event", get_args(NetworkEvent), ids=lambda event: event.__name__)
+def test_the_schema_of_events_names_every_field_of_every_event(event: type) -> None:
+    """An event may carry an object of its own, as the identity of a node that booted."""
+    own = {"identity": Identity(1, 2, 3, 4, 5), "emergency": Emergency(1, 2, 3, 4, b"", "")}
+    made = event(**{field.name: own.get(field.name, 0) for field in fields(event)})
+    assert names(json.loads(event_json(made))) <= names(SCHEMAS["event"])
