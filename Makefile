@@ -96,7 +96,7 @@ pictures: reproduce ## docs/*.svg from the results of sizing, reproduce, evaluat
 	$(BIN)/regolithd pictures
 	$(BIN)/python -m regolithd.daemon.demo.screenshot docs/demo.svg
 
-screenshots: $(DEV) ## docs/ground-*.png: the ground page while a virtual rover drives (4 min; needs mosquitto and chromium)
+screenshots: $(DEV) ## docs/ground-*.png: the ground page while a virtual rover drives, and after a comparison (5 min; needs mosquitto and chromium)
 	PYTHONPATH=tests/bench $(BIN)/python tests/bench/ground_pictures.py docs
 
 picture: $(DEV) ## the README's first figure: the head of a report (needs chromium)

@@ -36,9 +36,9 @@ def models_or_exit(configuration: Configuration) -> OnnxModels:
 
 
 def recorded_configuration(recording: Path) -> Configuration:
-    """Return the configuration that a recording was made with; the defaults where it holds none.
+    """Return the configuration that a recording was made with.
 
-    Prints why and exits where it is damaged.
+    Prints why and exits where there is none, or it is damaged.
     """
     from regolithd.daemon.recording.eds_files import with_recorded_eds  # noqa: PLC0415
     from regolithd.daemon.recording.mcap_file import (  # noqa: PLC0415  # only few commands read recordings
@@ -50,7 +50,8 @@ def recorded_configuration(recording: Path) -> Configuration:
         metadata = read_metadata(recording) if recording.is_file() else {}
         content = metadata.get("configuration")
         if not content:
-            return Configuration()
+            why = "holds no configuration" if recording.is_file() else "is not there"
+            _end([f"{recording} {why}, so the rover is unknown. Give its rover.toml with --config."])
         configuration = with_recorded_eds(Configuration.model_validate_json(content), metadata)
         configuration.described()
     except (DamagedRecordingError, ValidationError, DescriptionError) as error:

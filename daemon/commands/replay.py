@@ -24,7 +24,8 @@ def replay(
 ) -> None:
     """Recompute all estimates from candump logs, and compare them with the recording (MCAP) beside the first log.
 
-    Prints counters and a digest of all numbers. Exit status 1 if a recorded message differs.
+    Prints counters and a digest of all numbers. Exit status 1 if a recorded message differs, or if there is nothing to
+    replay or, without `--config`, to compare with.
     """
     from regolithd.daemon.recording.mcap_file import DamagedRecordingError
     from regolithd.daemon.recording.progress import open_text
@@ -61,3 +62,7 @@ def replay(
         raise typer.Exit(1)
     if result.compared:
         typer.echo(f"identical  to the last bit with the {result.compared} messages recorded then")
+        return
+    typer.echo(f"compared   with nothing: no {beside.name} beside the log has these snapshots", err=True)
+    if config is None or not result.digest.count:
+        raise typer.Exit(1)

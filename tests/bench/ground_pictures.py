@@ -2,11 +2,15 @@
 
     python tests/bench/ground_pictures.py FOLDER
 
-Writes ground-light.png, ground-dark.png and ground-phone.png; takes four minutes.
+Then, for ground-mismatch.png, three traverses with a drag that `rover.toml` does not know, as in
+`tests/system/test_compared_traverses.py`. Writes ground-light.png, -dark.png, -phone.png and -mismatch.png; takes five
+minutes.
 """
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 import sys
 import tempfile
 import time
@@ -15,6 +19,9 @@ from pathlib import Path
 from broker import Mosquitto
 from ground_rig import GroundRig, chromium, until
 from playwright.sync_api import Browser, sync_playwright
+from recorded_traverse import HOUR_NS, drive_traverse
+
+from regolithd.daemon.closed_loop.simulated_drive import START_NS
 
 SCENARIO = """
 [[ground.stretches]]
@@ -25,6 +32,7 @@ soil = "lete-sand"
 """
 OUTAGE_AFTER_S, OUTAGE_S = 60, 12
 AFTER_ALARM_S = 25
+ONLY_COMPARISON = "#presence, #wheels, #track, #log, #plots, #nodes, #downloads { display: none !important }"
 LOOKS = {
     "light": {"viewport": {"width": 1400, "height": 1120}},
     "dark": {"viewport": {"width": 1400, "height": 1120}, "color_scheme": "dark"},
@@ -57,6 +65,36 @@ def photograph(browser: Browser, rig: GroundRig, folder: Path) -> None:
         page.close()
 
 
+def compare_traverses(folder: Path, port: int) -> None:
+    """Drive three traverses and compare each; the second and third with the corrected simulation of the first."""
+    for number, drag in enumerate((1.2e-4, 1.2e-4, 2.4e-4)):
+        drive_traverse(folder, port, 300.0, drag, 3 + number, START_NS + number * HOUR_NS)
+        subprocess.run([sys.executable, "-m", "regolithd", "compare", "--config", folder / "rover.toml"], check=True)
+        if number == 0:
+            (corrected,) = (folder / "recordings/comparisons").glob("*.corrected.toml")
+            shutil.copy(corrected, folder / "SIM.toml")
+
+
+def photograph_comparison(browser: Browser, folder: Path) -> None:
+    """Write the picture of alarm and comparison after the third traverse."""
+    with tempfile.TemporaryDirectory() as temporary:
+        place = Path(temporary)
+        rig = GroundRig(place, Mosquitto(place))
+        try:
+            rig.broker.start()
+            rig.start_ground()
+            compare_traverses(place, rig.broker.port)
+            page = browser.new_page(viewport={"width": 880, "height": 900}, bypass_csp=True)
+            page.goto(f"{rig.url}/#kapvik")
+            page.add_style_tag(content=ONLY_COMPARISON)
+            page.locator("#comparison tbody tr").wait_for()
+            page.locator("#rover").screenshot(path=folder / "ground-mismatch.png")
+            page.close()
+        finally:
+            rig.end()
+            rig.broker.stop()
+
+
 def main(folder: Path) -> None:
     """Drive and photograph."""
     with tempfile.TemporaryDirectory() as temporary, sync_playwright() as playwright:
@@ -67,6 +105,7 @@ def main(folder: Path) -> None:
             drive(rig)
             browser = playwright.chromium.launch(executable_path=chromium(), args=["--no-sandbox"])
             photograph(browser, rig, folder)
+            photograph_comparison(browser, folder)
         finally:
             rig.end()
             rig.broker.stop()

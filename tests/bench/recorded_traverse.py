@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
 
 SECOND = 1_000_000_000
+HOUR_NS = 3600 * SECOND
 NO_LOAD_A = 0.037
 ROVER = f"""
 [nodes]

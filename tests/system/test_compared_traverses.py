@@ -12,7 +12,7 @@ import pytest
 from broker import mosquitto_program
 from ground_rig import GroundRig, until
 from playwright.sync_api import expect
-from recorded_traverse import daemon, drive_traverse
+from recorded_traverse import HOUR_NS, daemon, drive_traverse
 
 from regolithd.daemon.closed_loop.simulated_drive import START_NS
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.skipif(mosquitto_program() is None, reason="no broker here: apt-get install mosquitto")
 DRAG = 1.2e-4
 """A s/rad at the motor: at a usual speed 45 % of the mean current."""
-HOUR_NS = 3_600_000_000_000
 DURATION_S = 300.0
 
 

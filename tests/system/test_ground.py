@@ -141,7 +141,9 @@ def test_a_latching_alarm_of_another_rover_shows_its_evidence_and_needs_a_reset(
     for text in ("04:00:00", "1, 2", "29 %", "11.1, 10.8", "91 %", "60 %", "71 %"):
         expect(alarm.locator(".evidence")).to_contain_text(text)
     page.locator("#who").fill("Grace")
-    alarm.get_by_label("Shelve soil-change for").select_option("15 min")
+    alarm.get_by_label("Shelve soil-change for").select_option("1 h")
+    expect(alarm.locator(".state")).to_have_text("latched, unacknowledged")
+    alarm.get_by_role("button", name="Shelve").press("Enter")
     expect(alarm.locator(".state")).to_have_text("shelved")
     expect(alarm).to_contain_text("by Grace")
     alarm.get_by_role("button", name="Unshelve").click()

@@ -48,11 +48,14 @@ function buttons(alarm, act) {
   if (alarm.state === "shelved") return [button("Unshelve", { action: "unshelved" }, "unshelve")];
   if (ACKNOWLEDGEABLE.has(alarm.state)) made.push(button("Acknowledge", { action: "acknowledged" }, "acknowledge"));
   if (alarm.state === "latched-acknowledged") made.push(button("Reset", { action: "reset" }, "reset"));
-  const choice = el("select", {
-    "aria-label": `Shelve ${alarm.name} for`, "data-focus": `${alarm.name}-shelve`,
-    onchange: (event) => act(alarm.name, { action: "shelved", minutes: Number(event.target.value) }),
-  }, el("option", { value: "" }, "Shelve …"), ...SHELVING.map(([minutes, label]) => el("option", { value: minutes }, label)));
-  return [...made, choice];
+  // A button of its own: arrow keys move through the times without doing anything.
+  const choice = el("select", { "aria-label": `Shelve ${alarm.name} for`, "data-focus": `${alarm.name}-minutes` },
+    ...SHELVING.map(([minutes, label]) => el("option", { value: minutes }, label)));
+  const shelve = el("button", {
+    type: "button", "data-focus": `${alarm.name}-shelve`, "aria-label": `Shelve: ${alarm.name}`,
+    onclick: () => act(alarm.name, { action: "shelved", minutes: Number(choice.value) }),
+  }, "Shelve for");
+  return [...made, el("span", { class: "shelve" }, shelve, choice)];
 }
 
 function article(alarm, act) {

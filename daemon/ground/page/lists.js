@@ -36,14 +36,14 @@ function figures(value) {
 
 function effectRow(effect) {
   const interval = `${figures(effect.low)} to ${figures(effect.high)}`;
-  return el("tr", {}, el("th", { scope: "row" }, effect.name), el("td", {}, effect.where),
+  return el("tr", {}, el("th", { scope: "row" }, effect.name), el("td", {}, effect.where || effect.statement),
     el("td", {}, `${figures(effect.size)} ${effect.unit}`), el("td", {}, interval));
 }
 
 export function showComparison(rover, message) {
   replace(content("comparison"), JSON.stringify([rover, message ?? null]), () => {
     if (!message) return [el("p", { class: "none" }, "None yet: it is made after each traverse.")];
-    const names = ["effect", "where", "size", "90 % interval"];
+    const names = ["effect", "where, or what it was", "size", "90 % interval"];
     const found = [...message.effects, ...message.changes];
     return [
       el("p", { class: `verdict ${message.verdict}` }, el("b", {}, message.verdict), ` ${message.text}`),
@@ -51,7 +51,7 @@ export function showComparison(rover, message) {
         el("table", {}, el("thead", {}, el("tr", {}, ...names.map((name) => el("th", { scope: "col" }, name)))),
           el("tbody", {}, ...found.map(effectRow)))) : null,
       el("p", { class: "history" }, `${message.recording} · ${moment(message.time)} · `,
-        el("a", { href: `/report/${encodeURIComponent(rover)}`, target: "_blank" }, "report"), ` · on the rover: ${message.report}`),
+        el("a", { href: `/report/${encodeURIComponent(rover)}`, target: "_blank" }, "report"), " · on the rover: ", el("span", { title: message.report }, message.report.split("/").at(-1))),
     ].filter(Boolean);
   });
 }
