@@ -19,7 +19,7 @@ from pathlib import Path
 from broker import Mosquitto
 from ground_rig import GroundRig, chromium, until
 from playwright.sync_api import Browser, sync_playwright
-from recorded_traverse import HOUR_NS, drive_traverse
+from recorded_traverse import HOUR_NS, daemon, drive_traverse
 
 from regolithd.daemon.closed_loop.simulated_drive import START_NS
 
@@ -69,7 +69,8 @@ def compare_traverses(folder: Path, port: int) -> None:
     """Drive three traverses and compare each; the second and third with the corrected simulation of the first."""
     for number, drag in enumerate((1.2e-4, 1.2e-4, 2.4e-4)):
         drive_traverse(folder, port, 300.0, drag, 3 + number, START_NS + number * HOUR_NS)
-        subprocess.run([sys.executable, "-m", "regolithd", "compare", "--config", folder / "rover.toml"], check=True)
+        with daemon(folder):
+            subprocess.run([sys.executable, "-m", "regolithd", "compare", "--config", folder / "rover.toml"], check=True)
         if number == 0:
             (corrected,) = (folder / "recordings/comparisons").glob("*.corrected.toml")
             shutil.copy(corrected, folder / "SIM.toml")
