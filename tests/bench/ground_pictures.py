@@ -30,9 +30,11 @@ until_m = 6.5
 [[ground.stretches]]
 soil = "lete-sand"
 """
+COMPARE = (sys.executable, "-m", "regolithd", "compare", "--config")
 OUTAGE_AFTER_S, OUTAGE_S = 60, 12
 AFTER_ALARM_S = 25
-ONLY_COMPARISON = "#presence, #wheels, #track, #log, #plots, #nodes, #downloads { display: none !important }"
+OTHERS = "#presence, #wheels, #track, #log, #plots, #nodes, #downloads, [data-alarm^=node]"
+"""What the picture of a comparison leaves out: the daemon that publishes it has no nodes."""
 LOOKS = {
     "light": {"viewport": {"width": 1400, "height": 1120}},
     "dark": {"viewport": {"width": 1400, "height": 1120}, "color_scheme": "dark"},
@@ -70,7 +72,7 @@ def compare_traverses(folder: Path, port: int) -> None:
     for number, drag in enumerate((1.2e-4, 1.2e-4, 2.4e-4)):
         drive_traverse(folder, port, 300.0, drag, 3 + number, START_NS + number * HOUR_NS)
         with daemon(folder):
-            subprocess.run([sys.executable, "-m", "regolithd", "compare", "--config", folder / "rover.toml"], check=True)
+            subprocess.run([*COMPARE, folder / "rover.toml"], check=True)
         if number == 0:
             (corrected,) = (folder / "recordings/comparisons").glob("*.corrected.toml")
             shutil.copy(corrected, folder / "SIM.toml")
@@ -87,7 +89,7 @@ def photograph_comparison(browser: Browser, folder: Path) -> None:
             compare_traverses(place, rig.broker.port)
             page = browser.new_page(viewport={"width": 880, "height": 900}, bypass_csp=True)
             page.goto(f"{rig.url}/#kapvik")
-            page.add_style_tag(content=ONLY_COMPARISON)
+            page.add_style_tag(content=f"{OTHERS} {{ display: none !important }}")
             page.locator("#comparison tbody tr").wait_for()
             page.locator("#rover").screenshot(path=folder / "ground-mismatch.png")
             page.close()
