@@ -10,7 +10,7 @@ RECORDINGS ?= ../shared/recordings
 
 .PHONY: help demo test check docs clean install uninstall
 .PHONY: interop
-.PHONY: figures
+.PHONY: figures chaos fuzz
 .PHONY: sizing reproduce evaluate loop prove prove-machines real scaling thresholds mutations mutants frames pictures picture screenshots
 
 help:
@@ -83,6 +83,12 @@ mutants: $(DEV) ## mutation testing on a random sample (SEED=… COUNT=… ONLY=
 interop: $(DEV) ## slaves of other stacks, from CANOPENLINUX=FOLDER and LELY=FOLDER; docs/reference/interop.md
 	PYTHONPATH=src:tests/bench tests/bench/with-vcan $(BIN)/python tests/interop/run.py \
 		$(if $(CANOPENLINUX),--canopenlinux $(CANOPENLINUX)) $(if $(LELY),--lely $(LELY))
+
+chaos: $(DEV) ## a daemon on SocketCAN under faults in random order, checked from outside (SECONDS=1800 SEED=…)
+	PYTHONPATH=src:tests/bench:tests/chaos tests/bench/with-vcan $(BIN)/python tests/chaos/chaos.py --seconds $(or $(SECONDS),1800) --seed $(or $(SEED),1)
+
+fuzz: $(DEV) ## random damage to everything that is read from others (SECONDS=3600 SEED=…)
+	PYTHONPATH=src:tests/bench:tests/fuzz $(BIN)/python tests/fuzz/fuzzing.py --seconds $(or $(SECONDS),3600) --seed $(or $(SEED),1)
 
 figures: $(DEV) ## docs/reference/figures.md from build/figures/{chaos,holds,fuzz,bench,audit}.json, those that are there
 	$(BIN)/python tests/bench/figures_page.py

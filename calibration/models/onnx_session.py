@@ -38,6 +38,6 @@ def open_session(path: Path, remedy: str) -> onnxruntime.InferenceSession:
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = 3
     try:
-        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+        return onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"], enable_fallback=False)
     except Exception as error:  # onnxruntime's errors have no common base class
         raise ModelError(f"{path}: damaged, or not an ONNX model ({error}). {remedy}") from error

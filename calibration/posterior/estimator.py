@@ -136,8 +136,8 @@ class PosteriorEstimator:
         self._session = open_session(path, REMEDY)
         if {each.name: each.shape[-1] for each in self._session.get_inputs()}.get("known") != KNOWN:
             raise PosteriorModelError(f"{path}: was trained with other inputs. {REMEDY}")
-        metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
         try:
+            metadata: Mapping[str, str] = self._session.get_modelmeta().custom_metadata_map
             targets = json.loads(metadata["regolithd.targets"])
             self.version = metadata["regolithd.version"]
             self.radius_m = float(metadata["regolithd.radius_m"])
@@ -147,6 +147,19 @@ class PosteriorEstimator:
             self._unit = np.array([float(target["unit"]) for target in targets])
         except (KeyError, ValueError, TypeError) as error:
             raise PosteriorModelError(f"{path}: its metadata are not a posterior's: {error}. {REMEDY}") from error
+        self._run_once(path)
+
+    def _run_once(self, path: Path) -> None:
+        """Run it on one empty window, so that a model that does not fit is refused at the start."""
+        zeros = {
+            each.name: np.zeros([size if isinstance(size, int) else 1 for size in each.shape], np.float32)
+            for each in self._session.get_inputs()
+        }
+        try:
+            (raw,) = self._session.run(None, zeros)
+            unpack(raw, self._centre, self._unit)
+        except Exception as error:  # onnxruntime's errors have no common class
+            raise PosteriorModelError(f"{path}: does not run on a window: {error}. {REMEDY}") from error
 
     def mixtures(self, windows: Windows) -> Mixture:
         """Return the posterior of each window."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import os
+import socket
 import sys
+import time
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +31,9 @@ class ControlError(Exception):
 
 EX_UNAVAILABLE = 69
 EX_NOPERM = 77
+CONNECT_TIMEOUT_S = 5.0
+"""Time for a connection while others wait for theirs; the daemon accepts sixteen at a time."""
+CONNECT_RETRY_S = 0.02
 INSTALLED = Path("/etc/regolithd/rover.toml")
 
 
@@ -66,11 +71,30 @@ class ControlConnection:
         return REPLY.validate_json(line)
 
 
+async def _connected(path: Path) -> socket.socket:
+    """Return a socket that is connected; while too many others wait to be accepted, try again."""
+    connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK)
+    deadline = time.monotonic() + CONNECT_TIMEOUT_S
+    while True:
+        try:
+            connection.connect(str(path))
+        except BlockingIOError:  # EAGAIN, connect(2): asyncio would take it for a connection under way
+            if time.monotonic() > deadline:
+                connection.close()
+                raise
+            await asyncio.sleep(CONNECT_RETRY_S)
+        except OSError:
+            connection.close()
+            raise
+        else:
+            return connection
+
+
 @asynccontextmanager
 async def control_connection(path: Path) -> AsyncIterator[ControlConnection]:
     """Open the control socket."""
     try:
-        reader, writer = await asyncio.open_unix_connection(path, limit=LINE_LIMIT)
+        reader, writer = await asyncio.open_unix_connection(sock=await _connected(path), limit=LINE_LIMIT)
     except (FileNotFoundError, ConnectionRefusedError) as error:
         remedy = "Start it (`systemctl start regolithd`), or give its configuration with --config."
         raise ControlError(f"No daemon is running: no answer at {path}. {remedy}", EX_UNAVAILABLE) from error

@@ -92,7 +92,7 @@ class AbsentTerrainNetwork:
 def _card(path: Path, session: onnxruntime.InferenceSession) -> ModelCard:
     try:
         card = read_card(session.get_modelmeta().custom_metadata_map)
-    except ModelCardError as error:
+    except (ModelCardError, UnicodeDecodeError) as error:
         raise TerrainModelError(
             f"{path}: its metadata do not fit: {error}. Train it with `regolithd train`."
         ) from error

@@ -237,7 +237,8 @@ class Spool:
             return list(islice(self._recent, index - self._recent[0].index, None))
         for segment in self._segments:
             if index < segment.end and (left := self._readable(segment, index)):
-                return left
+                # What the disk refused before this file is in memory alone.
+                return [record for record in self._recent if index <= record.index < left[0].index] or left
         return list(self._recent)
 
     def _readable(self, segment: Segment, index: int) -> list[Record]:

@@ -109,4 +109,5 @@ async def each(actions: Iterable[Awaitable[None]]) -> list[DriverError]:
 
 
 def _drive_error(failures: Sequence[DriverError]) -> DriveError:
-    return DriveError("; ".join(str(failure) for failure in failures))
+    """Return one error that names each cause once: of a link that is down, every drive says the same."""
+    return DriveError("; ".join(dict.fromkeys(str(failure) for failure in failures)))

@@ -122,8 +122,8 @@ group = "{os.getgid()}"
     def ask(self, request: dict[str, Any]) -> dict[str, Any]:
         """Return the daemon's answer to one request over the control socket."""
         with socket.socket(socket.AF_UNIX) as connection:
+            connection.connect(str(self.folder / "control.sock"))  # waits while others wait to be accepted
             connection.settimeout(TIMEOUT_S)
-            connection.connect(str(self.folder / "control.sock"))
             connection.sendall(json.dumps(request).encode() + b"\n")
             with connection.makefile() as lines:
                 answer: dict[str, Any] = json.loads(lines.readline())

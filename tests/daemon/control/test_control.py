@@ -248,7 +248,7 @@ async def test_clients_are_told_why_they_cannot_speak_to_the_daemon(
         raise PermissionError(13, "Permission denied")
 
     with monkeypatch.context() as patch:
-        patch.setattr(asyncio, "open_unix_connection", forbidden)
+        patch.setattr("regolithd.daemon.control.client._connected", forbidden)
         assert "usermod -aG regolithd" in str(error := await failure())
         assert error.exit_status == 77
 

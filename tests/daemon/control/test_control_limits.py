@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+import time
 from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +13,7 @@ from subscriber import until
 
 from regolithd.daemon.config.configuration import Configuration, Control
 from regolithd.daemon.control import server
+from regolithd.daemon.control.client import control_connection
 from regolithd.daemon.control.protocol import Accepted
 from regolithd.daemon.control.server import MAX_CLIENTS, ControlSink
 from regolithd.daemon.control.socket import ControlSocketError
@@ -109,3 +111,29 @@ async def test_a_socket_that_cannot_be_made_is_tried_every_five_seconds(
     assert tried[:3] == [0, 10, 20]
     assert pauses[:10] == [(number, 0.5) for number in range(1, 11)]
     assert sink.problem == "no such group"
+
+
+async def test_a_client_waits_while_the_queue_of_connections_is_full(tmp_path: Path) -> None:
+    """Where too many wait to be accepted, a client tries again and is connected, instead of failing at once."""
+    path = tmp_path / "control.sock"
+    listener = socket.socket(socket.AF_UNIX)
+    listener.bind(str(path))
+    listener.listen(1)
+    waiting = []
+    while True:
+        waiting.append(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK))
+        try:
+            waiting[-1].connect(str(path))
+        except BlockingIOError:
+            break
+
+    def accept_later() -> None:
+        time.sleep(0.2)
+        for _ in waiting:  # of these the last is not connected; the client's is
+            listener.accept()[0].close()
+
+    accepting = asyncio.create_task(asyncio.to_thread(accept_later))
+    async with control_connection(path):
+        await accepting
+    for each in (*waiting, listener):
+        each.close()
