@@ -151,6 +151,14 @@ def test_a_predicted_column_that_is_always_zero_is_refused(tmp_path: Path) -> No
         use(tmp_path, "import", "import", {**columns(), "force_N": np.zeros(ROWS)})
 
 
+@pytest.mark.parametrize("sign", ["", "-"])
+def test_an_infinite_value_is_no_measurement(sign: str, tmp_path: Path) -> None:
+    """A derived channel that is 0 but for a division by zero was not measured either."""
+    bad = f"force_N=np.where(np.arange({ROWS})[:, None] == 5, {sign}np.inf, 0.0), "
+    with pytest.raises(MismatchError, match="is 0 wherever it was measured"):
+        use(tmp_path, "with_channels(", f"with_channels({bad}", columns())
+
+
 def test_a_missing_column_is_also_a_key_error() -> None:
     """A class may catch it as it would catch that of a dict, and its text has no quotes around it."""
     error = MissingColumnError("x", "there is no x")
