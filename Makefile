@@ -9,7 +9,7 @@ export PYTHON
 RECORDINGS ?= ../shared/recordings
 
 .PHONY: help demo test check docs clean install uninstall
-.PHONY: interop
+.PHONY: interop first-day week
 .PHONY: figures chaos fuzz
 .PHONY: sizing reproduce evaluate loop prove prove-machines real scaling thresholds mutations mutants frames pictures picture screenshots
 
@@ -30,6 +30,9 @@ check: $(DEV) ## lint, format, types and import rules alone
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+first-day: ## type the README's commands, but those with sudo, in a fresh clone in FOLDER (10 min)
+	python3 tests/bench/typed_readme.py $(or $(FOLDER),build/first-day)
 
 docs: $(DEV) ## documentation site in build/site; a warning or a broken link is an error
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
@@ -101,6 +104,10 @@ pictures: reproduce ## docs/*.svg from the results of sizing, reproduce, evaluat
 	test ! -f build/loop/loop.svg || cp build/loop/loop.svg docs/loop.svg
 	$(BIN)/regolithd pictures
 	$(BIN)/python -m regolithd.daemon.demo.screenshot docs/demo.svg
+
+week: $(DEV) ## the ground's store with a week of one rover at 10 Hz: size and times (10 min, 5 GB of disk)
+	mkdir -p build/figures
+	PYTHONPATH=tests/bench $(BIN)/python tests/bench/ground_week.py build/figures/week.json
 
 screenshots: $(DEV) ## docs/ground-*.png: the ground page while a virtual rover drives, and after a comparison (5 min; needs mosquitto and chromium)
 	PYTHONPATH=tests/bench $(BIN)/python tests/bench/ground_pictures.py docs

@@ -91,18 +91,21 @@ def _run(settings: GroundSettings) -> None:
     from regolithd.daemon.ground.ground import Ground
     from regolithd.daemon.ground.store.database import StoreError
     from regolithd.daemon.ground.web.application import application, serve
+    from regolithd.daemon.ground.web.listen import PageError, check_certificate, listen
     from regolithd.daemon.ground.web.users import UsersError
 
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
 
     async def run() -> None:
+        check_certificate(settings.page)
+        listening = listen(settings.page)
         ground = Ground(settings)
         app = application(ground)
         typer.echo(f"{settings.page.url} shows what {settings.mqtt.host}:{settings.mqtt.port} receives")
-        await serve(ground, app)
+        await serve(ground, app, listening)
 
     try:
         asyncio.run(run())
-    except (StoreError, UsersError) as error:
+    except (PageError, StoreError, UsersError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error

@@ -25,14 +25,15 @@ def used_bytes(connection: sqlite3.Connection) -> int:
 
 
 def trim(connection: sqlite3.Connection, limits: Store, now_ns: int) -> int:
-    """Delete one batch of what is beyond the limits; return how many messages, 0 once it is within them."""
+    """Delete one batch of what is beyond the limits; return how many messages, 0 once it is within them.
+
+    Only the messages that were received first are looked at: a search by time would read the whole store.
+    """
     oldest_ns = now_ns - int(limits.keep_days * _DAY_NS)
     too_large = used_bytes(connection) > limits.limit_MB * 1e6
-    where, values = ("1", ()) if too_large else ("time_ns < ?", (oldest_ns,))
-    rows = connection.execute(
-        f"SELECT id, time_ns FROM message WHERE {where} ORDER BY id LIMIT {BATCH}",  # noqa: S608  # constants
-        values,
-    ).fetchall()
+    rows = connection.execute(f"SELECT id, time_ns FROM message ORDER BY id LIMIT {BATCH}").fetchall()  # noqa: S608
+    if not too_large:
+        rows = [row for row in rows if row[1] < oldest_ns]
     connection.execute("BEGIN IMMEDIATE")
     connection.executemany("DELETE FROM message WHERE id = ?", [(row[0],) for row in rows])
     if rows:

@@ -22,6 +22,8 @@ from regolithd.daemon.ground.web.reports import ReportPages
 from regolithd.daemon.ground.web.users import Logins, read_users
 
 if TYPE_CHECKING:
+    import socket
+
     from starlette.requests import Request
     from starlette.responses import Response
 
@@ -57,14 +59,12 @@ async def _icon(_request: Request) -> Response:
     return RedirectResponse("/static/icon.svg", 301)
 
 
-async def serve(ground: Ground, app: Starlette) -> None:
+async def serve(ground: Ground, app: Starlette, listening: socket.socket) -> None:
     """Serve until SIGINT or SIGTERM, which the server catches; then end the ground's other tasks."""
     page = ground.settings.page
     server = uvicorn.Server(
         uvicorn.Config(
             app,
-            host=page.host,
-            port=page.port,
             ssl_certfile=page.certificate,
             ssl_keyfile=page.key,
             log_level="warning",
@@ -74,7 +74,7 @@ async def serve(ground: Ground, app: Starlette) -> None:
         )
     )
     running = asyncio.create_task(ground.run())
-    serving = asyncio.create_task(server.serve())
+    serving = asyncio.create_task(server.serve([listening]))
     try:
         await asyncio.wait({running, serving}, return_when=asyncio.FIRST_COMPLETED)
     finally:
