@@ -22,7 +22,7 @@ from regolithd.daemon.recording.candump import frame_line, parse_line, read_log
 from regolithd.daemon.recording.content import ESTIMATE, SNAPSHOT, six, snapshot_from_json
 from regolithd.daemon.recording.digest import Digest, _flattened
 from regolithd.daemon.recording.mcap_file import McapFile, read_messages, read_metadata
-from regolithd.daemon.recording.recorder import Recorder, _oldest_first
+from regolithd.daemon.recording.recorder import Recorder, _next_stem, _oldest_first
 from regolithd.daemon.recording.replay import replay_logs
 from regolithd.drivers.can.frame import Frame
 
@@ -318,3 +318,11 @@ def test_the_digest_refuses_a_value_that_it_cannot_encode() -> None:
     """A field of an unknown type is not left out silently."""
     with pytest.raises(TypeError, match="no encoding"):
         list(_flattened(([1.0],)))
+
+
+def test_a_recording_is_named_after_the_second_it_began_in(tmp_path: Path) -> None:
+    """Cut off, not rounded, and numbered after the highest number that is there."""
+    assert _next_stem(tmp_path, 1_370_959_642_999_999_999).name == "rover-20130611T140722Z-000001"
+    for name in ("rover-20130611T140722Z-000041.mcap", "rover-20200101T000000Z-000007.log", "rover-old.mcap"):
+        (tmp_path / name).touch()
+    assert _next_stem(tmp_path, 1_370_959_642_000_000_000).name == "rover-20130611T140722Z-000042"

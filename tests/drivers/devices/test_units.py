@@ -73,3 +73,26 @@ def test_every_named_unit_is_plausible_in_sixteen_bits_or_more() -> None:
     assert {
         name: implausible(end, factor) for name, (end, factor) in FIXED_UNITS.items() if implausible(end, factor)
     } == {"kN": "one step of the raw value would be 1e+03 N"}
+
+
+@pytest.mark.parametrize("bits", [8, 16, 32])
+@pytest.mark.parametrize(("dimension", "step", "reach"), [("A", 1.0, 0.1), ("N", 10.0, 1.0), ("degC", 10.0, 20.0)])
+def test_a_unit_is_implausible_by_its_step_or_by_its_range(
+    dimension: str, step: float, reach: float, bits: int
+) -> None:
+    """A raw value reaches 2 to the power of one bit less than it has; the sign of the factor is that of the wiring."""
+    finest = reach / 2 ** (bits - 1)
+    for sign in (1, -1):
+        assert implausible(dimension, sign * step, bits) == ""
+        assert implausible(dimension, sign * step * 1.01, bits).startswith("one step of the raw value would be")
+        assert implausible(dimension, sign * finest, bits) == ""
+        told = implausible(dimension, sign * finest * 0.99, bits)
+        assert told == f"all values together would cover only {0.99 * reach:.3g} {dimension}"
+    assert implausible(dimension, 0.0, bits) == f"a step of 0 {dimension}"
+    assert implausible(dimension, float("inf"), bits) == f"a step of inf {dimension}"
+
+
+def test_a_quantity_without_limits_has_any_unit_that_is_not_zero() -> None:
+    """Its name ends in a unit that is shown with a slash."""
+    assert implausible("m_s", 1e-30) == ""
+    assert implausible("m_s", float("nan")) == "a step of nan m/s"

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 from linear_machine import CANDIDATES, INSTANTS, Drag, Level, Power, design_of, equations_of, problem_of, table, term_of
@@ -11,6 +14,11 @@ from regolithd.calibration.mismatch.regression.discrepancy_basis import discrepa
 from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
 from regolithd.calibration.mismatch.regression.residuals import active_rms, contribution
 from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, with_periodic_terms, with_smooth_terms
+
+if TYPE_CHECKING:
+    from linear_machine import Array
+
+    from regolithd.calibration.mismatch import Problem, Shape
 
 PROBLEM = problem_of(table(drag=0.3))
 
@@ -105,3 +113,28 @@ def test_every_candidate_is_in_the_design_once_for_each_shape() -> None:
     """The grid of the four candidates has one, one, two and nine shapes."""
     names = [group.name for group in equations_of(PROBLEM).design.groups]
     assert [names.count(candidate.name) for candidate in CANDIDATES] == [1, 1, 2, 9]
+
+
+class EachAxis(Power):
+    """A column for each axis."""
+
+    def columns(self, problem: Problem, shape: Shape) -> Array:
+        """Return |ω|^p of one axis after the other, without the sign that both share."""
+        (both,) = super().columns(problem, shape)
+        return np.stack([np.where(np.arange(2) == axis, both, 0.0) for axis in range(2)])
+
+
+def test_columns_say_on_which_wheels_they_act() -> None:
+    """Where a wheel was not measured, nothing acts; one column alone acts wherever its term is."""
+    mask = PROBLEM.mask.copy()
+    mask[:100, 0] = mask[50:80, 1] = False
+    problem = replace(PROBLEM, mask=mask)
+    _, (group,) = with_candidate(design_of(problem), EachAxis(), [{"power": 1.0}])
+    assert group.acting is not None
+    np.testing.assert_array_equal(group.acting, [[True, False], [False, True]])
+    mask[:, 1] = False
+    _, (alone,) = with_candidate(design_of(replace(PROBLEM, mask=mask)), EachAxis(), [{"power": 1.0}])
+    assert alone.acting is not None
+    np.testing.assert_array_equal(alone.acting, [[True, False], [False, False]])
+    _, (single,) = with_candidate(design_of(problem), Power(), [{"power": 1.0}])
+    assert single.acting is None

@@ -85,3 +85,18 @@ def test_after_five_wrong_passwords_an_address_waits(writer: sqlite3.Connection)
     assert logins.blocked_s("here") == 0
     now[0] += FAILURES_WITHIN_S
     assert logins.blocked_s("there") == 0
+
+
+def test_a_folder_that_cannot_be_written_is_one_message(tmp_path: Path) -> None:
+    """It has the key of ground.toml that names the file."""
+    (tmp_path / "file").touch()
+    with pytest.raises(UsersError, match=r"Set \[page\] users to a file that you may write"):
+        add_user(tmp_path / "file" / "users", "ada", PASSWORD)
+
+
+def test_a_file_that_is_no_text_is_one_message(tmp_path: Path) -> None:
+    """It has the command that makes one."""
+    (tmp_path / "users").write_bytes(b"\xff\xfe")
+    for name in ("users", "absent"):
+        with pytest.raises(UsersError, match="--add-user NAME"):
+            read_users(tmp_path / name)
