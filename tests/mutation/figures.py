@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +30,7 @@ a test fails.
 | room | mutants | killed |
 |---|---|---|
 {rows}
-
+{earlier}
 Limits are of CPU time, and a test of the daemon or the drivers that fails is repeated alone, so that a busy machine
 kills no mutant. Left out are annotations, which do not run, and the values of constants, fields and parameters named
 `timeout_s` or `…_timeout_s`, because no requirement fixes a time limit to a second.
@@ -84,10 +85,20 @@ def line_of(figures: Mapping[str, Any]) -> str:
     )
 
 
+def earlier_lines(page: str, seed: int) -> list[str]:
+    """Return the lines of a page about samples of other seeds, the newest first."""
+    lines = re.findall(r"^(?:- )?(Seed (\d+): .*)$", page, flags=re.MULTILINE)
+    return [line for line, other in lines if int(other) != seed]
+
+
 def write_page(figures: Mapping[str, Any], fast_s: float, path: Path) -> None:
-    """Write the page of the documentation."""
+    """Write the page of the documentation; what it says of other samples stays as a list."""
+    before = earlier_lines(path.read_text(encoding="utf-8") if path.exists() else "", figures["seed"])
+    earlier = "".join(f"- {line}\n" for line in before)
+    if earlier:
+        earlier = f"\nSamples before it, each of the code and the tests of its day:\n\n{earlier}"
     rows = "\n".join(f"| `{room}/` | {each['mutants']} | {each['killed']} |" for room, each in figures["rooms"].items())
-    path.write_text(PAGE.format(line=line_of(figures), rows=rows, fast_s=fast_s), encoding="utf-8")
+    path.write_text(PAGE.format(line=line_of(figures), rows=rows, earlier=earlier, fast_s=fast_s), encoding="utf-8")
 
 
 def write_figures(figures: Mapping[str, Any], path: Path) -> None:

@@ -177,6 +177,16 @@ def test_the_page_tells_seed_share_and_words(tmp_path: Path) -> None:
     assert line_of(figures) in page
     assert "| `drivers/` | 3 | 3 |" in page
     assert "| `daemon/` | 1 | 0 |" in page
+    assert "before it" not in page
+
+
+def test_the_page_keeps_what_it_says_of_earlier_samples(tmp_path: Path) -> None:
+    """The newest first; a sample that is drawn again replaces its own line."""
+    path = tmp_path / "page.md"
+    for seed, results in ((7, [KILLED]), (8, [KILLED] * 2), (9, [KILLED] * 3), (8, [KILLED] * 4)):
+        write_page(score(results, seed, Words({})), 6.0, path)
+    lines = [line[:27] for line in path.read_text().splitlines() if "Seed" in line]
+    assert lines == ["Seed 8: 4 of 4 mutants kill", "- Seed 9: 3 of 3 mutants ki", "- Seed 7: 1 of 1 mutants ki"]
 
 
 @pytest.mark.parametrize("survivor", tomllib.loads(SURVIVORS.read_text())["survivor"], ids=lambda each: each["file"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from typing import TYPE_CHECKING
 
@@ -309,3 +310,15 @@ def test_a_step_of_the_wall_clock_is_limited() -> None:
         rover._advance(round(wall_s * second))
         times.append(rover._time_s)
     assert times == [0.0, 1.5, 1.5, 1.5, 6.5, 6.5, 7.0]
+
+
+def test_counts_are_told_by_node_and_for_the_bus() -> None:
+    """As JSON too, by the command `counts`; what is told is a copy."""
+    alone = Alone()
+    alone.send(0x000, bytes([0x01, NODE]), BOOT_NS)
+    counts = alone.rover.counts()
+    assert set(counts) == {"bus", str(NODE)}
+    assert counts[str(NODE)]["nmt"] == 1
+    assert json.loads(alone.rover.inject_fault("counts")) == counts
+    counts[str(NODE)]["nmt"] = 9
+    assert alone.node.counts["nmt"] == 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from law_problem import CANDIDATES, LOAD, SPEED, STEP_S, TIME_S, WARM, P
@@ -147,6 +149,17 @@ def test_shapes_and_profiles_of_the_bearing_are_of_this_recording() -> None:
     assert rises == pytest.approx([0.0, 1.8, 9.0])
     assert sorted(powers) == [0.12, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0]
     assert {each["full_at_s"] for each in profiles if "power" in each} == {MINUTE_S}
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1.0, 1e6])
+def test_a_loss_is_relative_to_the_mean_reading_in_any_unit(factor: float) -> None:
+    """A current in microamperes has the same shapes as one in amperes; a prediction of zero divides nothing by zero."""
+    efficiency = CANDIDATES["load-dependent-efficiency"]
+    scaled = replace(P, prediction=factor * P.prediction, made={})
+    references = {float(shape["reference_size"]) for shape in efficiency.shapes(scaled)}
+    assert list(references) == [pytest.approx(factor * float(np.mean(np.abs(P.prediction))))]
+    nothing = replace(P, prediction=0 * P.prediction, made={})
+    assert all(np.isfinite(efficiency.columns(nothing, shape)).all() for shape in efficiency.shapes(nothing))
 
 
 def test_the_problem_of_these_tests_is_as_they_assume() -> None:

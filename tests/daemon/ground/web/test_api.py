@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from typing import TYPE_CHECKING, Any
 
 import pyarrow.parquet as pq
@@ -153,6 +154,8 @@ async def test_an_action_is_stored_with_its_operator(browser: Browser, ground: G
         ({"action": "cleared", "who": "anna"}, 400, "An operator cannot do this: cleared"),
         ({"action": "dance", "who": "anna"}, 400, "Not an action: "),
         ({"action": "shelved", "who": "anna", "minutes": -1}, 400, "Not an action: "),
+        ({"action": "shelved", "who": "anna", "minutes": math.inf}, 400, "Not an action: "),
+        ({"action": "shelved", "who": "anna", "minutes": math.nan}, 400, "Not an action: "),
         ({"action": "shelved", "who": "anna", "comment": "x" * 501}, 400, "Not an action: "),
         ({"action": "shelved", "who": "a" * 65, "minutes": 1}, 400, "Not an action: "),
         ({"action": "reset", "who": "anna"}, 409, ""),
