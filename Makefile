@@ -10,7 +10,7 @@ RECORDINGS ?= ../shared/recordings
 
 .PHONY: help demo test check docs clean install uninstall
 .PHONY: interop first-day week
-.PHONY: figures chaos fuzz
+.PHONY: figures chaos fuzz bench audit wheelhouse lock
 .PHONY: sizing reproduce evaluate loop prove prove-machines real scaling thresholds mutations mutants frames pictures picture screenshots
 
 help:
@@ -82,6 +82,9 @@ mutations: $(DEV) ## `regolithd mismatch` on a thousand damaged files of each ki
 
 mutants: $(DEV) ## mutation testing on a random sample (SEED=… COUNT=… ONLY=drivers/can)
 	$(BIN)/python tests/mutation/sample.py --seed $(or $(SEED),1) --count $(or $(COUNT),200) $(if $(ONLY),--only $(ONLY))
+
+bench: $(DEV) ## CPU, memory and delays of the daemon, beside python-can with canopen and mosquitto; build/figures/bench.json (SECONDS=20)
+	PYTHONPATH=src:tests/bench $(BIN)/python tests/bench/speed.py --seconds $(or $(SECONDS),20)
 
 interop: $(DEV) ## slaves of other stacks, from CANOPENLINUX=FOLDER and LELY=FOLDER; docs/reference/interop.md
 	PYTHONPATH=src:tests/bench tests/bench/with-vcan $(BIN)/python tests/interop/run.py \

@@ -23,7 +23,7 @@ class Severity(StrEnum):
 class SoilChangeEvidence(BaseModel):
     """The evidence of a soil-change alarm, as numbers."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     onset: Time
     """Estimated time of the change."""

@@ -14,6 +14,7 @@ from pydantic.json_schema import models_json_schema
 
 from regolithd.daemon.messages.channels import CHANNELS, QoS
 from regolithd.daemon.messages.examples import example
+from regolithd.daemon.messages.field_docs import describe_fields
 from regolithd.daemon.messages.header import SCHEMA_VERSION
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def json_schemas() -> dict[str, dict[str, Any]]:
     schemas = {}
     for channel in CHANNELS:
         schema = channel.message.model_json_schema(mode="serialization")
+        describe_fields(schema)
         schemas[channel.name] = {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
     return schemas
 
@@ -58,6 +60,7 @@ def asyncapi() -> dict[str, Any]:
     _, definitions = models_json_schema(
         [(channel.message, "serialization") for channel in CHANNELS], ref_template="#/components/schemas/{model}"
     )
+    describe_fields(definitions)
     return {
         "asyncapi": "3.0.0",
         "info": {
@@ -70,7 +73,7 @@ def asyncapi() -> dict[str, Any]:
             "broker": {
                 "host": "localhost:1883",
                 "protocol": "mqtt",
-                "protocolVersion": "3.1.1",
+                "protocolVersion": "5.0",
                 "description": "[mqtt] host and port in rover.toml.",
                 "bindings": {"mqtt": _server_binding()},
             }

@@ -36,7 +36,7 @@ class AcquisitionReport(BaseModel):
 class PublishingReport(BaseModel):
     """Counts of the messages that are stored until the broker acknowledges them."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     connections: int
     queued: int

@@ -12,7 +12,7 @@ from regolithd.daemon.messages.header import Header
 class EffectReport(BaseModel):
     """An effect that the simulation leaves out, or a corrected one that has changed."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
     where: str
@@ -29,7 +29,7 @@ class EffectReport(BaseModel):
 class ComparisonResult(BaseModel):
     """The result of a comparison."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     verdict: Literal["consistent", "missing-physics", "unexplained"]
     text: str

@@ -7,12 +7,15 @@ broker that has no MQTT 5.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from typing import TYPE_CHECKING, Any
 
 from aiomqtt import Client, MqttCodeError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from paho.mqtt.client import Client as PahoClient
     from paho.mqtt.properties import Properties
     from paho.mqtt.reasoncodes import ReasonCode
@@ -46,6 +49,17 @@ class BrokerClient(Client):
         elif reason_code.is_failure:  # it would be refused again: it must not block those behind it
             _log.error("a message is refused by the broker, and lost: %s", reason_code)
         super()._on_publish(client, userdata, mid, reason_code, properties)
+
+    async def publish_live(self, messages: Mapping[str, bytes]) -> None:
+        """Publish at QoS 0, topic → payload, and return once all are written to the socket.
+
+        aiomqtt waits for each by a task and a timer of its own; they are written in order, so the last is enough.
+        """
+        *first, last = messages.items()
+        for topic, payload in first:
+            self._client.publish(topic, payload)
+        # In Python 3.11 `wait_for`, inside `publish`, may swallow a cancellation; `gather` does not.
+        await asyncio.gather(self.publish(*last))
 
     async def publish_acknowledged(self, topic: str, payload: bytes, *, retain: bool) -> None:
         """Publish at QoS 1, and return once the broker has acknowledged it.

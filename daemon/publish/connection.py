@@ -207,8 +207,8 @@ class Connection:
         while True:
             await self._live.live_arrived.wait()
             messages = self._live.take_live()
-            # All at once, so that they go out in one write; the next are taken once these are sent.
-            await asyncio.gather(*(client.publish(f"{self._root}/{topic}", messages[topic]) for topic in messages))
+            if messages:
+                await client.publish_live({f"{self._root}/{topic}": payload for topic, payload in messages.items()})
 
     async def _publish(self, client: BrokerClient, topic: str, payload: bytes, *, retain: bool) -> None:
         await client.publish_acknowledged(f"{self._root}/{topic}", payload, retain=retain)

@@ -7,7 +7,7 @@ import re
 import resource
 import shutil
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from regolithd.daemon.health.alarms import NO_INTRUDERS, Alarm, AlarmInputs, alarm_names, current_alarms
@@ -79,7 +79,7 @@ class MqttSink:
         self._control_problem = control_problem
         self._monotonic_ns = monotonic_ns
         self._started_ns = monotonic_ns()
-        self._published_nodes: dict[int, tuple[object, ...]] = {}
+        self._published_nodes: dict[int, NodeStatus] = {}
         self._published_alarms: dict[str, Alarm | None] = {}
         self._offset_ns = time.time_ns() - monotonic_ns()
         self._jump_s = 0.0
@@ -157,11 +157,10 @@ class MqttSink:
         self._changes_scheduled = False
         network = self._service.network
         for node_id, status in (network.status if network is not None else {}).items():
-            fields = node_fields(status)
-            state = tuple(value for name, value in fields.items() if name != "heard")
+            state = replace(status, heard_ns=None)  # the time of each heartbeat is no news
             if self._published_nodes.get(node_id) != state:
                 self._published_nodes[node_id] = state
-                self.publisher.publish(f"node/{node_id}", NodeMessage, **fields)
+                self.publisher.publish(f"node/{node_id}", NodeMessage, **node_fields(status))
         active = current_alarms(self._alarm_inputs())
         for name in alarm_names(node.node_id for node in self._service.configuration.described()):
             alarm = active.get(name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING
 
 from regolithd.drivers.canopen import cob_id
@@ -27,12 +28,14 @@ class RemoteNode:
     ----------
     state
         NMT state that it last reported; None before the first heartbeat.
-    heard_ns, heard
-        Time and number of its heartbeats and boot-up messages.
+    heard_ns, heard_s, heard
+        Kernel's time and monotonic time of its last heartbeat or boot-up message, and their number.
     boot_ups
         Number of its boot-up messages.
     changed
         Notified at each heartbeat and boot-up message, and at the end of each boot.
+    state_changed
+        Notified at each boot-up message, and at each heartbeat with another state than the last.
     stated
         Values of the objects in which the device states its units, as read during its last boot.
     """
@@ -41,9 +44,11 @@ class RemoteNode:
         self.node = node
         self.sdo = SdoClient(bus, node.node_id, timeout_s=sdo_timeout_s)
         self.changed = Condition()
+        self.state_changed = Condition()
         self.state: NmtState | None = None
         self.heard_ns: int | None = None
         self.heard = 0
+        self.heard_s = time.monotonic()
         self.boot_ups = 0
         self.stated: dict[ObjectKey, int] = {}
         self._bus = bus
@@ -83,9 +88,13 @@ class RemoteNode:
         """Take a heartbeat or boot-up message."""
         self.heard += 1
         self.heard_ns = report.time_ns
+        self.heard_s = time.monotonic()
         booted = report.state is NmtState.BOOT_UP
         if booted:
             self.boot_ups += 1
             self.sdo.interrupt()
-        self.state = NmtState.PRE_OPERATIONAL if booted else report.state
+        state = NmtState.PRE_OPERATIONAL if booted else report.state
+        changed, self.state = booted or state is not self.state, state
         self.changed.notify()
+        if changed:
+            self.state_changed.notify()

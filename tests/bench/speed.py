@@ -1,0 +1,283 @@
+"""Measures what the daemon costs, beside other programs in the same run: `make bench`. Writes build/figures/bench.json.
+
+Processor time is read from the kernel for the process alone, and given for one SYNC or frame as well, so that other
+load on the machine changes it little; latencies are of the machine as it is (`load average` is written beside them).
+The daemon runs as a process of its own, on a pair of sockets in place of SocketCAN (`can_pair`), with the virtual rover
+in another process, and mosquitto with `systemd/mosquitto`'s TCP_NODELAY.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import grp
+import json
+import os
+import platform
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import aiomqtt
+from broker import Mosquitto
+from can_pair import pair
+from speed_peers import frame_times, frames_on_bus, mosquitto_persistence, store_cost
+
+if TYPE_CHECKING:
+    import socket
+    from collections.abc import Iterator
+
+ROOT = Path(__file__).resolve().parents[2]
+FIGURES = ROOT / "build/figures/bench.json"
+FASTEST_BUS = 9009
+"""Frames per second of a bus with 1 Mbit/s: 111 bits each (11-bit identifier, 8 bytes of data, no stuff bits)."""
+TICKS = os.sysconf("SC_CLK_TCK")
+ROVER = """
+[sync]
+rate_Hz = {rate}
+[nodes]
+inclinometer = 21
+ground_speed = 22
+[drivetrain]
+no_load_current_A = 0.037
+no_load_current_std_A = 0.001
+[recording]
+directory = "recordings"
+[control]
+socket = "control.sock"
+group = "{group}"
+[mqtt]
+host = "127.0.0.1"
+port = {port}
+spool_directory = "spool"
+"""
+IMPORTS = {
+    "regolithd": "import regolithd.daemon.cli, regolithd.daemon.setup, regolithd.daemon.service, "
+    "regolithd.daemon.wiring, regolithd.drivers.can.socketcan",
+    "python-can, canopen, paho": "import asyncio, can, canopen, paho.mqtt.client",
+    "numpy": "import numpy",
+}
+Figures = dict[str, float | int | str | bool | None]
+
+
+@dataclass
+class Rig:
+    """A running daemon: its process, the broker, the other end of its CAN link, and snapshots as they arrive."""
+
+    process: subprocess.Popen[bytes]
+    port: int
+    link: socket.socket
+    delays_ms: list[float] = field(default_factory=list)
+    produced: list[int] = field(default_factory=list)
+    skipped: list[int] = field(default_factory=list)
+
+    def cpu_s(self) -> float:
+        """Return the processor time that the daemon has used."""
+        fields = Path(f"/proc/{self.process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / TICKS
+
+    def memory_MB(self) -> float:
+        """Return its resident memory."""
+        status = Path(f"/proc/{self.process.pid}/status").read_text()
+        return int(status.split("VmRSS:")[1].split()[0]) / 1e3
+
+    async def subscribe(self) -> None:
+        """Note the delay of each snapshot, SYNC to subscriber, and the counters of SYNC, until cancelled."""
+        options = (aiomqtt.client.socket.IPPROTO_TCP, aiomqtt.client.socket.TCP_NODELAY, 1)  # type: ignore[attr-defined]
+        async with aiomqtt.Client("127.0.0.1", self.port, socket_options=[options]) as client:
+            await client.subscribe([("regolith/kapvik/snapshot", 1), ("regolith/kapvik/health", 0)])
+            async for message in client.messages:
+                now_ms = time.time_ns() / 1e6
+                content = json.loads(bytes(message.payload))
+                if str(message.topic).endswith("snapshot"):
+                    if not content["late"]:
+                        self.delays_ms.append(now_ms - content["time_ms"])
+                elif content["sync"]:
+                    self.produced.append(content["sync"]["produced"])
+                    self.skipped.append(content["sync"]["skipped"] + content["sync"]["failed"])
+
+
+@contextmanager
+def rig(rate: float) -> Iterator[Rig]:
+    """Start broker, rover and daemon; stop all three at the end."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        broker = Mosquitto(folder, settings="allow_anonymous true\nset_tcp_nodelay true\n")
+        broker.start()
+        group = grp.getgrgid(os.getgid()).gr_name
+        (folder / "rover.toml").write_text(ROVER.format(rate=rate, group=group, port=broker.port))
+        daemons, rovers = pair()
+        environment = os.environ | {"OMP_NUM_THREADS": "1", "PYDANTIC_DISABLE_PLUGINS": "__all__"}
+        program = [sys.executable, str(ROOT / "tests/bench/can_pair.py")]
+        ends = {"rover": (rovers, []), "daemon": (daemons, [str(folder / "rover.toml")])}
+        started = [
+            subprocess.Popen(
+                [*program, role, str(end.fileno()), *more], pass_fds=[end.fileno()], env=environment, cwd=ROOT
+            )
+            for role, (end, more) in ends.items()
+        ]
+        try:
+            yield Rig(started[1], broker.port, rovers)
+        finally:
+            for process in reversed(started):
+                process.terminate()
+                process.wait(20)
+            broker.stop()
+            daemons.close()
+            rovers.close()
+
+
+async def measure(rate: float, seconds: float, frames_per_s: int = 0) -> tuple[Figures, Rig]:
+    """Run a daemon at a SYNC rate; return CPU, memory and delays over `seconds`, after the nodes have booted."""
+    with rig(rate) as running:
+        receiving = asyncio.create_task(running.subscribe())
+        while len(running.delays_ms) < 3 or len(running.produced) < 10:  # noqa: ASYNC110  # a list has no event
+            await asyncio.sleep(0.2)
+        running.delays_ms.clear()
+        syncs, skipped = running.produced[-1], running.skipped[-1]
+        cpu_s, began = running.cpu_s(), time.monotonic()
+        sent = await send_frames(running.link, frames_per_s, seconds)
+        elapsed_s = time.monotonic() - began
+        cpu_s = running.cpu_s() - cpu_s
+        memory_MB = running.memory_MB()
+        await end(receiving)
+    done = running.produced[-1] - syncs
+    return {
+        "core_percent": 100 * cpu_s / elapsed_s,
+        "cpu_s": cpu_s,
+        "cpu_ms_per_sync": 1e3 * cpu_s / max(done, 1),
+        "syncs": done,
+        "syncs_skipped": running.skipped[-1] - skipped,
+        "memory_MB": memory_MB,
+        "frames_sent": sent,
+        "frames_per_s": sent / elapsed_s,
+    }, running
+
+
+async def end(task: asyncio.Task[None]) -> None:
+    """Cancel a task and wait for its end."""
+    task.cancel()
+    with suppress(asyncio.CancelledError):
+        await task
+
+
+async def send_frames(link: socket.socket, per_s: int, seconds: float) -> int:
+    """Send frames of nodes that nobody expects for `seconds`, evenly in time; return how many were sent."""
+    if not per_s:
+        await asyncio.sleep(seconds)
+        return 0
+    began, sent, frames = time.monotonic(), 0, frames_on_bus()
+    while (elapsed_s := time.monotonic() - began) < seconds:
+        while sent < elapsed_s * per_s:
+            try:
+                link.send(frames[sent % len(frames)])
+            except BlockingIOError:
+                break
+            sent += 1
+        await asyncio.sleep(0.002)
+    return sent
+
+
+async def broker_delay(messages: int) -> list[float]:
+    """Return the delays of mosquitto alone, QoS 1, 2 kB, 100 a second, client to client [ms]."""
+    delays: list[float] = []
+    with tempfile.TemporaryDirectory() as name:
+        broker = Mosquitto(Path(name), settings="allow_anonymous true\nset_tcp_nodelay true\n")
+        broker.start()
+        async with (
+            aiomqtt.Client("127.0.0.1", broker.port) as sender,
+            aiomqtt.Client("127.0.0.1", broker.port) as taker,
+        ):
+            await taker.subscribe("a", qos=1)
+
+            async def take() -> None:
+                while True:
+                    message = await anext(taker.messages)
+                    delays.append(1e3 * (time.monotonic() - float(bytes(message.payload)[:20])))
+
+            receiving = asyncio.create_task(take())
+            for _ in range(messages):
+                await sender.publish("a", f"{time.monotonic():020.9f}".ljust(2000), qos=1)
+                await asyncio.sleep(0.01)
+            await end(receiving)
+        broker.stop()
+    return delays
+
+
+def import_cpu_s(statement: str) -> float:
+    """Return the processor time of importing, the interpreter's own start included; the smallest of three."""
+    code = f"{statement}\nimport time\nprint(time.process_time())"
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src"), "PYDANTIC_DISABLE_PLUGINS": "__all__"}
+    command = [sys.executable, "-c", code]
+    runs = [subprocess.run(command, check=True, capture_output=True, text=True, env=environment) for _ in range(3)]
+    return min(float(run.stdout) for run in runs)
+
+
+def percentile(values: list[float], share: float) -> float | None:
+    """Return a percentile; None without values."""
+    return statistics.quantiles(values, n=1000)[round(share * 1000) - 1] if len(values) > 1 else None
+
+
+async def daemon_figures(seconds: float) -> Figures:
+    """Return CPU, memory and delays of the daemon at 100 Hz, at 2 Hz and on a saturated bus."""
+    fast, running = await measure(100.0, seconds)
+    alone = await broker_delay(round(seconds * 50))
+    slow, _ = await measure(2.0, seconds)
+    quiet, _ = await measure(2.0, seconds)
+    full, _ = await measure(2.0, seconds, FASTEST_BUS)
+    idle_s = float(quiet["cpu_s"] or 0)
+    frame_us = 1e6 * (float(full["cpu_s"] or 0) - idle_s) / max(int(full["frames_sent"] or 0), 1)
+    figures: Figures = {}
+    for name, values in (("SYNC to subscriber, 100 Hz", running.delays_ms), ("mosquitto alone, 100 Hz", alone)):
+        figures |= {f"{name} / p50, ms": percentile(values, 0.5), f"{name} / p99, ms": percentile(values, 0.99)}
+    for name, found in (("100 Hz", fast), ("2 Hz", slow), ("2 Hz, saturated bus", full)):
+        figures |= {
+            f"daemon, {name} / % of a core": found["core_percent"],
+            f"daemon, {name} / CPU per SYNC, ms": found["cpu_ms_per_sync"],
+            f"daemon, {name} / SYNCs": found["syncs"],
+            f"daemon, {name} / SYNCs skipped": found["syncs_skipped"],
+            f"daemon, {name} / memory, MB": found["memory_MB"],
+        }
+    return figures | {
+        "100 Hz with recording and publishing, % of a core": float(fast["cpu_ms_per_sync"] or 0) * 10,
+        "saturated 1 Mbit/s bus: frames sent per s": full["frames_per_s"],
+        "saturated 1 Mbit/s bus: CPU per frame, µs": frame_us,
+        "saturated 1 Mbit/s bus, % of a core at 9009 frames/s": frame_us * FASTEST_BUS / 1e4,
+    }
+
+
+async def figures(seconds: float) -> Figures:
+    """Return all figures."""
+    found: Figures = {
+        "command": f"make bench SECONDS={seconds:g}",
+        "measured": f"{datetime.now(UTC):%Y-%m-%d}, {os.cpu_count()} processors, {platform.machine()}, "
+        f"Python {platform.python_version()}, load average {os.getloadavg()[0]:.1f}",
+    }
+    found |= {f"import / {name}, s CPU": import_cpu_s(statement) for name, statement in IMPORTS.items()}
+    found |= await daemon_figures(seconds)
+    found |= await frame_times()
+    found |= store_cost()
+    found |= await mosquitto_persistence()
+    return found
+
+
+def main() -> None:
+    """Measure, print, and write the file."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=20.0, help="time for each measurement of the daemon")
+    found = asyncio.run(figures(parser.parse_args().seconds))
+    FIGURES.parent.mkdir(parents=True, exist_ok=True)
+    FIGURES.write_text(json.dumps(found, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    for name, value in found.items():
+        sys.stdout.write(f"{name:<60} {value if not isinstance(value, float) else round(value, 3)}\n")
+
+
+if __name__ == "__main__":
+    main()
