@@ -26,6 +26,14 @@ def test_a_schedule_neither_drifts_nor_bursts(period_ns: int, delays_ns: list[in
         now = max(now, due) + delay
 
 
+def test_each_due_time_is_later_than_the_one_before() -> None:
+    """Asked early or at once, the next period; asked late, the period that is running, with those skipped before it."""
+    schedule = Schedule(START_NS, 10)
+    asked = {0: (10, 0), 3: (20, 0), 20: (30, 0), 31: (40, 0), 74: (70, 2), 70: (80, 0), 100: (100, 1)}
+    for now, (due, missed) in asked.items():
+        assert schedule.following(START_NS + now) == (START_NS + due, missed)
+
+
 @pytest.mark.parametrize("kind", [LoopTimer, KernelTimer])
 async def test_no_tick_is_early_and_missed_ones_are_counted(kind: type[Timer]) -> None:
     """Ticks and missed ticks add up to the time that has passed, and after a stall there is one tick, not a burst."""

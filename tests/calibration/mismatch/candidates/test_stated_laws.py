@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from law_problem import CANDIDATES, LOAD, SPEED, STEP_S, TIME_S, WARM, P
 
+from regolithd.calibration.mismatch.candidates.load_cell_drift import OFFSETS
 from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import WheelAngleRipple
 
 EITHER_SIGN = {
@@ -149,6 +150,16 @@ def test_shapes_and_profiles_of_the_bearing_are_of_this_recording() -> None:
     assert rises == pytest.approx([0.0, 1.8, 9.0])
     assert sorted(powers) == [0.12, 0.18, 0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0]
     assert {each["full_at_s"] for each in profiles if "power" in each} == {MINUTE_S}
+
+
+def test_a_drift_is_simulated_between_its_bounds() -> None:
+    """In ascending order, without an offset and at both bounds, in steps that no neighbour exceeds by far."""
+    low, high = CANDIDATES["load-cell-drift"].bounds(P, {})["relative_offset"]
+    steps = np.diff(OFFSETS)
+    assert (OFFSETS[0], OFFSETS[-1]) == (low, high)
+    assert 0.0 in OFFSETS
+    assert np.all((steps > 0) & (steps <= 0.8))
+    assert np.all(steps[np.array(OFFSETS[:-1]) >= -0.55] <= 0.2)
 
 
 @pytest.mark.parametrize("factor", [1e-6, 1.0, 1e6])
