@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 DEMO := $(VENV)/demo.ready
 DEV := $(VENV)/dev.ready
-export PYTHON
+export PYTHON WHEELHOUSE PYTHON_VERSION
 
 RECORDINGS ?= ../shared/recordings
 
@@ -44,6 +44,9 @@ clean: ## remove .venv and build
 
 install: ## install or upgrade the systemd service
 	systemd/install
+
+wheelhouse: ## build/wheelhouse: what `make install WHEELHOUSE=build/wheelhouse` needs without a network (PROCESSOR=aarch64 PYTHON_VERSION=3.11)
+	.ci/wheelhouse build/wheelhouse $(PROCESSOR)
 
 uninstall: ## remove it; configuration and recordings are kept
 	systemd/uninstall
@@ -85,6 +88,12 @@ mutants: $(DEV) ## mutation testing on a random sample (SEED=… COUNT=… ONLY=
 
 bench: $(DEV) ## CPU, memory and delays of the daemon, beside python-can with canopen and mosquitto; build/figures/bench.json (SECONDS=20)
 	PYTHONPATH=src:tests/bench $(BIN)/python tests/bench/speed.py --seconds $(or $(SECONDS),20)
+
+lock: $(DEV) ## systemd/requirements.lock anew: the newest packages that pyproject.toml allows, with their hashes
+	$(BIN)/python .ci/lock.py
+
+audit: $(DEV) wheelhouse ## licences, SBOM (CycloneDX) and known vulnerabilities of the locked packages; build/figures/audit.json
+	$(BIN)/python .ci/audit.py build/wheelhouse
 
 interop: $(DEV) ## slaves of other stacks, from CANOPENLINUX=FOLDER and LELY=FOLDER; docs/reference/interop.md
 	PYTHONPATH=src:tests/bench tests/bench/with-vcan $(BIN)/python tests/interop/run.py \

@@ -87,7 +87,8 @@ class Guest:
         pytest_command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "--durations=0", f"@{selection}"]
         command: list[str | Path] = [HERE / f"with-{self.name}", *pytest_command]
         if self.name == "systemd":  # it runs `make install` and has no network
-            command = ["bash", "-c", WITH_WHEELS, HERE / "wheelhouse", self.root / "build/wheelhouse", *command]
+            collect, wheels = self.root / ".ci/wheelhouse", self.root / "build/wheelhouse"
+            command = ["bash", "-c", WITH_WHEELS, collect, wheels, *command]
         inside = {INSIDE: self.name, REPORTS: str(lines), "BENCH_SHARED": str(self.folder)}
         with (self.folder / "output").open("wb") as output:
             self.process = subprocess.Popen(
