@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from regolithd.calibration.drivetrain.torque import no_load_current
 from regolithd.calibration.parameters import SOILS, Drivetrain
@@ -26,11 +27,11 @@ if TYPE_CHECKING:
 
 TRUTH, BEFORE, AFTER = "#1a1a1a", "#8c96a0", "#c0392b"
 STYLE: Any = {
-    "font.size": 10,
+    "font.size": 12.5,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.titlelocation": "left",
-    "axes.titlesize": 10.5,
+    "axes.titlesize": 13,
     "legend.frameon": False,
     "svg.hashsalt": "regolithd",
     "figure.facecolor": "white",
@@ -52,21 +53,30 @@ CAPTION = (
 def draw(runs: Sequence[LoopResult], path: Path) -> None:
     """Draw the cases, one below the other; equal results give equal bytes."""
     with mpl.rc_context(STYLE):
-        made = Figure(figsize=(16, 1.5 + 2.6 * len(runs)), layout="constrained")
-        made.suptitle(TITLE, x=0.008, ha="left", fontsize=14, fontweight="bold")
+        made = Figure(figsize=(15, 1.8 + 3.1 * len(runs)), layout="constrained")
+        made.suptitle(TITLE, x=0.008, ha="left", fontsize=16, fontweight="bold")
         rows = made.subfigures(len(runs), 1, squeeze=False)[:, 0]
         for result, row in zip(runs, rows, strict=True):
-            row.suptitle(_headline(result), x=0.008, ha="left", fontsize=11.5)
-            panels = row.subplots(1, 5, width_ratios=(0.85, 1.9, 1.9, 0.8, 0.8))
+            row.suptitle(_headline(result), x=0.008, ha="left", fontsize=13.5)
+            panels = row.subplots(1, 5, width_ratios=(0.95, 1.7, 1.7, 0.9, 0.9))
             _drag(panels[0], result)
             for k, label in enumerate(("cohesion c [kPa]", "friction angle φ [°]")):
                 _trace(panels[1 + k], result, k, label)
                 _errors(panels[3 + k], result, k)
-            panels[0].legend(fontsize=8.5, loc="lower right")
-            panels[1].legend(fontsize=8.5, loc="upper left", ncols=3)
-        rows[0].axes[3].legend(fontsize=8.5, loc="upper right")
-        made.supxlabel(CAPTION, x=0.008, ha="left", fontsize=9, color="#555555")
+        made.legend(handles=_legend(), loc="outside lower left", ncols=4)
+        made.supxlabel(CAPTION, x=0.008, ha="left", fontsize=12, color="#444444")
         save(made, path, dpi=130)
+
+
+def _legend() -> list[Line2D]:
+    """Return the lines of the legend, which all panels share."""
+    return [
+        Line2D([], [], color=BEFORE, linewidth=5, label="with rover.toml before"),
+        Line2D(
+            [], [], color=AFTER, linewidth=5, linestyle=(0, (1.6, 0.6)), label="with rover.toml after the comparison"
+        ),
+        Line2D([], [], color=TRUTH, linewidth=5, label="true (errors: with the true drivetrain)"),
+    ]
 
 
 def _headline(result: LoopResult) -> str:
@@ -116,7 +126,7 @@ def _name_soils(panel: Axes, estimates: SoilEstimates) -> None:
     for name in OTHER_SOILS:
         there = estimates.time_s[np.isclose(estimates.truth[:, 0], SOILS[name].cohesion_Pa / 1e3)]
         if there.size:
-            panel.text(float(there.mean()), 0.25, name, ha="center", va="bottom", fontsize=8.5, color="#555555")
+            panel.text(float(there.mean()), 0.25, name, ha="center", va="bottom", fontsize=10.5, color="#444444")
 
 
 def _errors(panel: Axes, result: LoopResult, k: int) -> None:
@@ -133,7 +143,7 @@ def _errors(panel: Axes, result: LoopResult, k: int) -> None:
         places = [step, step + 4]
         panel.bar(places, values, color=colour, width=0.85, alpha=0.85, label=label)
         for at, value in zip(places, values, strict=True):
-            panel.text(at, value + 0.015 * HIGHEST_ERROR[k], f"{value:.1f}", ha="center", fontsize=8.5)
+            panel.text(at, value + 0.015 * HIGHEST_ERROR[k], f"{value:.1f}", ha="center", fontsize=10.5)
     panel.set(ylim=(0, HIGHEST_ERROR[k]), title=f"error of {symbol} [{unit}]")
     panel.set_xticks([1, 5], ["posterior", "paper's\nnetwork"])
     panel.tick_params(axis="x", length=0)

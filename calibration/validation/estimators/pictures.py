@@ -7,12 +7,21 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 
-from regolithd.calibration.parameters import SOILS, Drivetrain, Wheel
+from regolithd.calibration.parameters import SOILS, Drivetrain, Rover, Wheel
 from regolithd.calibration.posterior import simulated_rovers
 from regolithd.calibration.posterior.window import CalibrationUncertainty, reduce_windows
 from regolithd.calibration.terrain.soils import draw_soils, soils_from
 from regolithd.calibration.validation.estimators.errors_and_coverage import NO_LOAD_A
-from regolithd.calibration.validation.reproduction.pictures import OURS, PAPER, SOIL_COLOURS, STYLE, figure, save
+from regolithd.calibration.validation.estimators.simulated_drives import SPEED_M_S
+from regolithd.calibration.validation.reproduction.pictures import (
+    OURS,
+    PAPER,
+    SOIL_COLOURS,
+    SOIL_MARKERS,
+    STYLE,
+    figure,
+    save,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,6 +35,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+OFFSET: Any = {"textcoords": "offset points", "fontsize": 10}
 CLASSICAL, SINGLE, SOIL_KNOWN = "#b08d57", "#e59866", "#922b21"
 
 
@@ -61,14 +71,17 @@ def calibration(found: Mapping[str, float], ranks: Array, path: Path) -> None:
     """Draw the rank histograms, and the coverage over all rovers and in each true class, known and not."""
     targets = ("cohesion", "friction_angle", "margin")
     with mpl.rc_context(STYLE):
-        made = figure(11, 6)
+        made = figure(11, 6.4)
         panels = made.subplots(2, 3)
         for column, (target, label) in enumerate(zip(targets, ("c", "φ", "drawbar margin"), strict=True)):
             _ranks(panels[0, column], ranks[:, column], label)
             _coverage(panels[1, column], found, target)
         panels[0, 0].set_ylabel("rovers")
         panels[1, 0].set_ylabel("coverage (%)")
-        panels[1, 2].legend(fontsize=8, loc="lower right")
+        handles, labels = panels[1, 2].get_legend_handles_labels()
+        made.legend(
+            handles, [*labels, "expected, ± 2 standard errors"], loc="outside lower left", ncols=5, fontsize=9.5
+        )
         save(made, path)
 
 
@@ -81,14 +94,22 @@ def _ranks(panel: Axes, ranks: Array, label: str) -> None:
 
 def _coverage(panel: Axes, found: Mapping[str, float], target: str) -> None:
     names = ["", *SOILS]
-    for name, colour, label in (("window", PAPER, "true class"), ("told_window", OURS, "true class, known")):
+    for name, colour, fill, label in (
+        ("window", PAPER, "none", "true class"),
+        ("told_window", OURS, OURS, "true class, known"),
+    ):
         for level, marker in ((50, "o"), (90, "s")):
             values = [100 * found[f"{name}_coverage_{level}_{target}{'_' + each if each else ''}"] for each in names]
-            legend = f"{label}, {level} %"
-            panel.plot(range(len(names)), values, marker, color=colour, label=legend, markersize=6)
-    for level in (50, 90):
-        panel.axhspan(level - 2, level + 2, color="black", alpha=0.15)
-    panel.set_xticks(range(len(names)), ["all", *(each.replace("-", "\n") for each in SOILS)], fontsize=8)
+            style: dict[str, Any] = {
+                "color": colour,
+                "markerfacecolor": fill,
+                "markeredgewidth": 1.5,
+                "label": f"{label}, {level} %",
+            }
+            panel.plot(range(len(names)), values, marker, markersize=6, **style)
+    for level, legend in ((50, "expected"), (90, None)):
+        panel.axhspan(level - 2, level + 2, color="black", alpha=0.15, label=legend)
+    panel.set_xticks(range(len(names)), ["all", *(each.replace("-", "\n") for each in SOILS)], fontsize=9.5)
     panel.set_ylim(0, 102)
 
 
@@ -144,12 +165,14 @@ def _scatter(panel: Axes, prior: Soils, samples: Array, colour: str) -> None:
         alpha=0.5,
         label="posterior",
     )
-    for (name, soil), shade in zip(SOILS.items(), SOIL_COLOURS, strict=True):
+    for (name, soil), shade, marker in zip(SOILS.items(), SOIL_COLOURS, SOIL_MARKERS, strict=True):
         panel.plot(
             soil.cohesion_Pa / 1e3,
             soil.friction_angle_deg,
-            "D",
+            marker,
             color=shade,
+            linestyle="none",
+            markersize=8,
             markeredgecolor="white",
             label=name,
         )
@@ -167,7 +190,7 @@ def alarm(delays: Mapping[str, Array], path: Path) -> None:
         ("paper_shift_delay_flat", "the same, level ground", {"color": "#2c3e50", "linestyle": "--"}),
     ]
     with mpl.rc_context(STYLE):
-        made = figure(11, 4.2)
+        made = figure(11, 4.9)
         panels = made.subplots(1, 2, sharey=True)
         for panel, suffix, title in (
             (panels[0], "", "all six wheels at once"),
@@ -185,10 +208,13 @@ def alarm(delays: Mapping[str, Array], path: Path) -> None:
                     label=label if reached.any() else f"{label}: never",
                     **style,
                 )
-            panel.axvline(15, color="black", linewidth=0.8, linestyle=":")
             panel.set(title=title, xlabel="seconds since the front axle met LETE sand", xlim=(0, 90), ylim=(0, 102))
+        for axle, name in ((1, "middle axle"), (2, "rear axle")):
+            crossing_s = axle * Rover().wheelbase_m / 2 / SPEED_M_S
+            panels[1].axvline(crossing_s, color="black", linewidth=0.8, linestyle=":")
+            panels[1].annotate(name, (crossing_s, 101), (-3, 0), ha="right", va="top", rotation=90, **OFFSET)
         panels[0].set_ylabel("rovers with an alarm (%)")
-        panels[1].legend(loc="lower right", fontsize=9)
+        made.legend(*panels[1].get_legend_handles_labels(), loc="outside lower left", ncols=3, fontsize=10)
         made.suptitle("Sandy loam to LETE sand, 35 % current noise, 2 Hz, one false alarm in 8 h", x=0.01, ha="left")
         save(made, path)
 

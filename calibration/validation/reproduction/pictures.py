@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 PAPER, OURS, SOIL_COLOURS = "#7f8c8d", "#c0392b", ("#e0a030", "#8e5a2b", "#4a7ba6", "#5b8a4a")
+SOIL_MARKERS = ("o", "s", "^", "D")
+"""Each soil has a marker of its own as well: brown and green are one colour to many."""
 STYLE: Any = {
     "font.size": 11,
     "axes.spines.top": False,
@@ -99,10 +101,11 @@ def training_set(pairs: TrainingSet, path: Path) -> None:
         made = figure(9, 4.2)
         panel = made.subplots()
         panel.axhspan(*ROVER_LOADS_N, color="#27ae60", alpha=0.15, label="range for a 30 kg rover")
-        for index, (name, colour) in enumerate(zip(SOILS, SOIL_COLOURS, strict=True)):
+        for index, (name, colour, marker) in enumerate(zip(SOILS, SOIL_COLOURS, SOIL_MARKERS, strict=True)):
             mine = pairs.soil == index
-            aside = (index - 1.5) * 1.6
-            panel.plot(1e3 * pairs.inputs[mine, 2] + aside, pairs.inputs[mine, 0], ".", color=colour, label=name)
+            current_mA = 1e3 * pairs.inputs[mine, 2] + (index - 1.5) * 1.6
+            style: dict[str, Any] = {"color": colour, "markersize": 3.5, "label": name}
+            panel.plot(current_mA, pairs.inputs[mine, 0], marker, linestyle="none", **style)
         panel.set(yscale="log", xlabel="motor current (mA)", ylabel="load by Step 14 (N)")
         panel.set_title("Most of the 504 pairs have loads outside the range of a 30 kg rover")
         panel.legend(loc="upper left", bbox_to_anchor=(1, 1))
@@ -125,7 +128,7 @@ def traverse(traverses: Sequence[SyntheticTraverse], path: Path, wheel: int = 5)
                 _trace(panels[row, column], time, values[:, wheel - 1], published_mean, label if column == 0 else "")
             panels[0, column].set_title(f"{each.ground} ground, wheel {wheel}")
             panels[1, column].set_xlabel("time (s)")
-        panels[0, 0].legend(loc="lower left", ncols=3, fontsize=9)
+        made.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
         save(made, path)
 
 
