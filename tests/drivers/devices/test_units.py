@@ -96,3 +96,30 @@ def test_a_quantity_without_limits_has_any_unit_that_is_not_zero() -> None:
     """Its name ends in a unit that is shown with a slash."""
     assert implausible("m_s", 1e-30) == ""
     assert implausible("m_s", float("nan")) == "a step of nan m/s"
+
+
+PREFIXES = {"": 1.0, "m": 1e-3, "k": 1e3, "0.1 ": 0.1, "0.01 ": 0.01}
+NAMED = {
+    "A": ("A", 1.0, ("", "m")),
+    "rad/s": ("rad_s", 1.0, ("",)),
+    "rpm": ("rad_s", math.tau / 60, ("", "m")),
+    "N": ("N", 1.0, ("", "0.1 ", "0.01 ", "m", "k")),
+    "g": ("N", 9.80665e-3, ("", "k")),
+    "V": ("V", 1.0, ("", "0.1 ", "m")),
+    "°C": ("degC", 1.0, ("", "0.1 ")),
+    "rad": ("rad", 1.0, ("",)),
+    "°": ("rad", math.pi / 180, ("", "0.01 ")),
+    "°/s": ("rad_s", math.pi / 180, ("", "0.01 ")),
+    "m/s": ("m_s", 1.0, ("",)),
+    "mm/s": ("m_s", 1e-3, ("", "0.01 ")),
+}
+
+
+def test_a_named_unit_has_its_factor_to_si() -> None:
+    """Prefix times unit; a kilogram is its weight at standard gravity."""
+    expected = {
+        f"{prefix}{unit}": (ending, pytest.approx(PREFIXES[prefix] * factor))
+        for unit, (ending, factor, prefixes) in NAMED.items()
+        for prefix in prefixes
+    }
+    assert dict(FIXED_UNITS) == expected

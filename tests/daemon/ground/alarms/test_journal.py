@@ -85,3 +85,23 @@ def test_an_alarm_of_an_unknown_kind_does_not_end_the_ground(writer: sqlite3.Con
     journal = AlarmJournal(writer)
     assert not journal.report(received("alarm/x", 1, name="x", active=True, severity="catastrophic"))
     assert journal.report(received("alarm/x", 2, name="x", active=True, severity="error", colour="red"))
+
+
+def test_an_entry_of_an_earlier_version_has_the_least(writer: sqlite3.Connection) -> None:
+    """What it did not know yet is empty: such an alarm latches nothing, and is a warning."""
+    writer.execute(
+        "INSERT INTO alarm_entry VALUES (NULL, 'kapvik', 'bus', ?, ?)",
+        (START_NS, f'{{"time_ns": {START_NS}, "action": "raised"}}'),
+    )
+    journal = AlarmJournal(writer)
+    (report,) = journal.reports("kapvik", START_NS)
+    assert (report.name, report.state, report.active) == ("bus", AlarmState.UNACKNOWLEDGED, True)
+    assert (report.severity, report.latching, report.text, report.remedy, report.evidence) == (
+        "warning",
+        False,
+        "",
+        "",
+        None,
+    )
+    ((_, entry),) = journal.entries(writer, "kapvik", 10)
+    assert (entry.who, entry.comment, entry.until_ns, entry.latching) == ("", "", 0, False)

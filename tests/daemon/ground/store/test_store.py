@@ -11,6 +11,7 @@ import pytest
 from ground_messages import SESSION, START_NS, received
 
 from regolithd.daemon.ground.settings import Store
+from regolithd.daemon.ground.store import retention
 from regolithd.daemon.ground.store.compression import compress, decompress, dictionary
 from regolithd.daemon.ground.store.database import StoreError, lock, open_reader, open_writer
 from regolithd.daemon.ground.store.messages import MessageStore
@@ -120,6 +121,16 @@ def test_the_oldest_messages_go_first(writer: sqlite3.Connection, history: Histo
     assert [each.sequence for each in history.messages("kapvik", "event", 0, 2 * START_NS)] == list(
         range(19_000, 20_000)
     )
+
+
+@pytest.mark.parametrize(("bytes_over", "deleted"), [(-1, 0), (0, 0), (1, 3)])
+def test_a_store_may_be_as_large_as_its_limit(
+    bytes_over: int, deleted: int, writer: sqlite3.Connection, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beyond it the messages go that were received first, however new they are."""
+    MessageStore(writer).add([received("event", number, float(number)) for number in range(3)])
+    monkeypatch.setattr(retention, "used_bytes", lambda _: 20_000_000 + bytes_over)
+    assert trim(writer, Store(limit_MB=20.0), START_NS) == deleted
 
 
 def test_payloads_are_small_and_come_back_whole(writer: sqlite3.Connection) -> None:
