@@ -1,6 +1,8 @@
 """Friction larger than all the current that the simulation expects: named, corrected, and then consistent."""
 
 import tomllib
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,9 +12,11 @@ from servo import ServoAxis
 
 from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.comparison import Comparison, compare
-from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects
+from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects, write_corrected
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.simulation.load import load_simulation
 from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel
+from regolithd.calibration.mismatch.templates import write_templates
 from regolithd.calibration.toml_document import to_toml, with_tables
 
 CONCEALED_A = 0.037
@@ -117,3 +121,20 @@ def test_viscous_friction_is_told_per_motor_speed_and_its_wheels_alone_have_it()
     assert drivetrain["no_load_current_A"] == pytest.approx([0.07, 0, 0, 0, 0, 0])
     assert drivetrain["no_load_current_std_A"] == pytest.approx([0.01, 0, 0, 0, 0, 0])
     assert [effect["shape"]["power"] for effect in tables["effects"]] == [0.8]
+
+
+@pytest.mark.parametrize(
+    ("folder", "led"), [("sim", None), ("before", "../sim"), ("zoo", "../sim"), ("sim/inner", ".."), (".", "sim")]
+)
+def test_a_file_in_another_folder_leads_to_the_class(folder: str, led: str | None, tmp_path: Path) -> None:
+    """Wherever it is; beside SIM.toml nothing is added, and the class is found again from both."""
+    (tmp_path / folder).mkdir(parents=True, exist_ok=True)
+    (tmp_path / "sim").mkdir(exist_ok=True)
+    write_templates("class", tmp_path / "sim")
+    found = load_simulation(tmp_path / "sim" / "SIM.toml")
+    values = {name: prior.value for name, prior in found.parameters.items()}
+    answer, evidence = SimpleNamespace(unexplained=(), effects=()), SimpleNamespace(values=values, contributions=())
+    path = tmp_path / folder / "CORRECTED.toml"
+    write_corrected(path, answer, evidence, found)  # type: ignore[arg-type]
+    assert tomllib.loads(path.read_text())["simulation"].get("path") == led
+    assert load_simulation(path).parameters.keys() == found.parameters.keys()

@@ -17,6 +17,7 @@ from regolithd.daemon.control.client import control_connection
 from regolithd.daemon.control.protocol import Accepted
 from regolithd.daemon.control.server import MAX_CLIENTS, ControlSink
 from regolithd.daemon.control.socket import ControlSocketError
+from regolithd.drivers.master.events import MotionStopped
 
 
 async def test_stop_gets_through_a_thousand_half_sent_lines(tmp_path: Path) -> None:
@@ -137,3 +138,15 @@ async def test_a_client_waits_while_the_queue_of_connections_is_full(tmp_path: P
         await accepting
     for each in (*waiting, listener):
         each.close()
+
+
+def test_only_a_stop_of_the_motion_ends_a_traverse() -> None:
+    """Another event does not, and a stop without a traverse is nothing."""
+    told: list[tuple[str, bool]] = []
+    sink = ControlSink(Configuration(), lambda: None)
+    sink.event(MotionStopped(0, 3, "node 3 is silent"))
+    sink._traverse = SimpleNamespace(stop=lambda text, *, quick: told.append((text, quick)))  # type: ignore[assignment]
+    sink.event(SimpleNamespace(text="something else"))  # type: ignore[arg-type]
+    assert told == []
+    sink.event(MotionStopped(0, 3, "node 3 is silent"))
+    assert told == [("node 3 is silent", True)]

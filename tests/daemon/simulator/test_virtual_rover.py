@@ -208,3 +208,12 @@ def test_an_impossible_ground_is_refused(ground: dict[str, object]) -> None:
     """Unknown soils and unordered stretches are validation errors."""
     with pytest.raises(ValidationError):
         Scenario.model_validate({"ground": ground})
+
+
+def test_a_rover_that_drives_far_and_back_meets_the_same_ground() -> None:
+    """The terrain of the whole track is kept, for the way back."""
+    world = VirtualWorld()
+    begin = world._terrain.at(0.0)
+    far = world._terrain.at(1000 * world.scenario.noise.terrain_length_m)
+    np.testing.assert_array_equal(world._terrain.at(0.0), begin)
+    assert not np.allclose(far, begin)

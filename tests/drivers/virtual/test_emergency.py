@@ -136,3 +136,15 @@ def test_a_fault_has_its_unit_and_is_none_at_first(line: str, name: str, value: 
     assert getattr(master.node(12).faults, name) == value
     assert master.rover.inject_fault("clear all") == "ok"
     assert getattr(master.node(11).faults, name) == fresh
+
+
+def test_writing_zero_to_the_error_history_clears_it() -> None:
+    """CiA 301, 7.5.2.4: the number of errors and every entry; the errors themselves stay."""
+    master = Master()
+    node = master.node(NODE)
+    node._emergency.set(0x2310)
+    node._emergency.set(0x3210)
+    assert master.read(NODE, 0x1003, 0) == 2
+    master.write(NODE, 0x1003, 0, 0, 1)
+    assert [master.read(NODE, 0x1003, sub) for sub in range(3)] == [0, 0, 0]
+    assert master.read(NODE, 0x1001, 0) == 0x07

@@ -95,3 +95,12 @@ def test_what_stays_blank_is_not_said_to_be_bridged() -> None:
     np.testing.assert_allclose(found.channels["half"][:, 0], [*LINE[:5], *[np.nan] * 5])
     assert found.channels["x"] is recording.channels["x"]
     assert found.channels["none"] is recording.channels["none"]
+
+
+def test_channels_after_the_predicted_one_are_filled_too() -> None:
+    """The order of the columns means nothing."""
+    slow = every(10, TIME_S)
+    found = filled_between(recorded(y=TIME_S, x=slow, mode=slow, z=slow), "y", {"mode": "blank"})
+    np.testing.assert_allclose(found.channels["x"][:991, 0], TIME_S[:991])
+    np.testing.assert_allclose(found.channels["z"][:991, 0], TIME_S[:991])
+    np.testing.assert_array_equal(found.channels["mode"][:, 0], slow)

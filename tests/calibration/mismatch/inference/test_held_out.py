@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from linear_machine import NOISE, equations_of, problem_of, table, term_of
 
+from regolithd.calibration.mismatch.inference import held_out
 from regolithd.calibration.mismatch.inference.held_out import chosen_effects, held_out_errors
 
 
@@ -54,3 +58,25 @@ def test_three_effects_at_once_are_chosen() -> None:
     columns["reading_V"] = columns["reading_V"] + 0.5 * (columns["t_s"] >= 200)
     found = chosen_effects(equations_of(problem_of(columns)), 8.0)
     assert {term.name for term in found} == {"drag", "power", "step"}
+
+
+def test_beside_one_effect_pairs_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The three best alone; then three beside it, and two beside each of the six best; three effects at most."""
+    tried: list[tuple[str, ...]] = []
+
+    def fit(terms: tuple[str, ...]) -> SimpleNamespace:
+        tried.append(tuple(terms))
+        return SimpleNamespace(terms=tuple(terms))
+
+    train: Any = SimpleNamespace(fit=fit, score=lambda found: len(found.terms))
+    monkeypatch.setattr(
+        held_out, "best_of_each_candidate", lambda _, terms: [(1.0, f"{len(terms)}{k}") for k in range(9)]
+    )
+    monkeypatch.setattr(held_out, "acceptable", lambda *_: True)
+    monkeypatch.setattr(held_out, "passes_entry_test", lambda *_: True)
+    assert chosen_effects(train, 8.0) == ("00", "10", "20")
+    alone = [("00",), ("01",), ("02",)]
+    beside = [("00", f"1{k}") for k in range(3)]
+    pairs = [(f"0{one}", f"1{other}") for one in range(6) for other in range(2)]
+    third = [("00", "10", f"2{k}") for k in range(3)]
+    assert [each for each in tried if each] == [*alone, *beside, *pairs, ("00",), *third, ("00", "10")]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from linear_machine import AXES, INSTANTS, STEP_S, Level, problem_of, table
@@ -9,6 +11,7 @@ from linear_machine import AXES, INSTANTS, STEP_S, Level, problem_of, table
 from regolithd.calibration.mismatch import RecordingError, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.prior import own_name
+from regolithd.calibration.mismatch.problem.problem import StatedEffect
 from regolithd.calibration.mismatch.thresholds import Thresholds
 
 
@@ -126,3 +129,13 @@ def test_a_simulation_without_sides_has_no_sets_and_no_contrasts() -> None:
     assert problem.wheel_sets == ()
     assert problem.contrasts("roll") == {}
     assert own_name("gain", 4) == "gain of 4"
+
+
+def test_a_stated_effect_is_added_unless_the_simulation_has_it() -> None:
+    """By default the simulation's own prediction lacks it."""
+    problem = problem_of(table())
+    column = np.full(problem.mask.shape, 0.5)
+    outside = StatedEffect("drag", (1, 2), column, 0.1)
+    inside = StatedEffect("slope", (1,), 3 * column, 0.1, in_simulation=True)
+    np.testing.assert_array_equal(replace(problem, stated=(outside, inside, outside)).added, 2 * column)
+    assert not problem.added.any()

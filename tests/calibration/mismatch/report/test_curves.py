@@ -11,6 +11,7 @@ import pytest
 
 from regolithd.calibration.mismatch.answer import Evidence
 from regolithd.calibration.mismatch.report.curves import curve_of
+from regolithd.calibration.mismatch.report.labels import Labels
 
 ROWS, WHEELS = 300, 2
 RANDOM = np.random.default_rng(3)
@@ -127,3 +128,18 @@ def test_there_is_no_curve_of_what_is_not_there() -> None:
     """A covariate that was not recorded, and the turned angle, over which everything is periodic."""
     assert curve_of(seen(), "temperature", (1, 2)) is None
     assert curve_of(seen(wheel_angle=SPEED), "wheel_angle", (1, 2)) is None
+
+
+@pytest.mark.parametrize(("length_s", "in_minutes"), [(180.0, False), (180.5, True)])
+def test_a_recording_of_more_than_three_minutes_has_minutes_on_its_axes(length_s: float, in_minutes: bool) -> None:
+    """From its first instant to its last, wherever the clock began."""
+    evidence = replace(seen(), time_s=1000 + np.linspace(0, length_s, ROWS), candidates=())
+    assert Labels.of(evidence).in_minutes == in_minutes
+
+
+@pytest.mark.parametrize(("unit", "size", "in_milli"), [("A", 0.99, True), ("A", 1.01, False), ("N", 0.5, False)])
+def test_small_currents_are_shown_in_milliamperes(unit: str, size: float, in_milli: bool) -> None:
+    """Where their mean size is below one ampere; readings that are absent do not count."""
+    measured = np.where(np.arange(ROWS)[:, None] % 2, size, -size) * np.ones(WHEELS)
+    measured[0, 0] = np.nan
+    assert Labels.of(replace(seen(), unit=unit, measured=measured)).in_milli == in_milli

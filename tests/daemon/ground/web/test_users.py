@@ -100,3 +100,15 @@ def test_a_file_that_is_no_text_is_one_message(tmp_path: Path) -> None:
     for name in ("users", "absent"):
         with pytest.raises(UsersError, match="--add-user NAME"):
             read_users(tmp_path / name)
+
+
+def test_the_first_of_five_wrong_passwords_counts(writer: sqlite3.Connection) -> None:
+    """An address waits until that one is long enough ago, and a sixth makes the second one count."""
+    now = [1000.0]
+    logins = Logins({}, writer, lambda: now[0])
+    for _ in range(MOST_FAILURES):
+        logins.failed("there")
+        now[0] += 10
+    assert logins.blocked_s("there") == FAILURES_WITHIN_S - 10 * MOST_FAILURES
+    logins.failed("there")
+    assert logins.blocked_s("there") == FAILURES_WITHIN_S - 10 * (MOST_FAILURES - 1)
