@@ -10,7 +10,7 @@ RECORDINGS ?= ../shared/recordings
 
 .PHONY: help demo test check docs clean install uninstall
 .PHONY: interop first-day week
-.PHONY: figures chaos fuzz bench audit wheelhouse lock
+.PHONY: figures chaos fuzz holds bench audit wheelhouse lock
 .PHONY: sizing reproduce evaluate loop prove prove-machines real scaling thresholds mutations mutants frames pictures picture screenshots
 
 help:
@@ -100,10 +100,13 @@ interop: $(DEV) ## slaves of other stacks, from CANOPENLINUX=FOLDER and LELY=FOL
 		$(if $(CANOPENLINUX),--canopenlinux $(CANOPENLINUX)) $(if $(LELY),--lely $(LELY))
 
 chaos: $(DEV) ## a daemon on SocketCAN under faults in random order, checked from outside (SECONDS=1800 SEED=…)
-	PYTHONPATH=src:tests/bench:tests/chaos tests/bench/with-vcan $(BIN)/python tests/chaos/chaos.py --seconds $(or $(SECONDS),1800) --seed $(or $(SEED),1)
+	PYTHONPATH=$(CURDIR)/src:$(CURDIR)/tests/bench:$(CURDIR)/tests/chaos tests/bench/with-vcan $(BIN)/python tests/chaos/chaos.py --seconds $(or $(SECONDS),1800) --seed $(or $(SEED),1)
 
 fuzz: $(DEV) ## random damage to everything that is read from others (SECONDS=3600 SEED=…)
-	PYTHONPATH=src:tests/bench:tests/fuzz $(BIN)/python tests/fuzz/fuzzing.py --seconds $(or $(SECONDS),3600) --seed $(or $(SEED),1)
+	PYTHONPATH=$(CURDIR)/src:$(CURDIR)/tests/bench:$(CURDIR)/tests/fuzz $(BIN)/python tests/fuzz/fuzzing.py --seconds $(or $(SECONDS),3600) --seed $(or $(SEED),1)
+
+holds: $(DEV) ## SIGKILL at 300 points, 10 000 flipped bits, nodes that babble, a day replayed (half an hour; SEED=…)
+	PYTHONPATH=$(CURDIR)/src:$(CURDIR)/tests/bench:$(CURDIR)/tests/holds $(BIN)/python tests/holds/holds.py --seed $(or $(SEED),1)
 
 figures: $(DEV) ## docs/reference/figures.md from build/figures/{chaos,holds,fuzz,bench,audit}.json, those that are there
 	$(BIN)/python tests/bench/figures_page.py

@@ -61,6 +61,21 @@ class BrokerClient(Client):
         # In Python 3.11 `wait_for`, inside `publish`, may swallow a cancellation; `gather` does not.
         await asyncio.gather(self.publish(*last))
 
+    def _on_socket_register_write(self, client: PahoClient, userdata: object, sock: Any) -> None:  # noqa: ANN401, ARG002  # a paho socket
+        """Do as aiomqtt does, but leave a socket alone that was closed meanwhile: its number may be another file's."""
+        self._loop.call_soon_threadsafe(self._write_when_ready, client, sock)
+
+    def _write_when_ready(self, client: PahoClient, sock: Any) -> None:  # noqa: ANN401  # a paho socket
+        if sock.fileno() >= 0:
+            self._loop.add_writer(sock.fileno(), self._write, client)
+
+    def _write(self, client: PahoClient) -> None:
+        try:
+            client.loop_write()
+        except Exception as error:  # noqa: BLE001  # whatever it is, the connection is lost
+            if not self._disconnected.done():
+                self._disconnected.set_exception(error)
+
     async def publish_acknowledged(self, topic: str, payload: bytes, *, retain: bool) -> None:
         """Publish at QoS 1, and return once the broker has acknowledged it.
 
