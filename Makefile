@@ -105,8 +105,8 @@ chaos: $(DEV) ## a daemon on SocketCAN under faults in random order, checked fro
 fuzz: $(DEV) ## random damage to everything that is read from others (SECONDS=3600 SEED=…)
 	PYTHONPATH=$(CURDIR)/src:$(CURDIR)/tests/bench:$(CURDIR)/tests/fuzz $(BIN)/python tests/fuzz/fuzzing.py --seconds $(or $(SECONDS),3600) --seed $(or $(SEED),1)
 
-holds: $(DEV) ## SIGKILL at 300 points, 10 000 flipped bits, nodes that babble, a day replayed (half an hour; SEED=…)
-	PYTHONPATH=$(CURDIR)/src:$(CURDIR)/tests/bench:$(CURDIR)/tests/holds $(BIN)/python tests/holds/holds.py --seed $(or $(SEED),1)
+holds: $(DEV) ## SIGKILL at 300 points, 10 000 flipped bits, nodes that babble, a day replayed (SEED=… DAY=86400)
+	PYTHONPATH=$(CURDIR)/src:$(CURDIR)/tests/bench:$(CURDIR)/tests/holds $(BIN)/python tests/holds/holds.py --seed $(or $(SEED),1) --day-seconds $(or $(DAY),86400)
 
 figures: $(DEV) ## docs/reference/figures.md from build/figures/{chaos,holds,fuzz,bench,audit}.json, those that are there
 	$(BIN)/python tests/bench/figures_page.py

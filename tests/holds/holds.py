@@ -1,4 +1,4 @@
-"""`make holds`: SIGKILL at 300 points, 10 000 flipped bits, nodes that babble, and a day that is replayed.
+"""`make holds SEED=1 DAY=86400`: SIGKILL at 300 points, 10 000 flipped bits, nodes that babble, a day that is replayed.
 
 Writes build/figures/holds.json; exit status 1 where something was lost, altered, late or fatal.
 """
@@ -35,7 +35,7 @@ def main() -> None:
     parser.add_argument("--figures", type=Path, default=ROOT / "build/figures/holds.json")
     chosen = parser.parse_args()
     figures: dict[str, object] = {
-        "command": f"make holds SEED={chosen.seed}",
+        "command": f"make holds SEED={chosen.seed} DAY={chosen.day_seconds:g}",
         "measured": f"{time.strftime('%Y-%m-%d')}, Python {platform.python_version()}",
     }
     failures: list[str] = []
