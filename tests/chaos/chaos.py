@@ -165,8 +165,8 @@ def one_round(rig: Rig, faults: list[Fault], outcome: Outcome, *, drive: bool, h
         if fault.heard is not None and not (fault.name == "disk full" and "link down" in what):  # nothing to write
             topic, fields = fault.heard
             rig.check(rig.messages.heard(topic, begun, **fields), f"{what}: not heard: {topic} {fields}")
+    rig.end_drive()
     if driving:
-        rig.end_drive()
         deadline = time.monotonic() + STOP_TIMEOUT_S
         while rig.turning() and time.monotonic() < deadline:
             time.sleep(0.1)
