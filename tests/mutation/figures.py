@@ -31,6 +31,8 @@ a test fails.
 |---|---|---|
 {rows}
 {earlier}
+The mutation score leaves equal programs out, which no test can kill (DeMillo, Lipton and Sayward, 1978).
+
 Limits are of CPU time, and a test of the daemon or the drivers that fails is repeated alone, so that a busy machine
 kills no mutant. Left out are annotations, which do not run, and the values of constants, fields and parameters named
 `timeout_s` or `…_timeout_s`, because no requirement fixes a time limit to a second.
@@ -77,11 +79,13 @@ def score(results: Sequence[Result], seed: int, words: Words) -> dict[str, Any]:
 
 def line_of(figures: Mapping[str, Any]) -> str:
     """Return the figures as one line."""
-    since = figures["killed"] + figures["test_added"]
+    mutants, since = max(figures["mutants"], 1), figures["killed"] + figures["test_added"]
+    mutation_score = figures["killed"] / max(figures["mutants"] - figures["equal"], 1)
     return (
         f"Seed {figures['seed']}: {figures['killed']} of {figures['mutants']} mutants killed "
-        f"({100 * figures['share_killed']:.0f} %), {since} ({100 * since / max(figures['mutants'], 1):.0f} %) with the "
-        f"tests that were added for survivors since; {figures['equal']} are equal programs."
+        f"({100 * figures['share_killed']:.0f} %; mutation score {100 * mutation_score:.0f} %), {since} "
+        f"({100 * since / mutants:.0f} %) with the tests that were added for survivors since; "
+        f"{figures['equal']} are equal programs."
     )
 
 
