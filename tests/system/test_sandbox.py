@@ -41,8 +41,7 @@ STATE = "/var/lib/regolithd"
 print("PROBE " + json.dumps({
     "write to its state": result(lambda: write(STATE + "/probe")),
     **{"write to " + path: result(lambda path=path: write(path)) for path in
-       ("/etc/probe", "/usr/probe", "/opt/regolithd/probe", "/var/log/probe", "/etc/regolithd/rover.toml",
-        "/root/probe")},
+       ("/etc/probe", "/usr/probe", "/opt/regolithd/probe", "/var/log/probe", "/etc/regolithd/rover.toml")},
     "read /etc/shadow": result(lambda: open("/etc/shadow").close()),
     **{name: result(lambda args=args: socket.socket(*args).close()) for name, args in {
         "CAN socket": (socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW),
