@@ -12,6 +12,7 @@ RECORDINGS ?= ../shared/recordings
 .PHONY: interop first-day week
 .PHONY: figures chaos fuzz holds bench audit wheelhouse lock
 .PHONY: sizing reproduce evaluate loop prove prove-machines real scaling thresholds mutations mutants frames pictures picture screenshots
+.PHONY: fleet
 
 help:
 	@awk -F ':.*## ' '/^## / { print "\n" substr($$0, 4) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -79,6 +80,9 @@ thresholds: $(DEV) ## each threshold of the mismatch engine halved and doubled, 
 
 scaling: $(DEV) ## time and memory of a comparison against rows and candidates
 	$(BIN)/python -m regolithd.calibration.validation.blind_trials.figures.cost_scaling build/figures/scaling.json docs/mismatch-scaling.svg
+
+fleet: $(DEV) ## 100 recordings of five virtual rovers on a local Dask cluster, a worker killed half way (half an hour)
+	$(BIN)/python -m regolithd.calibration.validation.fleet_study $(if $(SEED),--seed $(SEED)) $(if $(CHECK),--check $(CHECK))
 
 mutations: $(DEV) ## `regolithd mismatch` on a thousand damaged files of each kind, and in other units (half an hour)
 	MUTATIONS=1000 INVARIANCES=1000 $(BIN)/python -m pytest tests/daemon/mismatch tests/calibration/mismatch/test_invariance.py

@@ -76,6 +76,19 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "ShapeProfile",
         "StatedEffect",
         "_Draws",
+        *(
+            "Found",
+            "FoundTerm",
+            "Sums",
+            "_Columns",
+            "FleetEquations",
+            "FleetFit",
+            "Place",
+            "Summed",
+            "Chooser",
+            "Chosen",
+        ),
+        "Searched",
     }
 
 

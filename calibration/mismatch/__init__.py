@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
     from regolithd.calibration.mismatch.candidates.library import library
-    from regolithd.calibration.mismatch.comparison import compare
     from regolithd.calibration.mismatch.data.recording import Recording, as_recording, from_columns, read_recording
     from regolithd.calibration.mismatch.errors import MismatchError, RecordingError, SimulationError
+    from regolithd.calibration.mismatch.fleet.comparison import Member, compare
     from regolithd.calibration.mismatch.problem.prior import Prior, SensorError
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.simulation.load import load_simulation
@@ -27,6 +27,7 @@ __all__ = [
     "Array",
     "Candidate",
     "Coefficient",
+    "Member",
     "MismatchError",
     "Prior",
     "Problem",
@@ -47,9 +48,9 @@ __all__ = [
 _HOME = {
     "candidates.candidate": ("Candidate", "Coefficient", "Shape"),
     "candidates.library": ("library",),
-    "comparison": ("compare",),
     "data.recording": ("Recording", "as_recording", "from_columns", "read_recording"),
     "errors": ("MismatchError", "RecordingError", "SimulationError"),
+    "fleet.comparison": ("Member", "compare"),
     "problem.prior": ("Prior", "SensorError"),
     "problem.problem": ("Problem",),
     "simulation.load": ("load_simulation",),

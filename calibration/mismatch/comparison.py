@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.selection.decision import Decision
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 
@@ -63,6 +64,15 @@ class Comparison:
 
     def _repr_html_(self) -> str:
         return notebook_html(self.answer, self.evidence)
+
+
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """A comparison of one channel, what was decided, and the candidates in their forms for the simulation."""
+
+    comparison: Comparison
+    decision: Decision
+    candidates: tuple[Candidate, ...]
 
 
 def compare(
@@ -104,6 +114,18 @@ def compare(
             for channel in simulation.channels
         ]
         return merged(found, simulation)
+    return searched(recorded, simulation, effects=effects, thresholds=thresholds, progress=progress).comparison
+
+
+def searched(
+    recorded: Recording,
+    simulation: Simulation,
+    *,
+    effects: Sequence[Contribution],
+    thresholds: Thresholds = THRESHOLDS,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Searched:
+    """Compare the one channel of a simulation, as `compare` does, and return the decision as well."""
     progress("simulating")
     candidates: Sequence[Candidate] = [each.form_for(simulation) for each in simulation.candidates(library())]
     stated = stated_in(candidates, effects, simulation.stated_effects())
@@ -131,7 +153,7 @@ def compare(
         covariate_labels=problem.labels,
         wheel_column=simulation.wheel_column,
     )
-    return Comparison(answer, evidence, simulation)
+    return Searched(Comparison(answer, evidence, simulation), decision, tuple(candidates))
 
 
 def _labelled(comparison: Comparison, channel: str) -> Comparison:

@@ -37,8 +37,9 @@ def compare(
     the simulation lacks physics, or when an effect of a corrected simulation has changed.
     """
     from regolithd.calibration.mismatch.errors import MismatchError
+    from regolithd.daemon.mismatch.files import Outputs
     from regolithd.daemon.mismatch.result import comparison_result
-    from regolithd.daemon.mismatch.run import Outputs, run
+    from regolithd.daemon.mismatch.run import run
     from regolithd.daemon.mismatch.traverse import extract_last_traverse
     from regolithd.daemon.setup import configuration_or_exit
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path  # noqa: TC003  # typer reads the annotations when it runs
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
+RoverFrom = Literal["column", "metadata", "folder"]
+Level = Literal["shared", "rover", "recording"]
 EXIT_DATA = 65
 """EX_DATAERR: recording or simulation cannot be used."""
 
@@ -18,12 +20,26 @@ def register(app: typer.Typer) -> None:
     def mismatch(
         recordings: Annotated[
             list[Path] | None,
-            typer.Argument(help="CSV(.gz), Parquet, or MCAP of the daemon; each is a run of its own."),
+            typer.Argument(help="CSV(.gz), Parquet, or MCAP of the daemon; each is a run of its own, of its rover."),
         ] = None,
         simulation: Annotated[Path | None, typer.Option(help="SIM.toml: the simulation and its parameters.")] = None,
         json: Annotated[Path | None, typer.Option(help="Write the answer here, as JSON.")] = None,
         report: Annotated[Path | None, typer.Option(help="Write a self-contained HTML report here.")] = None,
         corrected: Annotated[Path | None, typer.Option(help="Write the corrected SIM.toml here.")] = None,
+        catalogue: Annotated[
+            Path | None,
+            typer.Option(help="Write what was found in which recording here (.parquet); continues a stopped run."),
+        ] = None,
+        rover_from: Annotated[
+            RoverFrom | None,
+            typer.Option(help="What names a recording's rover: by default the column `rover` or an MCAP's metadata."),
+        ] = None,
+        parameters: Annotated[
+            Level | None, typer.Option(help="Of several rovers: whose the simulation's parameters are (rover).")
+        ] = None,
+        scheduler: Annotated[
+            str | None, typer.Option(metavar="ADDRESS", help="Compare recordings on this Dask cluster.")
+        ] = None,
         init: Annotated[
             tuple[str, Path] | None,
             typer.Option(
@@ -44,9 +60,12 @@ def register(app: typer.Typer) -> None:
                 return
             if not recordings or simulation is None:
                 raise typer.BadParameter("a recording and --simulation SIM.toml are needed, or --init KIND FOLDER")
-            from regolithd.daemon.mismatch.run import Outputs, run
+            from regolithd.daemon.mismatch.files import Outputs
+            from regolithd.daemon.mismatch.fleet import FleetOptions
+            from regolithd.daemon.mismatch.run import run
 
-            run(recordings, simulation, Outputs(json, report, corrected))
+            fleet = FleetOptions(rover_from, parameters, catalogue, scheduler)
+            run(recordings, simulation, Outputs(json, report, corrected), fleet)
         except (MismatchError, OSError) as error:
             typer.echo(f"regolithd mismatch: {error}", err=True)
             raise typer.Exit(EXIT_DATA) from error

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from hashlib import sha256
 from typing import TYPE_CHECKING
 
+from regolithd.calibration.mismatch.errors import MismatchError
 from regolithd.calibration.mismatch.report.page import Provenance, write_report
 
 if TYPE_CHECKING:
@@ -14,6 +16,27 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.answer import Answer
     from regolithd.calibration.mismatch.comparison import Comparison
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """Paths to write to; None: not written."""
+
+    json: Path | None = None
+    report: Path | None = None
+    corrected: Path | None = None
+
+    def check(self) -> None:
+        """Check that the folders are there, before minutes are spent.
+
+        Raises
+        ------
+        MismatchError
+            When one is not.
+        """
+        for path in (self.json, self.report, self.corrected):
+            if path and not path.resolve().parent.is_dir():
+                raise MismatchError(f"{path} cannot be written: there is no folder {path.parent}")
 
 
 def write_json(path: Path, answer: Answer) -> None:

@@ -25,11 +25,18 @@ def read_recordings(paths: Sequence[Path], unit: str) -> Recording:
     RecordingError
         When a file is damaged, or they have no column in common; the message names the file.
     """
-    return joined([_read(path, unit) for path in paths], [path.name for path in paths])
+    return joined([read_one(path, unit) for path in paths], [path.name for path in paths])
 
 
-def _read(path: Path, unit: str) -> Recording:
-    return _read_mcap(path) if path.suffix == ".mcap" else read_recording(path, unit=unit)
+def read_one(path: Path, unit: str, rover: str | None = None) -> Recording:
+    """Read a file of any kind; of one that holds several rovers, the rows of one.
+
+    Raises
+    ------
+    RecordingError
+        When it is damaged, or no recording.
+    """
+    return _read_mcap(path) if path.suffix == ".mcap" else read_recording(path, unit=unit, rover=rover)
 
 
 def _read_mcap(path: Path) -> Recording:

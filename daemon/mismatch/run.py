@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -10,9 +9,10 @@ import typer
 from rich.console import Console
 
 from regolithd.calibration.mismatch.comparison import compare
-from regolithd.calibration.mismatch.errors import MismatchError, RecordingError
+from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.simulation.load import load_simulation
-from regolithd.daemon.mismatch.files import write_json, write_page
+from regolithd.daemon.mismatch.files import Outputs, write_json, write_page
+from regolithd.daemon.mismatch.fleet import FleetOptions, files_of_rovers, run_fleet
 from regolithd.daemon.mismatch.recordings import read_recordings
 from regolithd.daemon.mismatch.terminal import print_answer
 
@@ -23,29 +23,14 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Answer
 
 
-@dataclass(frozen=True, slots=True)
-class Outputs:
-    """Paths to write to; None: not written."""
-
-    json: Path | None = None
-    report: Path | None = None
-    corrected: Path | None = None
-
-    def check(self) -> None:
-        """Check that the folders are there, before minutes are spent.
-
-        Raises
-        ------
-        MismatchError
-            When one is not.
-        """
-        for path in (self.json, self.report, self.corrected):
-            if path and not path.resolve().parent.is_dir():
-                raise MismatchError(f"{path} cannot be written: there is no folder {path.parent}")
+NO_FLEET = FleetOptions()
+"""No option that only a fleet has."""
 
 
-def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs) -> Answer:
+def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs, options: FleetOptions = NO_FLEET) -> Answer:
     """Compare, write the outputs, print the answer and return it.
+
+    Recordings of one rover are runs of one recording, unless an option of `FleetOptions` is given.
 
     Raises
     ------
@@ -53,6 +38,9 @@ def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs) -> Answe
         When recording or simulation cannot be used.
     """
     outputs.check()
+    files = files_of_rovers(recordings, options.rover_from)
+    if options.asked_for or len({file.rover for file in files}) > 1:
+        return run_fleet(files, simulation, outputs, options)
     simulated = load_simulation(simulation, announce=partial(typer.echo, err=True))
     with Console(stderr=True).status("reading") as status:
         recorded = read_recordings(recordings, simulated.wheel_column)

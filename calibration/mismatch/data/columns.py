@@ -28,6 +28,8 @@ Column = NDArray[Any]
 
 NUMBERS_NEEDED = frozenset({"t_s", "t_ms", "t_us", "t_ns", "t_min", "t_h", "run"})
 """Columns in which text is an error, however much of it there is."""
+ROVER = "rover"
+"""The column that tells rovers apart, where a file has several."""
 PARQUET = b"PAR1"
 MCAP = b"\x89MCAP"
 _FOREIGN = {
@@ -66,8 +68,8 @@ class _Source:
         return f"{self.counted} {row + (2 if self.counted == 'line' else 1)}"
 
 
-def file_columns(path: Path, unit: str) -> Columns:
-    """Read CSV (also .gz) or Parquet.
+def file_columns(path: Path, unit: str, rover: str | None = None) -> Columns:
+    """Read CSV (also .gz) or Parquet; of a file with several rovers, the rows of one.
 
     Raises
     ------
@@ -76,8 +78,44 @@ def file_columns(path: Path, unit: str) -> Columns:
     """
     if not path.is_file():
         raise RecordingError(f"{path} is not there" if not path.exists() else f"{path} is not a file")
-    table = _parquet_table(path) if path.suffix == ".parquet" else _csv_table(path)
+    table = _table(path)
+    if rover is not None:
+        table = table.filter(_text(table, ROVER) == rover).drop_columns([ROVER])
     return _columns(table, unit, _Source(f"{path}: ", "row" if path.suffix == ".parquet" else "line"))
+
+
+def rovers_in(path: Path) -> tuple[str, ...]:
+    """Return the rovers that the column `rover` of a CSV or Parquet file names, in ascending order; empty: it has none.
+
+    Raises
+    ------
+    RecordingError
+        When the file cannot be read.
+    """
+    if path.suffix != ".parquet" and ROVER.encode() not in _first_line_of(path):
+        return ()
+    table = _table(path)
+    return tuple(str(name) for name in np.unique(_text(table, ROVER)) if name) if ROVER in table.column_names else ()
+
+
+def _first_line_of(path: Path) -> bytes:
+    """Return a text file's first line, unpacked; empty where it cannot be: reading the whole then says why."""
+    try:
+        with path.open("rb") as raw:
+            packed = raw.read(2) == b"\x1f\x8b"
+        with gzip.open(path, "rb") if packed else path.open("rb") as file:
+            return file.readline(1 << 16)
+    except (OSError, EOFError, zlib.error):
+        return b""
+
+
+def _table(path: Path) -> Any:  # noqa: ANN401  # pyarrow has no types
+    return _parquet_table(path) if path.suffix == ".parquet" else _csv_table(path)
+
+
+def _text(table: Any, name: str) -> NDArray[Any]:  # noqa: ANN401
+    """Return a column as text, empty where it is blank."""
+    return np.array(["" if cell is None else str(cell) for cell in table.column(name).to_pylist()])
 
 
 def frame_columns(frame: object, unit: str) -> Columns:

@@ -95,8 +95,8 @@ class Recording:
         return replace(self, channels={**self.channels, **channels})
 
 
-def read_recording(path: Path, *, unit: str = UNIT) -> Recording:
-    """Read CSV (also .gz) or Parquet.
+def read_recording(path: Path, *, unit: str = UNIT, rover: str | None = None) -> Recording:
+    """Read CSV (also .gz) or Parquet; of a file whose column `rover` names several rovers, the rows of one.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def read_recording(path: Path, *, unit: str = UNIT) -> Recording:
         When the file is none of these, has no time, or a cell is no number; the message names line and column.
     """
     try:
-        return _arrange(file_columns(path, unit), unit)
+        return _arrange(file_columns(path, unit, rover), unit)
     except RecordingError as error:
         raise error if str(path) in str(error) else RecordingError(f"{path}: {error}") from error
 

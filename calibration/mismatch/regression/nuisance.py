@@ -45,9 +45,9 @@ class Nuisance:
 
 def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:
     """Add ∂prediction/∂parameter of every parameter whose prior has a spread, and of each wheel's own deviation."""
-    names, stds, tangents = _tangents(design.problem)
+    names, stds, columns = tangents(design.problem)
     away = np.array([_from_prior(design.problem, name) for name in names])
-    design, places = design.extended(tangents)
+    design, places = design.extended(columns)
     # The coefficient of a column that was divided by its scale is the parameter's shift times that scale.
     precision = 1 / (np.array(stds) * design.scale[list(places)]) ** 2 if places else np.zeros(0)
     centre = away * design.scale[list(places)] if places else np.zeros(0)
@@ -61,20 +61,20 @@ def _from_prior(problem: Problem, name: str) -> float:
     return 0.0 if prior is None else prior.value - problem.values[name]
 
 
-def _tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
+def tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
     """Return names, prior standard deviations and tangents, shape (time, wheel) each."""
     simulation, wheels = problem.simulation, problem.recording.wheels
     free = {name: prior.std for name, prior in simulation.parameters.items() if prior.std > 0}
-    names, stds, tangents = list(free), list(free.values()), [problem.tangent(name) for name in free]
+    names, stds, found = list(free), list(free.values()), [problem.tangent(name) for name in free]
     for name in free if len(wheels) > 1 else ():
         if name in simulation.own_to_each_wheel:
             names += [own_name(name, wheel) for wheel in wheels]
             stds += [problem.thresholds.own_share * free[name]] * len(wheels)
-            tangents += [np.where(np.array(wheels) == wheel, problem.tangent(name), 0.0) for wheel in wheels]
+            found += [np.where(np.array(wheels) == wheel, problem.tangent(name), 0.0) for wheel in wheels]
     uncertain = [effect for effect in problem.stated if effect.relative_std > 0]
     names += [stated_name(effect.name) for effect in uncertain]
     stds += [effect.relative_std for effect in uncertain]
-    return names, stds, tangents + [effect.column for effect in uncertain]
+    return names, stds, found + [effect.column for effect in uncertain]
 
 
 def stated_name(effect: str) -> str:

@@ -54,3 +54,8 @@ def active_rms(squares: Array, active_share: float) -> float:
     """
     weighted = np.sum(squares**2) / max(float(np.sum(squares)), 1e-300)
     return float(np.sqrt(max(np.mean(squares), active_share**2 * weighted)))
+
+
+def active_size(squares: float, fourths: float, readings: float, active_share: float) -> float:
+    """Return the same from the sums of an effect's squares and fourth powers over so many readings."""
+    return float(np.sqrt(max(squares / max(readings, 1.0), active_share**2 * fourths / max(squares, 1e-300))))

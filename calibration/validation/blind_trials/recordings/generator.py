@@ -198,20 +198,20 @@ def make_trial(
     rng = np.random.default_rng([plan.seed, 1, plan.number])
     tables = simulation_tables(rng)
     kind = "constant" if plan.group == "constant" else str(rng.choice(["patrol", "patrol", "patrol", *KINDS]))
-    traverse = _traverse(rng, kind, tables, duration_s, step_s)
+    traverse = rover_traverse(rng, kind, tables, duration_s, step_s)
     model = true_model(rng, tables, traverse)
     effects = conceal(rng, plan, model)
     if experiment:
         rng = np.random.default_rng([plan.seed, 3, plan.number])
         duration_s = max(duration_s, experiment.duration_s)
-        traverse = _traverse(rng, "experiment", tables, duration_s, step_s, experiment.conditions)
+        traverse = rover_traverse(rng, "experiment", tables, duration_s, step_s, experiment.conditions)
         model = replace(model, traverse=traverse)
         repeated = (effect_of_plan(plan, model, index) for index in range(len(effects)))
         effects = tuple(replace(now, size=before.size) for now, before in zip(repeated, effects, strict=True))
-    return _with_noise(rng, plan, model, tables, effects)
+    return with_noise(rng, plan, model, tables, effects)
 
 
-def _traverse(  # the quantities of a traverse
+def rover_traverse(  # the quantities of a traverse
     rng: Generator, kind: str, tables: Tables, duration_s: float, step_s: float, varied: frozenset[str] = ALL_CONDITIONS
 ) -> Traverse:
     """Return a traverse of the rover of SIM.toml."""
@@ -227,7 +227,7 @@ def _traverse(  # the quantities of a traverse
     )
 
 
-def _with_noise(
+def with_noise(
     rng: Generator, plan: Plan, model: TrueModel, tables: Tables, effects: tuple[ConcealedEffect, ...]
 ) -> Trial:
     """Return the trial with noise on the motor currents, as measured."""

@@ -1,0 +1,1 @@
+"""The search over rovers, wheels and dates, on the sums of all recordings."""

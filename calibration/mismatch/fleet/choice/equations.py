@@ -1,0 +1,269 @@
+"""Normal equations of a whole fleet, from the sums of its recordings.
+
+A coefficient acts through one column of the sums, with a factor in each recording and on each wheel: a parameter of one
+rover has the factor 1 in that rover's recordings, an effect of one wheel since a date on that wheel and since then.
+Weights are one over the long-run variance of each recording's noise, so Δχ² is twice a log likelihood ratio.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from regolithd.calibration.mismatch.fleet.choice.courses import Course
+    from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
+    from regolithd.calibration.mismatch.fleet.work.sums import Sums
+
+Array = NDArray[np.float64]
+Level = Literal["shared", "rover", "recording"]
+"""Whose a parameter of the simulation is: one value for the fleet, for each rover, or for each recording."""
+SINGULAR = 1e-12
+"""Relative eigenvalue below which a direction counts as undetermined: rounding of the sums."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """Wheels of rovers that share an effect.
+
+    Attributes
+    ----------
+    rovers: indices
+    wheels: indices
+    kind: "fleet" and "each rover" are all wheels of all rovers, with one size or one for each; then one rover's
+    """
+
+    rovers: tuple[int, ...]
+    wheels: tuple[int, ...]
+    kind: Literal["fleet", "each rover", "rover", "some", "one"]
+
+
+@dataclass(frozen=True)
+class FleetTerm:
+    """A candidate in one shape, on some wheels of some rovers, with its course over the recordings."""
+
+    group: GridGroup
+    units: Units
+    course: Course
+
+    @property
+    def name(self) -> str:
+        """The candidate's."""
+        return self.group.candidate.name
+
+
+@dataclass(frozen=True, eq=False)
+class FleetFit:
+    """Terms fitted together with the free parameters.
+
+    Attributes
+    ----------
+    terms: what was fitted
+    columns: of every coefficient, the free parameters' first, shape (coefficient,)
+    factors: of every coefficient, shape (coefficient, recording, wheel)
+    coefficients, covariance: in physical units
+    delta_chi2: below the free parameters alone
+    spans: the coefficients of each term
+    """
+
+    terms: tuple[FleetTerm, ...]
+    columns: NDArray[np.int64]
+    factors: Array
+    coefficients: Array
+    covariance: Array
+    delta_chi2: float
+    spans: tuple[slice, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FleetEquations:
+    """The sums of all recordings, aligned.
+
+    Attributes
+    ----------
+    sums: of each recording
+    rover: index of each recording's rover, shape (recording,)
+    when: its time, or its place in the order, shape (recording,)
+    wheels: names of all wheels
+    tangents: names of all tangents
+    groups: the candidates of the grid; their columns come after the tangents
+    level: whose the parameters are
+    gram, moment: weighted, shape (recording, wheel, column, column), (recording, wheel, column)
+    used: whether each recording is fitted, shape (recording,)
+    """
+
+    sums: tuple[Sums, ...]
+    rover: NDArray[np.int64]
+    when: Array
+    wheels: tuple[int | str, ...]
+    tangents: tuple[str, ...]
+    prior_stds: Array
+    groups: tuple[GridGroup, ...]
+    level: Level
+    gram: Array = field(repr=False)
+    moment: Array = field(repr=False)
+    weights: Array = field(repr=False)
+
+    @property
+    def count(self) -> int:
+        """Number of recordings."""
+        return len(self.sums)
+
+    @cached_property
+    def recordings_of(self) -> tuple[tuple[int, ...], ...]:
+        """The recordings of each rover, in the order of time."""
+        rovers = range(int(self.rover.max()) + 1)
+        found = [np.flatnonzero(self.rover == rover) for rover in rovers]
+        return tuple(tuple(int(i) for i in at[np.argsort(self.when[at], kind="stable")]) for at in found)
+
+    def of_rovers(self, rovers: Iterable[int]) -> tuple[int, ...]:
+        """Return the recordings of some rovers, in the order of time."""
+        at = np.array(sorted(i for rover in rovers for i in self.recordings_of[rover]), np.int64)
+        return tuple(int(i) for i in at[np.argsort(self.when[at], kind="stable")])
+
+    def factors(self, term: FleetTerm) -> Array:
+        """Return the factors of a term's sizes, shape (size, recording, wheel): one, or one for each rover."""
+        parts = [(rover,) for rover in term.units.rovers] if term.units.kind == "each rover" else [term.units.rovers]
+        found = np.zeros((len(parts), self.count, len(self.wheels)))
+        for size, rovers in enumerate(parts):
+            recordings = self.of_rovers(rovers)
+            relative = term.course.factors(recordings, self.when)
+            found[size][np.ix_(list(recordings), list(term.units.wheels))] = relative[:, None]
+        return found
+
+    @cached_property
+    def parameter_factors(self) -> tuple[NDArray[np.int64], Array, Array]:
+        """Columns, factors and prior precisions of the free parameters."""
+        owners = {
+            "shared": np.zeros(self.count, np.int64),
+            "rover": self.rover,
+            "recording": np.arange(self.count),
+        }[self.level]
+        columns, factors = [], []
+        for owner in np.unique(owners):
+            for column in range(len(self.tangents)):
+                columns.append(column)
+                factors.append(np.repeat((owners == owner)[:, None], len(self.wheels), axis=1).astype(np.float64))
+        shape = (0, self.count, len(self.wheels))
+        stacked = np.stack(factors) if factors else np.zeros(shape)
+        return np.array(columns, np.int64), stacked, 1 / self.prior_stds[columns] ** 2 if columns else np.zeros(0)
+
+    def fit(self, terms: Iterable[FleetTerm], used: Array | None = None) -> FleetFit:
+        """Fit terms and free parameters together, to all recordings or those with `used` (recording,) of 1."""
+        terms = tuple(terms)
+        columns, factors, precision = self.parameter_factors
+        base, spans = len(columns), []
+        parts, places = [factors], [columns]
+        for term in terms:
+            sizes, before = self.factors(term), sum(map(len, places))
+            for of_size in sizes:
+                parts.append(np.repeat(of_size[None], len(term.group.columns), axis=0))
+                places.append(np.array(term.group.columns, np.int64))
+            spans.append(slice(before, before + len(sizes) * len(term.group.columns)))
+        at, by = np.concatenate(places), np.concatenate(parts)
+        matrix, moment = self._normal(at, by, np.ones(self.count) if used is None else used)
+        matrix[range(base), range(base)] += precision
+        inverse = pseudo_inverse(matrix, SINGULAR)
+        solved = inverse @ moment
+        gained = float(moment @ solved)
+        if base:
+            gained -= float(moment[:base] @ np.linalg.solve(matrix[:base, :base], moment[:base]))
+        return FleetFit(terms, at, by, solved, inverse, gained, tuple(spans))
+
+    def _normal(self, at: NDArray[np.int64], by: Array, used: Array) -> tuple[Array, Array]:
+        """Return matrix and moment, summed recording by recording in their order: always the same sum."""
+        matrix, moment = np.zeros((len(at), len(at))), np.zeros(len(at))
+        for i in np.flatnonzero(used):
+            acting = np.flatnonzero(by[:, i].any(axis=1))
+            of = at[acting]
+            part = np.zeros((len(acting), len(acting)))
+            for w in range(len(self.wheels)):
+                factor = by[acting, i, w]
+                part += np.outer(factor, factor) * self.gram[i, w][np.ix_(of, of)]
+                moment[acting] += factor * self.moment[i, w, of]
+            matrix[np.ix_(acting, acting)] += part
+        return matrix, moment
+
+    def left_moment(self, fit: FleetFit) -> Array:
+        """Return the moments of all columns with what a fit leaves, shape (recording, wheel, column)."""
+        left = self.moment.copy()
+        for i in range(self.count):
+            for w in range(len(self.wheels)):
+                sizes = fit.coefficients * fit.factors[:, i, w]
+                left[i, w] -= sizes @ self.gram[i, w][fit.columns]
+        return left
+
+    def squares(self, fit: FleetFit) -> Array:
+        """Return the sum of squares that a fit leaves, unweighted, shape (recording, wheel)."""
+        total = np.zeros((self.count, len(self.wheels)))
+        for i, sums in enumerate(self.sums):
+            for w, name in enumerate(sums.wheels):
+                k = self.wheels.index(name)
+                acting = np.flatnonzero(fit.factors[:, i, k])
+                sizes, at = (fit.coefficients * fit.factors[:, i, k])[acting], fit.columns[acting]
+                explained = 2 * sizes @ self.moment[i, k, at] - sizes @ self.gram[i, k][np.ix_(at, at)] @ sizes
+                total[i, k] = sums.energy[w] - explained / sums.weights[w]
+        return total
+
+    @cached_property
+    def counts(self) -> Array:
+        """Readings, shape (recording, wheel)."""
+        return self._spread([sums.counts for sums in self.sums])
+
+    def _spread(self, values: Sequence[Array]) -> Array:
+        """Return values of each recording's own wheels as values of all wheels, shape (recording, wheel)."""
+        found = np.zeros((self.count, len(self.wheels)))
+        for i, sums in enumerate(self.sums):
+            found[i, [self.wheels.index(name) for name in sums.wheels]] = values[i]
+        return found
+
+
+def column_map(sums: Sums, tangents: Sequence[str], groups: Sequence[GridGroup]) -> tuple[list[int], list[int]]:
+    """Return places in a recording's sums, and those of the same columns in the fleet's."""
+    own = [sums.tangents.index(name) for name in tangents if name in sums.tangents]
+    fleet = [place for place, name in enumerate(tangents) if name in sums.tangents]
+    for group, places in zip(groups, sums.places, strict=True):
+        own += places
+        fleet += group.columns[: len(places)]
+    return own, fleet
+
+
+def fleet_equations(
+    sums: Sequence[Sums], rover: Sequence[int], when: Sequence[float], groups: Sequence[GridGroup], level: Level
+) -> FleetEquations:
+    """Align the sums of recordings by the names of wheels and tangents, and weigh them."""
+    found = {wheel for each in sums for wheel in each.wheels}
+    wheels = tuple(sorted(found, key=lambda wheel: (isinstance(wheel, str), wheel)))
+    stds = {name: float(std) for each in sums for name, std in zip(each.tangents, each.prior_stds, strict=True)}
+    size = len(stds) + sum(len(group.columns) for group in groups)
+    gram = np.zeros((len(sums), len(wheels), size, size))
+    moment = np.zeros((len(sums), len(wheels), size))
+    weights = np.zeros((len(sums), len(wheels)))
+    for i, each in enumerate(sums):
+        own, fleet = column_map(each, list(stds), groups)
+        for w, name in enumerate(each.wheels):
+            k = wheels.index(name)
+            weights[i, k] = each.weights[w]
+            gram[i, k][np.ix_(fleet, fleet)] = each.weights[w] * each.gram[w][np.ix_(own, own)]
+            moment[i, k][fleet] = each.weights[w] * each.moment[w, own]
+    return FleetEquations(
+        sums=tuple(sums),
+        rover=np.array(rover, np.int64),
+        when=np.array(when, np.float64),
+        wheels=wheels,
+        tangents=tuple(stds),
+        prior_stds=np.array(list(stds.values())),
+        groups=tuple(groups),
+        level=level,
+        gram=gram,
+        moment=moment,
+        weights=weights,
+    )

@@ -1,0 +1,220 @@
+"""The search over a fleet: which candidates, on which wheels of which rovers, since when.
+
+Effects are chosen one after the other; after each, every chosen one is searched anew beside the others. A term pays for
+its coefficients, and for having been chosen among shapes, rovers, wheels and dates (2 ln of their numbers).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.fleet.choice.courses import courses_over
+from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, Units
+from regolithd.calibration.mismatch.regression.schur import delta_chi2_of_each, delta_chi2_together
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from regolithd.calibration.mismatch.fleet.choice.courses import Course
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
+
+Array = NDArray[np.float64]
+
+MOST_TERMS = 24
+"""Effects of a fleet at most (a choice: computing time)."""
+TRIED = 12
+"""Best terms that are tried for each further effect (a choice: the best may be implausible or too small)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A set of units with the courses that an effect may have there, and what all columns still explain there.
+
+    Attributes
+    ----------
+    units, recordings: where; in the order of time
+    begins, stands: courses of what is a change by its nature, and of what is not
+    """
+
+    units: Units
+    recordings: tuple[int, ...]
+    begins: tuple[Course, ...]
+    stands: tuple[Course, ...]
+
+    def courses(self, group: GridGroup) -> tuple[Course, ...]:
+        """Return the courses of a candidate."""
+        return self.begins if group.begins else self.stands
+
+
+def places_of(equations: FleetEquations) -> list[Place]:
+    """Return all sets of units: the fleet, each rover, and single wheels and sets of wheels of each rover."""
+    rovers = tuple(range(len(equations.recordings_of)))
+    wheels = tuple(range(len(equations.wheels)))
+    sets = [Units(rovers, wheels, "fleet")] if len(rovers) > 1 else []
+    for rover in rovers:
+        sets.append(Units((rover,), wheels, "rover"))
+        if len(wheels) > 1:
+            sets += [Units((rover,), (wheel,), "one") for wheel in wheels]
+            sets += [Units((rover,), some, "some") for some in _wheel_sets(equations)]
+    found = []
+    for units in sets:
+        at = equations.of_rovers(units.rovers)
+        begins, stands = (_told_apart(equations, units, courses_over(at, begins=kind)) for kind in (True, False))
+        found.append(Place(units, at, begins, stands))
+    return found
+
+
+def _told_apart(equations: FleetEquations, units: Units, courses: Sequence[Course]) -> tuple[Course, ...]:
+    """Return the courses whose date every rover has seen: else a rover that came later would look like a date."""
+    found = []
+    for course in courses:
+        when = equations.when[course.first]
+        seen = [
+            equations.when[at[0]] < when <= equations.when[at[-1]]
+            for at in (list(equations.recordings_of[rover]) for rover in units.rovers)
+        ]
+        if course.kind == "always" or all(seen):
+            found.append(course)
+    return tuple(found)
+
+
+def _wheel_sets(equations: FleetEquations) -> set[tuple[int, ...]]:
+    found = set()
+    for sums in equations.sums:
+        for some in sums.wheel_sets:
+            found.add(tuple(equations.wheels.index(sums.wheels[w]) for w in some))
+    return {some for some in found if 1 < len(some) < len(equations.wheels)}
+
+
+def penalty(equations: FleetEquations, term: FleetTerm, thresholds: Thresholds = THRESHOLDS) -> float:
+    """Return what a term has to gain beyond chance, in Δχ²."""
+    group, units = term.group, term.units
+    sizes = len(units.rovers) if units.kind == "each rover" else 1
+    total = thresholds.coefficient_penalty * len(group.columns) * sizes + 2 * float(np.log(group.tried))
+    total += _implausibility(equations, group)
+    if term.course.kind != "always":
+        total += 2 * float(np.log(len(courses_over(equations.of_rovers(units.rovers), begins=group.begins))))
+    rovers = len(equations.recordings_of)
+    choices = (rovers if rovers > 1 and units.kind not in {"fleet", "each rover"} else 1) * (
+        len(equations.wheels) if units.kind in {"one", "some"} else 1
+    )
+    total += 2 * float(np.log(2 * choices)) if choices > 1 else 0.0
+    if units.kind in {"one", "some"} and "all" in group.candidate.sharing:
+        total += thresholds.single_wheel_penalty
+    return total
+
+
+def _implausibility(equations: FleetEquations, group: GridGroup) -> float:
+    place = equations.groups.index(group)
+    return max(float(sums.penalties[place]) for sums in equations.sums)
+
+
+def score(equations: FleetEquations, fit: FleetFit) -> float:
+    """Return Δχ² less penalties."""
+    return fit.delta_chi2 - sum(penalty(equations, term) for term in fit.terms)
+
+
+def may_share(group: GridGroup, units: Units, wheel_count: int) -> bool:
+    """Return whether a candidate may be on such units; where a machine has one wheel, on that."""
+    sharing = group.candidate.sharing
+    if units.kind == "one":
+        return "one" in sharing
+    if units.kind == "some":
+        return len(sharing) > 1
+    return "all" in sharing or wheel_count == 1
+
+
+def further(
+    equations: FleetEquations, fit: FleetFit, places: Sequence[Place], groups: Sequence[GridGroup] | None = None
+) -> list[tuple[float, FleetTerm]]:
+    """Return the best further term of each candidate on each set of units, with Δχ² less penalty, best first."""
+    left = equations.left_moment(fit)
+    best: list[tuple[float, FleetTerm]] = []
+    for place in places:
+        allowed = [
+            group
+            for group in (equations.groups if groups is None else groups)
+            if may_share(group, place.units, len(equations.wheels)) and place.courses(group)
+        ]
+        of_name: dict[str, tuple[float, FleetTerm]] = {}
+        for gain, term in _gains(equations, fit, left, place, allowed):
+            value = gain - penalty(equations, term)
+            if gain > 0 and (term.name not in of_name or value > of_name[term.name][0]):
+                of_name[term.name] = (value, term)
+        best += of_name.values()
+    return sorted(best, key=lambda pair: -pair[0])
+
+
+def _gains(
+    equations: FleetEquations, fit: FleetFit, left: Array, place: Place, groups: Sequence[GridGroup]
+) -> Iterator[tuple[float, FleetTerm]]:
+    """Yield the best course of each group on a set of units, with its Δχ²."""
+    summed = summed_over(equations, fit, left, place)
+    for courses, of_courses in ((place.begins, True), (place.stands, False)):
+        chosen = [group for group in groups if group.begins == of_courses]
+        if not chosen or not courses:
+            continue
+        by = np.stack([course.factors(place.recordings, equations.when) for course in courses])
+        for group in chosen:
+            gains = summed.gains(by, group)
+            top = int(np.argmax(gains))
+            yield float(gains[top]), FleetTerm(group, place.units, courses[top])
+
+
+@dataclass(frozen=True, eq=False)
+class Summed:
+    """Sums over the wheels of a set of units, by recording.
+
+    Attributes
+    ----------
+    left: shape (recording, column)
+    own: gram, shape (recording, column, column)
+    cross: of fitted coefficients with all columns, shape (coefficient, recording, column)
+    inverse: of the fitted coefficients that act here
+    """
+
+    left: Array
+    own: Array
+    cross: Array
+    inverse: Array
+
+    def gains(self, by: Array, group: GridGroup) -> Array:
+        """Return the Δχ² of a group with each course, shape (course,); `by` is (course, recording)."""
+        at = list(group.columns)
+        moment = by @ self.left[:, at]
+        cross = np.einsum("jic,mi->mjc", self.cross[:, :, at], by)
+        own = np.einsum("icd,mi->mcd", self.own[:, at][:, :, at], by**2)
+        complement = own - np.einsum("mjc,jl,mld->mcd", cross, self.inverse, cross, optimize=True)
+        least, signs = THRESHOLDS.least_tolerance, group.signs
+        if len(at) == 1:
+            sign = np.array(signs[:1])
+            return delta_chi2_of_each(moment[:, 0], complement[:, 0, 0], own[:, 0, 0], sign, least)
+        largest = np.max(np.diagonal(own, axis1=1, axis2=2), axis=1)
+        return np.array(
+            [
+                delta_chi2_together(m, c, float(most), signs, least) if most > 0 else 0.0
+                for m, c, most in zip(moment, complement, largest, strict=True)
+            ]
+        )
+
+
+def summed_over(equations: FleetEquations, fit: FleetFit, left: Array, place: Place) -> Summed:
+    """Return the sums over the wheels of a set of units."""
+    at, on = list(place.recordings), list(place.units.wheels)
+    acting = np.flatnonzero(fit.factors[:, at].any(axis=(1, 2)))
+    cross = np.zeros((len(acting), len(at), equations.gram.shape[-1]))
+    own = np.zeros((len(at), *equations.gram.shape[-2:]))
+    for place_of, i in enumerate(at):
+        for w in on:
+            factor = fit.factors[acting, i, w]
+            cross[:, place_of] += factor[:, None] * equations.gram[i, w][fit.columns[acting]]
+            own[place_of] += equations.gram[i, w]
+    return Summed(
+        left=left[at][:, on].sum(axis=1), own=own, cross=cross, inverse=fit.covariance[np.ix_(acting, acting)]
+    )

@@ -1,0 +1,162 @@
+"""The choice of a fleet's effects: forwards, each searched anew beside the others, confirmed by other recordings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.fleet.choice.search import MOST_TERMS, TRIED, further, score
+from regolithd.calibration.mismatch.regression.residuals import active_size
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit, FleetTerm
+    from regolithd.calibration.mismatch.fleet.choice.search import Place
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Chooser:
+    """What the choice is made from.
+
+    Attributes
+    ----------
+    equations: of the fleet
+    places: sets of units and courses
+    entry_threshold: score that a term must bring
+    used: whether each recording is fitted, shape (recording,); None: all
+    """
+
+    equations: FleetEquations
+    places: Sequence[Place]
+    entry_threshold: float
+
+    def chosen(self) -> FleetFit:
+        """Return the fit of all effects that may be named."""
+        fit = self.equations.fit(())
+        while len(fit.terms) < MOST_TERMS:
+            best = self._best_further(fit)
+            if best is None:
+                break
+            fit = self._searched_anew(best)
+        return self._confirmed(fit)
+
+    def _best_further(self, fit: FleetFit) -> FleetFit | None:
+        """Return the fit with one more effect, the best that may be named; None: there is none."""
+        needed = self.entry_threshold + (THRESHOLDS.further_term_entry if fit.terms else 0.0)
+        for gained, term in further(self.equations, fit, self.places)[:TRIED]:
+            if gained <= needed:
+                return None
+            more = self.equations.fit((*fit.terms, term))
+            if self.acceptable(more) and self._worthwhile(fit, more):
+                return more
+        return None
+
+    def _worthwhile(self, less: FleetFit, more: FleetFit) -> bool:
+        """Return whether the last effect gains enough beside those on the same rovers: no law is exact."""
+        rovers = set(more.terms[-1].units.rovers)
+        others = [k for k, term in enumerate(less.terms) if rovers & set(term.units.rovers)]
+        beside = sum(less.delta_chi2 - self.equations.fit(without(less, k)).delta_chi2 for k in others)
+        return more.delta_chi2 - less.delta_chi2 > THRESHOLDS.further_share * beside
+
+    def _searched_anew(self, fit: FleetFit) -> FleetFit:
+        """Return the fit with each term replaced by the best one on overlapping units beside the others."""
+        for index in range(len(fit.terms)):
+            rest, old = self.equations.fit(without(fit, index)), fit.terms[index]
+            near = [place for place in self.places if set(place.units.rovers) & set(old.units.rovers)]
+            trials = [term for _, term in further(self.equations, rest, near)[:2]]
+            if old.units.kind == "fleet" and old.course.kind == "always":
+                trials.append(replace(old, units=replace(old.units, kind="each rover")))
+            for term in trials:
+                trial = self.equations.fit((*rest.terms[:index], term, *rest.terms[index:]))
+                if score(self.equations, trial) > score(self.equations, fit) + 1e-6 and self.acceptable(trial):
+                    fit = trial
+        return fit
+
+    def acceptable(self, fit: FleetFit) -> bool:
+        """Return whether every coefficient has its sign, and every effect is possible and large enough."""
+        return all(self._acceptable_term(fit, index) for index in range(len(fit.terms)))
+
+    def _acceptable_term(self, fit: FleetFit, index: int) -> bool:
+        term, span = fit.terms[index], fit.spans[index]
+        signs, count = term.group.signs, len(term.group.columns)
+        sizes = fit.coefficients[span].reshape(-1, count)
+        if np.any(np.array(signs) * sizes < 0):
+            return False
+        if term.units.kind == "each rover":
+            variances = np.diag(fit.covariance)[span].reshape(-1, count)
+            if np.any(np.max(sizes**2 / variances, axis=1) < self.entry_threshold):
+                return False
+        return relative_size(self.equations, fit, index) >= THRESHOLDS.smallest_effect
+
+    def _confirmed(self, fit: FleetFit) -> FleetFit:
+        """Return the fit without effects that recordings which did not fit them do not confirm, the worst first."""
+        while fit.terms:
+            margins = [self._transfer_margin(fit, index) for index in range(len(fit.terms))]
+            worst = int(np.argmin(margins))
+            if margins[worst] >= 0:
+                break
+            fit = self.equations.fit(without(fit, worst))
+        return fit
+
+    def _transfer_margin(self, fit: FleetFit, index: int) -> float:
+        """Return by how much a term's Δχ² on recordings that did not fit it passes the share that is asked for."""
+        equations, rest = self.equations, without(fit, index)
+        if len(equations.of_rovers(fit.terms[index].units.rovers)) < FEWEST_TO_CONFIRM:
+            return 0.0
+        came_back, gained = 0.0, fit.delta_chi2 - equations.fit(rest).delta_chi2
+        for fold in folds_of(equations):
+            with_it, less = (equations.fit(terms, 1.0 - fold) for terms in (fit.terms, rest))
+            saved = (equations.squares(less) - equations.squares(with_it)) * equations.weights
+            came_back += float(fold @ saved.sum(axis=1))
+        loss = THRESHOLDS.coefficient_cost * (fit.spans[index].stop - fit.spans[index].start)
+        return came_back + loss - THRESHOLDS.transferred_share * gained
+
+
+FEWEST_TO_CONFIRM = 3
+"""Recordings of its rovers below which no other recording can confirm an effect (a choice)."""
+
+
+def folds_of(equations: FleetEquations) -> list[Array]:
+    """Return the folds, each 1 for its recordings: every fifth of each rover's, in the order of time."""
+    fold = np.zeros(equations.count, np.int64)
+    for recordings in equations.recordings_of:
+        fold[list(recordings)] = np.arange(len(recordings)) % THRESHOLDS.folds
+    return [(fold == number).astype(np.float64) for number in np.unique(fold)]
+
+
+def without(fit: FleetFit, index: int) -> tuple[FleetTerm, ...]:
+    """Return all terms but one."""
+    return (*fit.terms[:index], *fit.terms[index + 1 :])
+
+
+def relative_size(equations: FleetEquations, fit: FleetFit, index: int) -> float:
+    """Return a term's active root mean square where it acts, over the mean magnitude of the channel there."""
+    term, span = fit.terms[index], fit.spans[index]
+    at = list(term.group.columns)
+    squares = fourths = readings = mean = 0.0
+    for size, factor in zip(fit.coefficients[span].reshape(-1, len(at)), fit.factors[span][:: len(at)], strict=True):
+        for i, w in zip(*np.nonzero(factor), strict=True):
+            values, weight = factor[i, w] * size, max(equations.weights[i, w], 1e-300)
+            part = float(values @ equations.gram[i, w][np.ix_(at, at)] @ values) / weight
+            squares += part
+            fourths += float(values @ values) ** 2 * _fourth(equations, int(i), int(w), at)
+            readings += equations.counts[i, w]
+            mean += equations.counts[i, w] * equations.sums[int(i)].mean_size
+    return active_size(squares, fourths, readings, THRESHOLDS.active_share) / max(mean / max(readings, 1.0), 1e-300)
+
+
+def _fourth(equations: FleetEquations, recording: int, wheel: int, at: Sequence[int]) -> float:
+    """Return the sum of fourth powers of a single column; 0 for several, whose size is their root mean square."""
+    sums = equations.sums[recording]
+    name = equations.wheels[wheel]
+    if len(at) > 1 or name not in sums.wheels:
+        return 0.0
+    places = sums.places[[group.columns[0] for group in equations.groups].index(at[0])]
+    return float(sums.fourth[sums.wheels.index(name), places[0]]) if places else 0.0

@@ -1,0 +1,293 @@
+"""Comparing the recordings of a fleet together: `compare_fleet`, and `compare`, which takes one recording or many."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, replace
+from functools import partial
+from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any, TypeVar, overload
+
+from regolithd.calibration.mismatch import comparison as single
+from regolithd.calibration.mismatch.data.recording import as_recording
+from regolithd.calibration.mismatch.errors import MismatchError, RecordingError
+from regolithd.calibration.mismatch.fleet.catalogue import CatalogueRow, catalogue_rows, write_catalogue
+from regolithd.calibration.mismatch.fleet.choice.chance import entry_threshold
+from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, Level, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.search import places_of
+from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
+from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
+from regolithd.calibration.mismatch.fleet.told.findings import Chosen, Names, answer_of_fleet
+from regolithd.calibration.mismatch.fleet.work.found import Found, found_in, one_channel
+from regolithd.calibration.mismatch.fleet.work.grid import GridGroup, grid_of
+from regolithd.calibration.mismatch.fleet.work.sums import Laws, Sums, forms_of, sums_of
+from regolithd.calibration.mismatch.fleet.work.workers import ThisProcess, Workers
+from regolithd.calibration.mismatch.inference.several_channels import WORST_FIRST
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from datetime import datetime
+    from pathlib import Path
+
+    from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer
+    from regolithd.calibration.mismatch.fleet.work.store import Store
+    from regolithd.calibration.mismatch.simulation.simulation import Simulation
+
+Result = TypeVar("Result")
+Progress = "Callable[[str, int, int], None]"
+
+
+@dataclass(frozen=True)
+class Member:
+    """A recording of a fleet, and how to read it; it is read where it is compared.
+
+    Attributes
+    ----------
+    name: unique in the fleet
+    rover: who drove it
+    begins: when it began; None: not known
+    read: returns it; has to be picklable where it is compared by other processes
+    digest: of its content; empty: what is found in it is not stored
+    """
+
+    name: str
+    rover: str
+    begins: datetime | None
+    read: Callable[[], Recording]
+    digest: str = ""
+
+
+@dataclass(frozen=True)
+class FleetComparison:
+    """The answer of a fleet, and what was found in which recording; a notebook shows it as a table."""
+
+    answer: FleetAnswer
+    rows: tuple[CatalogueRow, ...] = field(repr=False)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what `regolithd mismatch --json` writes."""
+        return self.answer.to_json()
+
+    def write_catalogue(self, path: Path) -> None:
+        """Write what was found in which recording as a Parquet file."""
+        write_catalogue(path, self.rows)
+
+    def _repr_html_(self) -> str:
+        from html import escape  # noqa: PLC0415
+
+        lines = "".join(f"<li>{escape(effect.statement)}</li>" for effect in self.answer.effects)
+        return f"<p><b>{self.answer.verdict}</b>, {len(self.answer.rovers)} rovers</p><ul>{lines}</ul>"
+
+
+@overload
+def compare(  # type: ignore[overload-overlap]  # a list is an object too
+    recording: list[Any] | tuple[Any, ...], simulation: Simulation
+) -> FleetComparison: ...
+@overload
+def compare(
+    recording: object,
+    simulation: Simulation,
+    **options: Any,  # noqa: ANN401
+) -> single.Comparison: ...
+def compare(
+    recording: Recording | object,
+    simulation: Simulation,
+    **options: Any,  # of `comparison.compare`
+) -> single.Comparison | FleetComparison:
+    """Compare a recording with a simulation, or a list of recordings together.
+
+    Parameters
+    ----------
+    recording: as `read_recording` returns it, a data frame or a mapping of arrays; or a list of these, or of `Member`s,
+        which say which rover each is of and when it began
+    options: of `regolithd.calibration.mismatch.comparison.compare`, for one recording
+
+    Raises
+    ------
+    MismatchError
+        When there is nothing to compare.
+    """
+    if not isinstance(recording, list | tuple):
+        return single.compare(recording, simulation, **options)
+    members = [_member(number, each, simulation) for number, each in enumerate(recording, 1)]
+    return compare_fleet(members, lambda: simulation)
+
+
+def _member(number: int, data: object, simulation: Simulation) -> Member:
+    if isinstance(data, Member):
+        return data
+    recorded = as_recording(data, unit=simulation.wheel_column)
+    return Member(f"recording {number}", ONLY_ROVER, None, lambda: recorded)
+
+
+def compare_fleet(
+    members: Sequence[Member],
+    load: Callable[[], Simulation],
+    *,
+    level: Level = "rover",
+    workers: Workers | None = None,
+    store: Store | None = None,
+    key: str = "",
+    progress: Callable[[str, int, int], None] = lambda *_: None,
+) -> FleetComparison:
+    """Compare recordings of one or several rovers together.
+
+    Parameters
+    ----------
+    members: the recordings
+    load: returns the simulation; it is called wherever recordings are compared
+    level: whose the simulation's parameters are: `shared`, each `rover`'s own, or each `recording`'s
+    workers: where recordings are compared; None: in this process
+    store, key: where results of recordings are kept, and a digest of the simulation; None: nowhere
+    progress: called with the step, how many recordings are done, and of how many
+
+    Raises
+    ------
+    MismatchError
+        When no recording can be compared.
+    """
+    simulation = load()
+    work = _Work(workers or ThisProcess(), store, key, progress)
+    names = [member.name for member in members]
+    if len(set(names)) < len(names):
+        raise RecordingError("two recordings of a fleet have the same name")
+    channels = list(simulation.channels) or [simulation.channel]
+    compared = [
+        _of_channel(members, load, one_channel(simulation, channel), channel, level, work) for channel in channels
+    ]
+    work.tidy()
+    answers = [answer_of_fleet(chosen) for chosen in compared]
+    rows = tuple(
+        row for chosen, answer in zip(compared, answers, strict=True) for row in catalogue_rows(chosen, answer)
+    )
+    answer = answers[0] if len(answers) == 1 else _merged(answers)
+    return FleetComparison(replace(answer, notes=(*answer.notes, *work.notes)), rows)
+
+
+@dataclass
+class _Work:
+    """Does a step for all recordings, with what is stored already."""
+
+    workers: Workers
+    store: Store | None
+    key: str
+    progress: Callable[[str, int, int], None]
+    notes: list[str] = field(default_factory=list)
+    keys: list[str] = field(default_factory=list)
+
+    def done(
+        self, step: str, members: Sequence[Member], task_of: Callable[[int], Callable[[], Result]], depends: str
+    ) -> dict[int, Result]:
+        """Return what the step gives for each recording that it can be done for, by its number."""
+        found: dict[int, Result] = {}
+        keys = [self._key(step, member, depends) for member in members]
+        self.keys += keys
+        if self.store is not None:
+            stored = {number: self.store.read(key) for number, key in enumerate(keys) if members[number].digest}
+            found = {number: value for number, value in stored.items() if value is not None}
+        self.progress(step, len(found), len(members))
+        tasks = {number: partial(_tried, task_of(number)) for number in range(len(members)) if number not in found}
+        for number, result in self.workers.results(tasks):
+            if isinstance(result, str):
+                self.notes.append(f"{members[number].name} is left out: {result}")
+                continue
+            found[number] = result
+            if self.store is not None and members[number].digest:
+                self.store.write(keys[number], result)
+            self.progress(step, len(found), len(members))
+        if not found:
+            raise MismatchError("; ".join(self.notes) or "there is no recording")
+        return found
+
+    def _key(self, step: str, member: Member, depends: str) -> str:
+        try:
+            package = version("regolithd")
+        except PackageNotFoundError:
+            package = ""
+        told = repr((step, member.digest, self.key, package, depends))
+        return sha256(told.encode()).hexdigest()[:32]
+
+    def tidy(self) -> None:
+        """Remove stored results that this comparison did not use."""
+        if self.store is not None:
+            self.store.keep_only(self.keys)
+
+
+def _tried(task: Callable[[], Result]) -> Result | str:
+    """Return a task's result, or why the recording cannot be used."""
+    try:
+        return task()
+    except MismatchError as error:
+        return str(error)
+
+
+def _find(read: Callable[[], Recording], load: Callable[[], Simulation], channel: str) -> Found:
+    return found_in(read(), load(), channel)
+
+
+def _sum(read: Callable[[], Recording], load: Callable[[], Simulation], channel: str, laws: Laws, found: Found) -> Sums:
+    return sums_of(read(), load(), channel, laws, found)
+
+
+def _of_channel(
+    members: Sequence[Member],
+    load: Callable[[], Simulation],
+    simulation: Simulation,
+    channel: str,
+    level: Level,
+    work: _Work,
+) -> Chosen:
+    """Compare each recording, sum their products in a common grid, and choose the effects of the fleet."""
+    found = work.done("comparing", members, lambda n: partial(_find, members[n].read, load, channel), channel)
+    kept = sorted(found)
+    members, results = [members[n] for n in kept], [found[n] for n in kept]
+    grid = grid_of(forms_of(simulation), results, 0)
+    laws: Laws = tuple((group.candidate.name, group.shape) for group in grid)
+    sums = work.done(
+        "summing",
+        members,
+        lambda n: partial(_sum, members[n].read, load, channel, laws, results[n]),
+        json.dumps((channel, laws), sort_keys=True),
+    )
+    kept = sorted(sums)
+    names = _names([members[n] for n in kept])
+    equations = _equations([sums[n] for n in kept], names, [members[n] for n in kept], grid, level)
+    work.progress("searching", len(kept), len(kept))
+    places = places_of(equations)
+    chooser = Chooser(equations, places, entry_threshold(equations, places))
+    return Chosen(chooser, chooser.chosen(), names, tuple(results[n] for n in kept), simulation)
+
+
+def _names(members: Sequence[Member]) -> Names:
+    rovers = tuple(sorted({member.rover for member in members}))
+    return Names(rovers, tuple(member.name for member in members), tuple(member.begins for member in members))
+
+
+def _equations(
+    sums: Sequence[Sums], names: Names, members: Sequence[Member], grid: Sequence[GridGroup], level: Level
+) -> FleetEquations:
+    dates = [begins for begins in names.begins if begins is not None]
+    when = [each.timestamp() for each in dates] if len(dates) == len(names.begins) else list(range(len(members)))
+    rover = [names.rovers.index(member.rover) for member in members]
+    first = len({name for each in sums for name in each.tangents})
+    placed = [replace(group, columns=tuple(first + column for column in group.columns)) for group in grid]
+    return fleet_equations(sums, rover, when, placed, level)
+
+
+def _merged(answers: Sequence[FleetAnswer]) -> FleetAnswer:
+    """Return one answer of all channels; parameters are those of the first that has them."""
+    told = {answer.verdict for answer in answers}
+    best = max(answers, key=lambda each: each.fit.held_out_rmse_before / max(each.fit.held_out_rmse_after, 1e-300))
+    return replace(
+        best,
+        verdict=next(verdict for verdict in WORST_FIRST if verdict in told),
+        effects=tuple(each for answer in answers for each in answer.effects),
+        unexplained=tuple(each for answer in answers for each in answer.unexplained),
+        indistinguishable=tuple(dict.fromkeys(each for answer in answers for each in answer.indistinguishable)),
+        sensitivity=tuple(each for answer in answers for each in answer.sensitivity),
+        fits=tuple(answer.fit for answer in answers),
+        left_out=tuple(each for answer in answers for each in answer.left_out),
+        notes=tuple(dict.fromkeys(note for answer in answers for note in answer.notes)),
+    )

@@ -1,0 +1,330 @@
+"""What is told of a fleet: its effects with rovers and dates, what single recordings show beside them, and the fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.answer import FitImprovement, Parameter, Sensitivity
+from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm
+from regolithd.calibration.mismatch.fleet.choice.search import penalty
+from regolithd.calibration.mismatch.fleet.choice.selection import Chooser, folds_of, relative_size, without
+from regolithd.calibration.mismatch.fleet.told.answer import (
+    FleetAnswer,
+    FleetEffect,
+    FleetParameter,
+    FleetUnexplained,
+    RoverOfFleet,
+)
+from regolithd.calibration.mismatch.fleet.told.intervals import onset_places, size_stds
+from regolithd.calibration.mismatch.fleet.told.recordings import shown_beside
+from regolithd.calibration.mismatch.fleet.told.rivals import rivals
+from regolithd.calibration.mismatch.inference.findings import NINETY_PERCENT_STDS, beyond_prior
+from regolithd.calibration.mismatch.inference.statements import wheels_in_words
+from regolithd.calibration.mismatch.problem.problem import LeftOut
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from datetime import datetime
+
+    from regolithd.calibration.mismatch.answer import Effect, Verdict
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.work.found import Found
+    from regolithd.calibration.mismatch.simulation.simulation import Simulation
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Names:
+    """What rovers and recordings are called, in the order of the sums.
+
+    Attributes
+    ----------
+    rovers: names of the rovers, by index
+    recordings: names of the recordings
+    begins: when each began
+    """
+
+    rovers: tuple[str, ...]
+    recordings: tuple[str, ...]
+    begins: tuple[datetime | None, ...]
+
+    def date(self, recording: int) -> str | None:
+        """Return when a recording began (ISO 8601)."""
+        begins = self.begins[recording]
+        return None if begins is None else begins.isoformat().replace("+00:00", "Z")
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """The choice for one channel, and what it is told from."""
+
+    chooser: Chooser
+    fit: FleetFit
+    names: Names
+    found: tuple[Found, ...]
+    simulation: Simulation
+
+    @property
+    def equations(self) -> FleetEquations:
+        """Of the fleet."""
+        return self.chooser.equations
+
+
+def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
+    """Return the answer of one channel."""
+    equations, fit, simulation = chosen.equations, chosen.fit, chosen.simulation
+    held_out = _held_out(chosen.chooser, fit)
+    effects = tuple(_effect(chosen, index, held_out) for index in range(len(fit.terms)))
+    shown = shown_beside(equations, fit, chosen.found, chosen.names.recordings)
+    single = tuple(_of_recording(chosen, i, effect) for i, effect in shown.effects)
+    rest = tuple(_unexplained(chosen, i, each) for i, each in shown.unexplained)
+    parameters = _parameters(chosen)
+    moved = beyond_prior(parameters, THRESHOLDS)
+    named = effects or single or moved
+    verdict: Verdict = "unexplained" if rest else "missing-physics" if named else "consistent"
+    floor = _noise_floor(chosen)
+    counts = equations.counts
+    before, after = (_rms(squares, counts) for squares in held_out[:2])
+    return FleetAnswer(
+        verdict=verdict,
+        effects=(*effects, *single),
+        unexplained=rest,
+        indistinguishable=rivals(chosen.chooser, fit, simulation),
+        sensitivity=_sensitivities(chosen),
+        fit=FitImprovement(simulation.channel, before, after if fit.terms else before, floor),
+        parameters=parameters,
+        left_out=_left_out(chosen),
+        notes=_notes(chosen),
+        rovers=tuple(_rover(chosen, rover) for rover in range(len(chosen.names.rovers))),
+    )
+
+
+def _rover(chosen: Chosen, rover: int) -> RoverOfFleet:
+    names, at = chosen.names, chosen.equations.recordings_of[rover]
+    return RoverOfFleet(
+        names.rovers[rover], tuple(names.recordings[i] for i in at), names.date(at[0]), names.date(at[-1])
+    )
+
+
+def _held_out(chooser: Chooser, fit: FleetFit) -> tuple[Array, Array, list[Array]]:
+    """Return squares on recordings that neither chose nor fitted, shape (recording, wheel).
+
+    Without any effect, with those of the answer's names that the other recordings chose, and with all of these but one.
+    """
+    equations = chooser.equations
+    shape = equations.counts.shape
+    before, after, but_one = np.zeros(shape), np.zeros(shape), [np.zeros(shape) for _ in fit.terms]
+    for fold in folds_of(equations):
+        used, out = 1.0 - fold if fold.min() == 0 else fold, fold > 0
+        before[out] = equations.squares(equations.fit((), used))[out]
+        chosen = equations.fit(fit.terms, used)
+        after[out] = equations.squares(chosen)[out]
+        for index, squares in enumerate(but_one):
+            squares[out] = equations.squares(equations.fit(without(fit, index), used))[out]
+    return before, after, but_one
+
+
+def _rms(squares: Array, counts: Array) -> float:
+    return float(np.sqrt(max(float(squares.sum()), 0.0) / max(float(counts.sum()), 1.0)))
+
+
+def _effect(chosen: Chosen, index: int, held_out: tuple[Array, Array, list[Array]]) -> FleetEffect:
+    equations, fit, names = chosen.equations, chosen.fit, chosen.names
+    term = fit.terms[index]
+    candidate, acting = term.group.candidate, equations.factors(term).any(axis=0)
+    where = acting & (equations.counts > 0)
+    errors = _rms(held_out[2][index][where], equations.counts[where]), _rms(held_out[1][where], equations.counts[where])
+    wheels = tuple(equations.wheels[w] for w in term.units.wheels if where[:, w].any())
+    since = term.course.kind in {"since", "growing"}
+    first, last = onset_places(equations, fit, index) if since else (0, 0)
+    parameters = _sizes(chosen, index)
+    rovers = tuple(names.rovers[rover] for rover in term.units.rovers)
+    kind, all_wheels = chosen.simulation.wheel_column, len(equations.wheels)
+    return FleetEffect(
+        name=term.name,
+        channel=candidate.channel or chosen.simulation.channel,
+        wheels=wheels,
+        covariate=candidate.covariate,
+        onset_s=None,
+        equation=candidate.equation,
+        statement=_statement(
+            chosen, term, wheels_in_words(wheels, all_wheels, kind), parameters["relative_size"], errors
+        ),
+        parameters=parameters,
+        rmse_before=errors[0],
+        rmse_after=errors[1],
+        rovers=rovers,
+        recordings=tuple(names.recordings[i] for i in np.flatnonzero(where.any(axis=1))),
+        since=names.date(term.course.first) if since else None,
+        since_low=names.date(first) if since else None,
+        since_high=names.date(last) if since else None,
+        until=names.date(term.course.first) if term.course.kind == "until" else None,
+    )
+
+
+def _sizes(chosen: Chosen, index: int) -> dict[str, Parameter]:
+    """Return coefficients and relative size with their intervals; of a size of each rover's own, the mean."""
+    equations, fit = chosen.equations, chosen.fit
+    term, span = fit.terms[index], fit.spans[index]
+    count = len(term.group.columns)
+    stds = size_stds(equations, fit)[span].reshape(-1, count)
+    values = fit.coefficients[span].reshape(-1, count)
+    weights = 1 / np.maximum(stds, 1e-300) ** 2
+    mean = np.sum(weights * values, axis=0) / np.sum(weights, axis=0)
+    std = np.maximum(1 / np.sqrt(np.sum(weights, axis=0)), np.std(values, axis=0))
+    found = {}
+    unit = chosen.simulation.unit
+    for coefficient, value, spread in zip(term.group.candidate.coefficients, mean, std, strict=False):
+        reach = NINETY_PERCENT_STDS * spread
+        told = coefficient.unit.replace("{unit}", unit)
+        found[coefficient.name] = Parameter(float(value), float(value - reach), float(value + reach), told)
+    for name, value in term.group.shape.items():
+        if name in term.group.candidate.free and name != term.group.candidate.change_point:
+            found[name] = Parameter(float(value), float("nan"), float("nan"), "1")
+    size = relative_size(equations, fit, index)
+    share = NINETY_PERCENT_STDS * float(np.max(std / np.maximum(np.abs(mean), 1e-300)))
+    return {**found, "relative_size": Parameter(size, size * (1 - share), size * (1 + share), "1")}
+
+
+def _statement(chosen: Chosen, term: FleetTerm, wheels: str, size: Parameter, errors: tuple[float, float]) -> str:
+    """Return one sentence: what, on which wheels of which rovers, since when, how large, and what it costs."""
+    names, course = chosen.names, term.course
+    rovers = [names.rovers[rover] for rover in term.units.rovers]
+    of = (
+        ""
+        if len(names.rovers) == 1
+        else f" of {'all rovers' if len(rovers) == len(names.rovers) else ', '.join(rovers)}"
+    )
+    at = names.date(course.first) or names.recordings[course.first]
+    when = {
+        "always": "",
+        "since": f" since {at}",
+        "until": f" until {at}",
+        "growing": f" since {at}, growing",
+    }[course.kind]
+    costs = 100 * (errors[0] / errors[1] - 1) if errors[1] > 0 else 0.0
+    words = term.group.candidate.words
+    return (
+        f"{words[:1].upper()}{words[1:]}, on {wheels}{of}{when}: {100 * size.value:.0f} % of the mean reading "
+        f"(90 % sure: {100 * size.low:.0f} to {100 * size.high:.0f} %); left out, it makes the held-out error there "
+        f"{abs(costs):.1f} % {'larger' if costs >= 0 else 'smaller'}."
+    )
+
+
+def _of_recording(chosen: Chosen, recording: int, effect: Effect) -> FleetEffect:
+    """Return an effect that one recording shows beside those of the fleet."""
+    names = chosen.names
+    plain = {each.name: getattr(effect, each.name) for each in fields(effect)}
+    rover = names.rovers[int(chosen.equations.rover[recording])]
+    told = f"{names.recordings[recording]} of {rover}: {effect.statement}"
+    return FleetEffect(**{**plain, "statement": told}, rovers=(rover,), recordings=(names.recordings[recording],))
+
+
+def _unexplained(chosen: Chosen, recording: int, rest: object) -> FleetUnexplained:
+    names = chosen.names
+    rover = names.rovers[int(chosen.equations.rover[recording])]
+    return FleetUnexplained(**vars(rest), rovers=(rover,), recordings=(names.recordings[recording],))
+
+
+def _parameters(chosen: Chosen) -> tuple[FleetParameter, ...]:
+    """Return each parameter where the recordings moved it: of the fleet, or of each rover; of recordings, none."""
+    equations, fit, names = chosen.equations, chosen.fit, chosen.names
+    owners: dict[str, list[tuple[str, ...]]] = {
+        "shared": [names.rovers],
+        "rover": [(rover,) for rover in names.rovers],
+        "recording": [],
+    }
+    found = []
+    for place, rovers in enumerate(owners[equations.level]):
+        for name, prior in chosen.simulation.parameters.items():
+            value, std = prior.value, 0.0
+            if name in equations.tangents:
+                at = place * len(equations.tangents) + equations.tangents.index(name)
+                value += float(fit.coefficients[at])
+                std = float(np.sqrt(max(fit.covariance[at, at], 0.0)))
+            reach = NINETY_PERCENT_STDS * std
+            found.append(
+                FleetParameter(name, prior.unit, prior.value, prior.std, value, value - reach, value + reach, rovers)
+            )
+    return tuple(found)
+
+
+def _noise_floor(chosen: Chosen) -> float:
+    squares = sum(
+        float(found.deviation**2 @ sums.counts) for found, sums in zip(chosen.found, chosen.equations.sums, strict=True)
+    )
+    return float(np.sqrt(squares / max(float(chosen.equations.counts.sum()), 1.0)))
+
+
+def _sensitivities(chosen: Chosen) -> tuple[Sensitivity, ...]:
+    """Return, for each candidate, the smallest root mean square that would have shown, on the first place it may be."""
+    equations, channel, unit = chosen.equations, chosen.simulation.channel, chosen.simulation.unit
+    found: dict[str, float] = {}
+    for group in equations.groups:
+        place = next(
+            (
+                p
+                for p in chosen.chooser.places
+                if group.candidate.sharing[0] in _KINDS[p.units.kind] and p.courses(group)
+            ),
+            None,
+        )
+        if place is None:
+            found.setdefault(group.candidate.name, float("inf"))
+            continue
+        term = FleetTerm(group, place.units, place.courses(group)[0])
+        others = [each for each in chosen.fit.terms if each.name != term.name]
+        found.setdefault(term.name, _smallest(chosen, others, term))
+    return tuple(Sensitivity(name, channel, size, unit) for name, size in sorted(found.items()))
+
+
+_KINDS = {"fleet": "all", "rover": "all", "one": "one", "some": "", "each rover": ""}
+
+
+def _smallest(chosen: Chosen, others: Sequence[FleetTerm], term: FleetTerm) -> float:
+    equations = chosen.equations
+    fit = equations.fit((*others, term))
+    at, factors = list(term.group.columns), equations.factors(term)[0]
+    outside = 1 / max(float(np.max(np.diag(fit.covariance)[fit.spans[-1]])), 1e-300)
+    weighted = np.einsum("iw,iwc->c", factors**2, np.diagonal(equations.gram, axis1=2, axis2=3)[:, :, at])
+    if outside <= 1e-9 * float(weighted.max()):
+        return float("inf")
+    weights = np.where(equations.weights > 0, equations.weights, np.inf)
+    squares = float(np.sum(np.diagonal(equations.gram, axis1=2, axis2=3)[:, :, at[0]] * factors**2 / weights))
+    readings = float(equations.counts[factors != 0].sum())
+    needed = np.sqrt(chosen.chooser.entry_threshold + penalty(equations, term)) + THRESHOLDS.detection_quantile
+    size = float(np.mean([sums.mean_size for sums in equations.sums]))
+    return max(
+        float(np.sqrt(squares / max(readings, 1.0)) * needed / np.sqrt(outside)), THRESHOLDS.smallest_effect * size
+    )
+
+
+def _left_out(chosen: Chosen) -> tuple[LeftOut, ...]:
+    total: dict[tuple[str, str], int] = {}
+    for found in chosen.found:
+        for each in found.answer.left_out:
+            total[each.channel, each.reason] = total.get((each.channel, each.reason), 0) + each.readings
+    return tuple(LeftOut(channel, readings, reason) for (channel, reason), readings in total.items())
+
+
+def _notes(chosen: Chosen) -> tuple[str, ...]:
+    """Return the notes of the recordings, each once with the recordings that it is of."""
+    of: dict[str, list[str]] = {}
+    for name, found in zip(chosen.names.recordings, chosen.found, strict=True):
+        for note in found.answer.notes:
+            if not note.startswith("Readings of"):
+                of.setdefault(note, []).append(name)
+    count = len(chosen.names.recordings)
+    return tuple(f"{_which(names, count)}: {note}" for note, names in of.items())
+
+
+def _which(names: Sequence[str], count: int) -> str:
+    if len(names) == count:
+        return "All recordings"
+    return ", ".join(names) if len(names) <= 3 else f"{', '.join(names[:2])} and {len(names) - 2} more"

@@ -1,0 +1,92 @@
+"""What single recordings show beside the effects of the fleet.
+
+A finding of one recording counts if it gains more than was asked of it there, with the fleet's effects in place, and
+pays for having been found in one of many recordings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.regression.schur import delta_chi2_together
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.answer import Effect, Unexplained
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.work.found import Found
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Findings with the places of their recordings."""
+
+    effects: tuple[tuple[int, Effect], ...]
+    unexplained: tuple[tuple[int, Unexplained], ...]
+
+
+def shown_beside(equations: FleetEquations, fit: FleetFit, found: Sequence[Found], names: Sequence[str]) -> Shown:
+    """Return the effects and structures that recordings show beside the fit."""
+    effects, rest = [], []
+    for i, of_recording in enumerate(found):
+        terms = of_recording.terms
+        named = [term for term in terms if term.named]
+        for k, term in enumerate(terms):
+            needed = of_recording.entry_threshold if term.named else THRESHOLDS.smooth_term_entry
+            needed += term.penalty + 2 * float(np.log(len(names)))
+            if gain_beside(equations, fit, i, k) <= needed:
+                continue
+            if term.named:
+                effects += [(i, each) for each in of_recording.answer.effects if each.name == term.name][:1]
+            else:
+                rest += [(i, each) for each in of_recording.answer.unexplained[k - len(named) : k - len(named) + 1]]
+    return Shown(tuple(effects), tuple(rest))
+
+
+def gain_beside(equations: FleetEquations, fit: FleetFit, recording: int, index: int) -> float:
+    """Return the Δχ² of a term of one recording with the fleet's effects and the parameters that it has there.
+
+    The parameters are as the fleet has them; in this recording they may still move as far as their priors.
+    """
+    sums = equations.sums[recording]
+    own, parameters = list(sums.own[index]), list(range(len(sums.tangents)))
+    fleet = _explained(equations, fit, recording)
+    weights = sums.weights
+    moment = np.einsum("w,wc->c", weights, sums.moment - fleet)
+    matrix = np.einsum("w,wcd->cd", weights, sums.gram)
+    base = matrix[np.ix_(parameters, parameters)] + np.diag(1 / sums.prior_stds**2)
+    cross = matrix[np.ix_(parameters, own)]
+    left = moment[own] - cross.T @ np.linalg.solve(base, moment[parameters]) if parameters else moment[own]
+    energy = matrix[np.ix_(own, own)]
+    complement = energy - cross.T @ np.linalg.solve(base, cross) if parameters else energy
+    largest = float(np.max(np.diag(energy)))
+    return (
+        delta_chi2_together(left, complement, largest, (0,) * len(own), THRESHOLDS.least_tolerance) if largest else 0.0
+    )
+
+
+def _explained(equations: FleetEquations, fit: FleetFit, recording: int) -> Array:
+    """Return the moments of a recording's columns with what the fit explains there, shape (wheel, column)."""
+    sums = equations.sums[recording]
+    found = np.zeros(sums.moment.shape)
+    place: dict[int, int] = {}
+    for fleet, name in enumerate(equations.tangents):
+        if name in sums.tangents:
+            place[fleet] = sums.tangents.index(name)
+    for group, places in zip(equations.groups, sums.places, strict=True):
+        place |= dict(zip(group.columns, places, strict=False))
+    for w, wheel in enumerate(sums.wheels):
+        factors = fit.factors[:, recording, equations.wheels.index(wheel)]
+        for j in np.flatnonzero(factors):
+            at = place.get(int(fit.columns[j]))
+            if at is not None:
+                found[w] += fit.coefficients[j] * factors[j] * sums.gram[w][:, at]
+    return found

@@ -1,0 +1,139 @@
+"""What a recording shows by itself: the first of the two steps that are done recording by recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.comparison import searched
+from regolithd.calibration.mismatch.inference.evidence import calibrated_values
+from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.answer import Answer
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.group import Term
+    from regolithd.calibration.mismatch.selection.decision import Decision
+    from regolithd.calibration.mismatch.simulation.simulation import Simulation
+
+Array = NDArray[np.float64]
+Single = NDArray[np.float32]
+
+
+@dataclass(frozen=True, eq=False)
+class FoundTerm:
+    """A term that a recording shows by itself.
+
+    Attributes
+    ----------
+    name: the candidate's, or the covariate's of a smooth term
+    named: whether it is a candidate
+    shape: the candidate's
+    wheels: indices
+    penalty: what it had to gain, in Δχ²
+    columns: shape (column, time, wheel), 0 on other wheels and where nothing is compared
+    """
+
+    name: str
+    named: bool
+    shape: Shape
+    wheels: tuple[int, ...]
+    penalty: float
+    columns: Single
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """A candidate's grid of shapes in one recording, and how far its covariate reaches there."""
+
+    reach: float
+    shapes: tuple[Shape, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The answer of one recording, and what the sums over the fleet need of it.
+
+    Attributes
+    ----------
+    answer: as `regolithd mismatch` gives it for this recording alone
+    values: the parameters at which the simulation was linearised
+    deviation, autocorrelation_time: of the noise beside all that was found, shape (wheel,); and in readings
+    entry_threshold: score above which an effect was named
+    terms: named effects, then smooth terms
+    shapes: the grid of each candidate that this recording allows, by name
+    """
+
+    answer: Answer
+    values: dict[str, float]
+    deviation: Array
+    autocorrelation_time: float
+    entry_threshold: float
+    terms: tuple[FoundTerm, ...]
+    shapes: dict[str, Shapes]
+
+
+def one_channel(simulation: Simulation, channel: str) -> Simulation:
+    """Return the simulation of one channel of a simulation that predicts several; else the simulation itself."""
+    return OneChannel(simulation, channel) if simulation.channels else simulation
+
+
+def found_in(recording: Recording, simulation: Simulation, channel: str, thresholds: Thresholds = THRESHOLDS) -> Found:
+    """Compare one channel of one recording.
+
+    Raises
+    ------
+    MismatchError
+        When there is nothing to compare.
+    """
+    of_channel = one_channel(simulation, channel)
+    effects = [each for each in simulation.corrected_effects if not simulation.channels or each.channel == channel]
+    search = searched(recording, of_channel, effects=effects, thresholds=thresholds)
+    decision = search.decision
+    problem, whole = decision.equations.problem, decision.whole
+    values = {
+        name: problem.values[name] for name in calibrated_values(decision.equations, whole) if name in problem.values
+    }
+    return Found(
+        answer=search.comparison.answer,
+        values=values,
+        deviation=decision.noise.deviation,
+        autocorrelation_time=decision.noise.autocorrelation_time,
+        entry_threshold=decision.entry_threshold,
+        terms=tuple(_found_term(decision, term) for term in whole.terms),
+        shapes=shapes_in(problem, search.candidates),
+    )
+
+
+def _found_term(decision: Decision, term: Term) -> FoundTerm:
+    equations = decision.equations
+    design = equations.design
+    columns = design.in_time(design.columns[term.group.span]).astype(np.float32)
+    columns[:, :, [wheel for wheel in equations.all_wheels if wheel not in term.wheels]] = 0.0
+    return FoundTerm(
+        name=term.name,
+        named=term.group.named,
+        shape=dict(term.group.shape),
+        wheels=term.wheels,
+        penalty=equations.penalty(term),
+        columns=columns,
+    )
+
+
+def shapes_in(problem: Problem, candidates: Sequence[Candidate]) -> dict[str, Shapes]:
+    """Return each applicable candidate's grid, and how far its covariate reaches in this recording."""
+    found = {}
+    for candidate in candidates:
+        if candidate.applies(problem):
+            values = problem.covariates.get(candidate.covariate)
+            reach = float(np.nanstd(values[problem.mask])) if values is not None else 0.0
+            found[candidate.name] = Shapes(reach, tuple(candidate.shapes(problem)))
+    return found

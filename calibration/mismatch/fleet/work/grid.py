@@ -1,0 +1,80 @@
+"""The columns that the sums of all recordings have in common: candidates, each in a few shapes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.fleet.work.found import Found
+
+MOST_SHAPES = 6
+"""Shapes of a candidate's grid (a choice: the shapes that single recordings were found to have come beside them)."""
+MOST_FOUND_SHAPES = 6
+"""Shapes that were found in single recordings, of one candidate (a choice)."""
+AT_ONCE = "onset_s"
+"""The shape parameter of what begins within a recording. Over a fleet it is there from its first instant."""
+
+
+@dataclass(frozen=True)
+class GridGroup:
+    """One candidate in one shape: columns that enter together.
+
+    Attributes
+    ----------
+    candidate, shape: whose columns they are
+    columns: their places in the sums
+    tried: how many shapes of the candidate there are to choose from
+    begins: whether it is a change by its nature: it cannot have been there from the start
+    """
+
+    candidate: Candidate
+    shape: Shape
+    columns: tuple[int, ...]
+    tried: int
+    begins: bool = field(default=False)
+
+    @property
+    def signs(self) -> tuple[int, ...]:
+        """The coefficients' signs, 0 for either."""
+        return tuple(each.sign for each in self.candidate.coefficients)
+
+
+def grid_of(candidates: Sequence[Candidate], found: Sequence[Found], first: int) -> tuple[GridGroup, ...]:
+    """Return the groups, whose columns begin at place `first`.
+
+    A candidate's grid is that of the recording in which its covariate reaches furthest. Faults that another channel
+    shows (a load cell's) stay with their recording.
+    """
+    groups: list[GridGroup] = []
+    for candidate in candidates:
+        shapes = shapes_over_fleet(candidate, found) if candidate.channel is None else ()
+        for shape in shapes:
+            columns = tuple(range(first, first + len(candidate.coefficients)))
+            groups.append(GridGroup(candidate, shape, columns, len(shapes), begins=candidate.change_point in shape))
+            first += len(columns)
+    return tuple(groups)
+
+
+def shapes_over_fleet(candidate: Candidate, found: Sequence[Found]) -> tuple[Shape, ...]:
+    """Return a candidate's shapes for all recordings; of what begins at some time, the shape after that alone."""
+    grids = [each.shapes[candidate.name] for each in found if candidate.name in each.shapes]
+    if not grids:
+        return ()
+    widest = max(grids, key=lambda grid: (grid.reach, len(grid.shapes))).shapes
+    change_point = candidate.change_point
+    if widest and change_point in widest[0]:
+        return ({**widest[0], change_point: 0.0},)
+    kept = (
+        [widest[int(place)] for place in np.unique(np.linspace(0, len(widest) - 1, MOST_SHAPES).round())]
+        if widest
+        else []
+    )
+    named = [term.shape for each in found for term in each.terms if term.named and term.name == candidate.name]
+    more = {repr(sorted(shape.items())): shape for shape in named if shape not in kept}
+    return (*kept, *list(more.values())[:MOST_FOUND_SHAPES])

@@ -1,0 +1,201 @@
+"""Sums of products of one recording: the second step that is done recording by recording.
+
+Columns, in this order: the simulation's tangents (free parameters, each wheel's own deviations, sizes of corrected
+effects), the candidates of the fleet's grid, and what the recording shows by itself. All are in physical units, so that
+sums of different recordings add up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.changes import corrected_problem, stated_in
+from regolithd.calibration.mismatch.fleet.work.found import one_channel
+from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
+from regolithd.calibration.mismatch.regression.candidate_groups import implausibility
+from regolithd.calibration.mismatch.regression.nuisance import tangents
+from regolithd.calibration.mismatch.signal.noise import NoiseModel
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
+    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.simulation.simulation import Simulation
+
+Array = NDArray[np.float64]
+
+PIECE = 4096
+"""Instants that are summed at once (a choice: a few MiB)."""
+Laws = tuple[tuple[str, "Shape"], ...]
+"""Names and shapes of the candidates of the fleet's grid."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Sums over the readings of one recording that are compared.
+
+    Attributes
+    ----------
+    wheels: names
+    tangents: names of the simulation's tangents
+    prior_stds: of their coefficients, shape (tangent,)
+    places: the columns of each law of the grid; fewer than it has coefficients, or none, where it does not apply
+    penalties: Δχ² that each law must gain for being hardly possible, shape (law,)
+    own: the columns of each term that the recording shows by itself
+    gram: shape (wheel, column, column)
+    moment: with the residual of the stated simulation, shape (wheel, column)
+    fourth: sums of fourth powers, shape (wheel, column)
+    energy, counts: sum of squares of that residual, and readings, shape (wheel,)
+    weights: one over the long-run variance of the noise, shape (wheel,)
+    blocks: weighted moments of each block of time with what the own terms leave, shape (block, wheel, column)
+    mean_size: the channel's mean magnitude
+    wheel_sets: sets of wheels, by indices, that may share an effect
+    """
+
+    wheels: tuple[int | str, ...]
+    tangents: tuple[str, ...]
+    prior_stds: Array
+    places: tuple[tuple[int, ...], ...]
+    penalties: Array
+    own: tuple[tuple[int, ...], ...]
+    gram: Array
+    moment: Array
+    fourth: Array
+    energy: Array
+    counts: Array
+    weights: Array
+    blocks: Array
+    mean_size: float
+    wheel_sets: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Columns:
+    """Columns of a recording, shape (column, time, wheel), and which of them belong to what."""
+
+    values: Array
+    tangents: tuple[str, ...]
+    prior_stds: Array
+    shifts: Array
+    places: tuple[tuple[int, ...], ...]
+    own: tuple[tuple[int, ...], ...]
+
+
+def sums_of(
+    recording: Recording,
+    simulation: Simulation,
+    channel: str,
+    laws: Laws,
+    found: Found,
+    thresholds: Thresholds = THRESHOLDS,
+) -> Sums:
+    """Return the sums of one recording, with the candidates of the fleet's grid in their shapes."""
+    of_channel = one_channel(simulation, channel)
+    candidates = {each.name: each for each in forms_of(of_channel)}
+    problem = _posed(recording, simulation, of_channel, found, thresholds)
+    columns = _columns(problem, [(candidates[name], shape) for name, shape in laws], found.terms)
+    residual = np.where(problem.mask, problem.measured - problem.filled, 0.0)
+    # Measured from the stated values, not from where this recording's own comparison linearised the simulation.
+    residual += np.einsum("c,ctw->tw", columns.shifts, columns.values[: len(columns.shifts)])
+    noise = NoiseModel(found.deviation, found.autocorrelation_time)
+    gram, moment, fourth = _products(columns.values, residual)
+    return Sums(
+        wheels=problem.recording.wheels,
+        tangents=columns.tangents,
+        prior_stds=columns.prior_stds,
+        places=columns.places,
+        penalties=np.array([implausibility(problem, candidates[name], shape) for name, shape in laws]),
+        own=columns.own,
+        gram=gram,
+        moment=moment,
+        fourth=fourth,
+        energy=np.sum(residual**2, axis=0),
+        counts=problem.mask.sum(axis=0).astype(np.float64),
+        weights=noise.weights,
+        blocks=_block_moments(problem, columns, residual, gram, moment, noise),
+        mean_size=problem.mean_size,
+        wheel_sets=problem.wheel_sets,
+    )
+
+
+def forms_of(simulation: Simulation) -> tuple[Candidate, ...]:
+    """Return the candidates in the forms that they have for a simulation of one channel."""
+    return tuple(each.form_for(simulation) for each in simulation.candidates(library()))
+
+
+def _posed(
+    recording: Recording, simulation: Simulation, of_channel: Simulation, found: Found, thresholds: Thresholds
+) -> Problem:
+    """Return the problem where the recording's own comparison linearised it."""
+    effects = [
+        each for each in simulation.corrected_effects if not simulation.channels or each.channel == of_channel.channel
+    ]
+    stated = stated_in(forms_of(of_channel), effects, of_channel.stated_effects())
+    return corrected_problem(build_problem(recording, of_channel, found.values, thresholds=thresholds), stated)
+
+
+def _columns(problem: Problem, laws: Sequence[tuple[Candidate, Shape]], terms: Sequence[FoundTerm]) -> _Columns:
+    names, stds, made = tangents(problem)
+    parameters = problem.simulation.parameters
+    shifts = [problem.values[name] - parameters[name].value if name in parameters else 0.0 for name in names]
+    count, places = len(made), []
+    for candidate, shape in laws:
+        fresh = np.asarray(candidate.columns(problem, shape), np.float64) if candidate.applies(problem) else ()
+        places.append(tuple(range(count, count + len(fresh))))
+        made, count = [*made, *fresh], count + len(fresh)
+    own = []
+    for term in terms:
+        own.append(tuple(range(count, count + len(term.columns))))
+        made, count = [*made, *term.columns.astype(np.float64)], count + len(term.columns)
+    whole = problem.mask.shape
+    values = np.where(problem.mask, np.stack([np.broadcast_to(each, whole) for each in made]), 0.0)
+    return _Columns(values, tuple(names), np.array(stds), np.array(shifts), tuple(places), tuple(own))
+
+
+def _products(values: Array, residual: Array) -> tuple[Array, Array, Array]:
+    """Return sums of products of columns with each other and the residual, and of fourth powers, for each wheel."""
+    columns, instants, wheels = values.shape
+    gram, moment = np.zeros((wheels, columns, columns)), np.zeros((wheels, columns))
+    fourth = np.zeros((wheels, columns))
+    for wheel in range(wheels):
+        for start in range(0, instants, PIECE):
+            piece = np.ascontiguousarray(values[:, start : start + PIECE, wheel])
+            gram[wheel] += piece @ piece.T
+            moment[wheel] += piece @ residual[start : start + PIECE, wheel]
+            fourth[wheel] += np.sum(piece**4, axis=1)
+    return gram, moment, fourth
+
+
+def _block_moments(
+    problem: Problem, columns: _Columns, residual: Array, gram: Array, moment: Array, noise: NoiseModel
+) -> Array:
+    """Return each block's weighted moments with what tangents and own terms leave of the residual."""
+    blocks = blocks_of_time(problem, noise)
+    taken = [*range(len(columns.tangents)), *(column for own in columns.own for column in own)]
+    fitted = _fitted(gram, moment, noise.weights, taken, columns.prior_stds)
+    left = (residual - np.einsum("c,ctw->tw", fitted, columns.values[taken])) * noise.weights
+    order = np.argsort(blocks, kind="stable")
+    starts = np.flatnonzero(np.diff(blocks[order], prepend=-1))
+    sums = [np.add.reduceat((column * left)[order], starts, axis=0) for column in columns.values]
+    return np.stack(sums, axis=2)
+
+
+def _fitted(gram: Array, moment: Array, weights: Array, taken: Sequence[int], prior_stds: Array) -> Array:
+    """Return the coefficients of these columns, tangents first, held by their priors."""
+    at = list(taken)
+    matrix = np.einsum("w,wcd->cd", weights, gram[:, at][:, :, at])
+    count = len(prior_stds)
+    matrix[range(count), range(count)] += 1 / prior_stds**2
+    scale = np.sqrt(np.where(np.diag(matrix) > 0, np.diag(matrix), 1.0))
+    solved = np.linalg.lstsq(matrix / np.outer(scale, scale), weights @ moment[:, at] / scale, rcond=1e-10)[0]
+    return np.asarray(solved / scale)

@@ -1,0 +1,121 @@
+"""Where the work on single recordings is done: in this process, on all of its computer's cores, or on a Dask cluster.
+
+A worker that dies costs time, not the answer: what it was doing is done again by another.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+from regolithd.calibration.mismatch.errors import MismatchError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+Result = TypeVar("Result")
+
+MOST_BROKEN_POOLS = 3
+"""Pools of processes that may break before it is an error (a choice: a recording that is too large breaks each)."""
+DASK_RETRIES = 3
+"""Failures of one recording on a cluster before it is an error (a choice)."""
+CONNECT_S = "30s"
+"""How long to wait for the scheduler (a choice)."""
+THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+"""One process for each core: threads of the linear algebra would only compete."""
+
+
+class Workers(Protocol):
+    """Calls tasks, and yields what each returns as it comes, with its number."""
+
+    def results(self, tasks: Mapping[int, Callable[[], Result]]) -> Iterator[tuple[int, Result]]:
+        """Yield (number, result) in any order."""
+
+
+class ThisProcess:
+    """One task after the other, here."""
+
+    def results(self, tasks: Mapping[int, Callable[[], Result]]) -> Iterator[tuple[int, Result]]:
+        """Yield in the order of the tasks."""
+        for number, task in tasks.items():
+            yield number, task()
+
+
+class AllCores:
+    """A process for each core of this computer."""
+
+    def __init__(self, processes: int | None = None) -> None:
+        self._processes = processes or len(os.sched_getaffinity(0))
+
+    def results(self, tasks: Mapping[int, Callable[[], Result]]) -> Iterator[tuple[int, Result]]:
+        """Yield as they come; where a process dies, what is left is done by new ones.
+
+        Raises
+        ------
+        MismatchError
+            When processes keep dying.
+        """
+        left = dict(tasks)
+        for _ in range(MOST_BROKEN_POOLS):
+            try:
+                with _one_thread_each(), self._pool() as pool:
+                    for number, result in _submitted(pool, left):
+                        del left[number]
+                        yield number, result
+            except BrokenProcessPool:
+                continue
+            return
+        raise MismatchError(
+            f"worker processes died {MOST_BROKEN_POOLS} times, with {len(left)} recordings left: is there memory?"
+        )
+
+    def _pool(self) -> ProcessPoolExecutor:
+        # Not forked: threads of this process (progress, linear algebra) would be copied in the middle of their work.
+        return ProcessPoolExecutor(self._processes, mp_context=multiprocessing.get_context("spawn"))
+
+
+class DaskCluster:
+    """The workers of a Dask cluster; they need the same version of regolithd, and see files under the same paths."""
+
+    def __init__(self, scheduler: str) -> None:
+        try:
+            from distributed import Client  # noqa: PLC0415  # the extra `cluster`
+        except ImportError as error:
+            raise MismatchError(
+                "a Dask cluster needs the package distributed: pip install 'regolithd[cluster]'"
+            ) from error
+        try:
+            self._client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise MismatchError(f"no Dask scheduler answers at {scheduler}: {error}") from error
+
+    def results(self, tasks: Mapping[int, Callable[[], Result]]) -> Iterator[tuple[int, Result]]:
+        """Yield as they come; the scheduler gives the work of a lost worker to another."""
+        with self._client.get_executor(retries=DASK_RETRIES, pure=False) as pool:
+            yield from _submitted(pool, tasks)
+
+
+def _submitted(pool: Executor, tasks: Mapping[int, Callable[[], Result]]) -> Iterator[tuple[int, Result]]:
+    numbers = {pool.submit(task): number for number, task in tasks.items()}
+    try:
+        for future in as_completed(numbers):
+            yield numbers.pop(future), future.result()
+    finally:
+        for future in numbers:
+            future.cancel()
+
+
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Set the environment that new processes inherit, and restore it."""
+    before = {name: os.environ.get(name) for name in THREADS}
+    os.environ.update(dict.fromkeys(THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name, None) if value is None else os.environ.update({name: value})

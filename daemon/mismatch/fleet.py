@@ -1,0 +1,194 @@
+"""`regolithd mismatch` with the recordings of several rovers: whose each is, and the comparison from files to files."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from regolithd.calibration.mismatch.data.columns import rovers_in
+from regolithd.calibration.mismatch.errors import MismatchError, RecordingError
+from regolithd.calibration.mismatch.fleet.comparison import Member, compare_fleet
+from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER, date_in
+from regolithd.calibration.mismatch.fleet.work.store import Store
+from regolithd.calibration.mismatch.fleet.work.workers import AllCores, DaskCluster, Workers
+from regolithd.calibration.mismatch.simulation.load import load_simulation, model_folder, read_tables
+from regolithd.daemon.mismatch.files import write_json
+from regolithd.daemon.mismatch.recordings import read_one
+from regolithd.daemon.mismatch.terminal import print_answer
+from regolithd.daemon.recording.export import recorded_snapshots
+from regolithd.daemon.recording.mcap_file import DamagedRecordingError, read_metadata
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.answer import Answer
+    from regolithd.calibration.mismatch.fleet.choice.equations import Level
+    from regolithd.daemon.mismatch.files import Outputs
+
+RoverFrom = Literal["column", "metadata", "folder"]
+
+
+@dataclass(frozen=True, slots=True)
+class FleetOptions:
+    """How recordings of several rovers are compared.
+
+    Attributes
+    ----------
+    rover_from: what says whose a recording is; None: the column `rover` or the metadata, where there are such
+    parameters: whose the simulation's parameters are
+    catalogue: Parquet file of what was found in which recording; results are kept beside it
+    scheduler: address of a Dask scheduler; None: all cores of this computer
+    """
+
+    rover_from: RoverFrom | None = None
+    parameters: Level | None = None
+    catalogue: Path | None = None
+    scheduler: str | None = None
+
+    @property
+    def asked_for(self) -> bool:
+        """Whether an option was given that only a fleet has."""
+        return any((self.rover_from, self.parameters, self.catalogue, self.scheduler))
+
+
+@dataclass(frozen=True, slots=True)
+class RoverFile:
+    """A file, or the rows of one rover in it; `rover` is empty where nothing says whose it is."""
+
+    path: Path
+    rover: str
+    of_column: bool = False
+
+
+def files_of_rovers(paths: Sequence[Path], rover_from: RoverFrom | None) -> list[RoverFile]:
+    """Return whose each recording is.
+
+    Raises
+    ------
+    RecordingError
+        When a recording does not say whose it is, and was to.
+    """
+    found = [each for path in paths for each in _rovers_of(path, rover_from)]
+    if rover_from and (silent := [str(each.path) for each in found if not each.rover]):
+        raise RecordingError(f"{silent[0]} does not say whose it is: it has no {rover_from} that names a rover")
+    return found
+
+
+def _rovers_of(path: Path, rover_from: RoverFrom | None) -> list[RoverFile]:
+    if not path.is_file():
+        raise RecordingError(f"{path} is not there" if not path.exists() else f"{path} is not a file")
+    if rover_from == "folder":
+        return [RoverFile(path, path.resolve().parent.name)]
+    if path.suffix == ".mcap":
+        return [RoverFile(path, "" if rover_from == "column" else _in_metadata(path))]
+    names = () if rover_from == "metadata" else rovers_in(path)
+    return [RoverFile(path, name, of_column=True) for name in names] or [RoverFile(path, "")]
+
+
+def _in_metadata(path: Path) -> str:
+    """Return the name in the configuration that a recording of the daemon holds; empty where it holds none."""
+    try:
+        return str(json.loads(read_metadata(path).get("configuration", "{}")).get("rover", {}).get("name", ""))
+    except (DamagedRecordingError, ValueError, OSError):
+        return ""
+
+
+def begins_at(path: Path) -> datetime | None:
+    """Return when a recording began: by its first snapshot, else by a date in its name or its folder's."""
+    if path.suffix == ".mcap":
+        try:
+            first = next(recorded_snapshots([path]), None)
+        except (DamagedRecordingError, ValueError, KeyError, OSError):
+            first = None
+        if first is not None:
+            return datetime.fromtimestamp(first.time_ns / 1e9, UTC)
+    return date_in(path.name) or date_in(path.resolve().parent.name)
+
+
+def members_of(files: Sequence[RoverFile], unit: str) -> list[Member]:
+    """Return the recordings of a fleet; their names are the files', with folders where two have the same."""
+    paths = [file.path for file in files]
+    short = len({path.name for path in paths}) == len(set(paths))
+    found = []
+    for file in files:
+        path, name = file.path.resolve(), file.path.name if short else str(file.path)
+        found.append(
+            Member(
+                name=f"{name} ({file.rover})" if paths.count(file.path) > 1 else name,
+                rover=file.rover or ONLY_ROVER,
+                begins=begins_at(path),
+                read=partial(read_one, path, unit, file.rover if file.of_column else None),
+                digest=sha256(path.read_bytes() + file.rover.encode()).hexdigest(),
+            )
+        )
+    return found
+
+
+def run_fleet(files: Sequence[RoverFile], simulation: Path, outputs: Outputs, options: FleetOptions) -> Answer:
+    """Compare, write the outputs, print the answer and return it.
+
+    Raises
+    ------
+    MismatchError
+        When no recording can be compared, or the simulation cannot be used.
+    """
+    outputs.check()
+    if outputs.report or outputs.corrected:
+        raise MismatchError("--report and --corrected are of one rover; a fleet has --json and --catalogue")
+    simulated = load_simulation(simulation, announce=partial(typer.echo, err=True))
+    workers: Workers = DaskCluster(options.scheduler) if options.scheduler else AllCores()
+    store = Store(_kept_beside(options.catalogue)) if options.catalogue else None
+    with _bar() as bar:
+        task = bar.add_task("reading", total=len(files))
+        found = compare_fleet(
+            members_of(files, simulated.wheel_column),
+            partial(load_simulation, simulation.resolve()),
+            level=options.parameters or "rover",
+            workers=workers,
+            store=store,
+            key=_digest_of(simulation),
+            progress=lambda step, done, of: bar.update(task, description=step, completed=done, total=of),
+        )
+    if outputs.json:
+        write_json(outputs.json, found.answer)
+    if options.catalogue:
+        found.write_catalogue(options.catalogue)
+    print_answer(Console(), found.answer)
+    return found.answer
+
+
+def _bar() -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    return Progress(*columns, console=Console(stderr=True), transient=True)
+
+
+def _kept_beside(catalogue: Path) -> Path:
+    """Return the folder in which results of single recordings are kept."""
+    if catalogue.suffix != ".parquet":
+        raise MismatchError(f"{catalogue}: the catalogue is a Parquet file; name it .parquet")
+    if not catalogue.resolve().parent.is_dir():
+        raise MismatchError(f"{catalogue} cannot be written: there is no folder {catalogue.parent}")
+    return catalogue.with_suffix(".parts")
+
+
+def _digest_of(simulation: Path) -> str:
+    """Return a digest of SIM.toml, and of the FMU or the module that it names."""
+    tables = read_tables(simulation)
+    digest = sha256(simulation.read_bytes())
+    model = str(tables["simulation"]["model"])
+    fmu = model_folder(tables, simulation.resolve().parent) / model
+    module = sys.modules.get(model.split(":", maxsplit=1)[0])
+    for path in (fmu, Path(getattr(module, "__file__", None) or "-")):
+        if path.is_file():
+            digest.update(path.read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,214 @@
+"""Recordings of several rovers are compared together: what is found says on which rovers and since when."""
+
+from __future__ import annotations
+
+import os
+import signal
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any
+
+import fleet_arm
+import pyarrow.parquet
+import pytest
+from jsonschema import Draft202012Validator
+
+from regolithd.calibration.mismatch import MismatchError, compare
+from regolithd.calibration.mismatch.fleet.comparison import FleetComparison, Member, compare_fleet
+from regolithd.calibration.mismatch.fleet.told.answer import fleet_answer_schema
+from regolithd.calibration.mismatch.fleet.work.store import Store
+from regolithd.calibration.mismatch.fleet.work.workers import DaskCluster
+from regolithd.calibration.validation.fleet_study.__main__ import largest_difference
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    from regolithd.calibration.mismatch.fleet.told.answer import FleetEffect
+
+DRIVES = 5
+NOTHING: list[Mapping[str, Any]] = [{}] * DRIVES
+CHANGED: list[Mapping[str, Any]] = [{}] * 3 + [{"viscous": 0.08}] * 2
+WEARING: list[Mapping[str, Any]] = [{}, {}, *({"coulomb": (0.0, 0.05 * n)} for n in range(1, 4))]
+
+
+def compared(folder: Path, rovers: Mapping[str, Sequence[Mapping[str, Any]]]) -> FleetComparison:
+    """Write the recordings and compare them in this process."""
+    return compare_fleet(fleet_arm.season(folder, rovers), fleet_arm.loader(folder))
+
+
+def effect_of(found: FleetComparison, rover: str) -> FleetEffect:
+    """Return the one effect of a rover."""
+    (effect,) = [effect for effect in found.answer.effects if effect.rovers == (rover,)]
+    return effect
+
+
+def day(number: int, place: int) -> str:
+    """Return when a rover's recording began, as the answer tells it."""
+    begins = fleet_arm.FIRST + timedelta(days=fleet_arm.DAYS_APART * number, hours=place)
+    return begins.isoformat().replace("+00:00", "Z")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return where the recordings of the fleet are."""
+    return tmp_path_factory.mktemp("fleet")
+
+
+@pytest.fixture(scope="module")
+def members(folder: Path) -> list[Member]:
+    """Return a fleet in which one rover changes half way, one bearing wears, and one has nothing."""
+    return fleet_arm.season(folder, {"changed": CHANGED, "sound": NOTHING, "wearing": WEARING})
+
+
+@pytest.fixture(scope="module")
+def fleet(members: list[Member], folder: Path) -> FleetComparison:
+    """Return its comparison in this process; results are kept beside it."""
+    return compare_fleet(members, fleet_arm.loader(folder), store=Store(folder / "parts"))
+
+
+def test_a_change_half_way_has_its_rover_and_date(fleet: FleetComparison) -> None:
+    """On all wheels of that rover, since the first recording that has it."""
+    effect = effect_of(fleet, "changed")
+    assert (effect.name, effect.wheels) == ("viscous-friction", fleet_arm.JOINTS)
+    assert effect.since_low is not None
+    assert effect.since_high is not None
+    assert effect.since_low <= day(3, 0) <= effect.since_high
+    size = next(iter(effect.parameters.values()))
+    assert size.low < 0.08 < size.high
+
+
+def test_a_wearing_bearing_has_its_wheel_and_grows(fleet: FleetComparison) -> None:
+    """Drag that was not there before, on one joint, in the recordings since then alone."""
+    effect = effect_of(fleet, "wearing")
+    assert (effect.name, effect.wheels) == ("bearing-drag", ("wrist",))
+    assert effect.since_low is not None
+    assert effect.since_high is not None
+    assert effect.since_low <= day(2, 2) <= effect.since_high
+    assert len(effect.recordings) < DRIVES
+    assert "growing" in effect.statement
+    assert effect.rmse_after < effect.rmse_before
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.filterwarnings("ignore")  # a killed worker is no news
+def test_a_cluster_that_loses_a_worker_has_the_same_answer(
+    fleet: FleetComparison, members: list[Member], folder: Path
+) -> None:
+    """To one part in 10⁹, wherever the recordings were compared."""
+    distributed = pytest.importorskip("distributed", reason="pip install 'regolithd[cluster]'")
+    killed: list[int] = []
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+
+        def kill(step: str, done: int, of: int) -> None:
+            if step == "comparing" and not killed and of // 2 <= done < of:
+                killed.append(next(iter(cluster.workers.values())).pid)
+                os.kill(killed[0], signal.SIGKILL)
+
+        workers = DaskCluster(cluster.scheduler_address)
+        again = compare_fleet(members, fleet_arm.loader(folder), workers=workers, progress=kill)
+    assert len(killed) == 1
+    assert largest_difference(fleet.to_json(), again.to_json()) < 1e-9
+
+
+def test_a_comparison_continues_with_what_is_stored(
+    fleet: FleetComparison, members: list[Member], folder: Path
+) -> None:
+    """Only what is missing or damaged is computed again: the answer is the same."""
+    parts = sorted((folder / "parts").iterdir())
+    parts[0].unlink()
+    parts[1].write_bytes(parts[1].read_bytes()[:1000])
+    steps: list[tuple[str, int, int]] = []
+    again = compare_fleet(
+        members,
+        fleet_arm.loader(folder),
+        store=Store(folder / "parts"),
+        progress=lambda *step: steps.append(step),
+    )
+    assert largest_difference(fleet.to_json(), again.to_json()) < 1e-9
+    # Each step is told once at its begin, and once for each recording that is computed.
+    assert sum(1 for step, _, _ in steps if step in {"comparing", "summing"}) == 2 + 2
+
+
+def test_nothing_is_said_of_a_sound_rover(fleet: FleetComparison) -> None:
+    """Only two effects are named, and the sound rover is in none."""
+    assert fleet.answer.verdict == "missing-physics"
+    assert len(fleet.answer.effects) == 2
+    assert fleet.answer.fit.held_out_rmse_after < fleet.answer.fit.held_out_rmse_before
+
+
+def test_the_answer_follows_its_schema(fleet: FleetComparison) -> None:
+    """It is the contract's, with rovers, recordings and dates."""
+    errors = Draft202012Validator(fleet_answer_schema()).iter_errors(fleet.to_json())
+    assert [error.message for error in errors] == []
+    assert [rover["name"] for rover in fleet.to_json()["rovers"]] == ["changed", "sound", "wearing"]
+
+
+def test_the_catalogue_answers_since_when_and_where(fleet: FleetComparison, tmp_path: Path) -> None:
+    """One query: the first recording in which each effect acts, by rover and wheel."""
+    path = tmp_path / "season.parquet"
+    fleet.write_catalogue(path)
+    table = pyarrow.parquet.read_table(path, filters=[("acts", "=", True)])
+    since = table.group_by(["rover", "wheel", "effect"]).aggregate([("begins", "min")]).to_pylist()
+    found = {(row["rover"], row["wheel"], row["effect"]) for row in since}
+    assert found == {
+        ("changed", "elbow", "viscous-friction"),
+        ("changed", "wrist", "viscous-friction"),
+        ("wearing", "wrist", "bearing-drag"),
+    }
+    silent = pyarrow.parquet.read_table(path, filters=[("rover", "=", "sound")]).to_pylist()
+    assert len(silent) == DRIVES
+    assert {row["effect"] for row in silent} == {""}
+
+
+def test_the_size_in_each_recording_follows_the_wear(fleet: FleetComparison) -> None:
+    """The catalogue has the size in every recording alone, before the onset too."""
+    sizes = [row.value for row in fleet.rows if row.effect == "bearing-drag"]
+    assert len(sizes) == DRIVES
+    assert sizes[-1] == pytest.approx(0.15, abs=0.04)
+    assert abs(sizes[0] or 1) < 0.04
+
+
+def test_an_effect_of_all_rovers_is_one_effect(tmp_path: Path) -> None:
+    """All rovers share it, although no single recording would need to show it."""
+    drives: list[Mapping[str, Any]] = [{"coulomb": (0.05, 0.05)}] * 2
+    (effect,) = compared(tmp_path, {"a": drives, "b": drives}).answer.effects
+    assert (effect.name, effect.rovers, effect.since) == ("coulomb-friction", ("a", "b"), None)
+    assert effect.parameters["coulomb_current"].low < 0.05 < effect.parameters["coulomb_current"].high
+
+
+def test_a_fleet_without_a_finding_is_consistent(tmp_path: Path) -> None:
+    """And tells how small an effect it would have shown: smaller than one recording does."""
+    found = compared(tmp_path, {"a": NOTHING[:2], "b": NOTHING[:2]}).answer
+    assert (found.verdict, found.effects, found.unexplained) == ("consistent", (), ())
+    alone = compare(fleet_arm.season(tmp_path, {"a": [{}]})[0].read(), fleet_arm.Arm()).answer
+    of = {one.name: one.smallest_detectable for one in alone.sensitivity}
+    least = {one.name: one.smallest_detectable for one in found.sensitivity}
+    assert least["coulomb-friction"] < 0.7 * of["coulomb-friction"]
+
+
+def test_what_one_recording_shows_is_reported_with_it(tmp_path: Path) -> None:
+    """An effect in a single recording of many is none of the rover."""
+    drives: list[Mapping[str, Any]] = [{}, {"coulomb": (0.3, 0.3)}, {}, {}]
+    (effect,) = compared(tmp_path, {"a": drives}).answer.effects
+    assert effect.name == "coulomb-friction"
+    assert len(effect.recordings) == 1
+    assert effect.rovers == ("a",)
+
+
+def test_a_list_of_tables_is_compared_together() -> None:
+    """In Python: `compare([one, two, …], simulation)`, without a word on rovers and dates."""
+    found = compare([fleet_arm.columns(n, (0.2, 0.2)) for n in range(2)], fleet_arm.Arm())
+    (effect,) = found.answer.effects
+    assert (effect.name, effect.rovers) == ("coulomb-friction", ("rover",))
+    assert effect.recordings == ("recording 1", "recording 2")
+
+
+def test_a_recording_that_cannot_be_compared_is_left_out(tmp_path: Path) -> None:
+    """With its reason, while the others are compared; without any other, it is an error."""
+    members = fleet_arm.season(tmp_path, {"a": NOTHING[:1]})
+    unmeasured = members[0].read().channel("none")
+    broken = Member("broken.csv", "a", None, lambda: members[0].read().with_channels(torque_Nm=unmeasured))
+    found = compare_fleet([*members, broken], fleet_arm.Arm)
+    assert any(note.startswith("broken.csv is left out") for note in found.answer.notes)
+    with pytest.raises(MismatchError, match=r"broken\.csv is left out"):
+        compare_fleet([broken], fleet_arm.Arm)

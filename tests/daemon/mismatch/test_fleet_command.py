@@ -1,0 +1,100 @@
+"""`regolithd mismatch` with recordings of several rovers: whose they are, what is written, and wrong calls."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+import fleet_arm
+import pyarrow as pa
+import pyarrow.csv
+import pyarrow.parquet
+import pytest
+from typer.testing import CliRunner
+
+from regolithd.calibration.mismatch.errors import RecordingError
+from regolithd.daemon.cli import app
+from regolithd.daemon.mismatch.fleet import begins_at, files_of_rovers, members_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from click.testing import Result
+
+
+def call(*words: object) -> Result:
+    """Run `regolithd mismatch`."""
+    return CliRunner().invoke(app, ["mismatch", *map(str, words)])
+
+
+@pytest.fixture
+def two(tmp_path: Path) -> list[Path]:
+    """Return a recording of each of two rovers, in a folder each; one of them has friction."""
+    sound = fleet_arm.columns(1)
+    worn = fleet_arm.columns(2, (0.3, 0.3))
+    return [
+        fleet_arm.write_recording(tmp_path / "asper" / "20260301.csv", sound, rover="asper"),
+        fleet_arm.write_recording(tmp_path / "bruno" / "20260302.csv", worn, rover="bruno"),
+    ]
+
+
+def test_recordings_of_two_rovers_are_told_apart(two: list[Path], tmp_path: Path) -> None:
+    """By their column, without an option; the catalogue and the answer say whose the friction is."""
+    simulation, out = fleet_arm.write_simulation(tmp_path), tmp_path / "out.json"
+    catalogue = tmp_path / "season.parquet"
+    done = call(*two, "--simulation", simulation, "--json", out, "--catalogue", catalogue)
+    assert done.exit_code == 0, done.output
+    (effect,) = json.loads(out.read_text())["effects"]
+    assert (effect["name"], effect["rovers"]) == ("coulomb-friction", ["bruno"])
+    assert {row["rover"] for row in pyarrow.parquet.read_table(catalogue).to_pylist()} == {"asper", "bruno"}
+    assert len(list(catalogue.with_suffix(".parts").iterdir())) == 4
+
+
+def test_a_file_may_hold_several_rovers(two: list[Path], tmp_path: Path) -> None:
+    """Its rows are taken apart, and have the same content as a file for each."""
+    both = tmp_path / "both.csv"
+    pyarrow.csv.write_csv(pa.concat_tables([pyarrow.csv.read_csv(path) for path in two]), both)
+    files = files_of_rovers([both], None)
+    assert [file.rover for file in files] == ["asper", "bruno"]
+    one, other = (members_of(each, "axis") for each in (files, files_of_rovers(two, None)))
+    assert [member.name for member in one] == ["both.csv (asper)", "both.csv (bruno)"]
+    for mine, apart in zip(one, other, strict=True):
+        assert (mine.read().channels["torque_Nm"] == apart.read().channels["torque_Nm"]).all()
+
+
+def test_the_folder_names_the_rover_where_asked(two: list[Path]) -> None:
+    """The column is not looked at then."""
+    assert [file.rover for file in files_of_rovers(two, "folder")] == ["asper", "bruno"]
+    assert not any(file.of_column for file in files_of_rovers(two, "folder"))
+
+
+def test_a_recording_that_has_to_say_whose_it_is_and_does_not_is_an_error(tmp_path: Path) -> None:
+    """With the file and what it lacks."""
+    path = fleet_arm.write_recording(tmp_path / "drive.csv", fleet_arm.columns(1))
+    assert [file.rover for file in files_of_rovers([path], None)] == [""]
+    with pytest.raises(RecordingError, match=r"drive\.csv does not say whose it is: it has no column"):
+        files_of_rovers([path], "column")
+
+
+def test_the_time_of_a_recording_is_in_its_name(two: list[Path]) -> None:
+    """Where it is no MCAP file, which knows its time."""
+    assert begins_at(two[0]) == datetime(2026, 3, 1, tzinfo=UTC)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--report", "out.html"), "are of one rover"),
+        (("--catalogue", "season.csv"), "name it .parquet"),
+        (("--catalogue", "nowhere/season.parquet"), "there is no folder"),
+    ],
+)
+def test_what_a_fleet_has_not_is_one_message(
+    words: tuple[str, str], told: str, two: list[Path], tmp_path: Path
+) -> None:
+    """And nothing is compared before."""
+    words = (words[0], str(tmp_path / words[1]))
+    done = call(*two, "--simulation", fleet_arm.write_simulation(tmp_path), *words)
+    assert done.exit_code == 65
+    assert told in done.output.replace("\n", " ")
