@@ -94,16 +94,19 @@ class Rig:
                     self.queued.add((message["session"], message["sequence"]))
 
     def drive(self) -> bool:
-        """Begin a traverse, and return whether the wheels turn."""
+        """Begin a traverse, and return whether the wheels turn; the last one may still be ending."""
         self.client = socket.socket(socket.AF_UNIX)
-        self.client.settimeout(10)
         self.client.connect(str(self.stack.folder / "control.sock"))
-        self.client.sendall(b'{"command": "traverse", "distance_m": 10.0, "speed_m_s": 0.02}\n')
-        answer = self.client.recv(4096)
+        self.client.settimeout(10)
+        deadline = time.monotonic() + 10
+        answer = b""
+        while b"accepted" not in answer and time.monotonic() < deadline:
+            self.client.sendall(b'{"command": "traverse", "distance_m": 10.0, "speed_m_s": 0.02}\n')
+            answer = self.client.recv(4096)
+            time.sleep(0.2)
         if b"accepted" not in answer:
             self.problems.append(f"traverse: {answer[:200]!r}")
             return False
-        deadline = time.monotonic() + 10
         while time.monotonic() < deadline and not self.turning():
             time.sleep(0.1)
         return self.turning()

@@ -118,7 +118,7 @@ def sdo(random: Random, _folder: Path) -> None:
 
 def eds(random: Random, folder: Path) -> None:
     """An EDS file of the rover's, damaged, named by `[devices]`."""
-    path = folder / "device.eds"
+    path = folder / f"device-{random.randrange(1 << 62):x}.eds"  # what was read is kept by its path
     kind, source = random.choice(EDS)
     path.write_bytes(damaged_text(source.read_text(encoding="latin-1"), random, "="))
     object_dictionary.cache_clear()
@@ -126,6 +126,7 @@ def eds(random: Random, folder: Path) -> None:
     try:
         parse_configuration(text, folder / "rover.toml")
     finally:
+        path.unlink()
         object_dictionary.cache_clear()
 
 
