@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import onnx
 import pytest
 from typer.testing import CliRunner
 
 from regolithd.daemon.cli import app
 from regolithd.daemon.closed_loop import run as loop_run
 from regolithd.daemon.closed_loop.run import DriveLengths
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 def regolithd(*arguments: object) -> Any:
@@ -24,7 +25,8 @@ def regolithd(*arguments: object) -> Any:
 
 def test_train_keeps_the_network_with_the_lowest_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each training has its own seed; drivetrain and wheel come from the file; the mean of all errors is printed."""
-    from regolithd.calibration.paper import (  # noqa: PLC0415  # laptop only
+    from regolithd.calibration.models import digest  # noqa: PLC0415  # laptop only
+    from regolithd.calibration.paper import (  # noqa: PLC0415
         backpropagation,
         onnx_export,
         training_set,
@@ -43,15 +45,17 @@ def test_train_keeps_the_network_with_the_lowest_error(tmp_path: Path, monkeypat
 
     monkeypatch.setattr(backpropagation, "train", trained)
     monkeypatch.setattr(training_set, "training_set", pairs)
-    monkeypatch.setattr(onnx_export, "export_onnx", lambda perceptron, _pairs: perceptron)
+    monkeypatch.setattr(
+        onnx_export, "export_onnx", lambda perceptron, _: SimpleNamespace(SerializeToString=perceptron.encode)
+    )
     monkeypatch.setattr(onnx_export, "model_card", lambda *_: SimpleNamespace(version="paper-3:5:2"))
-    monkeypatch.setattr(onnx, "save", lambda model, path: Path(path).write_text(model))
+    monkeypatch.setattr(digest, "with_digest", lambda model: model + b" with its digest")
     config = tmp_path / "rover.toml"
     config.write_text("[wheel]\nradius_m = 0.08\n[drivetrain]\nno_load_current_A = 0.01\n")
     out = tmp_path / "folder" / "terrain.onnx"
     options = ("--neurons", 5, "--trainings", 3, "--epochs", 70, "--config", config, "--out", out)
     done = regolithd("train", *options)
-    assert out.read_text() == "perceptron 0.02"
+    assert out.read_text() == "perceptron 0.02 with its digest"
     assert [each[:3] for each in asked] == [("pairs", 5, 70)] * 3
     assert len({each[3] for each in asked}) == 3
     assert sets == [(0.01, 0.08)]
@@ -60,7 +64,8 @@ def test_train_keeps_the_network_with_the_lowest_error(tmp_path: Path, monkeypat
 
 def test_train_posterior_hands_seed_and_numbers_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """So many rovers are simulated, and so many steps fitted; the wheel's radius goes into the file."""
-    from regolithd.calibration.posterior import (  # noqa: PLC0415  # laptop only
+    from regolithd.calibration.models import digest  # noqa: PLC0415  # laptop only
+    from regolithd.calibration.posterior import (  # noqa: PLC0415
         onnx_export,
         training,
         training_examples,
@@ -78,18 +83,18 @@ def test_train_posterior_hands_seed_and_numbers_on(tmp_path: Path, monkeypatch: 
         progress(1.25)
         return "parameters", "standardisation"
 
-    def export(*given: Any) -> str:
+    def export(*given: Any) -> Any:
         asked.append(given)
-        return "model"
+        return SimpleNamespace(SerializeToString="model".encode)
 
     monkeypatch.setattr(training_examples, "simulate_examples", simulate)
     monkeypatch.setattr(training, "fit", fit)
     monkeypatch.setattr(onnx_export, "export_onnx", export)
-    monkeypatch.setattr(onnx, "save", lambda model, path: Path(path).write_text(model))
+    monkeypatch.setattr(digest, "with_digest", lambda model: model + b" with its digest")
     out = tmp_path / "folder" / "posterior.onnx"
     done = regolithd("train-posterior", "--rovers", 2000, "--steps", 60, "--seed", 9, "--out", out)
     assert asked == [2000, ("examples", 9, 60), ("parameters", "standardisation", 0.075)]
-    assert out.read_text() == "model"
+    assert out.read_text() == "model with its digest"
     assert done.stdout.endswith(f"Wrote {out}.\n")
 
 
