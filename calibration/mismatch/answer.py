@@ -132,6 +132,15 @@ class Change:
 
 
 @dataclass(frozen=True)
+class RunnerUp:
+    """The next best answer: its names, whether something stays unexplained beside them, and how probable it is."""
+
+    effects: tuple[str, ...]
+    unexplained: bool
+    probability: float
+
+
+@dataclass(frozen=True)
 class Answer:
     """The result of `regolithd mismatch`."""
 
@@ -144,6 +153,9 @@ class Answer:
     parameters: tuple[CalibratedParameter, ...] = ()
     changes: tuple[Change, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
+    probability: float = 1.0
+    """That the set of names is right: of answers with 0.9 or more, nine in ten are (docs/proof.md)."""
+    runner_up: RunnerUp | None = None
     notes: tuple[str, ...] = ()
     """What was wrong with the recording, and which candidates could not be looked for."""
     fits: tuple[FitImprovement, ...] = ()
@@ -164,7 +176,10 @@ class Answer:
             "parameters",
             "changes",
         )
-        return {name: plain[name] for name in ("version", "verdict", *findings, "left_out", "notes")}
+        return {
+            name: plain[name]
+            for name in ("version", "verdict", *findings, "left_out", "probability", "runner_up", "notes")
+        }
 
 
 def answer_schema() -> dict[str, Any]:

@@ -350,6 +350,17 @@ class Thresholds:
     )
     rivals_tried: int = _threshold(8, "Other effects tried in the place of each.", f"{CHOICE}: computing time")
     additions_tried: int = _threshold(3, "Other effects tried beside each.", f"{CHOICE}: computing time")
+    # Probability of the answer
+    evidence_scale: float = _threshold(
+        4.0,
+        "Margin of evidence, in Δχ², by which an answer is e times as probable as another.",
+        f"{TRIALS}: maximum likelihood of right and wrong answers; 2 where noise and laws are exact",
+    )
+    highest_probability: float = _threshold(
+        0.97,
+        "Probability of an answer that no alternative comes near to.",
+        f"{TRIALS}: maximum likelihood of right and wrong answers",
+    )
     # Sensitivity and experiments
     detection_quantile: float = _threshold(
         1.2816, "Normal quantile of the probability with which an effect is to be found.", "standard: of 0.9"

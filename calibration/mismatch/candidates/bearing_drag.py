@@ -13,6 +13,7 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     onset_grid,
     onset_range,
 )
+from regolithd.calibration.mismatch.candidates.motion import along_motion, transition_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -48,15 +49,16 @@ class BearingDrag(Candidate):
         rises = (0.0, *(share * problem.length_s for share in RISES))
         rising: list[Shape] = [{"onset_s": t, "rise_s": rise} for t in at for rise in rises]
         wear: list[Shape] = [{"onset_s": t, **_wear(problem, p)} for t in at for p in (1.0, *POWERS)]
-        return [*rising, *wear]
+        return [{**transition_of(problem), **shape} for shape in (*rising, *wear)]
 
     def onset_profiles(self, problem: Problem) -> Sequence[Shape]:
         """Add more powers of time than the search has: the onset's interval depends on how the drag grows after it."""
-        return [*super().onset_profiles(problem), *(_wear(problem, power) for power in FURTHER_POWERS)]
+        further = [{**transition_of(problem), **_wear(problem, power)} for power in FURTHER_POWERS]
+        return [*super().onset_profiles(problem), *further]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return sign(ω) g(t − t_0)."""
-        return (problem.covariates["direction"] * growth(problem, shape))[None]
+        return (along_motion(problem, shape) * growth(problem, shape))[None]
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Return the recording without its ends: drag must be seen without and with the fault."""

@@ -13,6 +13,8 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     Coefficient,
     Shape,
 )
+from regolithd.calibration.mismatch.candidates.celsius import temperature_degC
+from regolithd.calibration.mismatch.candidates.motion import along_motion, transition_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -58,13 +60,13 @@ class ColdLubricantFriction(Candidate):
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return Vogel's law with several scales, and straight lines that end at several temperatures."""
-        temperature = problem.covariates["temperature"][problem.mask]
+        temperature = temperature_degC(problem)[problem.mask]
         soonest = _coldest(problem) + STEEPEST_K
         top = max(float(np.nanmax(temperature)), soonest)
         ends = np.unique(np.maximum([*np.nanquantile(temperature, END_QUANTILES), top], soonest)).tolist()
         found: list[Shape] = []
         for power in (0.0, 1.0):
-            cold: Shape = {"power": power, "reference_degC": _coldest(problem)}
+            cold: Shape = {**transition_of(problem), "power": power, "reference_degC": _coldest(problem)}
             found += [{**cold, "pole_degC": pole, "scale_K": scale} for pole in POLES_DEGC for scale in SCALES_K]
             found += [{**cold, "no_drag_above_degC": end} for end in (*ends, top + BEYOND_K)]
         return found
@@ -75,14 +77,14 @@ class ColdLubricantFriction(Candidate):
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return g(T) sign(ω)|ω|^p; g is 1 at the reference temperature."""
-        drag = problem.covariates["direction"] * self._growth(problem, shape)
+        drag = along_motion(problem, shape) * self._growth(problem, shape)
         if float(shape["power"]) and "wheel_speed" in problem.covariates:
             drag = drag * np.abs(problem.covariates["wheel_speed"])
         return drag[None]
 
     def _growth(self, problem: Problem, shape: Shape) -> Array:
         """Return g(T), shape (time, wheel)."""
-        temperature = np.nan_to_num(problem.covariates["temperature"])
+        temperature = np.nan_to_num(temperature_degC(problem))
         coldest = float(shape["reference_degC"])
         if "scale_K" in shape:
             # Vogel: ln η = A + B/(T − T_0); near the reference the viscosity falls by a factor e over the scale.
@@ -94,7 +96,7 @@ class ColdLubricantFriction(Candidate):
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
         """Return the range of the one parameter that this shape has."""
-        temperature = problem.covariates["temperature"][problem.mask]
+        temperature = temperature_degC(problem)[problem.mask]
         soonest = max(float(np.nanquantile(temperature, LOWEST_END_QUANTILE)), _coldest(problem) + STEEPEST_K)
         ends = (soonest, max(float(np.nanmax(temperature)), soonest) + FURTHEST_END_K)
         return {"scale_K": self.free["scale_K"]} if "scale_K" in shape else {"no_drag_above_degC": ends}
@@ -102,4 +104,4 @@ class ColdLubricantFriction(Candidate):
 
 def _coldest(problem: Problem) -> float:
     """Return the coldest temperature [°C], single readings aside."""
-    return float(np.nanquantile(problem.covariates["temperature"][problem.mask], COLDEST_QUANTILE))
+    return float(np.nanquantile(temperature_degC(problem)[problem.mask], COLDEST_QUANTILE))

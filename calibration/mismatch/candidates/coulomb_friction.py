@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.motion import along_motion, transition_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 
@@ -27,6 +28,10 @@ class CoulombFriction(Candidate):
     parameter_labels: ClassVar = {"coulomb_current": "Coulomb friction"}
     coefficients: ClassVar = (Coefficient("coulomb_current", "{unit}"),)
 
-    def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002
+    def shapes(self, problem: Problem) -> Sequence[Shape]:
+        """Return the one shape: a step at standstill, or the recording's transition."""
+        return [transition_of(problem)]
+
+    def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return sign(ω)."""
-        return np.asarray(problem.covariates["direction"])[None]
+        return along_motion(problem, shape)[None]

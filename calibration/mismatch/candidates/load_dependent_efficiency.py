@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     Coefficient,
     Shape,
 )
+from regolithd.calibration.mismatch.candidates.motion import along_motion, transition_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,7 +59,7 @@ class LoadDependentEfficiency(Candidate):
         light: list[Shape] = [{"light": s} for s in LIGHT_LOADS]
         bent: list[Shape] = [{"bent": b} for b in SLOPES]
         reference = max(float(np.mean(np.abs(problem.filled[problem.mask]))), 1e-30)
-        return [{**form, "reference_size": reference} for form in (*curved, *light, *bent)]
+        return [{**transition_of(problem), **form, "reference_size": reference} for form in (*curved, *light, *bent)]
 
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
         """Return the linear efficiency with the fitted slope, as long as at least a third of the efficiency is left."""
@@ -73,13 +74,13 @@ class LoadDependentEfficiency(Candidate):
         """Charge a loss proportional to torque where the load never drives: there it contradicts the stated gain."""
         if shape.get("power") != 0.0:
             return 0.0
-        lost, torque = _against_motion(problem)[problem.mask], problem.filled[problem.mask]
+        lost, torque = _against_motion(problem, shape)[problem.mask], problem.filled[problem.mask]
         alike = float(lost @ torque) / max(float(np.linalg.norm(lost) * np.linalg.norm(torque)), 1e-300)
         return UNLIKELY_SHAPE_PENALTY if alike > SAME_AS_GAIN else 0.0
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the loss as a multiple of the predicted size, against the motion."""
-        relative, lost = _relative(problem, shape), _against_motion(problem)
+        relative, lost = _relative(problem, shape), _against_motion(problem, shape)
         if "bent" in shape:
             above = relative - 1
             # At torques beyond those of the identification, the line ends where a third of the efficiency is left.
@@ -90,11 +91,11 @@ class LoadDependentEfficiency(Candidate):
         return (lost * relative ** float(shape["power"]))[None]
 
 
-def _against_motion(problem: Problem) -> Array:
+def _against_motion(problem: Problem, shape: Shape) -> Array:
     """Return the predicted size with the sign of a loss: a load that drives the motor loses as well."""
     if "direction" not in problem.covariates:
         return problem.filled
-    return np.asarray(np.abs(problem.filled) * np.nan_to_num(problem.covariates["direction"]))
+    return np.abs(problem.filled) * along_motion(problem, shape)
 
 
 def _relative(problem: Problem, shape: Shape) -> Array:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.motion import along_motion, transition_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -48,7 +49,7 @@ class StribeckFriction(Candidate):
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return Stribeck speeds between the slowest and half of the highest speed, in three forms."""
         return [
-            {"stribeck_speed_rad_s": float(speed), "fades": fades}
+            {**transition_of(problem), "stribeck_speed_rad_s": float(speed), "fades": fades}
             for fades in FADES
             for speed in np.geomspace(*self._range(problem), SPEED_COUNT)
         ]
@@ -57,7 +58,7 @@ class StribeckFriction(Candidate):
         """Return sign(ω) times the share of the extra drag that is left at this speed."""
         speed = problem.covariates["wheel_speed"]
         ratio = np.abs(speed) / float(shape["stribeck_speed_rad_s"])
-        return (np.sign(speed) * FADES[str(shape["fades"])](ratio))[None]
+        return (along_motion(problem, shape) * FADES[str(shape["fades"])](ratio))[None]
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Return the range in which it can be told from nothing and from a constant."""

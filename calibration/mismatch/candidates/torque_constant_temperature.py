@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     Coefficient,
     Shape,
 )
+from regolithd.calibration.mismatch.candidates.celsius import temperature_degC
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,7 +42,7 @@ class TorqueConstantTemperature(Candidate):
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the reference temperatures of data sheets, and the recording's mean."""
-        middle = float(np.nanmean(problem.covariates["temperature"][problem.mask]))
+        middle = float(np.nanmean(temperature_degC(problem)[problem.mask]))
         return [{"reference_degC": t, "bent_per_K": 0.0} for t in (*REFERENCES_DEGC, middle)]
 
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
@@ -65,4 +66,4 @@ class TorqueConstantTemperature(Candidate):
         return (warmer / left * problem.filled)[None]
 
     def _warmer(self, problem: Problem, shape: Shape) -> Array:
-        return np.nan_to_num(problem.covariates["temperature"]) - float(shape["reference_degC"])
+        return np.nan_to_num(temperature_degC(problem)) - float(shape["reference_degC"])

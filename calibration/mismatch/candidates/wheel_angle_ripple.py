@@ -30,6 +30,9 @@ LEAST_CYCLES = 4.0
 """Cycles within the range of angles that were met: of fewer, a sine is a curve over position (a choice)."""
 READINGS_PER_CYCLE = 2.5
 """Least readings in a cycle (Nyquist: 2): with fewer, a constant drag is an alias of a ripple of high order."""
+RESOLVED_SHARE = 0.25
+"""Share of the readings in motion that must resolve an order so (a choice). An alias has another order at each speed:
+what a quarter of the readings resolves is no alias, and the others may tell of it too."""
 
 
 class WheelAngleRipple(Candidate):
@@ -166,10 +169,10 @@ def _lowest(problem: Problem) -> float:
 
 
 def _resolved(problem: Problem) -> float:
-    """Return the highest order with enough readings in a cycle at the median speed of what turns."""
+    """Return the highest order with enough readings in a cycle, in the slow part of the motion."""
     speed = np.abs(problem.covariates["wheel_speed"][problem.mask])
-    usual = float(np.median(speed[speed > 0])) if np.any(speed > 0) else 0.0
-    return min(HIGHEST_ORDER, 2 * np.pi / (READINGS_PER_CYCLE * problem.recording.step_s * max(usual, 1e-9)))
+    slow = float(np.quantile(speed[speed > 0], RESOLVED_SHARE)) if np.any(speed > 0) else 0.0
+    return min(HIGHEST_ORDER, 2 * np.pi / (READINGS_PER_CYCLE * problem.recording.step_s * max(slow, 1e-9)))
 
 
 def _angle(problem: Problem, lag: float) -> Array:

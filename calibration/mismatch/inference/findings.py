@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.inference.evidence import calibrated_values,
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
 from regolithd.calibration.mismatch.inference.intervals import parameters_of
 from regolithd.calibration.mismatch.inference.located import share_of_residual, spell_of
+from regolithd.calibration.mismatch.inference.probability import probability_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
 from regolithd.calibration.mismatch.inference.statements import statement
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
@@ -49,6 +50,7 @@ def answer_of(
     moved = beyond_prior(parameters, equations.thresholds)
     extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold)
     channel, floor = problem.simulation.channel, noise_floor(decision)
+    probability, runner_up = probability_of(decision)
     return Answer(
         verdict=verdict_of(decision, moved),
         effects=effects,
@@ -59,6 +61,8 @@ def answer_of(
         parameters=parameters,
         changes=changes,
         left_out=problem.left_out,
+        probability=probability,
+        runner_up=runner_up,
         notes=(
             *map(_beyond_prior_in_words, moved),
             *map(change_in_words, changes),
@@ -181,7 +185,8 @@ def _beyond_prior_in_words(parameter: CalibratedParameter) -> str:
     away = abs(parameter.value - parameter.prior) / parameter.prior_std
     return (
         f"{parameter.name} had to leave its prior: {parameter.value:.4g} {parameter.unit}, "
-        f"{away:.1f} standard deviations from {parameter.prior:.4g}. Check the stated value and its standard deviation."
+        f"{away:.1f} standard deviations from {parameter.prior:.4g}. Check the stated value and its standard "
+        "deviation, or look for physics that acts as this parameter does."
     )
 
 

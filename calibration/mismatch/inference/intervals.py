@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Parameter
-from regolithd.calibration.mismatch.inference.onset_interval import onset_bounds
+from regolithd.calibration.mismatch.inference.onset_interval import onset_interval
 from regolithd.calibration.mismatch.inference.parameter_interval import interval
 from regolithd.calibration.mismatch.inference.sandwich import Linearisation, linearised, sandwich
 from regolithd.calibration.mismatch.inference.size_interval import relative_size_interval
@@ -75,7 +75,7 @@ def _of_term(
     }
     onset = candidate.change_point
     if onset in shape and onset in candidate.free:
-        found[onset] = Parameter(float(shape[onset]), *onset_bounds(equations, fit, index), unit_of(onset, labels))
+        found[onset] = Parameter(*onset_interval(equations, fit, index), unit_of(onset, labels))
     return found
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import prod
 from typing import TYPE_CHECKING
 
+from regolithd.calibration.mismatch.answer import RunnerUp
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -34,8 +36,31 @@ def merged_answers(answers: Sequence[Answer]) -> Answer:
         parameters=tuple(map(combined, *(answer.parameters for answer in answers))),
         changes=tuple(each for answer in answers for each in answer.changes),
         left_out=tuple(each for answer in answers for each in answer.left_out),
+        probability=prod(answer.probability for answer in answers),
+        runner_up=next_best(answers),
         notes=tuple(dict.fromkeys(note for answer in answers for note in answer.notes)),
     )
+
+
+def next_best(answers: Sequence[Answer]) -> RunnerUp | None:
+    """Return the answer that differs in the one channel whose runner-up is closest, beside the names of the others."""
+    open_ones = [answer for answer in answers if answer.runner_up is not None]
+    if not open_ones:
+        return None
+    ratios = [answer.runner_up.probability / answer.probability for answer in open_ones if answer.runner_up]
+    closest = open_ones[ratios.index(max(ratios))]
+    kept = [answer for answer in answers if answer is not closest]
+    assert closest.runner_up is not None  # noqa: S101  # those without are not in the list
+    return RunnerUp(
+        effects=(*(name for answer in kept for name in told_names(answer)), *closest.runner_up.effects),
+        unexplained=closest.runner_up.unexplained or any(answer.unexplained for answer in kept),
+        probability=closest.runner_up.probability * prod(answer.probability for answer in kept),
+    )
+
+
+def told_names(answer: Answer) -> tuple[str, ...]:
+    """Return the names of an answer: of new effects and of those that changed."""
+    return tuple(dict.fromkeys([*(each.name for each in answer.effects), *(each.name for each in answer.changes)]))
 
 
 def combined(*found: CalibratedParameter) -> CalibratedParameter:

@@ -13,6 +13,7 @@ from regolithd.calibration.mismatch.problem.prior import own_name
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
+    from regolithd.calibration.mismatch.regression.group import Fit
 
 Array = NDArray[np.float64]
 
@@ -41,6 +42,17 @@ class Nuisance:
         precision = self.precision.copy()
         precision[place] = value
         return replace(self, precision=precision)
+
+    def prior_stds_away(self, fit: Fit) -> Array:
+        """Return how far each parameter is from its prior in a fit, in the prior's standard deviations."""
+        fitted = fit.coefficients[: len(self.columns)]
+        return np.asarray(np.abs(fitted - self.centre) * np.sqrt(self.precision))
+
+    def leaving_their_priors(self, fit: Fit, problem: Problem) -> NDArray[np.int64]:
+        """Return the places of the simulation's own parameters that are beyond their priors in a fit."""
+        own = [name in problem.simulation.parameters for name in self.names]
+        away = self.prior_stds_away(fit)
+        return np.flatnonzero((away > problem.thresholds.furthest_prior_stds) & np.array(own, bool))
 
 
 def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:

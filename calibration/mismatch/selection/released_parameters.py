@@ -11,16 +11,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.selection.smooth_terms import unexplained_beside
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
-    from regolithd.calibration.mismatch.regression.nuisance import Nuisance
-
-Array = NDArray[np.float64]
 
 
 def released(equations: NormalEquations, named: Fit) -> NormalEquations | None:
@@ -30,9 +26,7 @@ def released(equations: NormalEquations, named: Fit) -> NormalEquations | None:
     (`furthest_linearisation_stds`), or where something stays unexplained all the same.
     """
     limits, nuisance = equations.thresholds, equations.nuisance
-    own = [name in equations.problem.simulation.parameters for name in nuisance.names]
-    away = _prior_stds_away(nuisance, equations.fit(named.terms))
-    leaving = np.flatnonzero((away > limits.furthest_prior_stds) & own)
+    leaving = nuisance.leaving_their_priors(equations.fit(named.terms), equations.problem)
     if not leaving.size:
         return None
     wider = nuisance
@@ -41,11 +35,5 @@ def released(equations: NormalEquations, named: Fit) -> NormalEquations | None:
         wider = wider.with_precision(int(place), float(wide))
     freed = equations.with_nuisance(wider)
     fit = freed.fit(named.terms)
-    too_far = np.any(_prior_stds_away(nuisance, fit)[leaving] > limits.furthest_linearisation_stds)
-    return None if too_far or unexplained_beside(freed, fit) is not None else freed
-
-
-def _prior_stds_away(nuisance: Nuisance, fit: Fit) -> Array:
-    """Return how far each parameter is from its prior in a fit, in the prior's standard deviations."""
-    fitted = fit.coefficients[: len(nuisance.columns)]
-    return np.asarray(np.abs(fitted - nuisance.centre) * np.sqrt(nuisance.precision))
+    too_far = np.any(nuisance.prior_stds_away(fit)[leaving] > limits.furthest_linearisation_stds)
+    return None if too_far or unexplained_beside(freed, fit, tolerated=0.0) is not None else freed

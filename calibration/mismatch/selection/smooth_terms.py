@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
@@ -21,8 +22,15 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SAME_COURSE = 0.999
+"""Correlation of two covariates above which they are one quantity (a choice: a thousandth of the power differs)."""
 
 
 def weigh_against_smooth_terms(
@@ -45,17 +53,27 @@ def weigh_against_smooth_terms(
     if left is None and not imitated:
         return named, ()
     beside = _effects_beside_curve(equations, named, curve, entry_threshold)
-    if left is None or imitated or equations.score(beside) >= equations.score(equations.fit((*named.terms, left))):
+    if left is None or imitated or _is_enough(equations, beside, equations.fit((*named.terms, left)), entry_threshold):
         kept = equations.fit([term for term in beside.terms if term.group.named])
         return drop_what_a_curve_explains(equations, kept, curve), (curve,)
     return drop_what_a_curve_explains(equations, named, left), (left,)
 
 
 def _imitates_a_curve(equations: NormalEquations, named: Fit, curve: Term, entry_threshold: float) -> bool:
-    """Return whether one curve scores clearly more than several effects, of which some have other covariates."""
-    if len(named.terms) < 2 or all(_covariate(term) == curve.name for term in named.terms):
+    """Return whether one curve explains more than the effects, of which some have other covariates.
+
+    Each has to pay for its own entry: a curve is freer than a law, two effects are freer than one.
+    """
+    if all(_covariate(term) == curve.name for term in named.terms):
         return False
-    return equations.score(equations.fit((curve,))) > equations.score(named) + entry_threshold
+    ahead = equations.score(equations.fit((curve,))) - equations.score(named)
+    return ahead > equations.thresholds.smooth_term_entry - entry_threshold * len(named.terms)
+
+
+def _is_enough(equations: NormalEquations, fewer: Fit, more: Fit, entry_threshold: float) -> bool:
+    """Return whether the further names of another fit score less more than names have to."""
+    further = sum(term.group.named for term in more.terms) - sum(term.group.named for term in fewer.terms)
+    return equations.score(more) - equations.score(fewer) <= entry_threshold * max(further, 0)
 
 
 def _effects_beside_curve(equations: NormalEquations, named: Fit, curve: Term, entry_threshold: float) -> Fit:
@@ -69,8 +87,12 @@ def _effects_beside_curve(equations: NormalEquations, named: Fit, curve: Term, e
     return fit
 
 
-def unexplained_beside(equations: NormalEquations, named: Fit) -> Term | None:
-    """Return the best smooth term beside the effects, if it is significant, large, and more than a law's misfit."""
+def unexplained_beside(equations: NormalEquations, named: Fit, *, tolerated: float | None = None) -> Term | None:
+    """Return the best smooth term beside the effects, if it is significant, large, and more than a law's misfit.
+
+    `tolerated` is the share that is a law's misfit, by default `form_misfit`; none where parameters leave their priors
+    beside the effects: then it is not the law that is a little wrong.
+    """
     limits, faulty = equations.thresholds, wheels_of_faulty_sensors(named)
     curves = best_of_each_smooth_term(equations, named.terms)
     left = [(score, term) for score, term in curves if not set(term.wheels) <= faulty]
@@ -83,7 +105,10 @@ def unexplained_beside(equations: NormalEquations, named: Fit) -> Term | None:
     if power < limits.smooth_term_power * np.sum(residual_of(equations, named)[:, on] ** 2):
         return None
     misfit = (beside.delta_chi2 - named.delta_chi2) / max(beside.delta_chi2, 1e-9)
-    return None if named.terms and misfit < limits.form_misfit else curve
+    if tolerated is None:
+        leaving = equations.nuisance.leaving_their_priors(named, equations.problem)
+        tolerated = 0.0 if leaving.size else limits.form_misfit
+    return None if named.terms and misfit < tolerated else curve
 
 
 def _covariate(term: Term) -> str:
@@ -93,15 +118,42 @@ def _covariate(term: Term) -> str:
 
 
 def drop_what_a_curve_explains(equations: NormalEquations, named: Fit, curve: Term) -> Fit:
-    """Leave out effects that gain little beside a curve that gains much: what has no law leaks into every law."""
+    """Leave out effects that a curve may hold: what has no law leaks into every law.
+
+    These are effects of the curve's own covariate, which are a part of one unknown law, and those that gain little
+    beside a curve that gains much.
+    """
     both = equations.fit((*named.terms, curve))
     unknown = both.delta_chi2 - named.delta_chi2
     kept = []
     for index, term in enumerate(named.terms):
         without = equations.fit((*named.without(index), curve))
-        if both.delta_chi2 - without.delta_chi2 >= equations.thresholds.beside_smooth_share * unknown:
+        gain = both.delta_chi2 - without.delta_chi2
+        if not _same_quantity(equations.problem, term, curve) and (
+            gain >= equations.thresholds.beside_smooth_share * unknown
+        ):
             kept.append(term)
     return equations.fit(kept)
+
+
+def _same_quantity(problem: Problem, term: Term, curve: Term) -> bool:
+    """Return whether a term's covariate is a curve's on the same wheels: by name, or as an angle is a position."""
+    wheels = sorted(set(term.wheels) & set(curve.wheels))
+    if not wheels or _covariate(term) == curve.name:
+        return bool(wheels)
+    one, other = (problem.covariates.get(name) for name in (_covariate(term), curve.name))
+    if one is None or other is None:
+        return False
+    return all(_proportional(one[:, w], other[:, w], problem.mask[:, w]) for w in wheels)
+
+
+def _proportional(one: Array, other: Array, mask: Mask) -> bool:
+    """Return whether two courses differ by a factor and a constant alone."""
+    known = mask & np.isfinite(one) & np.isfinite(other)
+    pair = np.stack((one[known], other[known]))
+    if known.sum() < 2 or np.any(np.ptp(pair, axis=1) == 0):
+        return False
+    return bool(abs(np.corrcoef(pair)[0, 1]) > SAME_COURSE)
 
 
 def drop_transients(equations: NormalEquations, named: Fit) -> Fit:

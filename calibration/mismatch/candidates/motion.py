@@ -1,0 +1,83 @@
+"""The direction of motion, as laws of friction depend on it: a step at standstill, or a smooth transition about it.
+
+Dry friction does not turn round at once: before it slides, a contact yields (presliding), and a speed that is measured
+with noise or averaged over a reading crosses zero gradually. How slow "slow" is belongs to the machine, not to one law,
+so it is found once for a recording and stands in the shape of each law that reverses.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.signal.noise import estimate_noise
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.candidates.candidate import Shape
+    from regolithd.calibration.mismatch.problem.problem import Problem
+
+Array = NDArray[np.float64]
+
+TRANSITIONS = (0.01, 0.02, 0.04)
+"""Speeds at which the friction has turned round by three quarters, as shares of the highest usual speed (a choice: from
+where it is a step for most readings to where it would be taken for viscous friction)."""
+USUAL_SPEED_QUANTILE = 0.98
+LEAST_WITHIN = 0.01
+"""Share of the readings in motion that must be within a transition, to tell it from a step (a choice)."""
+LEAST_GAIN = 10.8
+"""Δχ² from which a transition is preferred to a step: one chance in a thousand for one more coefficient."""
+
+
+def transition_of(problem: Problem) -> Shape:
+    """Return the transition that explains this recording's friction better than a step does, empty where none does."""
+    key = ("transition of the direction", 0.0)
+    if key not in problem.made:
+        problem.made[key] = np.array(_best_transition(problem))
+    speed = float(problem.made[key])
+    return {"transition_rad_s": speed} if speed else {}
+
+
+def along_motion(problem: Problem, shape: Shape) -> Array:
+    """Return sign(ω), or tanh(ω/ω_t) where the shape has a transition, shape (time, wheel)."""
+    if "transition_rad_s" in shape:
+        return np.tanh(np.nan_to_num(problem.covariates["wheel_speed"]) / float(shape["transition_rad_s"]))
+    return np.asarray(np.nan_to_num(problem.covariates["direction"]))
+
+
+def _best_transition(problem: Problem) -> float:
+    if not problem.has("wheel_speed", "direction"):
+        return 0.0
+    speed = np.abs(problem.covariates["wheel_speed"][problem.mask])
+    moving = speed[speed > 0]
+    widths = (
+        [share * float(np.nanquantile(moving, USUAL_SPEED_QUANTILE)) for share in TRANSITIONS] if moving.size else []
+    )
+    widths = [width for width in widths if np.mean(moving < width) > LEAST_WITHIN]
+    if not widths:
+        return 0.0
+    step = _left_beside_friction(problem, {})
+    noise = estimate_noise(step, problem.mask, problem.thresholds)
+    count = float(problem.mask.sum()) / noise.autocorrelation_time
+    squares = {width: _squares(_left_beside_friction(problem, {"transition_rad_s": width})) for width in widths}
+    best = min(squares, key=lambda width: squares[width])
+    gain = count * (1 - squares[best] / max(_squares(step), 1e-300))
+    return best if gain > LEAST_GAIN else 0.0
+
+
+def _left_beside_friction(problem: Problem, shape: Shape) -> Array:
+    """Return what the free parameters and friction of any usual law leave of the residual, shape (time, wheel)."""
+    direction, speed = along_motion(problem, shape), np.nan_to_num(np.abs(problem.covariates["wheel_speed"]))
+    laws = [direction, direction * np.sqrt(speed), direction * speed, direction * np.abs(problem.filled)]
+    free = [problem.tangent(name) for name, prior in problem.simulation.parameters.items() if prior.std > 0]
+    here = problem.mask
+    residual = np.where(here, problem.measured - problem.filled, 0.0)
+    columns = np.stack([column[here] for column in (*free, *laws)], axis=1)
+    fitted = np.linalg.lstsq(columns, residual[here], rcond=None)[0]
+    residual[here] -= columns @ fitted
+    return residual
+
+
+def _squares(residual: Array) -> float:
+    return float(np.sum(residual**2))

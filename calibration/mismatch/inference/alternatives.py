@@ -1,0 +1,82 @@
+"""Other answers to the same recording: one name less, one more, or one in another's place, and how far they are behind.
+
+Two answers are compared by their evidence: the score of all their terms (Δχ² less the penalties), less what every term
+had to gain to enter. A term that only just entered leaves a small margin to the answer without it; an effect that
+another explains almost as well leaves a small margin to the answer with that one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from regolithd.calibration.mismatch.selection.best_subsets import (
+    acceptable,
+    best_of_each_candidate,
+    best_of_each_smooth_term,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from regolithd.calibration.mismatch.regression.group import Fit, Term
+    from regolithd.calibration.mismatch.selection.decision import Decision
+
+UNEXPLAINED = "unexplained"
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """Another answer.
+
+    Attributes
+    ----------
+    effects: its names, sorted; "unexplained" stands for a smooth term
+    margin: by how much its evidence is behind that of the answer that was given, in Δχ²; negative: it is ahead
+    """
+
+    effects: tuple[str, ...]
+    margin: float
+
+
+def alternatives(decision: Decision) -> tuple[Alternative, ...]:
+    """Return the other answers of one step's difference, the best of each set of names, best first."""
+    chosen = decision.whole
+    best: dict[tuple[str, ...], float] = {}
+    for terms in _neighbours(decision):
+        fit = decision.equations.fit(terms)
+        names = _names(fit.terms)
+        if names != _names(chosen.terms) and acceptable(decision.equations, fit):
+            best[names] = max(best.get(names, -float("inf")), _evidence(decision, fit))
+    ahead = _evidence(decision, chosen)
+    found = [Alternative(names, ahead - evidence) for names, evidence in best.items()]
+    return tuple(sorted(found, key=lambda each: each.margin))
+
+
+def _evidence(decision: Decision, fit: Fit) -> float:
+    """Return the score of a fit less what each of its terms had to gain to enter."""
+    limits = decision.equations.thresholds
+    entry = sum(decision.entry_threshold if term.group.named else limits.smooth_term_entry for term in fit.terms)
+    return decision.equations.score(fit) - entry
+
+
+def _neighbours(decision: Decision) -> Iterator[tuple[Term, ...]]:
+    """Yield the sets of terms with one less, one more, or one in another's place."""
+    terms = decision.whole.terms
+    yield from ((*terms, more) for more in _further(decision, terms))
+    for index in range(len(terms)):
+        rest = (*terms[:index], *terms[index + 1 :])
+        yield rest
+        yield from ((*rest, other) for other in _further(decision, rest))
+
+
+def _further(decision: Decision, given: tuple[Term, ...]) -> Iterator[Term]:
+    """Yield the effects and the smooth term that explain most beside the given terms."""
+    equations = decision.equations
+    candidates = best_of_each_candidate(equations, given)[: equations.thresholds.rivals_tried]
+    yield from (term for _, term in candidates)
+    yield from (term for _, term in best_of_each_smooth_term(equations, given)[:1])
+
+
+def _names(terms: tuple[Term, ...]) -> tuple[str, ...]:
+    return tuple(sorted(term.name if term.group.named else UNEXPLAINED for term in terms))
