@@ -19,6 +19,15 @@ def print_answer(console: Console, answer: Answer) -> None:
         console.print(f"  {escape(line)}")
 
 
+def sure_of(answer: Answer) -> str:
+    """Return how probable the set of names is, and which other is next."""
+    text = f"probability of this set of names: {answer.probability:.2f}"
+    if answer.runner_up is None:
+        return text
+    names = (*answer.runner_up.effects, *(("something unexplained",) if answer.runner_up.unexplained else ()))
+    return f"{text}; next: {' + '.join(names) or 'nothing'} ({answer.runner_up.probability:.2f})"
+
+
 def _lines(answer: Answer) -> list[str]:
     fit = answer.fit
     error = (
@@ -28,7 +37,7 @@ def _lines(answer: Answer) -> list[str]:
     return [
         *(f"{effect.name}: {effect.statement}" for effect in answer.effects),
         *(
-            f"unexplained: {100 * rest.share_of_residual:.0f} % of the residual follows {rest.covariate} on wheels "
+            f"unexplained: {100 * rest.share_of_residual:.0f} % of the residual follows {rest.covariate} on "
             f"{', '.join(map(str, rest.wheels))}, {rest.from_s:.0f} to {rest.to_s:.0f} s"
             for rest in answer.unexplained
         ),
@@ -36,6 +45,7 @@ def _lines(answer: Answer) -> list[str]:
             f"{' or '.join(pair.effects)}: this recording does not distinguish them. {pair.experiment}"
             for pair in answer.indistinguishable
         ),
+        sure_of(answer),
         error,
         *(f"note: {note}" for note in answer.notes),
     ]

@@ -59,6 +59,7 @@ def render_report(answer: Answer, evidence: Evidence, provenance: Provenance) ->
             labels=labels,
             style=Markup(_resource("style.css")),  # noqa: S704  # our own file
             verdict=verdict_sentence(answer, labels),
+            certainty=sections.certainty(answer, labels),
             summary=sections.summary(evidence, labels),
             parts=channel_parts(answer, evidence),
             confusions=sections.confusions(answer, labels),

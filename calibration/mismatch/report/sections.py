@@ -95,6 +95,23 @@ class SensitivityRow:
     share: str
 
 
+@dataclass(frozen=True)
+class Certainty:
+    """The probability of the set of names, and the next best answer with its own; empty where there is none."""
+
+    given: str
+    next: str
+
+
+def certainty(answer: Answer, labels: Labels) -> Certainty:
+    """Return how sure the answer is of its names."""
+    given, other = f"{answer.probability:.2f}", answer.runner_up
+    if other is None:
+        return Certainty(given, "")
+    names = [*map(labels.effect, other.effects), *(["something unexplained"] if other.unexplained else [])]
+    return Certainty(given, f"{' and '.join(names) or 'nothing missing'} ({other.probability:.2f})")
+
+
 def summary(evidence: Evidence, labels: Labels) -> tuple[tuple[str, str], ...]:
     """Return what was compared, as pairs of a number and its noun."""
     length = float(evidence.time_s[-1] - evidence.time_s[0]) * labels.time_factor

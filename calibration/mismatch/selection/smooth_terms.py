@@ -50,30 +50,35 @@ def weigh_against_smooth_terms(
         if unexplained_beside(equations, fit) is None:
             return fit, ()
     left = unexplained_beside(equations, named)
-    if left is None and not imitated:
-        return named, ()
     beside = _effects_beside_curve(equations, named, curve, entry_threshold)
-    if left is None or imitated or _is_enough(equations, beside, equations.fit((*named.terms, left)), entry_threshold):
+    with_rest = named if left is None else equations.fit((*named.terms, left))
+    if imitated or _explains_more(equations, beside, with_rest, entry_threshold):
         kept = equations.fit([term for term in beside.terms if term.group.named])
         return drop_what_a_curve_explains(equations, kept, curve), (curve,)
-    return drop_what_a_curve_explains(equations, named, left), (left,)
+    return (named, ()) if left is None else (drop_what_a_curve_explains(equations, named, left), (left,))
 
 
 def _imitates_a_curve(equations: NormalEquations, named: Fit, curve: Term, entry_threshold: float) -> bool:
-    """Return whether one curve explains more than the effects, of which some have other covariates.
-
-    Each has to pay for its own entry: a curve is freer than a law, two effects are freer than one.
-    """
-    if all(_covariate(term) == curve.name for term in named.terms):
+    """Return whether one curve scores clearly more than several effects, of which some have other covariates."""
+    if len(named.terms) < 2 or all(_covariate(term) == curve.name for term in named.terms):
         return False
-    ahead = equations.score(equations.fit((curve,))) - equations.score(named)
-    return ahead > equations.thresholds.smooth_term_entry - entry_threshold * len(named.terms)
+    return equations.score(equations.fit((curve,))) > equations.score(named) + entry_threshold
 
 
-def _is_enough(equations: NormalEquations, fewer: Fit, more: Fit, entry_threshold: float) -> bool:
-    """Return whether the further names of another fit score less more than names have to."""
-    further = sum(term.group.named for term in more.terms) - sum(term.group.named for term in fewer.terms)
-    return equations.score(more) - equations.score(fewer) <= entry_threshold * max(further, 0)
+def _explains_more(equations: NormalEquations, curve: Fit, named: Fit, entry_threshold: float) -> bool:
+    """Return whether a curve, and what stands beside it, has more evidence than names and what they leave.
+
+    Each term has to pay for its own entry. Names that leave nothing have paid for theirs: there the curve must be of
+    another covariate, and gain beyond them what is significant and more than a law's misfit.
+    """
+    limits = equations.thresholds
+    ahead = equations.score(curve) - equations.score(named)
+    if all(term.group.named for term in named.terms):
+        of_its_covariate = all(_covariate(term) == curve.terms[-1].name for term in named.terms)
+        misfit = (curve.delta_chi2 - named.delta_chi2) / max(curve.delta_chi2, 1e-9)
+        return not of_its_covariate and misfit > limits.form_misfit and ahead > limits.smooth_term_entry
+    further = sum(term.group.named for term in named.terms) - sum(term.group.named for term in curve.terms)
+    return ahead >= -entry_threshold * max(further, 0)
 
 
 def _effects_beside_curve(equations: NormalEquations, named: Fit, curve: Term, entry_threshold: float) -> Fit:
@@ -139,9 +144,10 @@ def drop_what_a_curve_explains(equations: NormalEquations, named: Fit, curve: Te
 def _same_quantity(problem: Problem, term: Term, curve: Term) -> bool:
     """Return whether a term's covariate is a curve's on the same wheels: by name, or as an angle is a position."""
     wheels = sorted(set(term.wheels) & set(curve.wheels))
-    if not wheels or _covariate(term) == curve.name:
+    covariate = term.group.candidate.covariate if term.group.candidate else term.name
+    if not wheels or covariate == curve.name:
         return bool(wheels)
-    one, other = (problem.covariates.get(name) for name in (_covariate(term), curve.name))
+    one, other = (problem.covariates.get(name) for name in (covariate, curve.name))
     if one is None or other is None:
         return False
     return all(_proportional(one[:, w], other[:, w], problem.mask[:, w]) for w in wheels)
