@@ -132,8 +132,8 @@ class Change:
 
 
 @dataclass(frozen=True)
-class RunnerUp:
-    """The next best answer: its names, whether something stays unexplained beside them, and how probable it is."""
+class OtherAnswer:
+    """An answer that was not given: its names, whether something stays unexplained, and how probable it is."""
 
     effects: tuple[str, ...]
     unexplained: bool
@@ -155,7 +155,8 @@ class Answer:
     left_out: tuple[LeftOut, ...] = ()
     probability: float = 1.0
     """That the set of names is right: of answers with 0.9 or more, nine in ten are (docs/proof.md)."""
-    runner_up: RunnerUp | None = None
+    alternatives: tuple[OtherAnswer, ...] = ()
+    """The most probable other answers, best first."""
     notes: tuple[str, ...] = ()
     """What was wrong with the recording, and which candidates could not be looked for."""
     fits: tuple[FitImprovement, ...] = ()
@@ -178,7 +179,7 @@ class Answer:
         )
         return {
             name: plain[name]
-            for name in ("version", "verdict", *findings, "left_out", "probability", "runner_up", "notes")
+            for name in ("version", "verdict", *findings, "left_out", "probability", "alternatives", "notes")
         }
 
 

@@ -22,10 +22,11 @@ def print_answer(console: Console, answer: Answer) -> None:
 def sure_of(answer: Answer) -> str:
     """Return how probable the set of names is, and which other is next."""
     text = f"probability of this set of names: {answer.probability:.2f}"
-    if answer.runner_up is None:
+    if not answer.alternatives:
         return text
-    names = (*answer.runner_up.effects, *(("something unexplained",) if answer.runner_up.unexplained else ()))
-    return f"{text}; next: {' + '.join(names) or 'nothing'} ({answer.runner_up.probability:.2f})"
+    other = answer.alternatives[0]
+    names = (*other.effects, *(("something unexplained",) if other.unexplained else ()))
+    return f"{text}; next: {' + '.join(names) or 'nothing'} ({other.probability:.2f})"
 
 
 def _lines(answer: Answer) -> list[str]:

@@ -50,7 +50,7 @@ def answer_of(
     moved = beyond_prior(parameters, equations.thresholds)
     extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold)
     channel, floor = problem.simulation.channel, noise_floor(decision)
-    probability, runner_up = probability_of(decision)
+    probability, others = probability_of(decision)
     return Answer(
         verdict=verdict_of(decision, moved),
         effects=effects,
@@ -62,7 +62,7 @@ def answer_of(
         changes=changes,
         left_out=problem.left_out,
         probability=probability,
-        runner_up=runner_up,
+        alternatives=others,
         notes=(
             *map(_beyond_prior_in_words, moved),
             *map(change_in_words, changes),

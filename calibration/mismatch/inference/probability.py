@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.answer import RunnerUp
+from regolithd.calibration.mismatch.answer import OtherAnswer
 from regolithd.calibration.mismatch.inference.alternatives import UNEXPLAINED, alternatives
 
 if TYPE_CHECKING:
@@ -21,15 +21,17 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.selection.decision import Decision
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
+TOLD = 3
+"""Other answers that are told."""
 LARGEST_MARGIN = 500.0
 """Margin in either direction beyond which nothing changes: the exponential stays finite."""
 
 
-def probability_of(decision: Decision) -> tuple[float, RunnerUp | None]:
-    """Return the probability that the set of names is right, and the answer that is next."""
+def probability_of(decision: Decision) -> tuple[float, tuple[OtherAnswer, ...]]:
+    """Return the probability that the set of names is right, and the most probable other answers."""
     others = alternatives(decision)
     limits = decision.equations.thresholds
-    return probability(others, limits), runner_up(others, limits)
+    return probability(others, limits), other_answers(others, limits)
 
 
 def probability(others: Sequence[Alternative], thresholds: Thresholds) -> float:
@@ -37,16 +39,17 @@ def probability(others: Sequence[Alternative], thresholds: Thresholds) -> float:
     return thresholds.highest_probability / (1 + float(np.sum(_relative(others, thresholds))))
 
 
-def runner_up(others: Sequence[Alternative], thresholds: Thresholds) -> RunnerUp | None:
-    """Return the best other answer, if there is one."""
-    if not others:
-        return None
-    best, relative = others[0], _relative(others, thresholds)
-    names = tuple(name for name in best.effects if name != UNEXPLAINED)
-    return RunnerUp(
-        effects=names,
-        unexplained=UNEXPLAINED in best.effects,
-        probability=float(thresholds.highest_probability * relative[0] / (1 + relative.sum())),
+def other_answers(others: Sequence[Alternative], thresholds: Thresholds) -> tuple[OtherAnswer, ...]:
+    """Return the most probable other answers, best first."""
+    relative = _relative(others, thresholds)
+    probabilities = thresholds.highest_probability * relative / (1 + relative.sum())
+    return tuple(
+        OtherAnswer(
+            effects=tuple(name for name in other.effects if name != UNEXPLAINED),
+            unexplained=UNEXPLAINED in other.effects,
+            probability=float(probable),
+        )
+        for other, probable in zip(others[:TOLD], probabilities, strict=False)
     )
 
 

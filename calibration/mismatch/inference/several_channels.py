@@ -6,7 +6,8 @@ from dataclasses import replace
 from math import prod
 from typing import TYPE_CHECKING
 
-from regolithd.calibration.mismatch.answer import RunnerUp
+from regolithd.calibration.mismatch.answer import OtherAnswer
+from regolithd.calibration.mismatch.inference.probability import TOLD
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -37,25 +38,26 @@ def merged_answers(answers: Sequence[Answer]) -> Answer:
         changes=tuple(each for answer in answers for each in answer.changes),
         left_out=tuple(each for answer in answers for each in answer.left_out),
         probability=prod(answer.probability for answer in answers),
-        runner_up=next_best(answers),
+        alternatives=other_answers(answers),
         notes=tuple(dict.fromkeys(note for answer in answers for note in answer.notes)),
     )
 
 
-def next_best(answers: Sequence[Answer]) -> RunnerUp | None:
-    """Return the answer that differs in the one channel whose runner-up is closest, beside the names of the others."""
-    open_ones = [answer for answer in answers if answer.runner_up is not None]
-    if not open_ones:
-        return None
-    ratios = [answer.runner_up.probability / answer.probability for answer in open_ones if answer.runner_up]
-    closest = open_ones[ratios.index(max(ratios))]
-    kept = [answer for answer in answers if answer is not closest]
-    assert closest.runner_up is not None  # noqa: S101  # those without are not in the list
-    return RunnerUp(
-        effects=(*(name for answer in kept for name in told_names(answer)), *closest.runner_up.effects),
-        unexplained=closest.runner_up.unexplained or any(answer.unexplained for answer in kept),
-        probability=closest.runner_up.probability * prod(answer.probability for answer in kept),
-    )
+def other_answers(answers: Sequence[Answer]) -> tuple[OtherAnswer, ...]:
+    """Return the most probable answers that differ in one channel, with the names of the others."""
+    found = []
+    for place, answer in enumerate(answers):
+        kept = [*answers[:place], *answers[place + 1 :]]
+        names = tuple(name for each in kept for name in told_names(each))
+        found += [
+            OtherAnswer(
+                effects=tuple(sorted({*names, *other.effects})),
+                unexplained=other.unexplained or any(each.unexplained for each in kept),
+                probability=other.probability * prod(each.probability for each in kept),
+            )
+            for other in answer.alternatives
+        ]
+    return tuple(sorted(found, key=lambda other: -other.probability)[:TOLD])
 
 
 def told_names(answer: Answer) -> tuple[str, ...]:

@@ -105,9 +105,10 @@ class Certainty:
 
 def certainty(answer: Answer, labels: Labels) -> Certainty:
     """Return how sure the answer is of its names."""
-    given, other = f"{answer.probability:.2f}", answer.runner_up
-    if other is None:
+    given = f"{answer.probability:.2f}"
+    if not answer.alternatives:
         return Certainty(given, "")
+    other = answer.alternatives[0]
     names = [*map(labels.effect, other.effects), *(["something unexplained"] if other.unexplained else [])]
     return Certainty(given, f"{' and '.join(names) or 'nothing missing'} ({other.probability:.2f})")
 
