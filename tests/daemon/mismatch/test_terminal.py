@@ -10,7 +10,7 @@ from regolithd.daemon.mismatch.terminal import print_answer
 
 
 def test_mismatch_prints_the_answer() -> None:
-    """Verdict, effects, what is unexplained, effects that cannot be distinguished, held-out error and notes."""
+    """Verdict, effects, what is unexplained or not distinguished, how sure it is, held-out error and notes."""
     answer = SimpleNamespace(
         verdict="effects",
         effects=[SimpleNamespace(name="coulomb-friction", statement="37 mA")],
@@ -21,6 +21,8 @@ def test_mismatch_prints_the_answer() -> None:
         fit=SimpleNamespace(
             channel="current", held_out_rmse_before=0.00412345, held_out_rmse_after=0.001, noise_floor_rmse=0.0009
         ),
+        probability=0.914,
+        alternatives=[SimpleNamespace(effects=("other",), unexplained=True, probability=0.05)],
         notes=["short"],
     )
     console = Console(record=True, width=200, quiet=False)
@@ -28,8 +30,9 @@ def test_mismatch_prints_the_answer() -> None:
     assert console.export_text().splitlines() == [
         "effects",
         "  coulomb-friction: 37 mA",
-        "  unexplained: 12 % of the residual follows time on wheels 1, 4, 3 to 100 s",
+        "  unexplained: 12 % of the residual follows time on 1, 4, 3 to 100 s",
         "  one or other: this recording does not distinguish them. Drive backwards.",
+        "  probability of this set of names: 0.91; next: other + something unexplained (0.05)",
         "  held-out error of current: 0.0041234 before, 0.001 after, noise floor 0.0009",
         "  note: short",
     ]
