@@ -352,14 +352,14 @@ class Thresholds:
     additions_tried: int = _threshold(3, "Other effects tried beside each.", f"{CHOICE}: computing time")
     # Probability of the answer
     evidence_scale: float = _threshold(
-        4.0,
+        2.0,
         "Margin of evidence, in Δχ², by which an answer is e times as probable as another.",
-        f"{TRIALS}: maximum likelihood of right and wrong answers; 2 where noise and laws are exact",
+        "standard: Δχ² is twice a log likelihood ratio; it is also the best of 1 to 14 on 123 trials of seed 61180339",
     )
     highest_probability: float = _threshold(
-        0.97,
-        "Probability of an answer that no alternative comes near to.",
-        f"{TRIALS}: maximum likelihood of right and wrong answers",
+        0.98,
+        "Probability, for each channel, of an answer that no alternative comes near to.",
+        f"{TRIALS}: of 75 answers with the highest margins, 73 had the right names (seed 61180339)",
     )
     # Sensitivity and experiments
     detection_quantile: float = _threshold(

@@ -15,6 +15,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     best_of_each_candidate,
     best_of_each_smooth_term,
 )
+from regolithd.calibration.mismatch.selection.smooth_terms import drop_what_a_curve_explains
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -46,11 +47,21 @@ def alternatives(decision: Decision) -> tuple[Alternative, ...]:
     for terms in _neighbours(decision):
         fit = decision.equations.fit(terms)
         names = _names(fit.terms)
-        if names != _names(chosen.terms) and acceptable(decision.equations, fit):
+        if names != _names(chosen.terms) and _admissible(decision, fit):
             best[names] = max(best.get(names, -float("inf")), _evidence(decision, fit))
     ahead = _evidence(decision, chosen)
     found = [Alternative(names, ahead - evidence) for names, evidence in best.items()]
     return tuple(sorted(found, key=lambda each: each.margin))
+
+
+def _admissible(decision: Decision, fit: Fit) -> bool:
+    """Return whether a set could have been the answer: acceptable, and no name is what a smooth term holds."""
+    equations = decision.equations
+    named = equations.fit([term for term in fit.terms if term.group.named])
+    curves = [term for term in fit.terms if not term.group.named]
+    return acceptable(equations, fit) and all(
+        len(drop_what_a_curve_explains(equations, named, curve).terms) == len(named.terms) for curve in curves
+    )
 
 
 def _evidence(decision: Decision, fit: Fit) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from linear_machine import equations_of, problem_of, table, term_of
 
+from regolithd.calibration.mismatch.regression.nuisance import Nuisance
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection import smooth_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
@@ -109,3 +110,39 @@ def test_noise_has_no_curve(seed: int) -> None:
     """Nothing is unexplained where nothing is missing."""
     equations = equations_with(seed=seed)
     assert weigh_against_smooth_terms(equations, equations.fit(()), (), 8.0)[1] == ()
+
+
+def test_a_name_of_the_curves_own_covariate_is_part_of_the_unknown() -> None:
+    """However much it gains beside the curve; a name of another covariate that gains as much is kept."""
+    equations = equations_with(lambda columns: bump(columns) + 0.4 * np.abs(columns["speed_rad_s"]), drag=0.4)
+    curve = next(term for _, term in best_of_each_smooth_term(equations, ()) if term.name == "wheel_speed")
+    named = equations.fit([term_of(equations, "power"), term_of(equations, "drag")])
+    assert {term.name for term in drop_what_a_curve_explains(equations, named, curve).terms} == {"drag"}
+
+
+def test_a_curve_that_explains_far_more_than_one_name_takes_its_place() -> None:
+    """A drag that is there for a while is no drag, though beside the drag no curve is significant."""
+    equations = equations_with(spell)
+    named = equations.fit([term_of(equations, "drag")])
+    kept, (curve,) = weigh_against_smooth_terms(equations, named, (), 8.0)
+    assert kept.terms == ()
+    assert curve.name == "time"
+
+
+def test_beside_a_parameter_that_leaves_its_prior_no_misfit_is_tolerated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A curve of a tenth of a name's gain is a law's misfit, unless a parameter has to pay for it."""
+    equations = equations_with(lambda columns: 0.25 * bump(columns), drag=0.6)
+    named = equations.fit([term_of(equations, "drag")])
+    assert unexplained_beside(equations, named) is None
+    monkeypatch.setattr(Nuisance, "leaving_their_priors", lambda *_: np.array([0]))
+    left = unexplained_beside(equations, named)
+    assert left is not None
+    assert left.name == "wheel_speed"
+
+
+def test_a_parameter_leaves_its_prior_beyond_three_deviations() -> None:
+    """The level is stated as 2.0 with a deviation of 0.5."""
+    for shift, leaving in ((1.3, 0), (1.7, 1)):
+        equations = equations_with(shift)
+        found = equations.nuisance.leaving_their_priors(equations.fit(()), equations.problem)
+        assert len(found) == leaving

@@ -1,0 +1,53 @@
+"""The direction of motion in laws of friction: a step, or the transition that a recording shows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from linear_machine import problem_of, table
+
+from regolithd.calibration.mismatch.candidates.bearing_drag import BearingDrag
+from regolithd.calibration.mismatch.candidates.coulomb_friction import CoulombFriction
+from regolithd.calibration.mismatch.candidates.motion import TRANSITIONS, along_motion, transition_of
+
+FASTEST = 2.0
+"""About the highest usual speed of the linear machine [rad/s]."""
+
+
+def with_friction(transition_rad_s: float, noise: float = 0.05) -> dict[str, np.ndarray]:
+    """Return a recording with a friction that turns round within a speed; 0: at once."""
+    columns = table(noise=noise)
+    speed = columns["speed_rad_s"]
+    turned = np.tanh(speed / transition_rad_s) if transition_rad_s else np.sign(speed)
+    return {**columns, "reading_V": columns["reading_V"] + 0.8 * turned}
+
+
+def test_a_step_stays_a_step() -> None:
+    """Friction that turns round at once has no transition in its shape."""
+    assert transition_of(problem_of(with_friction(0.0))) == {}
+
+
+def test_without_friction_there_is_no_transition() -> None:
+    """Noise alone prefers no transition."""
+    assert transition_of(problem_of(table())) == {}
+
+
+def test_a_smooth_reversal_is_found() -> None:
+    """The nearest of the transitions that are looked for, as a speed of this machine."""
+    found = transition_of(problem_of(with_friction(TRANSITIONS[-1] * FASTEST)))
+    assert float(found["transition_rad_s"]) == pytest.approx(TRANSITIONS[-1] * FASTEST, rel=0.25)
+
+
+def test_every_law_that_reverses_has_it_in_its_shape() -> None:
+    """So that a corrected simulation gives the same on another recording, whatever that one shows."""
+    problem = problem_of(with_friction(TRANSITIONS[-1] * FASTEST))
+    for candidate in (CoulombFriction(), BearingDrag()):
+        assert all("transition_rad_s" in shape for shape in candidate.shapes(problem))
+    (column,) = CoulombFriction().columns(problem, {"transition_rad_s": 0.5})
+    assert column == pytest.approx(np.tanh(problem.covariates["wheel_speed"] / 0.5))
+
+
+def test_a_shape_without_a_transition_is_a_step() -> None:
+    """Files that were corrected before keep their meaning."""
+    problem = problem_of(table())
+    assert set(np.unique(along_motion(problem, {}))) <= {-1.0, 0.0, 1.0}

@@ -1,0 +1,63 @@
+"""How sure an answer is: its alternatives, and the probability that their margins leave to it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from linear_machine import CANDIDATES, equations_of, problem_of, table
+
+from regolithd.calibration.mismatch.inference.alternatives import Alternative, alternatives
+from regolithd.calibration.mismatch.inference.probability import other_answers, probability, probability_of
+from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
+from regolithd.calibration.mismatch.selection.decision import Decision, decide
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
+
+HIGHEST, SCALE = THRESHOLDS.highest_probability, THRESHOLDS.evidence_scale
+
+
+def decided(**effects: float) -> Decision:
+    """Return what is decided of a recording with these effects."""
+    equations = equations_of(problem_of(table(**effects)))  # type: ignore[arg-type]
+    return decide(equations.over(with_smooth_terms(equations.design)), CANDIDATES)
+
+
+def test_without_alternatives_only_the_unknown_may_be_wrong() -> None:
+    """The highest probability, and no other answer."""
+    assert probability((), THRESHOLDS) == HIGHEST
+    assert other_answers((), THRESHOLDS) == ()
+
+
+def test_an_equal_alternative_halves_the_probability() -> None:
+    """And has the other half; one that is ahead has more."""
+    assert probability([Alternative(("drag",), 0.0)], THRESHOLDS) == pytest.approx(HIGHEST / 2)
+    (other,) = other_answers([Alternative(("drag", "unexplained"), 0.0)], THRESHOLDS)
+    assert (other.effects, other.unexplained) == (("drag",), True)
+    assert other.probability == pytest.approx(HIGHEST / 2)
+    assert probability([Alternative((), -2 * SCALE)], THRESHOLDS) == pytest.approx(HIGHEST / (1 + np.e**2))
+
+
+def test_probabilities_of_all_answers_add_up() -> None:
+    """To what is left beside the unknown; three others are told at most."""
+    margins = [Alternative((str(k),), 3.0 * k) for k in range(3)]
+    told = other_answers(margins, THRESHOLDS)
+    assert probability(margins, THRESHOLDS) + sum(other.probability for other in told) == pytest.approx(HIGHEST)
+    assert len(other_answers([*margins, Alternative(("4",), 9.0)], THRESHOLDS)) == 3
+
+
+def test_a_strong_drag_is_surer_than_a_weak_one() -> None:
+    """The margin to nothing shrinks with the effect, and with it the probability."""
+    strong, weak = (decided(drag=drag) for drag in (0.3, 0.035))
+    assert {term.name for term in strong.named.terms} == {"drag"}
+    assert probability_of(strong)[0] > 0.9
+    assert probability_of(strong)[0] > probability_of(weak)[0]
+
+
+def test_the_alternatives_are_one_name_away() -> None:
+    """Nothing, another name, or one more; never the answer itself, and the best first."""
+    found = alternatives(decided(drag=0.3))
+    assert () in {each.effects for each in found}
+    assert ("drag",) not in {each.effects for each in found}
+    assert all(len(each.effects) <= 2 for each in found)
+    margins = [each.margin for each in found]
+    assert margins == sorted(margins)
+    assert min(margins) > 0
