@@ -11,7 +11,7 @@ RECORDINGS ?= ../shared/recordings
 .PHONY: help demo test check docs clean install uninstall
 .PHONY: interop first-day week
 .PHONY: figures chaos fuzz holds bench audit wheelhouse lock
-.PHONY: sizing reproduce evaluate loop prove prove-machines real scaling thresholds mutations mutants frames pictures picture screenshots
+.PHONY: sizing reproduce evaluate loop prove prove-machines reliability real scaling thresholds mutations mutants frames pictures picture screenshots
 .PHONY: fleet
 
 help:
@@ -71,6 +71,9 @@ prove: $(DEV) ## blind trials of `regolithd mismatch` on 200 recordings; continu
 
 prove-machines: $(DEV) ## the same on five other machines, one of them an FMU (needs a C compiler; CASES=…)
 	$(BIN)/python -m regolithd.calibration.validation.machine_trials --cases $(or $(CASES),300) $(if $(SEED),--seed $(SEED))
+
+reliability: $(DEV) ## how often answers are right at their stated probability (BATCHES="folders of prove and prove-machines")
+	$(BIN)/python -m regolithd.calibration.validation.reliability build/figures/reliability.json docs/reliability.svg $(or $(BATCHES),build/prove $(wildcard build/prove-machines/*))
 
 real: $(DEV) ## worked examples on recordings that are not part of this project (RECORDINGS=… ONLY="…")
 	$(BIN)/python docs/examples/run.py $(RECORDINGS) build/figures/real.json build/real $(ONLY)
