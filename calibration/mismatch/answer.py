@@ -153,8 +153,9 @@ class Answer:
     parameters: tuple[CalibratedParameter, ...] = ()
     changes: tuple[Change, ...] = ()
     left_out: tuple[LeftOut, ...] = ()
-    probability: float = 1.0
-    """That the set of names is right: of answers with 0.9 or more, nine in ten are (docs/proof.md)."""
+    probability: float | None = None
+    """That the set of names is right: of answers with 0.9 or more, nine in ten are (`make reliability`). None: unknown,
+    as of many recordings together."""
     alternatives: tuple[OtherAnswer, ...] = ()
     """The most probable other answers, best first."""
     notes: tuple[str, ...] = ()

@@ -21,6 +21,8 @@ def print_answer(console: Console, answer: Answer) -> None:
 
 def sure_of(answer: Answer) -> str:
     """Return how probable the set of names is, and which other is next."""
+    if answer.probability is None:
+        return "probability of this set of names: not known"
     text = f"probability of this set of names: {answer.probability:.2f}"
     if not answer.alternatives:
         return text

@@ -360,6 +360,6 @@ def test_other_web_sites_are_refused(tmp_path: Path, mosquitto: Mosquitto) -> No
         assert rig.post("/api/alarms/a/b", {"action": "acknowledged", "who": "E"})[0] == 409
         rig.spawn("second", "-m", "regolithd", "ground", "--config", "ground.toml")
         assert rig.processes["second"].wait(30) == 1
-        assert "is in use by another" in rig.output("second")
+        assert "another program uses it" in rig.output("second")
     finally:
         rig.end()

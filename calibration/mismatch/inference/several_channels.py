@@ -37,7 +37,7 @@ def merged_answers(answers: Sequence[Answer]) -> Answer:
         parameters=tuple(map(combined, *(answer.parameters for answer in answers))),
         changes=tuple(each for answer in answers for each in answer.changes),
         left_out=tuple(each for answer in answers for each in answer.left_out),
-        probability=prod(answer.probability for answer in answers),
+        probability=joint([answer.probability for answer in answers]),
         alternatives=other_answers(answers),
         notes=tuple(dict.fromkeys(note for answer in answers for note in answer.notes)),
     )
@@ -53,11 +53,17 @@ def other_answers(answers: Sequence[Answer]) -> tuple[OtherAnswer, ...]:
             OtherAnswer(
                 effects=tuple(sorted({*names, *other.effects})),
                 unexplained=other.unexplained or any(each.unexplained for each in kept),
-                probability=other.probability * prod(each.probability for each in kept),
+                probability=other.probability * (joint([each.probability for each in kept]) or 0.0),
             )
             for other in answer.alternatives
         ]
     return tuple(sorted(found, key=lambda other: -other.probability)[:TOLD])
+
+
+def joint(probabilities: Sequence[float | None]) -> float | None:
+    """Return the probability that all channels are right, if each has one."""
+    known = [each for each in probabilities if each is not None]
+    return prod(known) if len(known) == len(probabilities) else None
 
 
 def told_names(answer: Answer) -> tuple[str, ...]:

@@ -105,7 +105,7 @@ class Certainty:
 
 def certainty(answer: Answer, labels: Labels) -> Certainty:
     """Return how sure the answer is of its names."""
-    given = f"{answer.probability:.2f}"
+    given = "unknown" if answer.probability is None else f"{answer.probability:.2f}"
     if not answer.alternatives:
         return Certainty(given, "")
     other = answer.alternatives[0]

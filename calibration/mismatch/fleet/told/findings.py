@@ -113,9 +113,9 @@ def _rover(chosen: Chosen, rover: int) -> RoverOfFleet:
 
 
 def _held_out(chooser: Chooser, fit: FleetFit) -> tuple[Array, Array, list[Array]]:
-    """Return squares on recordings that neither chose nor fitted, shape (recording, wheel).
+    """Return squares on recordings that did not fit the effects, shape (recording, wheel); all recordings chose them.
 
-    Without any effect, with those of the answer's names that the other recordings chose, and with all of these but one.
+    Without any effect, with the answer's names as the other recordings fit them, and with all of these but one.
     """
     equations = chooser.equations
     shape = equations.counts.shape

@@ -41,6 +41,7 @@ KINDS: Mapping[str, type] = {
         answers.FitImprovement,
         answers.CalibratedParameter,
         answers.Change,
+        answers.OtherAnswer,
     )
 }
 """Data classes that may be in a file."""
@@ -90,7 +91,10 @@ def _encoded(value: object, arrays: list[np.ndarray[Any, Any]]) -> Any:  # noqa:
         return {"array": len(arrays) - 1}
     if is_dataclass(value):
         content = {each.name: _encoded(getattr(value, each.name), arrays) for each in fields(value)}
-        return {"class": type(value).__name__, "fields": content}
+        name = type(value).__name__
+        if name not in KINDS:
+            raise TypeError(f"{name} is none of the data classes that may be in a file: add it to KINDS")
+        return {"class": name, "fields": content}
     if isinstance(value, tuple | list):
         return {"tuple": [_encoded(each, arrays) for each in value]}
     if isinstance(value, Mapping):
