@@ -37,6 +37,7 @@ PARTS = {
     "calibrated_parameter": answers.CalibratedParameter,
     "change": answers.Change,
     "left_out": LeftOut,
+    "other_answer": answers.OtherAnswer,
 }
 """Data class of each part of the schema."""
 FEW = {"coulomb-friction", "viscous-friction", "cold-lubricant-friction"}
