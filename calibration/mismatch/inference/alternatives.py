@@ -15,6 +15,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     best_of_each_candidate,
     best_of_each_smooth_term,
 )
+from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
 from regolithd.calibration.mismatch.selection.smooth_terms import drop_what_a_curve_explains
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 UNEXPLAINED = "unexplained"
+LARGEST_MARGIN = 40.0
+"""Margin beyond which an answer is no alternative: it is e^20 times less probable."""
 
 
 @dataclass(frozen=True)
@@ -44,12 +47,13 @@ def alternatives(decision: Decision) -> tuple[Alternative, ...]:
     """Return the other answers of one step's difference, the best of each set of names, best first."""
     chosen = decision.whole
     best: dict[tuple[str, ...], float] = {}
+    ahead = _evidence(decision, chosen)
     for terms in _neighbours(decision):
         fit = decision.equations.fit(terms)
-        names = _names(fit.terms)
-        if names != _names(chosen.terms) and _admissible(decision, fit):
-            best[names] = max(best.get(names, -float("inf")), _evidence(decision, fit))
-    ahead = _evidence(decision, chosen)
+        names, evidence = _names(fit.terms), _evidence(decision, fit)
+        plausible = ahead - evidence < LARGEST_MARGIN and evidence > best.get(names, -float("inf"))
+        if names != _names(chosen.terms) and plausible and _admissible(decision, fit):
+            best[names] = evidence
     found = [Alternative(names, ahead - evidence) for names, evidence in best.items()]
     return tuple(sorted(found, key=lambda each: each.margin))
 
@@ -59,8 +63,10 @@ def _admissible(decision: Decision, fit: Fit) -> bool:
     equations = decision.equations
     named = equations.fit([term for term in fit.terms if term.group.named])
     curves = [term for term in fit.terms if not term.group.named]
-    return acceptable(equations, fit) and all(
-        len(drop_what_a_curve_explains(equations, named, curve).terms) == len(named.terms) for curve in curves
+    return (
+        acceptable(equations, fit)
+        and all(len(drop_what_a_curve_explains(equations, named, curve).terms) == len(named.terms) for curve in curves)
+        and len(drop_what_a_changed_parameter_explains(equations, named).terms) == len(named.terms)
     )
 
 
@@ -90,4 +96,4 @@ def _further(decision: Decision, given: tuple[Term, ...]) -> Iterator[Term]:
 
 
 def _names(terms: tuple[Term, ...]) -> tuple[str, ...]:
-    return tuple(sorted(term.name if term.group.named else UNEXPLAINED for term in terms))
+    return tuple(sorted({term.name if term.group.named else UNEXPLAINED for term in terms}))

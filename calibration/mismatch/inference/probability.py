@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import OtherAnswer
-from regolithd.calibration.mismatch.inference.alternatives import UNEXPLAINED, alternatives
+from regolithd.calibration.mismatch.inference.alternatives import LARGEST_MARGIN, UNEXPLAINED, alternatives
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 TOLD = 3
 """Other answers that are told."""
-LARGEST_MARGIN = 500.0
-"""Margin in either direction beyond which nothing changes: the exponential stays finite."""
 
 
 def probability_of(decision: Decision) -> tuple[float, tuple[OtherAnswer, ...]]:

@@ -18,6 +18,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     best_of_each_smooth_term,
     wheels_of_faulty_sensors,
 )
+from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -43,7 +44,7 @@ def weigh_against_smooth_terms(
     alone = best_of_each_smooth_term(equations, ())
     if not alone:
         return named, ()
-    named = drop_transients(equations, named)
+    named = drop_what_a_changed_parameter_explains(equations, drop_transients(equations, named))
     curve = alone[0][1]
     imitated = _imitates_a_curve(equations, named, curve, entry_threshold)
     for fit in simpler if imitated else ():

@@ -54,8 +54,9 @@ def test_a_strong_drag_is_surer_than_a_weak_one() -> None:
 
 def test_the_alternatives_are_one_name_away() -> None:
     """Nothing, another name, or one more; never the answer itself, and the best first."""
-    found = alternatives(decided(drag=0.3))
+    found = alternatives(decided(drag=0.035))
     assert () in {each.effects for each in found}
+    assert () not in {each.effects for each in alternatives(decided(drag=0.9))}
     assert ("drag",) not in {each.effects for each in found}
     assert all(len(each.effects) <= 2 for each in found)
     margins = [each.margin for each in found]

@@ -1,0 +1,56 @@
+"""A fault of one wheel against a parameter of the simulation that changes at the same time.
+
+A clogged outlet raises one level as a drifting load cell would, but it acts as the outlet's area does, on the next
+tank too. The library has no name for a parameter that changes; so the fault loses its name, and what changes with time
+stays unexplained.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, growth
+from regolithd.calibration.mismatch.selection.shape_optimisation import shape_profile
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.group import Fit, Term
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+
+class _ChangedParameter(Candidate):
+    """A parameter that moves away from its value after an onset."""
+
+    coefficients: ClassVar = (Coefficient("change", "1", 0),)
+
+    def __init__(self, parameter: str) -> None:
+        self._parameter = parameter
+
+    def columns(self, problem: Problem, shape: Shape) -> Array:
+        """Return ∂prediction/∂parameter times the growth since the onset."""
+        return (problem.tangent(self._parameter) * growth(problem, shape))[None]
+
+
+def drop_what_a_changed_parameter_explains(equations: NormalEquations, named: Fit) -> Fit:
+    """Leave out faults of one wheel that begin at some time, where a parameter that changes then is ahead.
+
+    Both have one coefficient and the same course over time. A lead of `lead_margin` against a true fault is chance in
+    2 % of the cases at most: where the wrong one lags by d² on average, with the variance 4 d², it leads by L with
+    the probability Φ(−(d² + L)/2d), which is Φ(−√L) at most.
+    """
+    kept = [term for index, term in enumerate(named.terms) if not _is_changed_parameter(equations, named, index, term)]
+    return named if len(kept) == len(named.terms) else equations.fit(kept)
+
+
+def _is_changed_parameter(equations: NormalEquations, named: Fit, index: int, term: Term) -> bool:
+    candidate = term.group.candidate
+    if candidate is None or tuple(candidate.sharing) != ("one",) or candidate.change_point not in term.group.shape:
+        return False
+    others, shape = named.without(index), term.group.shape
+    gain = named.delta_chi2 - equations.fit(others).delta_chi2
+    return any(
+        shape_profile(equations, others, _ChangedParameter(name), equations.all_wheels)(shape)
+        > gain + equations.thresholds.lead_margin
+        for name, prior in equations.problem.simulation.parameters.items()
+        if prior.std > 0
+    )

@@ -1,0 +1,49 @@
+"""A fault of one wheel against a parameter of the simulation that changes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+from linear_machine import CANDIDATES, STEP_S, Step, equations_of, problem_of, table, term_of
+
+from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch import Problem, Shape
+
+ONSET_S = 160.0
+
+
+class Fault(Step):
+    """A step of one axis."""
+
+    name = "fault"
+    sharing: ClassVar = ("one",)
+
+    def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
+        """One onset."""
+        return [{"onset_s": ONSET_S, "rise_s": 0.0}]
+
+
+@pytest.mark.parametrize(("axes", "kept"), [((1.0,), True), ((1.0, 2.0), False)])
+def test_what_all_axes_show_as_the_parameter_does_is_no_fault_of_one(axes: tuple[float, ...], kept: bool) -> None:
+    """A step of one reading is its fault; one of both is the level's, though it was named on one axis."""
+    columns = table()
+    later = (columns["t_s"] >= ONSET_S - STEP_S / 2) & np.isin(columns["axis"], axes)
+    columns["reading_V"] = columns["reading_V"] + 0.3 * later
+    equations = equations_of(problem_of(columns), (*CANDIDATES, Fault()))
+    named = equations.fit([term_of(equations, "fault", wheels=(0,))])
+    assert bool(drop_what_a_changed_parameter_explains(equations, named).terms) is kept
+
+
+def test_effects_of_all_axes_are_left_alone() -> None:
+    """They may be changes of parameters themselves, as of the soil."""
+    columns = table()
+    columns["reading_V"] = columns["reading_V"] + 0.3 * (columns["t_s"] > ONSET_S)
+    equations = equations_of(problem_of(columns))
+    named = equations.fit([term_of(equations, "step", place=3)])
+    assert drop_what_a_changed_parameter_explains(equations, named) is named
