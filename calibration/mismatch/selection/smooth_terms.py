@@ -44,19 +44,34 @@ def weigh_against_smooth_terms(
     alone = best_of_each_smooth_term(equations, ())
     if not alone:
         return named, ()
+    passed = named
     named = drop_what_a_changed_parameter_explains(equations, drop_transients(equations, named))
+    refuted = [term for term in passed.terms if term not in named.terms]
     curve = alone[0][1]
     imitated = _imitates_a_curve(equations, named, curve, entry_threshold)
     for fit in simpler if imitated else ():
         if unexplained_beside(equations, fit) is None:
             return fit, ()
-    left = unexplained_beside(equations, named)
+    left = unexplained_beside(equations, named) or _rest_of_refuted(equations, named, refuted, entry_threshold)
     beside = _effects_beside_curve(equations, named, curve, entry_threshold)
     with_rest = named if left is None else equations.fit((*named.terms, left))
     if imitated or _explains_more(equations, beside, with_rest, entry_threshold):
         kept = equations.fit([term for term in beside.terms if term.group.named])
         return drop_what_a_curve_explains(equations, kept, curve), (curve,)
     return (named, ()) if left is None else (drop_what_a_curve_explains(equations, named, left), (left,))
+
+
+def _rest_of_refuted(
+    equations: NormalEquations, named: Fit, refuted: Sequence[Term], entry_threshold: float
+) -> Term | None:
+    """Return the curve over time that is left where a name passed every test but that of how it changes.
+
+    What was significant enough for the name is there, whatever its name: the entry of names suffices.
+    """
+    wheels = {term.wheels for term in refuted}
+    curves = best_of_each_smooth_term(equations, named.terms) if refuted else []
+    found = [(score, term) for score, term in curves if term.name == "time" and term.wheels in wheels]
+    return found[0][1] if found and found[0][0] > entry_threshold else None
 
 
 def _imitates_a_curve(equations: NormalEquations, named: Fit, curve: Term, entry_threshold: float) -> bool:

@@ -146,3 +146,16 @@ def test_a_parameter_leaves_its_prior_beyond_three_deviations() -> None:
         equations = equations_with(shift)
         found = equations.nuisance.leaving_their_priors(equations.fit(()), equations.problem)
         assert len(found) == leaving
+
+
+def test_what_a_refuted_name_leaves_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A change that does not stay loses its name; what it explained is told, though no curve would enter alone."""
+    equations = equations_with(spell)
+    onset = term_of(equations, "step", place=2)
+    named = equations.fit([onset])
+    monkeypatch.setattr(smooth_terms, "drop_transients", lambda equations, _: equations.fit(()))
+    monkeypatch.setattr(smooth_terms, "unexplained_beside", lambda *_: None)
+    kept, curves = weigh_against_smooth_terms(equations, named, (), 1.0)
+    assert kept.terms == ()
+    assert [(curve.name, curve.wheels) for curve in curves] == [("time", onset.wheels)]
+    assert weigh_against_smooth_terms(equations, named, (), 1000.0)[1] == ()
