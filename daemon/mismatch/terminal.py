@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
+from regolithd.calibration.mismatch.report.sections import LEAST_TOLD
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -24,7 +26,7 @@ def sure_of(answer: Answer) -> str:
     if answer.probability is None:
         return "probability of this set of names: not known"
     text = f"probability of this set of names: {answer.probability:.2f}"
-    if not answer.alternatives:
+    if not answer.alternatives or answer.alternatives[0].probability < LEAST_TOLD:
         return text
     other = answer.alternatives[0]
     names = (*other.effects, *(("something unexplained",) if other.unexplained else ()))

@@ -95,6 +95,10 @@ class SensitivityRow:
     share: str
 
 
+LEAST_TOLD = 0.005
+"""Probability below which another answer is not told: two decimals would show 0."""
+
+
 @dataclass(frozen=True)
 class Certainty:
     """The probability of the set of names, and the next best answer with its own; empty where there is none."""
@@ -106,11 +110,12 @@ class Certainty:
 def certainty(answer: Answer, labels: Labels) -> Certainty:
     """Return how sure the answer is of its names."""
     given = "unknown" if answer.probability is None else f"{answer.probability:.2f}"
-    if not answer.alternatives:
+    if not answer.alternatives or answer.alternatives[0].probability < LEAST_TOLD:
         return Certainty(given, "")
     other = answer.alternatives[0]
     names = [*map(labels.effect, other.effects), *(["something unexplained"] if other.unexplained else [])]
-    return Certainty(given, f"{' and '.join(names) or 'nothing missing'} ({other.probability:.2f})")
+    *first, last = names or ["nothing missing"]
+    return Certainty(given, f"{' and '.join(filter(None, (', '.join(first), last)))} ({other.probability:.2f})")
 
 
 def summary(evidence: Evidence, labels: Labels) -> tuple[tuple[str, str], ...]:

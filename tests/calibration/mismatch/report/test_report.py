@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.answer import (
     Evidence,
     FitImprovement,
     Indistinguishable,
+    OtherAnswer,
     Parameter,
     Sensitivity,
     Unexplained,
@@ -31,6 +32,7 @@ from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.labels import Labels, verdict_sentence
 from regolithd.calibration.mismatch.report.notebook import notebook_html
 from regolithd.calibration.mismatch.report.page import equation, render_report
+from regolithd.calibration.mismatch.report.sections import certainty
 
 WORN = replace(
     sample_answer.WORN,
@@ -284,3 +286,17 @@ def test_an_effect_that_makes_held_out_data_worse_says_so(evidence: Evidence) ->
     page = render_report(answer(verdict="missing-physics", effects=(worse,)), evidence, FROM)
     assert "4.8 → 4.9 mA (+2.1 %)" in page
     assert "6.9 → 4.8 mA (−30.4 %)" in render_report(ANSWERS["missing-physics"], evidence, FROM)
+
+
+def test_the_next_best_answer_is_told_where_it_is_not_negligible() -> None:
+    """Names with commas, and something unexplained at the end; nothing below half a percent."""
+    labels = Labels.of(sample_answer.evidence(600.0))
+
+    def told(other: OtherAnswer) -> str:
+        return certainty(replace(sample_answer.ANSWER, probability=0.934, alternatives=(other,)), labels).next
+
+    frictions = OtherAnswer(("coulomb-friction", "viscous-friction"), True, 0.043)
+    assert told(frictions) == "Coulomb friction, viscous friction and something unexplained (0.04)"
+    assert told(OtherAnswer((), False, 0.1)) == "nothing missing (0.10)"
+    assert told(replace(frictions, probability=0.004)) == ""
+    assert certainty(sample_answer.ANSWER, labels).given == "unknown"
