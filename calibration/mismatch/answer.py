@@ -131,6 +131,10 @@ class Change:
     high: float
 
 
+LEAST_TOLD = 0.005
+"""Probability below which another answer is not told in words: two decimals would show 0."""
+
+
 @dataclass(frozen=True)
 class OtherAnswer:
     """An answer that was not given: its names, whether something stays unexplained, and how probable it is."""
@@ -164,11 +168,18 @@ class Answer:
     """Of several channels: the fit of each; `fit` is that of the channel that gains most."""
     version: int = 2
 
+    @property
+    def next_best(self) -> OtherAnswer | None:
+        """The most probable other answer, if two decimals show its probability."""
+        return next((other for other in self.alternatives[:1] if other.probability >= LEAST_TOLD), None)
+
     def to_json(self) -> dict[str, Any]:
         """Return the JSON object of answer.schema.json: tuples as lists, and null for numbers that are not finite."""
         plain: dict[str, Any] = _plain(asdict(self))
         plain["fits"] = plain["fits"] or [plain["fit"]]
-        findings = (
+        names = (
+            "version",
+            "verdict",
             "effects",
             "unexplained",
             "indistinguishable",
@@ -177,11 +188,12 @@ class Answer:
             "fits",
             "parameters",
             "changes",
+            "left_out",
+            "probability",
+            "alternatives",
+            "notes",
         )
-        return {
-            name: plain[name]
-            for name in ("version", "verdict", *findings, "left_out", "probability", "alternatives", "notes")
-        }
+        return {name: plain[name] for name in names}
 
 
 def answer_schema() -> dict[str, Any]:

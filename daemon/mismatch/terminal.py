@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from regolithd.calibration.mismatch.report.sections import LEAST_TOLD
-
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -26,9 +24,8 @@ def sure_of(answer: Answer) -> str:
     if answer.probability is None:
         return "probability of this set of names: not known"
     text = f"probability of this set of names: {answer.probability:.2f}"
-    if not answer.alternatives or answer.alternatives[0].probability < LEAST_TOLD:
+    if (other := answer.next_best) is None:
         return text
-    other = answer.alternatives[0]
     names = (*other.effects, *(("something unexplained",) if other.unexplained else ()))
     return f"{text}; next: {' + '.join(names) or 'nothing'} ({other.probability:.2f})"
 

@@ -19,6 +19,7 @@ import aiomqtt
 import pytest
 from broker import Mosquitto, mosquitto_program, unused_port
 from estimates import estimate
+from running import running
 from subscriber import until
 
 from regolithd.daemon.config.configuration import Configuration
@@ -161,14 +162,9 @@ async def daemon(site: Site, folder: Path, *, tls: bool) -> AsyncIterator[Publis
     port = site.tls_port if tls else site.broker.port
     mqtt = {"host": "127.0.0.1", "port": port, "spool_directory": folder / "spool", **account}
     publisher = Publisher(Configuration.model_validate({"mqtt": mqtt}), Stores.open(folder / "spool", 1_000_000))
-    runs = asyncio.create_task(publisher.run())
-    try:
+    async with running(publisher):
         await until(lambda: publisher.connected)
         yield publisher
-    finally:
-        runs.cancel()
-        with suppress(asyncio.CancelledError):
-            await runs
 
 
 @pytest.mark.parametrize("taken", ["regolithd-regolith-kapvik", "kapvik"])

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regolithd.calibration.mismatch.problem.words import column_of
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -32,7 +34,7 @@ def temperature_degC(problem: Problem) -> NDArray[np.float64]:
 
 def _unit_of_column(problem: Problem, values: NDArray[np.float64]) -> str | None:
     """Return the unit in the name of the column that has these values, if there is one."""
-    for name, column in problem.recording.channels.items():
-        if name.endswith(("_degC", "_degF", "_K")) and np.array_equal(column, values, equal_nan=True):
-            return name.rsplit("_", 1)[1]
-    return None
+    channels = problem.recording.channels
+    of_temperature = {name: read for name, read in channels.items() if name.endswith(("_degC", "_degF", "_K"))}
+    column = column_of(values, of_temperature)
+    return None if column is None else column.rsplit("_", 1)[1]

@@ -23,7 +23,7 @@ from regolithd.calibration.mismatch.fleet.work.found import Found, found_in, one
 from regolithd.calibration.mismatch.fleet.work.grid import GridGroup, grid_of
 from regolithd.calibration.mismatch.fleet.work.sums import Laws, Sums, forms_of, sums_of
 from regolithd.calibration.mismatch.fleet.work.workers import ThisProcess, Workers
-from regolithd.calibration.mismatch.inference.several_channels import WORST_FIRST
+from regolithd.calibration.mismatch.inference.several_channels import joined
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -162,7 +162,7 @@ def compare_fleet(
     rows = tuple(
         row for chosen, answer in zip(compared, answers, strict=True) for row in catalogue_rows(chosen, answer)
     )
-    answer = answers[0] if len(answers) == 1 else _merged(answers)
+    answer = answers[0] if len(answers) == 1 else joined(answers)
     return FleetComparison(replace(answer, notes=(*answer.notes, *work.notes)), rows)
 
 
@@ -274,20 +274,3 @@ def _equations(
     first = len({name for each in sums for name in each.tangents})
     placed = [replace(group, columns=tuple(first + column for column in group.columns)) for group in grid]
     return fleet_equations(sums, rover, when, placed, level)
-
-
-def _merged(answers: Sequence[FleetAnswer]) -> FleetAnswer:
-    """Return one answer of all channels; parameters are those of the first that has them."""
-    told = {answer.verdict for answer in answers}
-    best = max(answers, key=lambda each: each.fit.held_out_rmse_before / max(each.fit.held_out_rmse_after, 1e-300))
-    return replace(
-        best,
-        verdict=next(verdict for verdict in WORST_FIRST if verdict in told),
-        effects=tuple(each for answer in answers for each in answer.effects),
-        unexplained=tuple(each for answer in answers for each in answer.unexplained),
-        indistinguishable=tuple(dict.fromkeys(each for answer in answers for each in answer.indistinguishable)),
-        sensitivity=tuple(each for answer in answers for each in answer.sensitivity),
-        fits=tuple(answer.fit for answer in answers),
-        left_out=tuple(each for answer in answers for each in answer.left_out),
-        notes=tuple(dict.fromkeys(note for answer in answers for note in answer.notes)),
-    )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import Indistinguishable
+from regolithd.calibration.mismatch.inference.statements import capital
 from regolithd.calibration.mismatch.problem.words import in_words
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ def with_experiment(
     duration_s, in_all = rounded_up(seconds_needed(equations, entry_threshold))
     return Indistinguishable(
         effects=names,
-        experiment=f"{sentence[:1].upper()}{sentence[1:]}; {in_all} in all.",
+        experiment=f"{capital(sentence)}; {in_all} in all.",
         vary=tuple(dict.fromkeys(name for candidate in candidates for name in candidate.varied(problem))),
         duration_s=duration_s,
         lift=lift,

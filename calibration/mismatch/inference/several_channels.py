@@ -4,24 +4,30 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import prod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
-from regolithd.calibration.mismatch.answer import OtherAnswer
+from regolithd.calibration.mismatch.answer import Answer, OtherAnswer
 from regolithd.calibration.mismatch.inference.probability import TOLD
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.answer import Answer, CalibratedParameter, Verdict
+    from regolithd.calibration.mismatch.answer import CalibratedParameter, Verdict
 
+AnyAnswer = TypeVar("AnyAnswer", bound=Answer)
 NINETY_PERCENT_STDS = 1.645
 """Half the width of a 90 % interval of a normal density, in standard deviations."""
 WORST_FIRST: tuple[Verdict, ...] = ("unexplained", "missing-physics", "consistent")
 
 
 def merged_answers(answers: Sequence[Answer]) -> Answer:
-    """Return the findings of all channels; the fit is of the channel that gains most."""
+    """Return the findings of all channels, and each parameter's posterior from all of them."""
+    return replace(joined(answers), parameters=tuple(map(combined, *(answer.parameters for answer in answers))))
+
+
+def joined(answers: Sequence[AnyAnswer]) -> AnyAnswer:
+    """Return the findings of all channels; the fit and the parameters are of the channel that gains most."""
     told = {answer.verdict for answer in answers}
     best = max(
         answers, key=lambda answer: answer.fit.held_out_rmse_before / max(answer.fit.held_out_rmse_after, 1e-300)
@@ -34,7 +40,6 @@ def merged_answers(answers: Sequence[Answer]) -> Answer:
         indistinguishable=tuple(dict.fromkeys(each for answer in answers for each in answer.indistinguishable)),
         fits=tuple(answer.fit for answer in answers),
         sensitivity=tuple(each for answer in answers for each in answer.sensitivity),
-        parameters=tuple(map(combined, *(answer.parameters for answer in answers))),
         changes=tuple(each for answer in answers for each in answer.changes),
         left_out=tuple(each for answer in answers for each in answer.left_out),
         probability=joint([answer.probability for answer in answers]),

@@ -16,6 +16,11 @@ def listed(items: Sequence[str]) -> str:
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
 
 
+def capital(sentence: str) -> str:
+    """Return the sentence with its first letter as a capital."""
+    return sentence[:1].upper() + sentence[1:]
+
+
 def plural(noun: str) -> str:
     """Return the plural: wheels, axes, bodies."""
     if noun.endswith("is"):
@@ -48,15 +53,16 @@ def statement(
     parameters: with `relative_size`, and `onset_s` where it has an onset
     errors: held-out root mean squares on these wheels without and with the effect
     """
-    size = parameters["relative_size"]
     where = f", on {wheels_in_words(wheels, of, kind)}" if of > 1 else ""
     onset = parameters.get("onset_s")
     begins = f" from {onset.value:.0f} s on (90 % sure: {onset.low:.0f} to {onset.high:.0f} s)" if onset else ""
+    return f"{capital(candidate.words)}{where}{begins}: {size_and_cost(parameters['relative_size'], errors)}."
+
+
+def size_and_cost(size: Parameter, errors: tuple[float, float]) -> str:
+    """Return how large an effect is over the mean reading, and what leaving it out costs."""
     costs = 100 * (errors[0] / errors[1] - 1) if errors[1] > 0 else 0.0
-    costs_in_words = f"{abs(costs):.1f} % {'larger' if costs >= 0 else 'smaller'}"
-    words = candidate.words[:1].upper() + candidate.words[1:]
     return (
-        f"{words}{where}{begins}: {100 * size.value:.0f} % of the mean reading "
-        f"(90 % sure: {100 * size.low:.0f} to {100 * size.high:.0f} %); "
-        f"left out, it makes the held-out error there {costs_in_words}."
+        f"{100 * size.value:.0f} % of the mean reading (90 % sure: {100 * size.low:.0f} to {100 * size.high:.0f} %); "
+        f"left out, it makes the held-out error there {abs(costs):.1f} % {'larger' if costs >= 0 else 'smaller'}"
     )

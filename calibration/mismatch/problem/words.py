@@ -42,10 +42,15 @@ def labels_of(
     """Return a label with its unit for each covariate: as stated, or as the column is called that it is."""
     found = {}
     for name, values in covariates.items():
-        column = next((column for column, read in channels.items() if _same(values, read)), None)
+        column = column_of(values, channels)
         if column is not None and quantity(column) != column:
             found[name] = label_of_column(column)
     return {**found, **stated}
+
+
+def column_of(values: Array, channels: Mapping[str, Array]) -> str | None:
+    """Return the first column that has these values, if there is one."""
+    return next((column for column, read in channels.items() if _same(values, read)), None)
 
 
 def _same(values: Array, read: Array) -> bool:

@@ -52,8 +52,7 @@ def active_rms(squares: Array, active_share: float) -> float:
     Of a constant effect that is its root mean square; of an intermittent one, `active_share` of the root mean square
     weighted by its own squares.
     """
-    weighted = np.sum(squares**2) / max(float(np.sum(squares)), 1e-300)
-    return float(np.sqrt(max(np.mean(squares), active_share**2 * weighted)))
+    return active_size(float(np.sum(squares)), float(np.sum(squares**2)), squares.size, active_share)
 
 
 def active_size(squares: float, fourths: float, readings: float, active_share: float) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import direction_of
-from regolithd.calibration.mismatch.inference.statements import listed, plural
+from regolithd.calibration.mismatch.inference.statements import capital, listed, plural
 from regolithd.calibration.mismatch.problem.words import COVARIATES
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -99,11 +99,6 @@ class Labels:
         if len(wheels) == len(everything):
             return f"all {len(wheels)} {plural(self.wheel)}" if len(wheels) > 1 else ""
         return f"{plural(self.wheel) if len(wheels) > 1 else self.wheel} {', '.join(map(str, wheels))}"
-
-
-def capital(sentence: str) -> str:
-    """Return the sentence with its first letter as a capital."""
-    return sentence[:1].upper() + sentence[1:]
 
 
 def verdict_sentence(answer: Answer, labels: Labels | None = None) -> str:

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from regolithd.calibration.mismatch.inference.statements import listed
+from regolithd.calibration.mismatch.inference.statements import capital, listed
 from regolithd.calibration.mismatch.report.axes import number
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.figures import curve_figure, fit_figure, interval_figure, map_figure
-from regolithd.calibration.mismatch.report.labels import capital
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Answer, Change, Curve, Effect, Evidence, Unexplained
@@ -95,10 +94,6 @@ class SensitivityRow:
     share: str
 
 
-LEAST_TOLD = 0.005
-"""Probability below which another answer is not told: two decimals would show 0."""
-
-
 @dataclass(frozen=True)
 class Certainty:
     """The probability of the set of names, and the next best answer with its own; empty where there is none."""
@@ -110,12 +105,10 @@ class Certainty:
 def certainty(answer: Answer, labels: Labels) -> Certainty:
     """Return how sure the answer is of its names."""
     given = "unknown" if answer.probability is None else f"{answer.probability:.2f}"
-    if not answer.alternatives or answer.alternatives[0].probability < LEAST_TOLD:
+    if (other := answer.next_best) is None:
         return Certainty(given, "")
-    other = answer.alternatives[0]
     names = [*map(labels.effect, other.effects), *(["something unexplained"] if other.unexplained else [])]
-    *first, last = names or ["nothing missing"]
-    return Certainty(given, f"{' and '.join(filter(None, (', '.join(first), last)))} ({other.probability:.2f})")
+    return Certainty(given, f"{listed(names or ['nothing missing'])} ({other.probability:.2f})")
 
 
 def summary(evidence: Evidence, labels: Labels) -> tuple[tuple[str, str], ...]:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.changes import direction_of
+from regolithd.calibration.mismatch.inference.statements import capital
 from regolithd.calibration.mismatch.report.axes import number
-from regolithd.calibration.mismatch.report.labels import UNITS, beyond_prior, capital
+from regolithd.calibration.mismatch.report.labels import UNITS, beyond_prior
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Answer

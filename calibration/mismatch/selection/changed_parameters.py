@@ -7,6 +7,7 @@ stays unexplained.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, growth
@@ -48,9 +49,10 @@ def _is_changed_parameter(equations: NormalEquations, named: Fit, index: int, te
         return False
     others, shape = named.without(index), term.group.shape
     gain = named.delta_chi2 - equations.fit(others).delta_chi2
-    return any(
-        shape_profile(equations, others, _ChangedParameter(name), equations.all_wheels)(shape)
-        > gain + equations.thresholds.lead_margin
+    beside = shape_profile(equations, others, candidate, equations.all_wheels)
+    changes = (
+        replace(beside, candidate=_ChangedParameter(name))
         for name, prior in equations.problem.simulation.parameters.items()
         if prior.std > 0
     )
+    return any(change(shape) > gain + equations.thresholds.lead_margin for change in changes)

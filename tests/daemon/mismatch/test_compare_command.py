@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
 import json
 import tomllib
-from contextlib import asynccontextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
 import typer
 from recorded_traverse import ROVER, daemon, drive_traverse
+from running import running
 from subscriber import Subscriber, listening, until
 from typer.testing import CliRunner
 
@@ -32,7 +31,6 @@ from regolithd.daemon.publish.publisher import Publisher
 from regolithd.daemon.publish.stores import Stores
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator
     from pathlib import Path
 
     from broker import Mosquitto
@@ -108,7 +106,7 @@ async def test_the_alarm_is_active_where_physics_is_missing_or_has_changed(
     files = TraverseFiles(tmp_path / "a.csv", tmp_path / "a.html", tmp_path / "a.json", tmp_path / "a.toml")
     configuration = Configuration.model_validate({"mqtt": {"host": "127.0.0.1", "port": mosquitto.port}})
     publisher = Publisher(configuration, Stores.open(tmp_path / "spool", 1_000_000))
-    async with delivering(publisher):
+    async with running(publisher):
         await publish_comparison(publisher, comparison_result(answer, files, tmp_path / "SIM.toml"))
         await until(lambda: publisher.report.acknowledged == 3)
     async with listening(Subscriber(mosquitto.port)) as subscriber:
@@ -145,15 +143,3 @@ def test_no_file_outside_the_recordings_is_published(tmp_path: Path, capsys: pyt
             with pytest.raises(typer.Exit):
                 compare._publish(configuration, comparison_of(tmp_path, tmp_path / path))
             assert said in capsys.readouterr().err
-
-
-@asynccontextmanager
-async def delivering(publisher: Publisher) -> AsyncIterator[None]:
-    """Run a publisher while the context lasts."""
-    runs = asyncio.create_task(publisher.run())
-    try:
-        yield
-    finally:
-        runs.cancel()
-        with suppress(asyncio.CancelledError):
-            await runs

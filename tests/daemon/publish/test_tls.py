@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
 import gc
-from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +10,7 @@ import pytest
 from broker import Mosquitto, mosquitto_program
 from certificates import Authority, Certificate, new_authority
 from estimates import estimate
+from running import running
 from subscriber import until
 
 from regolithd.daemon.check.broker import check_broker
@@ -22,7 +21,7 @@ from regolithd.daemon.publish.publisher import Publisher
 from regolithd.daemon.publish.stores import Stores
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable, Iterator
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
 HERE = "DNS:localhost,IP:127.0.0.1"
@@ -76,18 +75,6 @@ def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("regolithd.daemon.publish.connection.ACKNOWLEDGE_TIMEOUT_S", 0.5)
     monkeypatch.setattr("regolithd.daemon.check.broker.TIMEOUT_S", 0.5)
     monkeypatch.setattr("regolithd.daemon.ground.subscription.TIMEOUT_S", 0.5)
-
-
-@asynccontextmanager
-async def running(task: Publisher | Subscription) -> AsyncIterator[None]:
-    """Run a publisher or a subscription while the context lasts."""
-    runs = asyncio.create_task(task.run())
-    try:
-        yield
-    finally:
-        runs.cancel()
-        with suppress(asyncio.CancelledError):
-            await runs
 
 
 def secured(authority: Authority, certificate: Certificate) -> str:

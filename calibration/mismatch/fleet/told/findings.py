@@ -23,7 +23,7 @@ from regolithd.calibration.mismatch.fleet.told.intervals import onset_places, si
 from regolithd.calibration.mismatch.fleet.told.recordings import shown_beside
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
 from regolithd.calibration.mismatch.inference.findings import NINETY_PERCENT_STDS, beyond_prior
-from regolithd.calibration.mismatch.inference.statements import wheels_in_words
+from regolithd.calibration.mismatch.inference.statements import capital, size_and_cost, wheels_in_words
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -208,13 +208,7 @@ def _statement(chosen: Chosen, term: FleetTerm, wheels: str, size: Parameter, er
         "until": f" until {at}",
         "growing": f" since {at}, growing",
     }[course.kind]
-    costs = 100 * (errors[0] / errors[1] - 1) if errors[1] > 0 else 0.0
-    words = term.group.candidate.words
-    return (
-        f"{words[:1].upper()}{words[1:]}, on {wheels}{of}{when}: {100 * size.value:.0f} % of the mean reading "
-        f"(90 % sure: {100 * size.low:.0f} to {100 * size.high:.0f} %); left out, it makes the held-out error there "
-        f"{abs(costs):.1f} % {'larger' if costs >= 0 else 'smaller'}."
-    )
+    return f"{capital(term.group.candidate.words)}, on {wheels}{of}{when}: {size_and_cost(size, errors)}."
 
 
 def _of_recording(chosen: Chosen, recording: int, effect: Effect) -> FleetEffect:

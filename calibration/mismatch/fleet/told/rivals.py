@@ -10,6 +10,7 @@ from regolithd.calibration.mismatch.answer import Indistinguishable
 from regolithd.calibration.mismatch.fleet.choice.search import further, score
 from regolithd.calibration.mismatch.fleet.choice.selection import without
 from regolithd.calibration.mismatch.inference.identifiability import wrong_choice_rate
+from regolithd.calibration.mismatch.inference.statements import capital
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def _with_experiment(names: tuple[str, ...], members: list[FleetTerm], simulatio
     sentence = sentence.replace("{", "").replace("}", "").replace("_", " ")
     return Indistinguishable(
         effects=names,
-        experiment=f"{sentence[:1].upper()}{sentence[1:]}.",
+        experiment=f"{capital(sentence)}.",
         vary=tuple(dict.fromkeys(name for candidate in candidates for name in candidate.vary)),
         duration_s=0.0,
         lift=lift,
