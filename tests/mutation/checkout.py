@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
 
-CLOCK_TIMEOUT_S = 1800.0
+CLOCK_TIMEOUT_S = 7200.0
 """Time on the clock after which a run is ended without a result: far beyond every limit of CPU time."""
 ENDED = -1000
 """Status of a run that was ended after that time."""

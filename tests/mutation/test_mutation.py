@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 import signal
 import sys
@@ -12,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from checkout import USAGE_ERROR, Checkout, Run
-from coverage_map import CoverageMap, statement_lines
+from coverage_map import CoverageMap, known_to_be_slow, statement_lines
 from figures import SURVIVORS, Words, line_of, score, write_page
 from mutants import Mutation, left_out, mutations, sample
 from trial import Result, selected_tests
@@ -210,3 +211,16 @@ def test_every_mutant_of_the_page_is_killed_noticed_now_or_equal() -> None:
     assert since + equal == mutants
     rows = re.findall(r"^\| `[a-z/]+` \| (\d+) \| (\d+) \|$", page, flags=re.MULTILINE)
     assert (sum(int(row[0]) for row in rows), sum(int(row[1]) for row in rows)) == (mutants, killed)
+
+
+def test_only_tests_that_took_too_long_are_left_out_in_the_next_sample(tmp_path: Path) -> None:
+    """A test that failed under another seed is run again."""
+    rows = [
+        {"test": "quick", "fast": True, "cpu_s": 0.1, "clock_s": 0.2},
+        {"test": "failed", "fast": False, "cpu_s": 0.1, "clock_s": 0.2},
+        {"test": "computes", "fast": False, "cpu_s": 6.1, "clock_s": 7.0},
+        {"test": "waits", "fast": False, "cpu_s": 0.1, "clock_s": 61.0},
+    ]
+    (tmp_path / "seed-1").mkdir()
+    (tmp_path / "seed-1" / "daemon.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert known_to_be_slow(tmp_path / "seed-2" / "daemon.jsonl") == {"computes", "waits"}

@@ -1,0 +1,164 @@
+"""The choice of a fleet's effects: what is concealed is named with its rovers, wheels and dates, and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from synthetic_fleet import DRAG, GROUPS, WAVE, WEAR, drive, equations_of, on_both, term
+
+from regolithd.calibration.mismatch.fleet.choice.courses import Course
+from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetTerm, Units, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.search import places_of
+from regolithd.calibration.mismatch.fleet.choice.selection import Chooser, folds_of, relative_size, without
+from regolithd.calibration.mismatch.regression.residuals import active_rms
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+ROVER = (0, 1) * 5
+ENTRY = 8.0
+
+
+def equations(concealed: Mapping[int, Mapping[tuple[int, int], float]]) -> FleetEquations:
+    """Return two rovers with five recordings each, which take turns, and effects in some of them."""
+    return equations_of([drive(100 + n, concealed.get(n)) for n in range(10)], ROVER)
+
+
+def chooser(of: FleetEquations) -> Chooser:
+    """Return the choice with a fixed threshold."""
+    return Chooser(of, places_of(of), ENTRY)
+
+
+def told(terms: Sequence[FleetTerm]) -> list[tuple[object, ...]]:
+    """Return name, rovers, wheels and course of terms."""
+    return sorted((t.name, t.units.kind, t.units.rovers, t.units.wheels, t.course.kind, t.course.first) for t in terms)
+
+
+def test_nothing_is_named_where_nothing_is_concealed() -> None:
+    """Noise gains less than is asked for."""
+    assert chooser(equations({})).chosen().terms == ()
+
+
+def test_effects_have_their_rovers_wheels_and_dates() -> None:
+    """One of the fleet, one of a rover since a date, and the wear of one wheel."""
+    of_all = dict(on_both(3, 0.1))
+    both = {n: of_all | (on_both(1, 0.12) if n in {4, 6, 8} else {}) for n in range(10)}
+    worn = {n: both[n] | ({(2, 1): 0.15} if n in {5, 7, 9} else {}) for n in range(10)}
+    assert told(chooser(equations(worn)).chosen().terms) == [
+        ("steady-drag", "rover", (0,), (0, 1), "since", 4),
+        ("wave", "fleet", (0, 1), (0, 1), "always", 0),
+        ("wear", "one", (1,), (1,), "since", 5),
+    ]
+
+
+def test_a_size_of_each_rover_s_own_is_told_from_one_size() -> None:
+    """Where rovers differ by more than the noise, each has its own."""
+    of = equations({n: on_both(1, 0.2 if n % 2 else 0.3) for n in range(10)})
+    (one,) = chooser(of).chosen().terms
+    assert (one.name, one.units.kind, one.course.kind) == ("steady-drag", "each rover", "always")
+
+
+def test_each_rover_must_show_an_effect_of_its_own_size() -> None:
+    """A size that is nothing beside its error is none, although the other rover's is large."""
+    of = equations({n: on_both(1, 0.3) for n in range(0, 10, 2)})
+    each = FleetTerm(DRAG, Units((0, 1), (0, 1), "each rover"), Course("always"))
+    assert not chooser(of).acceptable(of.fit((each,)))
+    assert chooser(of).acceptable(of.fit((term(DRAG, Course("always")),)))
+
+
+def test_an_effect_too_small_to_matter_is_not_acceptable() -> None:
+    """Below a fiftieth of the mean reading, however certain it is."""
+    concealed = {n: on_both(1, 0.1) for n in range(10)}
+    drives = [drive(100 + n, concealed[n]) for n in range(10)]
+    for mean_size, acceptable in ((4.0, True), (6.0, False)):
+        of = fleet_equations([each.sums(mean_size) for each in drives], ROVER, range(10), GROUPS, "rover")
+        fit = of.fit((term(DRAG, Course("always")),))
+        assert relative_size(of, fit, 0) == pytest.approx(0.1 / mean_size, rel=0.1)
+        assert chooser(of).acceptable(fit) == acceptable
+
+
+def test_an_effect_of_the_wrong_sign_is_not_acceptable() -> None:
+    """A drag does not push; each coefficient of a wave may have either sign."""
+    of = equations({n: {**on_both(1, -0.2), **on_both(3, -0.2), **on_both(4, 0.2)} for n in range(10)})
+    assert not chooser(of).acceptable(of.fit((term(DRAG, Course("always")),)))
+    assert chooser(of).acceptable(of.fit((term(WAVE, Course("always")),)))
+
+
+def test_the_size_is_the_root_mean_square_while_the_effect_acts() -> None:
+    """Of one column, computed from the readings; of several, their root mean square."""
+    drives = [drive(n, on_both(1, 0.2)) for n in range(4)]
+    of = fleet_equations([each.sums(mean_size=2.0) for each in drives], (0,) * 4, range(4), GROUPS, "rover")
+    fit = of.fit((term(DRAG, Course("since", 1), wheels=(1,)), term(WAVE, Course("always"))))
+    size = fit.coefficients[fit.spans[0]][0]
+    acting = size * np.concatenate([drives[i].columns[1, :, 1] for i in (1, 2, 3)])
+    assert relative_size(of, fit, 0) == pytest.approx(active_rms(acting**2, 0.4) / 2.0)
+    sine, cosine = fit.coefficients[fit.spans[1]]
+    waves = np.array([sine * each.columns[3] + cosine * each.columns[4] for each in drives])
+    assert relative_size(of, fit, 1) == pytest.approx(np.sqrt(np.mean(waves**2)) / 2.0)
+
+
+def test_an_intermittent_effect_counts_as_large_as_it_is_while_it_acts() -> None:
+    """At least two fifths of its root mean square there."""
+    quiet = drive(3)
+    columns = quiet.columns.copy()
+    columns[1, 6:] = 0.0
+    rare = replace(quiet, columns=columns, residual=quiet.residual + columns[1])
+    of = fleet_equations([rare.sums()], (0,), (0.0,), GROUPS, "rover")
+    fit = of.fit((term(DRAG, Course("always")),))
+    acting = fit.coefficients[fit.spans[0]][0] * columns[1]
+    assert relative_size(of, fit, 0) == pytest.approx(active_rms(acting.ravel() ** 2, 0.4))
+    assert relative_size(of, fit, 0) > 1.5 * np.sqrt(np.mean(acting**2))
+
+
+def test_an_effect_of_one_recording_is_not_confirmed_by_the_others() -> None:
+    """What gains enough only through one of five recordings is none of the rover."""
+    of = equations({2: on_both(1, 1.0), **{n: on_both(4, 0.1) for n in range(0, 10, 2)}})
+    of_one, of_all = term(DRAG, Course("always")), term(WAVE, Course("always"))
+    found = chooser(of)._confirmed(of.fit((of_one, of_all)))
+    assert found.terms == (of_all,)
+    assert found.delta_chi2 == pytest.approx(of.fit((of_all,)).delta_chi2)
+
+
+def test_two_recordings_cannot_confirm_an_effect_and_three_can() -> None:
+    """Of two, either would have to be predicted by the other alone."""
+    for count, kept in ((2, 1), (3, 0)):
+        concealed: list[dict[tuple[int, int], float]] = [{}] * (count - 1) + [on_both(1, 1.0)]
+        of = equations_of([drive(n, each) for n, each in enumerate(concealed)], (0,) * count)
+        assert len(chooser(of)._confirmed(of.fit((term(DRAG, Course("always")),))).terms) == kept
+
+
+def test_an_effect_is_searched_anew_beside_a_later_one() -> None:
+    """One that was taken for the fleet's belongs to the rover that has it, once that fits better."""
+    of = equations({n: on_both(1, 0.3) for n in range(0, 10, 2)})
+    taken = of.fit((term(DRAG, Course("always"), rovers=(0, 1)),))
+    assert told(chooser(of)._searched_anew(taken).terms) == [("steady-drag", "rover", (0,), (0, 1), "always", 0)]
+
+
+def test_what_cannot_be_improved_stays() -> None:
+    """Only a better score replaces an effect."""
+    of = equations({n: on_both(1, 0.3) for n in range(0, 10, 2)})
+    fit = of.fit((term(DRAG, Course("always")), term(WEAR, Course("since", 4), wheels=(0,))))
+    assert chooser(of)._searched_anew(of.fit(fit.terms[:1])).terms == fit.terms[:1]
+    assert without(fit, 0) == fit.terms[1:]
+    assert without(fit, 1) == fit.terms[:1]
+
+
+def test_a_further_effect_must_gain_a_share_of_the_others_on_its_rovers() -> None:
+    """A hundredth of a large effect's Δχ² may be the error of its law; effects of other rovers do not count."""
+    of = equations({n: {**on_both(1, 4.0), **on_both(3, 0.1)} if n % 2 == 0 else on_both(3, 0.1) for n in range(10)})
+    large = of.fit((term(DRAG, Course("always")),))
+    beside, elsewhere = (of.fit((*large.terms, term(WAVE, Course("always"), rovers=(n,)))) for n in (0, 1))
+    gained = beside.delta_chi2 - large.delta_chi2
+    assert 10 * ENTRY < gained < 0.01 * large.delta_chi2
+    assert not chooser(of)._worthwhile(large, beside)
+    assert chooser(of)._worthwhile(large, elsewhere)
+
+
+def test_every_fifth_recording_of_a_rover_is_in_the_same_fold() -> None:
+    """Each recording is in one fold."""
+    folds = folds_of(equations_of([drive(n) for n in range(7)], (0, 0, 0, 0, 0, 0, 1)))
+    assert [np.flatnonzero(fold).tolist() for fold in folds] == [[0, 5, 6], [1], [2], [3], [4]]
+    np.testing.assert_array_equal(np.sum(folds, axis=0), np.ones(7))
