@@ -5,13 +5,16 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, field
 
+LONGEST_S = 5.0
+"""A broker that is back is connected to within this time. An attempt costs milliseconds of CPU and a few packets."""
+
 
 @dataclass(slots=True)
 class Backoff:
     """Delays between attempts [s]: `first`, doubling up to `longest`, each shortened at random by up to a half."""
 
     first: float = 0.5
-    longest: float = 30.0
+    longest: float = LONGEST_S
     random: random.Random = field(default_factory=random.Random)
     attempts: int = 0
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import paho.mqtt.client as mqtt
-from chaos_observers import Sender
+from chaos_observers import Filler, Sender
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -150,18 +150,14 @@ def give_back(rig: Rig) -> None:
 
 
 def fill_disk(rig: Rig) -> None:
-    """Fill the disk of store and recordings to the last byte."""
-    with suppress(OSError), (rig.disk / "filler").open("wb", buffering=0) as file:
-        while True:
-            file.write(bytes(65536))
-    with suppress(OSError), (rig.disk / "filler").open("ab", buffering=0) as file:
-        while file.write(b"\0" * 512):
-            continue
+    """Begin to fill the disk of store and recordings, and keep it full."""
+    rig.filler = Filler(rig.disk / "filler")
 
 
 def empty_disk(rig: Rig) -> None:
     """Free the disk."""
-    (rig.disk / "filler").unlink()
+    assert rig.filler is not None
+    rig.filler.end()
 
 
 def set_clock(seconds: float) -> Callable[[Rig], None]:

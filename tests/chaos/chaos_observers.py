@@ -1,4 +1,4 @@
-"""Two observers that know nothing of the daemon: one of the CAN bus, one of the broker's messages."""
+"""Observers that know nothing of the daemon, of the CAN bus and the broker's messages; threads that disturb."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import struct
 import threading
 import time
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ from regolithd.drivers.devices.decoding.signals import Reading
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from paho.mqtt.client import MQTTMessage
 
@@ -193,3 +195,33 @@ class Sender:
         self._ended = True
         self._thread.join(5)
         self._socket.close()
+
+
+class Filler:
+    """Fills a disk from a thread, to the last byte, until `end`.
+
+    It takes at once what others free: the daemon deletes a file of its store that it cannot append to, up to 1 MB.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._fill, daemon=True)
+        self._fill_up()
+        self._thread.start()
+
+    def _fill_up(self) -> None:
+        for size in (65536, 512):
+            with suppress(OSError), self._path.open("ab", buffering=0) as file:
+                while file.write(bytes(size)):
+                    continue
+
+    def _fill(self) -> None:
+        while not self._ended.wait(0.02):
+            self._fill_up()
+
+    def end(self) -> None:
+        """Free the disk."""
+        self._ended.set()
+        self._thread.join(5)
+        self._path.unlink()

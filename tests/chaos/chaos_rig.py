@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import paho.mqtt.client as mqtt
-    from chaos_observers import Sender, Snapshot
+    from chaos_observers import Filler, Sender, Snapshot
 
 RATE_HZ = 10.0
 NORMAL_SNAPSHOTS = 10
@@ -50,6 +50,7 @@ class Rig:
     sigterm_s: list[float] = field(default_factory=list)
     crowd: list[socket.socket] = field(default_factory=list)
     sender: Sender | None = None
+    filler: Filler | None = None
     intruder: mqtt.Client | None = None
     client: socket.socket | None = None
     sent: int = 0

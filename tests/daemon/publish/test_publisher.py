@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
@@ -15,7 +16,7 @@ from subscriber import Subscriber, assert_complete, listening, until
 
 from regolithd.daemon.config.configuration import Configuration, Mqtt
 from regolithd.daemon.messages.bus import EventMessage, NodeMessage
-from regolithd.daemon.publish.backoff import Backoff
+from regolithd.daemon.publish.backoff import LONGEST_S, Backoff
 from regolithd.daemon.publish.publisher import Publisher
 from regolithd.daemon.publish.stores import Stores
 from regolithd.daemon.wiring import open_stores
@@ -321,6 +322,22 @@ def test_waiting_doubles_is_bounded_and_differs_from_rover_to_rover() -> None:
     assert delays != [Backoff(first=1.0, longest=20.0).next() for _ in range(8)]
     backoff.reset()
     assert backoff.next() <= 1.0
+
+
+async def test_a_broker_that_was_away_for_long_is_connected_to_within_seconds(
+    mosquitto: Mosquitto, tmp_path: Path
+) -> None:
+    """After any number of failed attempts the next one comes within `LONGEST_S`."""
+    settings = configuration(tmp_path, mosquitto.port)
+    mosquitto.stop()
+    publisher = Publisher(settings, Stores.open(tmp_path, 10_000_000))
+    publisher._backoff.attempts = 1000  # as after an outage of an hour
+    async with running(publisher):
+        await until(lambda: bool(publisher.problem))
+        await asyncio.to_thread(mosquitto.start)
+        begun = time.monotonic()
+        await until(lambda: publisher.connected)
+    assert time.monotonic() - begun < LONGEST_S + 1.0
 
 
 async def test_a_pause_ends_with_its_time() -> None:
