@@ -64,7 +64,7 @@ _ONCE, _ACKNOWLEDGED = QoS.AT_MOST_ONCE, QoS.AT_LEAST_ONCE
 CHANNELS = (
     Channel("state", "state", StateMessage, _ACKNOWLEDGED, True, False, "at the start and end of each connection"),
     Channel("snapshot", "snapshot", SnapshotMessage, _ACKNOWLEDGED, False, True, "at each SYNC, in order"),
-    Channel("wheel", "wheel/{wheel}", WheelMessage, _ONCE, False, False, "at each SYNC, while connected"),
+    Channel("wheel", "wheel/{wheel}", WheelMessage, _ONCE, False, False, "up to 20 times a second, while connected"),
     Channel("posterior", "posterior", PosteriorMessage, _ACKNOWLEDGED, False, True, "twice a second while wheels turn"),
     Channel("odometry", "odometry", OdometryMessage, _ACKNOWLEDGED, False, True, "twice a second while wheels turn"),
     Channel("node", "node/{node_id}", NodeMessage, _ACKNOWLEDGED, True, True, "when the node's state changes"),

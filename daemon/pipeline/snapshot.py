@@ -160,6 +160,11 @@ class Estimate:
     posterior: Posterior | None = None
     soil_change: SoilChange | None = None
 
-    def outside_inputs(self, wheel: int) -> tuple[str, ...]:
-        """Return the names of the inputs of one wheel (0–5) that lie outside the training range."""
-        return tuple(name for name, out in zip(self.input_names, self.outside[:, wheel], strict=True) if out)
+    @property
+    def outside_inputs(self) -> list[tuple[str, ...]]:
+        """The names of the inputs that lie outside the training range, for each wheel."""
+        if not np.logical_or.reduce(self.outside, axis=None):  # several times as fast as `any`
+            return [()] * WHEELS
+        return [
+            tuple(name for name, out in zip(self.input_names, column, strict=True) if out) for column in self.outside.T
+        ]

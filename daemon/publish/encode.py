@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from pydantic_core import to_json
 
 from regolithd.daemon.messages.header import SCHEMA_VERSION, time_fields
@@ -46,9 +45,6 @@ def _integers(numbers: Array) -> list[int | None]:
 def _per_wheel(estimate: Estimate) -> dict[str, Sequence[Any]]:
     """Return the fields that have one value for each wheel, name → six values."""
     snapshot = estimate.snapshot
-    outside: list[tuple[str, ...]] = [()] * WHEELS
-    if np.logical_or.reduce(estimate.outside, axis=None):
-        outside = [estimate.outside_inputs(wheel) for wheel in range(WHEELS)]
     return {
         "measured": snapshot.valid.tolist(),
         "valid": estimate.valid.tolist(),
@@ -63,7 +59,7 @@ def _per_wheel(estimate: Estimate) -> dict[str, Sequence[Any]]:
         "slip_source": [source.value for source in estimate.slip_source],
         "cohesion_Pa": estimate.cohesion_Pa.tolist(),
         "friction_angle_rad": estimate.friction_angle_rad.tolist(),
-        "outside_training_range": outside,
+        "outside_training_range": estimate.outside_inputs,
     }
 
 
@@ -78,13 +74,13 @@ def _header(estimate: Estimate, session: str) -> dict[str, Any]:
     }
 
 
-def encode(estimate: Estimate, session: str) -> tuple[bytes, list[bytes]]:
-    """Return the `snapshot` message of an estimate, and its six `wheel/…` messages, wheel 1 first."""
+def encode(estimate: Estimate, session: str, *, with_wheels: bool = True) -> tuple[bytes, list[bytes]]:
+    """Return the `snapshot` message of an estimate, and its six `wheel/…` messages, wheel 1 first, or none."""
     header = _header(estimate, session)
     six = _per_wheel(estimate)
     body = {quantity.name: float(estimate.snapshot.values[ROW[quantity], 0]) for quantity in BODY_QUANTITIES}
     wheels = [
         write(header | {"wheel": wheel + 1} | {name: values[wheel] for name, values in six.items()})
-        for wheel in range(WHEELS)
+        for wheel in range(WHEELS if with_wheels else 0)
     ]
     return write(header | body | six), wheels

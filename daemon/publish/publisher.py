@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import secrets
 import time
 from collections import Counter
@@ -49,6 +50,9 @@ With the time to stop the drives before it, and two `DEATH_TIMEOUT_S` after it, 
 
 STABLE_CONNECTION_S = 5.0
 """A shorter connection counts as a failed attempt: a broker disconnects a second client with the same identifier."""
+
+LIVE_RATE_Hz = 20.0
+"""The `wheel/…` messages are for displays: a display that wants every SYNC reads `snapshot`, which has all wheels."""
 
 DISK_SYNC_PERIOD_S = 1.0
 """Messages that have waited for this long are synced to the disk."""
@@ -97,6 +101,7 @@ class Publisher:
         self._settings = configuration.mqtt
         self._root = f"{configuration.mqtt.prefix}/{configuration.rover.name}"
         self._stores = stores
+        self._syncs_per_live = math.ceil(configuration.sync.rate_Hz / LIVE_RATE_Hz)
         self._snapshots, self._others = (Outbox(store) for store in stores.both)
         self._backoff = backoff or Backoff()
         self._beat = beat
@@ -144,10 +149,11 @@ class Publisher:
         )
 
     def estimate(self, estimate: Estimate) -> None:
-        """Publish the estimate of one SYNC: `snapshot` stored, and the six `wheel/…` live."""
-        snapshot, wheels = encode(estimate, self.session)
+        """Publish the estimate of one SYNC: `snapshot` stored, and the six `wheel/…` live, at most `LIVE_RATE_Hz`."""
+        live = self.connected and estimate.snapshot.sequence % self._syncs_per_live == 0
+        snapshot, wheels = encode(estimate, self.session, with_wheels=live)
         self._snapshots.store("snapshot", snapshot)
-        if self.connected:
+        if live:
             self._others.add_live({f"wheel/{k + 1}": payload for k, payload in enumerate(wheels)})
 
     def publish(self, topic: str, message: type[Header], *, time_ns: int | None = None, **fields: Any) -> None:  # noqa: ANN401  # the model checks them

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,9 +31,10 @@ _RENAMED = {"belief": "posterior", "outside": "outside_training_range"}
 _BODY = {quantity.name for quantity in QUANTITIES if not quantity.per_wheel}
 
 
-def six(name: str) -> list[str]:
+@cache
+def six(name: str) -> tuple[str, ...]:
     """Return the names of a quantity's values of wheels 1 to 6."""
-    return [f"{name}_{wheel}" for wheel in range(1, WHEELS + 1)]
+    return tuple(f"{name}_{wheel}" for wheel in range(1, WHEELS + 1))
 
 
 def _write(content: dict[str, Any]) -> bytes:
@@ -58,7 +60,7 @@ def snapshot_json(snapshot: Snapshot) -> bytes:
 def snapshot_from_json(content: dict[str, Any]) -> Snapshot:
     """Return the snapshot that `snapshot_json`, of this version or an earlier one, wrote."""
     content = as_written_today(content)
-    names = [six(each.name) if each.per_wheel else [each.name] * WHEELS for each in QUANTITIES]
+    names = [six(each.name) if each.per_wheel else (each.name,) * WHEELS for each in QUANTITIES]
     values = np.array([[content.get(name) for name in row] for row in names], dtype=np.float64)
     values.flags.writeable = False
     return Snapshot(content["sequence"], content["time_ns"], values)
@@ -72,7 +74,7 @@ def estimate_json(estimate: Estimate) -> bytes:
         "model_version": estimate.model_version,
         **dict(zip(six("slip_source"), estimate.slip_source, strict=True)),
         **dict(zip(six("valid"), estimate.valid.tolist(), strict=True)),
-        **_joined("outside_training_range", [estimate.outside_inputs(wheel) for wheel in range(WHEELS)]),
+        **_joined("outside_training_range", estimate.outside_inputs),
     }
     for name in ESTIMATED:
         content |= _measured(name, getattr(estimate, name).tolist())

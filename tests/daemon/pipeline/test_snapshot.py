@@ -103,4 +103,4 @@ def test_every_count_of_readings_begins_at_zero() -> None:
 def test_the_inputs_outside_the_training_range_are_named_for_each_wheel() -> None:
     """The names are in the order of the network's inputs."""
     made = estimate(Snapshot(0, 0, VALUES))
-    assert [made.outside_inputs(wheel) for wheel in range(WHEELS)] == [(), (), ("slip",), (), (), ()]
+    assert made.outside_inputs == [(), (), ("slip",), (), (), ()]

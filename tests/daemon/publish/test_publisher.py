@@ -324,6 +324,20 @@ def test_waiting_doubles_is_bounded_and_differs_from_rover_to_rover() -> None:
     assert backoff.next() <= 1.0
 
 
+async def test_wheels_are_published_at_a_limited_rate(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """At 100 Hz one SYNC in five has `wheel/…` messages; every one has a snapshot."""
+    rate = {"sync": {"rate_Hz": 100.0}, "mqtt": configuration(tmp_path, mosquitto.port).mqtt}
+    publisher = Publisher(Configuration.model_validate(rate), Stores.open(tmp_path, 10_000_000))
+    async with listening(Subscriber(mosquitto.port)) as subscriber, running(publisher):
+        await until(lambda: publisher.connected)
+        for sequence in range(21):
+            publisher.estimate(estimate(sequence))
+            await until(lambda: publisher.report.queued == 0)
+        await until(lambda: bool(subscriber.of("wheel/6")) and subscriber.of("wheel/6")[-1]["sequence"] == 20)
+    assert [each["sequence"] for each in subscriber.of("wheel/6")] == [0, 5, 10, 15, 20]
+    assert len(subscriber.of("snapshot")) == 21
+
+
 async def test_a_broker_that_was_away_for_long_is_connected_to_within_seconds(
     mosquitto: Mosquitto, tmp_path: Path
 ) -> None:
