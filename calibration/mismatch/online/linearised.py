@@ -1,0 +1,154 @@
+"""The simulation where the beginning of a recording linearises it: residual, tangents and laws of any later piece."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.calibration import linearised_where_it_fits
+from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, with_changes
+from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.online.laws import Law, allowed, law_columns, laws_of, wheel_sets_of
+from regolithd.calibration.mismatch.online.pieces import together
+from regolithd.calibration.mismatch.online.scores import Search
+from regolithd.calibration.mismatch.online.sums import Interval
+from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.regression.nuisance import tangents
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from regolithd.calibration.mismatch.changes import Stated
+    from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.online.pieces import Piece
+    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.simulation.simulation import Simulation
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """What the beginning of a recording has fixed for the rest of it.
+
+    Attributes
+    ----------
+    simulation: of one channel
+    values: the parameters' values where it is linearised
+    wheels: names
+    laws: that are searched for
+    sets: of wheels, by indices
+    search: what may be where
+    left_out: names of candidates that are not searched for
+    """
+
+    simulation: Simulation
+    stated: tuple[Stated, ...]
+    values: Mapping[str, float]
+    wheels: tuple[int | str, ...]
+    laws: tuple[Law, ...]
+    sets: tuple[tuple[int, ...], ...]
+    search: Search
+    left_out: tuple[str, ...]
+
+    def interval(self, piece: Piece, before: Piece | None) -> Interval:
+        """Return what is compared in a piece; the rows of the piece before it lead up to it.
+
+        Raises
+        ------
+        RecordingError
+            When too little of it can be compared.
+        """
+        pieces = [each for each in (before, piece) if each is not None]
+        recording, elapsed = together(pieces, self.wheels)
+        return self._of(self.pose(recording), elapsed, piece.start_s, piece.end_s)
+
+    def intervals(self, problem: Problem, elapsed: Array, pieces: Sequence[Piece]) -> list[Interval]:
+        """Return what is compared in each of the pieces that a problem was posed of together."""
+        return [self._of(problem, elapsed, piece.start_s, piece.end_s) for piece in pieces]
+
+    def pose(self, recording: Recording) -> Problem:
+        """Return the problem at the values, with the covariates that are constant in this piece."""
+        return _posed(recording, self.simulation, self.values, self.stated)
+
+    def _of(self, problem: Problem, elapsed: Array, start_s: float, end_s: float) -> Interval:
+        here = (elapsed >= start_s) & (elapsed < end_s)
+        mask = problem.mask & here[:, None]
+        names, _, beside = tangents(problem)
+        parameters = self.simulation.parameters
+        residual = problem.measured - problem.filled
+        for name, column in zip(names, beside, strict=True):
+            if name in parameters:  # measured from the stated values, where the priors are centred
+                residual = residual + (self.values[name] - parameters[name].value) * column
+        columns = np.concatenate((np.stack(np.broadcast_arrays(*beside, mask)[:-1]), law_columns(problem, self.laws)))
+        return Interval(
+            start_s,
+            end_s,
+            columns=np.where(mask, columns, 0.0)[:, here],
+            residual=np.where(mask, residual, 0.0)[here],
+            mask=mask[here],
+            size=float(np.sum(np.abs(problem.measured[mask]))),
+        )
+
+
+def _posed(
+    recording: Recording, simulation: Simulation, values: Mapping[str, float] | None, stated: Sequence[Stated]
+) -> Problem:
+    problem = corrected_problem(build_problem(recording, simulation, values), stated)
+    return replace(problem, covariates={**problem.constants, **problem.covariates}, constants={})
+
+
+def learned(pieces: Sequence[Piece], simulation: Simulation) -> tuple[Linearised, list[Interval]]:
+    """Linearise a simulation of one channel on the first pieces; return it with their intervals.
+
+    Raises
+    ------
+    RecordingError
+        When too little of them can be compared.
+    SimulationError
+        When the simulation depends on more than the rows just before, so that pieces cannot be compared one by one.
+    """
+    recording, elapsed = together(pieces)
+    candidates = tuple(each.form_for(simulation) for each in simulation.candidates(library()))
+    stated = stated_in(candidates, simulation.corrected_effects, simulation.stated_effects())
+    problem = linearised_where_it_fits(lambda values: _posed(recording, simulation, values, stated))
+    candidates = with_changes(problem, candidates, stated)
+    laws = laws_of(problem, candidates)
+    sets, wheels = wheel_sets_of(problem), problem.recording.wheels
+    at_start, later = allowed(laws, law_columns(problem, laws), sets, len(wheels))
+    _, stds, _ = tangents(problem)
+    search = Search(
+        precision=1 / np.array(stds) ** 2,
+        member=np.array([[float(w in chosen) for w in range(len(wheels))] for chosen in sets]),
+        at_start=at_start,
+        later=later,
+        signs=np.array([law.sign for law in laws], np.float64),
+        least_tolerance=problem.thresholds.least_tolerance,
+        smallest_effect=problem.thresholds.smallest_effect,
+    )
+    names = dict.fromkeys(law.name for law in laws)
+    left_out = tuple(dict.fromkeys(each.name for each in candidates if each.name not in names))
+    found = Linearised(simulation, stated, problem.values, wheels, laws, sets, search, left_out)
+    _check_memory(found, problem, pieces)
+    return found, found.intervals(problem, elapsed, pieces)
+
+
+def _check_memory(found: Linearised, problem: Problem, pieces: Sequence[Piece]) -> None:
+    """Compare the last piece as posed with all before it, and with one piece before it alone."""
+    recording, elapsed = together(pieces[-2:], found.wheels)
+    short = found.pose(recording)
+    here = elapsed >= pieces[-1].start_s
+    whole, alone = problem.filled[-len(elapsed) :][here], short.filled[here]
+    both = (problem.mask[-len(elapsed) :] & short.mask)[here]
+    apart = float(np.sqrt(np.mean((whole - alone)[both] ** 2))) if both.any() else 0.0
+    residual = float(np.sqrt(np.mean((problem.measured - problem.filled)[problem.mask] ** 2)))
+    if apart > problem.thresholds.carried_share * residual:
+        raise SimulationError(
+            f"the prediction of the last {pieces[-1].end_s - pieces[-1].start_s:.0f} s depends on what was long before "
+            f"(by {apart / residual:.2f} of the residual): a simulation that carries its state so far cannot be "
+            "followed piece by piece. Compare the whole recording with `regolithd mismatch` when it has ended."
+        )

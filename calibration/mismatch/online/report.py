@@ -1,0 +1,157 @@
+"""What the sequential test reports after an interval: what has begun, where, since when, how large, and how sure."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from regolithd.calibration.mismatch.inference.findings import NINETY_PERCENT_STDS
+from regolithd.calibration.mismatch.inference.statements import wheels_in_words
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from regolithd.calibration.mismatch.online.linearised import Linearised
+    from regolithd.calibration.mismatch.online.scores import Place, Scores
+
+WHOLE_DECIDES = "Sequential test while the recording grows; the comparison of the whole recording decides"
+"""Ends each statement: names need the whole recording."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """What explains a change nearly as well."""
+
+    name: str
+    wheels: tuple[int | str, ...]
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change that was reported.
+
+    Attributes
+    ----------
+    onset_s: when it began; None: it was there from the start
+    onset_low_s, onset_high_s: 90 % interval of that
+    size, low, high: of the law's coefficient, with a 90 % interval, in `unit`
+    statistic: Δχ²
+    first_reported_s: when it was reported first
+    rivals: other names or wheels that explain it nearly as well
+    """
+
+    name: str
+    wheels: tuple[int | str, ...]
+    onset_s: float | None
+    onset_low_s: float | None
+    onset_high_s: float | None
+    parameter: str
+    size: float
+    low: float
+    high: float
+    unit: str
+    statistic: float
+    first_reported_s: float
+    rivals: tuple[Rival, ...]
+    statement: str
+
+
+@dataclass(frozen=True)
+class Report:
+    """What is known after an interval.
+
+    Attributes
+    ----------
+    time_s: its end, from the recording's start
+    learning: whether the first intervals are still being collected
+    compared_intervals: how many have been compared
+    not_compared: why this one was not; empty: it was
+    leading: the largest Δχ² of what is not reported, to be held against `alarm`
+    left_out: candidates that are not looked for: the beginning of the recording did not show what they depend on, or
+        they need the whole recording
+    """
+
+    time_s: float
+    learning: bool
+    compared_intervals: int
+    not_compared: str
+    leading: float
+    alarm: float
+    changes: tuple[Change, ...]
+    left_out: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return a JSON object."""
+        return asdict(self)
+
+
+def change_of(found: Linearised, place: Place, beside: Scores, at_s: float, interval_s: float) -> Change:
+    """Return a reported change in words and numbers; `beside` are the scores beside the other changes."""
+    law = found.laws[place.law]
+    segment, chosen, k = at = beside.at(place)
+    statistic, size = float(beside.statistic[at]), float(beside.size[at])
+    reach = NINETY_PERCENT_STDS * float(beside.std[at])
+    near = beside.statistic[:, chosen, k] > statistic - THRESHOLDS.onset_fall
+    low_s, high_s = _interval(beside.starts_s, near, segment, interval_s)
+    begun = segment > 0
+    change = Change(
+        name=law.name,
+        wheels=_names(found, place.wheels),
+        onset_s=place.onset_s if begun else None,
+        onset_low_s=low_s if begun else None,
+        onset_high_s=high_s if begun else None,
+        parameter=law.parameter,
+        size=size,
+        low=size - reach,
+        high=size + reach,
+        unit=law.unit,
+        statistic=statistic,
+        first_reported_s=at_s,
+        rivals=_rivals(found, place, beside, statistic),
+        statement="",
+    )
+    return replace(change, statement=_statement(change, found, law.candidate.words))
+
+
+def _statement(change: Change, found: Linearised, words: str) -> str:
+    where = wheels_in_words(change.wheels, len(found.wheels), found.simulation.wheel_column)
+    since = (
+        f"since {change.onset_s:.0f} s (90 % sure: {change.onset_low_s:.0f} to {change.onset_high_s:.0f} s)"
+        if change.onset_s is not None
+        else "from the start"
+    )
+    names = ", ".join(dict.fromkeys(rival.name for rival in change.rivals if rival.name != change.name))
+    return (
+        f"{words[:1].upper()}{words[1:]}, on {where}, {since}: {change.size:.3g} {change.unit} "
+        f"(90 % sure: {change.low:.3g} to {change.high:.3g})"
+        f"{f'; or {names}, which explains it nearly as well' if names else ''}. {WHOLE_DECIDES}."
+    )
+
+
+def _names(found: Linearised, wheels: int) -> tuple[int | str, ...]:
+    return tuple(found.wheels[w] for w in found.sets[wheels])
+
+
+def _interval(
+    starts_s: NDArray[np.float64], near: NDArray[np.bool_], at: int, interval_s: float
+) -> tuple[float, float]:
+    """Return the onsets about the best that are nearly as good, with what the resolution leaves open on both sides."""
+    low = high = at
+    while low > 0 and near[low - 1]:
+        low -= 1
+    while high + 1 < len(near) and near[high + 1]:
+        high += 1
+    before = float(starts_s[low - 1]) if low > 0 else float(starts_s[0])
+    after = float(starts_s[high + 1]) if high + 1 < len(starts_s) else float(starts_s[high]) + interval_s
+    return before, after
+
+
+def _rivals(found: Linearised, place: Place, beside: Scores, statistic: float) -> tuple[Rival, ...]:
+    """Return the other laws and sets of wheels whose best onset is within the margin of chance."""
+    best = beside.statistic.max(axis=0)
+    near = np.argwhere(best > statistic - THRESHOLDS.lead_margin)
+    order = sorted(near.tolist(), key=lambda pair: -best[tuple(pair)])
+    return tuple(Rival(found.laws[k].name, _names(found, s)) for s, k in order if (s, k) != (place.wheels, place.law))

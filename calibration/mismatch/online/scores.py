@@ -1,0 +1,161 @@
+"""The generalised likelihood ratio of every law, on every set of wheels, from every onset on.
+
+The simulation's parameters and the changes that were reported are fitted together with each. With A the information of
+a column from its onset on, X its products with what is fitted beside it, N the information of that and β its estimate,
+
+    u = a − X β,   J = A − Xᵀ N⁻¹ X,   θ = u / J,   Δχ² = u² / J,
+
+each weighted by one over the long-run variance of the noise, as in the comparison of a whole recording.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.online.sums import Suffixes
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A law on a set of wheels from a time on: indices of law and set, and the onset [s]."""
+
+    law: int
+    wheels: int
+    onset_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What may be where: fixed when the beginning of the recording has been learned.
+
+    Attributes
+    ----------
+    precision: one over the prior variance of each tangent's coefficient, shape (tangent,)
+    member: whether a wheel is in a set, shape (set, wheel)
+    at_start, later: whether a law may act from the start, and begin later, on a set, shape (set, law) each
+    signs: of the laws' coefficients, 0 for either, shape (law,)
+    least_tolerance: share of a column's information that has to be left beside the others
+    smallest_effect: least root mean square of a change, over the channel's mean magnitude
+    """
+
+    precision: Array
+    member: Array
+    at_start: NDArray[np.bool_]
+    later: NDArray[np.bool_]
+    signs: Array
+    least_tolerance: float
+    smallest_effect: float
+
+
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """Δχ² and size of each law on each set from each segment's start on, shape (segment, set, law).
+
+    Attributes
+    ----------
+    statistic: Δχ²; 0 where a law may not be, has the wrong sign or is too small
+    size, std: of the coefficient
+    fitted: coefficients of the tangents and of the places beside which it was fitted, shape (coefficient,)
+    """
+
+    starts_s: Array
+    statistic: Array
+    size: Array
+    std: Array
+    fitted: Array
+
+    def best(self) -> Place:
+        """Return where the statistic is largest."""
+        segment, wheels, law = np.unravel_index(int(np.argmax(self.statistic)), self.statistic.shape)
+        return Place(int(law), int(wheels), float(self.starts_s[segment]))
+
+    def at(self, place: Place) -> tuple[int, int, int]:
+        """Return the indices of a place."""
+        return int(np.flatnonzero(self.starts_s == place.onset_s)[0]), place.wheels, place.law
+
+
+def scores(sums: Suffixes, weights: Array, search: Search, beside: Sequence[Place]) -> Scores:
+    """Return the scores of every law beside the tangents and the places given; `weights` has shape (wheel,)."""
+    count = len(search.precision)
+    gram, moment = sums.gram * weights[:, None, None], sums.moment * weights[:, None]
+    fitted_beside = _beside(sums.starts_s, gram, moment, search, beside)
+    inverse = _inverse(fitted_beside.information)
+    fitted = inverse @ fitted_beside.target
+    own = np.einsum("sw,ewkk->esk", search.member, gram[:, :, count:, count:])
+    together = np.einsum("sw,ewkp->eskp", search.member, fitted_beside.products)
+    left = own - np.einsum("eskp,eskp->esk", together @ inverse, together)
+    known = left > search.least_tolerance * np.maximum(own, 1e-300)
+    left = np.where(known, left, np.inf)
+    rough = np.einsum("sw,ewk->esk", search.member, moment[:, :, count:])
+    size = (rough - together @ fitted) / left
+    statistic = size**2 * np.where(known, left, 0.0)
+    counted = _may_be(search, len(gram)) & (size * search.signs >= 0) & _visible(sums, search, size)
+    return Scores(sums.starts_s, np.where(counted, statistic, 0.0), size, 1 / np.sqrt(left), fitted)
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """What is fitted beside every law: tangents, then places.
+
+    Attributes
+    ----------
+    information: with the priors, shape (coefficient, coefficient)
+    target: products with the residual, shape (coefficient,)
+    products: with the laws, from each segment's start on, shape (segment, wheel, law, coefficient)
+    """
+
+    information: Array
+    target: Array
+    products: Array
+
+
+def _beside(starts_s: Array, gram: Array, moment: Array, search: Search, places: Sequence[Place]) -> _Beside:
+    count = len(search.precision)
+    columns = [count + place.law for place in places]
+    at = [int(np.flatnonzero(starts_s == place.onset_s)[0]) for place in places]
+    on = [search.member[place.wheels] for place in places]
+    information = np.zeros((count + len(places),) * 2)
+    information[:count, :count] = gram[0].sum(axis=0)[:count, :count] + np.diag(search.precision)
+    for i, column in enumerate(columns):
+        information[count + i, :count] = information[:count, count + i] = on[i] @ gram[at[i]][:, column, :count]
+        for j, other in enumerate(columns):
+            both = gram[max(at[i], at[j])]  # two laws are there together from the later onset on
+            information[count + i, count + j] = (on[i] * on[j]) @ both[:, column, other]
+    with_places = [on[i] @ moment[at[i]][:, column] for i, column in enumerate(columns)]
+    later = [np.maximum(np.arange(len(gram)), first) for first in at]
+    products = [gram[later[i]][:, :, count:, column] * on[i][:, None] for i, column in enumerate(columns)]
+    return _Beside(
+        information,
+        np.array([*moment[0].sum(axis=0)[:count], *with_places]),
+        np.concatenate((gram[:, :, count:, :count], *(each[..., None] for each in products)), axis=-1),
+    )
+
+
+def _may_be(search: Search, segments: int) -> NDArray[np.bool_]:
+    """Return which law may be on which set from each segment on, shape (segment, set, law)."""
+    later = np.broadcast_to(search.later, (segments - 1, *search.later.shape))
+    return np.concatenate((search.at_start[None], later))
+
+
+def _visible(sums: Suffixes, search: Search, size: Array) -> NDArray[np.bool_]:
+    """Return where a law is large enough, while it acts, to be worth a report."""
+    laws = slice(len(search.precision), None)
+    acting = np.einsum("sw,ewk->esk", search.member, sums.acting[:, :, laws])
+    power = np.einsum("sw,ewkk->esk", search.member, sums.gram[:, :, laws, laws]) / np.maximum(acting, 1.0)
+    return np.asarray(size**2 * power > (search.smallest_effect * sums.mean_size) ** 2)
+
+
+def _inverse(information: Array) -> Array:
+    """Return the inverse of a positive semidefinite matrix, with its diagonal scaled to 1 first."""
+    scale = np.sqrt(np.where(np.diag(information) > 0, np.diag(information), 1.0))
+    both = np.outer(scale, scale)
+    return np.asarray(np.linalg.pinv(information / both, 1e-10, hermitian=True)) / both

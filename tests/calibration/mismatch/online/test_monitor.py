@@ -1,0 +1,151 @@
+"""A change is reported while the recording grows, a sound recording stays silent, and what cannot be done is said."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from linear_machine import STEP_S, Drag, Level, table
+
+from regolithd.calibration.mismatch import SimulationError
+from regolithd.calibration.mismatch.online.channels import monitors_of
+from regolithd.calibration.mismatch.online.monitor import Monitor
+from regolithd.calibration.mismatch.online.pieces import Cutter
+from regolithd.calibration.mismatch.online.thresholds import ONLINE_THRESHOLDS, OnlineThresholds
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from regolithd.calibration.mismatch import Candidate
+    from regolithd.calibration.mismatch.online.report import Report
+
+    Columns = dict[str, NDArray[np.float64]]
+
+LIMITS = OnlineThresholds(alarm=20.0, interval_s=40.0, learning_intervals=3)
+ONSET_S = 200.0
+
+
+def recorded(*, offset: float = 0.0, seed: int = 0) -> Columns:
+    """Return 400 s of two axes; on axis 2 an offset begins half way."""
+    columns = table(seed=seed)
+    late = (columns["t_s"] >= ONSET_S) & (columns["axis"] == 2)
+    columns["reading_V"] = columns["reading_V"] + offset * late
+    del columns["run"]
+    return columns
+
+
+def followed(columns: Mapping[str, NDArray[np.float64]], simulation: Level | None = None) -> list[Report]:
+    """Return the reports of a recording, one for each piece."""
+    cutter, monitor = Cutter(LIMITS.interval_s, "axis"), Monitor(simulation or Level(), LIMITS)
+    return [monitor.add(piece) for part in (cutter.add(columns), cutter.rest()) for piece in part]
+
+
+def test_a_sound_recording_stays_silent() -> None:
+    """No report in ten recordings."""
+    assert not [report.changes for seed in range(10) for report in followed(recorded(seed=seed)) if report.changes]
+
+
+def test_a_change_is_reported_before_the_recording_ends() -> None:
+    """With its axis, its onset in the interval, and its size in the interval."""
+    reports = followed(recorded(offset=0.3))
+    first = next(report for report in reports if report.changes)
+    assert ONSET_S < first.time_s < 400.0
+    (change,) = reports[-1].changes
+    assert change.wheels == (2,)
+    assert change.name in {"step", "offset"}
+    assert change.onset_low_s is not None
+    assert change.onset_high_s is not None
+    assert change.onset_low_s <= ONSET_S <= change.onset_high_s
+    assert change.low < 0.3 < change.high
+    assert change.first_reported_s == first.time_s
+    assert "axis 2, since 200 s" in change.statement
+
+
+def test_the_first_pieces_are_learned_from() -> None:
+    """Nothing is decided before, and the report says so."""
+    reports = followed(recorded(offset=0.3))
+    assert [report.learning for report in reports[:4]] == [True, True, False, False]
+    assert reports[2].compared_intervals == 3
+
+
+class OnlyDrag(Level):
+    """The level, and no other law than a drag."""
+
+    def candidates(self, library: Sequence[Candidate]) -> Sequence[Candidate]:  # noqa: ARG002
+        """Return the drag."""
+        return (Drag(),)
+
+
+def test_a_change_that_does_not_last_is_withdrawn() -> None:
+    """A drag that lasts 40 s is reported, and not any longer after minutes without it."""
+    columns = recorded()
+    brief = (columns["t_s"] >= 160) & (columns["t_s"] < 200) & (columns["axis"] == 2)
+    columns["reading_V"] = columns["reading_V"] + 0.15 * brief * np.sign(columns["speed_rad_s"])
+    reports = followed(columns, OnlyDrag())
+    assert [change.name for change in reports[4].changes] == ["drag"]
+    assert not reports[-1].changes
+
+
+def test_a_gap_is_told_and_bridged() -> None:
+    """The pieces without rows are not compared, with the reason, and the change after them is found."""
+    columns = recorded(offset=0.4)
+    gap = (columns["t_s"] >= 160) & (columns["t_s"] < 240)
+    reports = followed({name: values[~gap] for name, values in columns.items()})
+    assert [report.not_compared for report in reports].count("nothing was recorded") == 2
+    assert reports[-1].changes[0].wheels == (2,)
+
+
+def test_a_missing_input_is_told() -> None:
+    """Pieces in which the speed is blank are not compared, and named."""
+    columns = recorded()
+    blank = (columns["t_s"] >= 240) & (columns["t_s"] < 360)
+    columns["speed_rad_s"] = np.where(blank, np.nan, columns["speed_rad_s"])
+    told = [report.not_compared for report in followed(columns)]
+    assert any("speed_rad_s" in text for text in told)
+    assert told[-1] == ""
+
+
+def test_the_report_is_json() -> None:
+    """With the leading statistic and its threshold."""
+    told = followed(recorded(offset=0.3))[-1].to_json()
+    assert told["alarm"] == LIMITS.alarm
+    assert told["changes"][0]["statistic"] > LIMITS.alarm
+
+
+class Integrated(Level):
+    """A simulation that adds up its input since the start."""
+
+    def predict(self, inputs: Mapping[str, NDArray[np.float64]], values: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return the level and the angle that was turned so far."""
+        return values["level"] + np.cumsum(np.abs(inputs["speed_rad_s"]), axis=0) * STEP_S
+
+
+def test_a_simulation_that_carries_its_state_far_is_refused() -> None:
+    """It says why, and what to do."""
+    with pytest.raises(SimulationError, match="Compare the whole recording with `regolithd mismatch`"):
+        followed(recorded(), Integrated())
+
+
+class TwoChannels(Level):
+    """The same reading twice."""
+
+    channels: Mapping[str, str] = {"reading_V": "V", "other_V": "V"}  # type: ignore[misc]
+
+
+def test_several_channels_have_a_monitor_each() -> None:
+    """With a threshold that keeps the rate of false reports over all of them."""
+    found = monitors_of(TwoChannels(), LIMITS)
+    assert list(found) == ["reading_V", "other_V"]
+    piece = next(Cutter(1.0, "axis").add(recorded()))
+    assert found["other_V"].add(piece).alarm == pytest.approx(LIMITS.alarm + 2 * np.log(2))
+
+
+def test_each_threshold_says_what_it_decides_and_how_it_was_found() -> None:
+    """In words, with the value in use."""
+    for row in ONLINE_THRESHOLDS.table():
+        assert len(row.meaning) > 20
+        assert len(row.found) > 20, row.name
+        assert row.value == getattr(ONLINE_THRESHOLDS, row.name)
