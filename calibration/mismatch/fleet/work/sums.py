@@ -114,7 +114,7 @@ def sums_of(
         tangents=columns.tangents,
         prior_stds=columns.prior_stds,
         places=columns.places,
-        penalties=np.array([implausibility(problem, candidates[name], shape) for name, shape in laws]),
+        penalties=_penalties(problem, [(candidates[name], shape) for name, shape in laws], columns.places),
         own=columns.own,
         gram=gram,
         moment=moment,
@@ -126,6 +126,12 @@ def sums_of(
         mean_size=problem.mean_size,
         wheel_sets=problem.wheel_sets,
     )
+
+
+def _penalties(problem: Problem, laws: Sequence[tuple[Candidate, Shape]], places: Sequence[tuple[int, ...]]) -> Array:
+    """Return the Δχ² that each law must gain for being hardly possible; 0 where it does not apply."""
+    found = [implausibility(problem, *law) if own else 0.0 for law, own in zip(laws, places, strict=True)]
+    return np.array(found)
 
 
 def forms_of(simulation: Simulation) -> tuple[Candidate, ...]:

@@ -1,0 +1,218 @@
+"""What is told of a fleet: effects with rovers and dates, parameters, sensitivities, and the catalogue's rows."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+from golden import assert_golden
+from sample_answer import CONSISTENT, NO_CHANGE, WORN
+from synthetic_fleet import DEVIATION, DRAG, GROUPS, WAVE, WEAR, drive, equations_of, on_both, term
+
+from regolithd.calibration.mismatch.answer import Unexplained
+from regolithd.calibration.mismatch.fleet.catalogue import catalogue_rows
+from regolithd.calibration.mismatch.fleet.choice.courses import Course
+from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, Units, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.search import penalty, places_of
+from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
+from regolithd.calibration.mismatch.fleet.told.findings import Chosen, Names, answer_of_fleet
+from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
+from regolithd.calibration.mismatch.problem.prior import Prior
+from regolithd.calibration.mismatch.problem.problem import LeftOut
+from regolithd.calibration.mismatch.simulation.simulation import Simulation
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from regolithd.calibration.mismatch.answer import Answer
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, Level
+
+GOLDEN = Path(__file__).parent / "golden"
+FIRST = datetime(2026, 3, 1, 8, 0, tzinfo=UTC)
+ROVER = (0, 1) * 4
+SILENT: Answer = replace(CONSISTENT, sensitivity=(), fit=NO_CHANGE, notes=())
+
+
+class Machine(Simulation):
+    """Two wheels whose current has a gain; a second parameter is known exactly."""
+
+    channel, unit = "current_A", "A"
+    parameters: ClassVar = {"gain": Prior(1.5, 0.2, "A/A"), "offset": Prior(0.1, 0.0, "A")}
+
+
+def found(answer: Answer = SILENT, *terms: FoundTerm) -> Found:
+    """Return what one recording was found to show."""
+    return Found(answer, {}, DEVIATION, 1.0, 8.0, terms, {})
+
+
+def chosen(
+    equations: FleetEquations, terms: Iterable[FleetTerm], of_recordings: Sequence[Found], *, dated: bool = True
+) -> Chosen:
+    """Return the choice of these terms among recordings a day apart."""
+    names = Names(
+        tuple(f"rover {number}" for number in range(int(equations.rover.max()) + 1)),
+        tuple(f"drive {number}" for number in range(equations.count)),
+        tuple(FIRST + timedelta(days=number) if dated else None for number in range(equations.count)),
+    )
+    chooser = Chooser(equations, places_of(equations), 8.0)
+    return Chosen(chooser, equations.fit(terms), names, tuple(of_recordings), Machine())
+
+
+def consistent(level: Level = "rover", rover: Sequence[int] = ROVER, *, dated: bool = True) -> Chosen:
+    """Return the choice of nothing among recordings of noise."""
+    return chosen(
+        equations_of([drive(n) for n in range(len(rover))], rover, level), (), [found()] * len(rover), dated=dated
+    )
+
+
+@pytest.fixture(scope="module")
+def season() -> Chosen:
+    """Return effects with a size for each rover, growing, and until a date; and findings of one recording alone."""
+    drives = []
+    for n, rover in enumerate(ROVER):
+        concealed = {**on_both(1, 0.2 + 0.1 * rover), (0, 0): 0.05, (0, 1): 0.05}
+        concealed |= {(2, 1): 0.1 * (n - 2) / 4} if rover == 0 and n > 2 else {}
+        concealed |= on_both(3, 0.1) | on_both(4, 0.2) if rover == 1 and n < 5 else {}
+        concealed |= {(2, 0): 0.3} if n == 3 else {}
+        drives.append(drive(n, concealed))
+    own = FoundTerm("bearing-drag", True, {}, (0,), 2.0, np.zeros((1, 1, 2), np.float32))
+    curve = FoundTerm("voltage", False, {}, (0, 1), 2.0, np.zeros((1, 1, 2), np.float32))
+    sums = [each.sums() for each in drives]
+    sums[3] = replace(sums[3], own=((2,), (2,)))
+    equations = fleet_equations(sums, ROVER, range(8), GROUPS, "rover")
+    rest = Unexplained("current_A", ("left",), "voltage", 0.0, 60.0, 0.2)
+    worn = replace(WORN, wheels=("left",), channel="current_A")
+    shown = replace(SILENT, verdict="missing-physics", effects=(worn,), unexplained=(rest,))
+    left_out = replace(
+        SILENT, left_out=(LeftOut("current_A", 7, "an outlier"),), notes=("Readings of one.", "It rained.")
+    )
+    of_recordings = [found(left_out), found(left_out), *[found()] * 6]
+    of_recordings[3] = found(shown, own, curve)
+    terms = (
+        FleetTerm(DRAG, Units((0, 1), (0, 1), "each rover"), Course("always")),
+        term(WEAR, Course("growing", 4), wheels=(1,)),
+        term(WAVE, Course("until", 5), rovers=(1,)),
+    )
+    return chosen(equations, terms, of_recordings)
+
+
+def rounded(value: object) -> object:
+    """Return JSON content with numbers of four digits."""
+    if isinstance(value, float):
+        return float(f"{value:.4g}")
+    if isinstance(value, dict):
+        return {key: rounded(each) for key, each in value.items()}
+    return [rounded(each) for each in value] if isinstance(value, list | tuple) else value
+
+
+def test_the_answer_of_a_season_is_the_reviewed_one(season: Chosen) -> None:
+    """Every sentence, number, date, parameter and note of it."""
+    told = json.dumps(rounded(answer_of_fleet(season).to_json()), indent=1, ensure_ascii=False)
+    assert_golden(told + "\n", GOLDEN / "answer.json")
+
+
+def test_the_catalogue_of_a_season_is_the_reviewed_one(season: Chosen) -> None:
+    """One row for each recording, wheel and effect."""
+    rows = catalogue_rows(season, answer_of_fleet(season))
+    lines = [", ".join(str(rounded(value)) for value in vars(row).values()) for row in rows]
+    assert_golden("\n".join(lines) + "\n", GOLDEN / "catalogue.txt")
+
+
+def test_each_effect_pays_in_held_out_error_where_it_acts(season: Chosen) -> None:
+    """Left out, it makes the error of its own recordings and wheels larger."""
+    effects = answer_of_fleet(season).effects
+    assert all(effect.rmse_before > effect.rmse_after for effect in effects[:3])
+    worn = effects[1]
+    acting = [season.names.recordings.index(name) for name in worn.recordings]
+    assert acting == [4, 6]
+    assert worn.rmse_after == pytest.approx(DEVIATION[1], rel=0.15)
+
+
+def test_what_is_told_of_the_fit_is_on_recordings_that_did_not_fit_it(season: Chosen) -> None:
+    """Without effects it is the same before and after; the noise floor is that of the recordings' own noise."""
+    fit = answer_of_fleet(season).fit
+    assert fit.held_out_rmse_after < 0.8 * fit.held_out_rmse_before
+    nothing = answer_of_fleet(consistent()).fit
+    assert nothing.held_out_rmse_before == nothing.held_out_rmse_after
+    assert nothing.noise_floor_rmse == pytest.approx(np.sqrt(np.mean(DEVIATION**2)))
+    assert nothing.held_out_rmse_after == pytest.approx(nothing.noise_floor_rmse, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("level", "owners"),
+    [("shared", [("rover 0", "rover 1")]), ("rover", [("rover 0",), ("rover 1",)]), ("recording", [])],
+)
+def test_parameters_are_told_of_their_owners(level: Level, owners: list[tuple[str, ...]]) -> None:
+    """Of the fleet, or of each rover; of every recording they would be too many. What is known exactly stays."""
+    told = answer_of_fleet(consistent(level)).parameters
+    assert [parameter.rovers for parameter in told] == [owner for owner in owners for _ in range(2)]
+    for parameter in told:
+        reach = parameter.high - parameter.value
+        assert parameter.low == pytest.approx(parameter.value - reach)
+        assert (reach == 0.0) == (parameter.name == "offset")
+        assert abs(parameter.value - parameter.prior) < 0.05
+
+
+def test_a_parameter_that_leaves_its_prior_is_a_finding() -> None:
+    """Although nothing is missing from the simulation."""
+    drives = [drive(n, {(0, 0): 0.9, (0, 1): 0.9}) for n in range(4)]
+    answer = answer_of_fleet(chosen(equations_of(drives, (0,) * 4), (), [found()] * 4))
+    assert (answer.verdict, answer.effects) == ("missing-physics", ())
+    assert answer.parameters[0].value == pytest.approx(1.5 + 0.9, abs=0.02)
+    assert answer_of_fleet(consistent()).verdict == "consistent"
+
+
+def test_the_smallest_effect_that_shows_is_where_it_would_be_found() -> None:
+    """Its energy outside the parameters must be worth threshold, penalty and the probability of finding it."""
+    nothing = consistent()
+    told = {one.name: one.smallest_detectable for one in answer_of_fleet(nothing).sensitivity}
+    assert list(told) == ["steady-drag", "wave", "wear"]
+    equations = nothing.equations
+    drag = FleetTerm(DRAG, Units((0, 1), (0, 1), "fleet"), Course("always"))
+    needed = np.sqrt(8.0 + penalty(equations, drag)) + 1.2816
+    readings = 8 * 120 * 2
+    mean_square = np.mean([each.gram[:, 1, 1] for each in equations.sums]) / 120
+    noise = 1 / np.mean(1 / DEVIATION**2)
+    assert told["steady-drag"] == pytest.approx(max(needed * np.sqrt(mean_square * noise / readings), 0.02), rel=0.05)
+    assert told["wear"] > told["steady-drag"]
+
+
+def test_an_effect_that_has_no_place_shows_never() -> None:
+    """A change by its nature needs a second recording; what the simulation can imitate is not seen."""
+    one = consistent(rover=(0,))
+    told = {each.name: each.smallest_detectable for each in answer_of_fleet(one).sensitivity}
+    assert told["wear"] == float("inf")
+    assert np.isfinite(told["steady-drag"])
+
+
+def test_recordings_without_dates_are_told_by_their_names() -> None:
+    """There is no `since`; the sentence has the recording's name."""
+    drives = [drive(n, on_both(1, 0.3) if n >= 2 else None) for n in range(4)]
+    equations = equations_of(drives, (0,) * 4)
+    answer = answer_of_fleet(chosen(equations, (term(DRAG, Course("since", 2)),), [found()] * 4, dated=False))
+    (effect,) = answer.effects
+    assert (effect.since, effect.since_low, effect.since_high) == (None, None, None)
+    assert "on all 2 wheels since drive 2: 30 % of the mean reading" in effect.statement
+    assert (answer.rovers[0].first, answer.rovers[0].last) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("rainy", "told"),
+    [
+        ((0,), "drive 0: It rained."),
+        ((0, 2, 3), "drive 0, drive 2, drive 3: It rained."),
+        ((0, 1, 2, 3), "drive 0, drive 1 and 2 more: It rained."),
+        (range(5), "All recordings: It rained."),
+    ],
+)
+def test_a_note_of_several_recordings_is_told_once(rainy: Sequence[int], told: str) -> None:
+    """With the recordings that it is of."""
+    noted = found(replace(SILENT, notes=("Readings of one.", "It rained.")))
+    of_recordings = [noted if n in rainy else found() for n in range(5)]
+    answer = answer_of_fleet(chosen(equations_of([drive(n) for n in range(5)], (0,) * 5), (), of_recordings))
+    assert answer.notes == (told,)
