@@ -26,6 +26,15 @@ def assert_golden(text: str, stored: Path) -> None:
     assert text.splitlines() == stored.read_text(encoding="utf-8").splitlines()
 
 
+def rounded(value: object) -> object:
+    """Return JSON content with numbers of three digits: the last ones depend on the processor."""
+    if isinstance(value, float):
+        return float(f"{value:.3g}")
+    if isinstance(value, dict):
+        return {key: rounded(each) for key, each in value.items()}
+    return [rounded(each) for each in value] if isinstance(value, list | tuple) else value
+
+
 def description(figure: Figure) -> str:
     """Return what a figure shows, as text: size, axes, and each line, area, bar and text with data and style."""
     lines = [f"figure {figure.get_size_inches().tolist()}"]

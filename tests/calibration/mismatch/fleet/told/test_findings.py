@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
-from golden import assert_golden
+from golden import assert_golden, rounded
 from sample_answer import CONSISTENT, NO_CHANGE, WORN
 from synthetic_fleet import DEVIATION, DRAG, GROUPS, WAVE, WEAR, drive, equations_of, on_both, term
 
@@ -99,15 +99,6 @@ def season() -> Chosen:
         term(WAVE, Course("until", 5), rovers=(1,)),
     )
     return chosen(equations, terms, of_recordings)
-
-
-def rounded(value: object) -> object:
-    """Return JSON content with numbers of four digits."""
-    if isinstance(value, float):
-        return float(f"{value:.4g}")
-    if isinstance(value, dict):
-        return {key: rounded(each) for key, each in value.items()}
-    return [rounded(each) for each in value] if isinstance(value, list | tuple) else value
 
 
 def test_the_answer_of_a_season_is_the_reviewed_one(season: Chosen) -> None:
