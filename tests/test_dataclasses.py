@@ -71,6 +71,8 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "Simulated",
         "Linearisation",
         "DesignMatrix",
+        "Ranges",
+        "RangeSums",
         "NormalEquations",
         "Decision",
         "ShapeProfile",

@@ -55,8 +55,27 @@ class Effect:
 
 
 @dataclass(frozen=True)
+class Range:
+    """The values of a covariate between which something acts, and outside of which it does not.
+
+    Attributes
+    ----------
+    lower, upper: the bounds, each with its 90 % interval; None where there is none on that side
+    statement: the range in words
+    """
+
+    covariate: str
+    lower: Parameter | None
+    upper: Parameter | None
+    statement: str
+
+
+@dataclass(frozen=True)
 class Unexplained:
-    """A structure in the residual that no candidate explains: its covariate, wheels, time and share of the power."""
+    """A structure in the residual that no candidate explains: its covariate, wheels, time and share of the power.
+
+    `range` is where it is confined to a range of the covariate; None: it varies over the whole of it.
+    """
 
     channel: str
     wheels: tuple[int | str, ...]
@@ -64,6 +83,7 @@ class Unexplained:
     from_s: float
     to_s: float
     share_of_residual: float
+    range: Range | None = None
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.equations import equations_of
 from regolithd.calibration.mismatch.report.notebook import notebook_html
 from regolithd.calibration.mismatch.selection.decision import decide
+from regolithd.calibration.mismatch.selection.regions import in_regions
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
@@ -146,6 +147,7 @@ def searched(
         problem = pose(values)
     progress("measuring on held-out blocks and comparing with rivals")
     decision, held_out = earned(decision, equations.design.groups)
+    decision = in_regions(decision)
     answer = answer_of(decision, held_out, candidates, applicable)
     evidence = replace(
         evidence_of(decision),

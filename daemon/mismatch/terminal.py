@@ -41,6 +41,7 @@ def _lines(answer: Answer) -> list[str]:
         *(
             f"unexplained: {100 * rest.share_of_residual:.0f} % of the residual follows {rest.covariate} on "
             f"{', '.join(map(str, rest.wheels))}, {rest.from_s:.0f} to {rest.to_s:.0f} s"
+            f"{f'; only {rest.range.statement}' if rest.range else ''}"
             for rest in answer.unexplained
         ),
         *(

@@ -20,6 +20,7 @@ from regolithd.calibration.mismatch.inference.identifiability import indistingui
 from regolithd.calibration.mismatch.inference.intervals import parameters_of
 from regolithd.calibration.mismatch.inference.located import share_of_residual, spell_of
 from regolithd.calibration.mismatch.inference.probability import probability_of
+from regolithd.calibration.mismatch.inference.ranges import range_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
 from regolithd.calibration.mismatch.inference.statements import statement
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
@@ -162,6 +163,7 @@ def unexplained(decision: Decision, term: Term) -> Unexplained:
         from_s=first_s,
         to_s=last_s,
         share_of_residual=share_of_residual(equations, decision.whole, term),
+        range=range_of(decision, term),
     )
 
 

@@ -43,9 +43,12 @@ def spell_of(equations: NormalEquations, whole: Fit, term: Term) -> tuple[float,
     gained = ((left + own) ** 2 - left**2) @ equations.weights[on]
     charged = limits.coefficient_penalty * len(term.group.columns) / len(gained)
     first, last = largest_stretch(gained - charged)
-    if term.name == "time" and term.group.coupling in couplings_of(equations.problem):
-        first, last = _between_knots(_level(equations, term, own, left), first, last, len(term.group.columns))
     time_s = equations.problem.time_s[:, 0]
+    region = term.group.region
+    if region is not None and term.name == "time":
+        return max(region.lower, float(time_s[0])), min(region.upper, float(time_s[-1]))
+    if region is None and term.name == "time" and term.group.coupling in couplings_of(equations.problem):
+        first, last = _between_knots(_level(equations, term, own, left), first, last, len(term.group.columns))
     return float(time_s[first]), float(time_s[last])
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape, Sharing
+    from regolithd.calibration.mismatch.regression.region import Region
 
 Array = NDArray[np.float64]
 
@@ -30,6 +31,7 @@ class Group:
     noise_reduction: long-run variance of the noise over that at the frequencies of its columns, at least 1
     own_channel: for a fault of another channel, Δχ² and coefficient there, shape (wheel,) each
     acting: which column is other than zero on which wheel, shape (column, wheel); None: all on all
+    region: the range of the covariate outside which its columns are zero; None: they act everywhere
     """
 
     name: str
@@ -43,6 +45,7 @@ class Group:
     noise_reduction: float = 1.0
     own_channel: tuple[Array, Array] | None = None
     acting: NDArray[np.bool_] | None = None
+    region: Region | None = None
 
     @property
     def span(self) -> slice:

@@ -59,6 +59,19 @@ def couplings_of(problem: Problem) -> dict[str, Array]:
     return found
 
 
+def acting(problem: Problem, covariate: str, coupling: str) -> tuple[Array, Array]:
+    """Return a covariate as its smooth term has it, and the factor by which that acts, shape (time, wheel) each."""
+    values = problem.covariates[covariate]
+    if coupling == "each way":
+        return values, np.ones(values.shape)
+    values = np.abs(values) if covariate == "wheel_speed" else values
+    couplings = couplings_of(problem)
+    if coupling in couplings:
+        return values, couplings[coupling]
+    direction = np.nan_to_num(problem.covariates.get("direction", np.ones(values.shape)))
+    return values, direction * problem.contrasts(covariate)[coupling.removeprefix("drag, ")]
+
+
 def _ways_to_act(
     problem: Problem, covariate: str, couplings: dict[str, Array]
 ) -> Iterator[tuple[str, Array, tuple[Sharing, ...]]]:

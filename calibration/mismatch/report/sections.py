@@ -207,6 +207,7 @@ def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> Unexp
     """Return one structure that no candidate explains: channel, wheels, time, and share of the residual's power."""
     first, last = (number(each * labels.time_factor) for each in (place.from_s, place.to_s))
     facts = (
+        f"only {place.range.statement}".replace(" %", NO_BREAK + "%") if place.range else "",
         place.channel,
         labels.wheels(place.wheels, evidence.wheels),
         f"{first} to {last} {labels.time_unit}",

@@ -31,6 +31,7 @@ PARTS = {
     "effect": answers.Effect,
     "parameter": answers.Parameter,
     "unexplained": answers.Unexplained,
+    "range": answers.Range,
     "indistinguishable": answers.Indistinguishable,
     "sensitivity": answers.Sensitivity,
     "fit": answers.FitImprovement,

@@ -35,6 +35,7 @@ KINDS: Mapping[str, type] = {
         answers.Answer,
         answers.Parameter,
         answers.Effect,
+        answers.Range,
         answers.Unexplained,
         answers.Indistinguishable,
         answers.Sensitivity,

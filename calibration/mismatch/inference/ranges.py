@@ -1,0 +1,77 @@
+"""The range of a covariate to which something is confined: its bounds with their intervals, and a sentence."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from regolithd.calibration.mismatch.answer import Parameter, Range
+from regolithd.calibration.mismatch.problem.words import ANGULAR_SPEED, word_for
+from regolithd.calibration.mismatch.selection.region_bounds import bounds_of
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.group import Term
+    from regolithd.calibration.mismatch.selection.decision import Decision
+
+UNIT_IN_LABEL = re.compile(r"\(([^()]+)\)$")
+DIGITS = 2
+"""Significant digits of an interval's width that a sentence shows."""
+CLOSE_TO_NUMBER = ("°", "%")
+"""Units that stand at their number without a space."""
+
+
+def range_of(decision: Decision, term: Term) -> Range | None:
+    """Return the range of a term that is confined to one; else None."""
+    region = term.group.region
+    if region is None:
+        return None
+    whole, problem = decision.whole, decision.equations.problem
+    unit = covariate_unit(problem, region.covariate)
+    lower, upper = (
+        None if bound is None else Parameter(bound.value, bound.low, bound.high, unit)
+        for bound in bounds_of(decision.equations, whole, whole.terms.index(term))
+    )
+    return Range(region.covariate, lower, upper, in_words(region.covariate, lower, upper, problem))
+
+
+def covariate_unit(problem: Problem, covariate: str) -> str:
+    """Return a covariate's unit, as its label has it in brackets; 1 where it is not known."""
+    if covariate == "time":
+        return "s"
+    found = UNIT_IN_LABEL.search(problem.labels.get(covariate, ""))
+    if found:
+        return found[1]
+    if covariate == "wheel_speed":
+        return ANGULAR_SPEED
+    return problem.simulation.unit if covariate == "torque" else "1"
+
+
+def in_words(covariate: str, lower: Parameter | None, upper: Parameter | None, problem: Problem) -> str:
+    """Return the range as people say it: "beyond 12.3° of pitch (90 % sure: 11.9 to 12.8)".
+
+    Angles in rad are told in degrees.
+    """
+    bounds = [_told(bound) for bound in (lower, upper) if bound is not None]
+    values, intervals, unit = [each[0] for each in bounds], " and ".join(each[1] for each in bounds), bounds[0][2]
+    of = "" if covariate == "time" else f" of {word_for(covariate, problem.labels)}"
+    between = "" if unit in CLOSE_TO_NUMBER or not unit else " "
+    where = f"{' and '.join(values)}{between}{unit}{of}"
+    if lower is None:
+        words = "until" if covariate == "time" else "below"
+    elif upper is None:
+        words = "from" if covariate == "time" else "beyond"
+        where += " on" if covariate == "time" else ""
+    else:
+        words = "between"
+    return f"{words} {where} (90 % sure: {intervals})"
+
+
+def _told(bound: Parameter) -> tuple[str, str, str]:
+    """Return a bound, its interval, and the unit in which they are told."""
+    unit, factor = ("°", 180 / np.pi) if bound.unit == "rad" else (bound.unit, 1.0)
+    low, value, high = (factor * each for each in (bound.low, bound.value, bound.high))
+    places = max(DIGITS - 1 - int(np.floor(np.log10(max(high - low, 1e-300)))), 0)
+    return f"{value:.{places}f}", f"{low:.{places}f} to {high:.{places}f}", {"1": "", "degC": "°C"}.get(unit, unit)
