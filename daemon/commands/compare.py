@@ -74,7 +74,23 @@ def _simulation(configuration: Configuration, config: Path | None, given: Path |
 
 
 def _publish(configuration: Configuration, result: ComparisonResult) -> None:
-    """Let the daemon publish a result: a second client of the rover would end the daemon's connection to the broker."""
+    from regolithd.daemon.control.client import ControlError
+
+    try:
+        publish_result(configuration, result)
+    except ControlError as error:
+        typer.echo(f"not published: {error}", err=True)
+        raise typer.Exit(EXIT_DAEMON) from error
+
+
+def publish_result(configuration: Configuration, result: ComparisonResult) -> None:
+    """Let the daemon publish a result: a second client of the rover would end the daemon's connection to the broker.
+
+    Raises
+    ------
+    ControlError
+        The daemon does not answer, or refuses it.
+    """
     import asyncio
 
     from regolithd.daemon.control.client import ControlError, control_connection
@@ -87,8 +103,4 @@ def _publish(configuration: Configuration, result: ComparisonResult) -> None:
         if not isinstance(reply, Done):
             raise ControlError(f"The daemon refused it: {getattr(reply, 'text', reply)}", EXIT_DAEMON)
 
-    try:
-        asyncio.run(publish())
-    except ControlError as error:
-        typer.echo(f"not published: {error}", err=True)
-        raise typer.Exit(EXIT_DAEMON) from error
+    asyncio.run(publish())

@@ -209,9 +209,9 @@ class ControlSink:
                 return await self._publish_result(request.result)
 
     async def _publish_result(self, result: ComparisonResult) -> _Line:
-        """Publish a comparison whose report is below the recordings: no other file of the daemon's is published."""
+        """Publish a result; its report, if any, is below the recordings: no other file of the daemon's is published."""
         recordings = self._configuration.recording.directory
-        if self._publish_comparison is None or not _is_below(result.report, recordings):
+        if self._publish_comparison is None or (result.report and not _is_below(result.report, recordings)):
             return Refused(code=Code.BAD_REQUEST, text=f"{result.report} is not below {recordings}.")
         try:
             await self._publish_comparison(result)

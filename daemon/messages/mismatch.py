@@ -41,11 +41,11 @@ class ComparisonResult(BaseModel):
     """Name of the compared file."""
     simulation: str
     report: str
-    """Path of the report, on the computer that compared."""
+    """Path of the report, on the computer that compared; empty while driving, where `regolithd monitor` reports."""
 
 
 class MismatchMessage(ComparisonResult, Header):
-    """The result of the last comparison of a traverse with the simulation, by `regolithd compare`."""
+    """The result of the last comparison with the simulation: of a traverse by `regolithd compare`, or while driving."""
 
 
 class ReportMessage(Header):

@@ -23,7 +23,7 @@ REMEDY = "Read the report. Repair the rover; or copy the corrected simulation, b
 async def publish_comparison(publisher: Publisher, result: ComparisonResult) -> None:
     """Publish a result and its report; the alarm is active if physics is missing or an effect has changed.
 
-    The report comes first, so that it is there when the result is shown.
+    The report comes first, so that it is there when the result is shown. `regolithd monitor` has none.
 
     Raises
     ------
@@ -31,9 +31,10 @@ async def publish_comparison(publisher: Publisher, result: ComparisonResult) -> 
         The report cannot be read.
     """
     # Compressing takes as long as several SYNC periods at 100 Hz: hence a thread.
-    page = await asyncio.to_thread(_compressed, Path(result.report))
+    page = await asyncio.to_thread(_compressed, Path(result.report)) if result.report else b""
     now_ns = time.time_ns()
-    publisher.publish("report", ReportMessage, time_ns=now_ns, recording=result.recording, html_gzip=page)
+    if page:
+        publisher.publish("report", ReportMessage, time_ns=now_ns, recording=result.recording, html_gzip=page)
     publisher.publish("mismatch", MismatchMessage, time_ns=now_ns, **result.model_dump())
     publisher.publish(
         "alarm/mismatch",

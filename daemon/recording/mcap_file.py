@@ -84,6 +84,56 @@ def open_mcap(path: Path) -> AbstractContextManager[IO[bytes]]:
     return path.open("rb")
 
 
+class MessageReader:
+    """Reads the messages of a file, which may still be written to.
+
+    Parameters
+    ----------
+    opening: opens it for reading, each time
+    on_gap: called with a text for everything damaged that is left out
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        opening: Callable[[Path], AbstractContextManager[IO[bytes]]] = open_mcap,
+        on_gap: Callable[[str], None] | None = None,
+    ) -> None:
+        self._path, self._opening = path, opening
+        self._report = _reporter(path, on_gap)
+        self._scan = McapScan(self._report)
+        self._topics: dict[int, str] = {}
+
+    @property
+    def ended(self) -> bool:
+        """Whether no more will come: the file was closed, or nothing can be read behind what is damaged."""
+        return self._scan.ended
+
+    def messages(self) -> Iterator[Recorded]:
+        """Yield the messages of all complete chunks, in their order; called again, those that have come since.
+
+        Raises
+        ------
+        DamagedRecordingError
+            Something is damaged, and there is no `on_gap`.
+        """
+        topics = self._topics
+        with self._opening(self._path) as stream:
+            for record in self._scan.records(stream):
+                if isinstance(record, Channel):
+                    topics[record.id] = record.topic
+                elif isinstance(record, Message):
+                    if record.channel_id not in topics:  # it was defined in a damaged chunk
+                        topics |= _channels(self._path)
+                    if topic := topics.get(record.channel_id):
+                        yield Recorded(topic, record.log_time, json.loads(record.data))
+                    else:
+                        topics[record.channel_id] = ""
+                        self._report(
+                            f"the messages of channel {record.channel_id} are left out: its definition is damaged"
+                        )
+
+
 def read_messages(
     path: Path,
     opening: Callable[[Path], AbstractContextManager[IO[bytes]]] = open_mcap,
@@ -98,20 +148,7 @@ def read_messages(
     DamagedRecordingError
         Something is damaged, and there is no `on_gap`.
     """
-    report = _reporter(path, on_gap)
-    topics: dict[int, str] = {}
-    with opening(path) as stream:
-        for record in McapScan(stream, report).records():
-            if isinstance(record, Channel):
-                topics[record.id] = record.topic
-            elif isinstance(record, Message):
-                if record.channel_id not in topics:  # it was defined in a damaged chunk
-                    topics |= _channels(path)
-                if topic := topics.get(record.channel_id):
-                    yield Recorded(topic, record.log_time, json.loads(record.data))
-                else:
-                    topics[record.channel_id] = ""
-                    report(f"the messages of channel {record.channel_id} are left out: its definition is damaged")
+    yield from MessageReader(path, opening, on_gap).messages()
 
 
 def read_metadata(path: Path) -> dict[str, str]:
@@ -124,7 +161,7 @@ def read_metadata(path: Path) -> dict[str, str]:
     """
     report = _reporter(path, None)
     with open_mcap(path) as stream:
-        records = McapScan(stream, report).records()
+        records = McapScan(report).records(stream)
         metadata = next((dict(record.metadata) for record in records if isinstance(record, Metadata)), {})
     checksum = metadata.pop(_CHECKSUM, None)
     if checksum not in {None, _checksum(metadata)}:

@@ -38,20 +38,25 @@ _DATA_SECTION = frozenset({Opcode.HEADER, Opcode.METADATA, Opcode.CHUNK, Opcode.
 
 
 class McapScan:
-    """One pass over a file. `report` is called with a text for each gap: something that is damaged, and left out."""
+    """A pass over a file. `report` is called with a text for each gap: something that is damaged, and left out."""
 
-    def __init__(self, stream: IO[bytes], report: Callable[[str], None]) -> None:
-        self._stream = stream
+    def __init__(self, report: Callable[[str], None]) -> None:
         self._report = report
-        self._closed, self._size = closed_and_size(stream)
+        self._closed, self._size = False, 0
         self._offset = 0
         self._crc = 0
         self._unindexed = 0  # messages of the last chunk that no MESSAGE_INDEX has mentioned yet
         self._gaps = 0
+        self.ended = False
+        """Whether the end of the data, or damage beyond which nothing is read, has been reached."""
 
-    def records(self) -> Iterator[McapRecord]:
-        """Yield metadata, and schemas, channels and messages of all valid chunks, in their order."""
-        for opcode, content in self._framed():
+    def records(self, stream: IO[bytes]) -> Iterator[McapRecord]:
+        """Yield metadata, and schemas, channels and messages of all valid chunks, in their order.
+
+        Called again after the file has grown, it goes on behind the last complete record.
+        """
+        self._closed, self._size = closed_and_size(stream)
+        for opcode, content in self._framed(stream):
             match opcode:
                 case Opcode.CHUNK:
                     yield from self._chunk(content)
@@ -61,23 +66,22 @@ class McapScan:
                     yield from self._metadata(content)
                 case Opcode.DATA_END:
                     self._check_data_crc(content)
+                    self.ended = True
                     return
                 case _:
                     continue  # the header
 
-    def _framed(self) -> Iterator[tuple[int, bytes]]:
+    def _framed(self, stream: IO[bytes]) -> Iterator[tuple[int, bytes]]:
         """Yield opcode and content of each record of the data section; afterwards `_crc` covers it."""
-        magic = self._stream.read(len(MAGIC))
-        self._offset, self._crc = len(magic), zlib.crc32(magic)
-        if magic != MAGIC and len(magic) == len(MAGIC):
-            self._gap("this is not an MCAP file, or its begin is damaged")
+        if not self._at_first_record(stream):
             return
-        while len(head := self._stream.read(_HEAD.size)) == _HEAD.size:
+        while len(head := stream.read(_HEAD.size)) == _HEAD.size:
             opcode, length = _HEAD.unpack(head)
             if opcode not in _DATA_SECTION or length > _LONGEST:
                 self._gap(f"damaged at byte {self._offset}; the rest, {self._size - self._offset} bytes, is not read")
+                self.ended = True
                 return
-            content = self._stream.read(length)
+            content = stream.read(length)
             if len(content) < length:
                 break
             yield opcode, content
@@ -85,6 +89,20 @@ class McapScan:
             self._crc = zlib.crc32(content, zlib.crc32(head, self._crc))
         if self._closed or self._size - self._offset > _LONGEST_INCOMPLETE:
             self._gap(f"damaged at byte {self._offset}; the rest, {self._size - self._offset} bytes, is not read")
+
+    def _at_first_record(self, stream: IO[bytes]) -> bool:
+        """Go to the first record that is not read yet; return whether there may be one."""
+        stream.seek(self._offset)
+        if self._offset:
+            return not self.ended
+        magic = stream.read(len(MAGIC))
+        if len(magic) < len(MAGIC):  # just begun
+            return False
+        self._offset, self._crc = len(magic), zlib.crc32(magic)
+        self.ended = magic != MAGIC
+        if self.ended:
+            self._gap("this is not an MCAP file, or its begin is damaged")
+        return not self.ended
 
     def _chunk(self, content: bytes) -> list[McapRecord]:
         try:

@@ -102,6 +102,18 @@ def _posed(
     return replace(problem, covariates={**problem.constants, **problem.covariates}, constants={})
 
 
+def check_comparable(piece: Piece, simulation: Simulation) -> None:
+    """Check that a piece alone can be compared, before it is learned from.
+
+    Raises
+    ------
+    RecordingError
+        When it cannot: the machine stands, or an input is missing.
+    """
+    recording, _ = together([piece])
+    build_problem(recording, simulation)
+
+
 def learned(pieces: Sequence[Piece], simulation: Simulation) -> tuple[Linearised, list[Interval]]:
     """Linearise a simulation of one channel on the first pieces; return it with their intervals.
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import RecordingError
-from regolithd.calibration.mismatch.online.linearised import Linearised, learned
+from regolithd.calibration.mismatch.online.linearised import Linearised, check_comparable, learned
 from regolithd.calibration.mismatch.online.noise import NoiseHistory
 from regolithd.calibration.mismatch.online.report import Change, Report, change_of
 from regolithd.calibration.mismatch.online.scores import Place, Scores, scores
@@ -163,6 +163,7 @@ class Monitor:
 
     def _compare(self, piece: Piece) -> None:
         if self.test is None or self._linearised is None:
+            check_comparable(piece, self._simulation)
             self._first.append(piece)
             self._learn()
             return
@@ -172,11 +173,7 @@ class Monitor:
     def _learn(self) -> None:
         if len(self._first) < self._limits.learning_intervals:
             return
-        try:
-            self._linearised, intervals = learned(self._first, self._simulation)
-        except RecordingError:
-            del self._first[0]  # the machine stands: the earliest piece makes room
-            raise
+        self._linearised, intervals = learned(self._first, self._simulation)
         self.test = SequentialTest(self._linearised, self._limits)
         self.test.learn(intervals)
         self._compared = len(intervals)

@@ -3,7 +3,6 @@
 import json
 import struct
 from collections.abc import Callable
-from io import BytesIO
 from pathlib import Path
 
 import pytest
@@ -20,7 +19,7 @@ from regolithd.daemon.recording.mcap_file import (
     read_messages,
     read_metadata,
 )
-from regolithd.daemon.recording.mcap_records import MAGIC, McapScan
+from regolithd.daemon.recording.mcap_records import McapScan
 
 METADATA = {"configuration": "{}", "started_ns": "1"}
 MESSAGES = 12
@@ -195,7 +194,7 @@ def test_other_commands_end_with_one_message(tmp_path: Path, command: str, make_
 def test_an_index_that_cannot_be_read_is_named_once() -> None:
     """So is one of more messages than its chunk has; a readable index of as many says nothing."""
     told: list[str] = []
-    scan = McapScan(BytesIO(MAGIC), told.append)
+    scan = McapScan(told.append)
     scan._unindexed = 2
     channel, entries = struct.pack("<H", 1), struct.pack("<IQQQQ", 32, 5, 0, 6, 40)
     scan._check_index(channel + entries)
@@ -203,7 +202,7 @@ def test_an_index_that_cannot_be_read_is_named_once() -> None:
     scan._check_index(channel + entries)
     scan._check_index(channel + entries)
     assert told == ["an index, or the chunk before it, is damaged at byte 0; messages may be missing"]
-    other = McapScan(BytesIO(MAGIC), told.append)
+    other = McapScan(told.append)
     other._unindexed = 2
     other._check_index(b"\1")
     other._check_index(b"\1")
