@@ -4,9 +4,11 @@ import asyncio
 import grp
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from broker import Mosquitto, unused_port
@@ -16,10 +18,10 @@ from regolithd.daemon.check.broker import check_broker
 from regolithd.daemon.check.bus import check_bus, check_link, check_load, judge_link, judge_nodes, nodes_of_daemon
 from regolithd.daemon.check.clock import ClockState, check_clock, judge_clock, kernel_clock_state
 from regolithd.daemon.check.control import check_control, running_daemon
-from regolithd.daemon.check.disk import check_folder
+from regolithd.daemon.check.disk import check_disks, check_folder
 from regolithd.daemon.check.finding import Verdict
 from regolithd.daemon.check.models import check_models, judge_card
-from regolithd.daemon.config.configuration import Bus, Configuration, Control, Estimator, Mqtt
+from regolithd.daemon.config.configuration import Bus, Configuration, Control, Estimator, Mqtt, Recording
 from regolithd.daemon.control.client import ControlError
 from regolithd.daemon.control.protocol import NodeLine, Status
 from regolithd.drivers.devices.ground_speed import GROUND_SPEED_SENSOR
@@ -257,6 +259,57 @@ def test_a_folder_that_may_grow_beyond_its_disk_is_reported(tmp_path: Path) -> N
     assert check_folder("store", tmp_path / "file", 1.0, "[mqtt] spool_directory").verdict is Verdict.WRONG
 
 
+@pytest.mark.parametrize(
+    ("free_MB", "used_MB", "limit_MB", "verdict"),
+    [
+        (500.0, 0.0, 499.0, Verdict.GOOD),
+        (500.0, 2.0, 502.0, Verdict.GOOD),  # what is used already does not come again
+        (500.0, 0.0, 501.0, Verdict.WARNING),
+        (99.0, 0.0, 101.0, Verdict.WRONG),
+        (49.0, 0.0, 50.0, Verdict.WRONG),
+        (10.0, 2.0, 1.0, Verdict.GOOD),  # beyond its limit already: it shrinks
+    ],
+)
+def test_free_space_is_judged_by_what_a_folder_may_still_grow(
+    free_MB: float, used_MB: float, limit_MB: float, verdict: Verdict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Too little is a warning while 100 MB or all that is wanted are free, else wrong."""
+    (tmp_path / "file").write_bytes(bytes(round(used_MB * 1e6)))
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=free_MB * 1e6))
+    assert check_folder("store", tmp_path, limit_MB, "[mqtt] spool_directory").verdict is verdict
+
+
+def test_a_folder_of_another_user_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With who asked; a parent that may not be entered leaves it unknown."""
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    monkeypatch.setenv("USER", "ada")
+    finding = check_folder("store", tmp_path, 1.0, "[mqtt] spool_directory")
+    assert (finding.verdict, f"{tmp_path} cannot be written by you (ada)" in finding.text) == (Verdict.WRONG, True)
+    monkeypatch.delenv("USER")
+    assert f"(user {os.getuid()})" in check_folder("store", tmp_path, 1.0, "").text
+
+    def refuse(_: Path) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(shutil, "disk_usage", refuse)
+    finding = check_folder("store", tmp_path, 1.0, "[mqtt] spool_directory")
+    assert (finding.verdict, finding.text) == (Verdict.UNKNOWN, f"{tmp_path}: Permission denied")
+
+
+async def test_the_recordings_folder_is_checked_where_recordings_are_written(tmp_path: Path) -> None:
+    """Otherwise it is said that they are not; the store's is always checked."""
+    for enabled, verdict in ((True, Verdict.GOOD), (False, Verdict.UNKNOWN)):
+        configuration = Configuration(
+            recording=Recording(enabled=enabled, directory=tmp_path, limit_MB=1.0),
+            mqtt=Mqtt(spool_directory=tmp_path, spool_limit_MB=1.0),
+        )
+        found = await check_disks(configuration)
+        assert [(finding.subject, finding.verdict) for finding in found] == [
+            ("recording", verdict),
+            ("store", Verdict.GOOD),
+        ]
+
+
 async def test_a_network_that_does_not_suit_the_rover_is_reported(tmp_path: Path) -> None:
     """A network for other loads is a warning, a file that is no network is wrong."""
     card = ModelCard("small-1", (Variable("load_N", "N", 1.0, 10.0),), (), 1.0)
@@ -281,6 +334,26 @@ async def test_who_may_command_is_reported(tmp_path: Path) -> None:
     silent = await asyncio.start_unix_server(lambda _, writer: writer.close(), configuration.control.socket)
     async with silent:
         assert await running_daemon(configuration) is None
+
+
+def test_who_is_not_in_the_group_may_not_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Unless the group is one of the further groups, or the user is root; a group that is not there is wrong."""
+    number = grp.getgrnam(GROUP).gr_gid
+    configuration = Configuration(control=Control(group=GROUP, socket=tmp_path / "control.sock"))
+    monkeypatch.setattr(os, "geteuid", lambda: 1000)
+    monkeypatch.setattr(os, "getegid", lambda: number + 1)
+    for groups, verdict in (([], Verdict.WARNING), ([number], Verdict.GOOD)):
+        monkeypatch.setattr(os, "getgroups", lambda groups=groups: groups)
+        (finding,) = check_control(configuration, status("operational"))
+        assert finding.verdict is verdict
+    monkeypatch.setattr(os, "getgroups", list)
+    monkeypatch.setattr(os, "getegid", lambda: number)
+    assert check_control(configuration, status("operational"))[0].verdict is Verdict.GOOD
+    unknown = Configuration(control=Control(group="nobody-has-this-group", socket=tmp_path / "control.sock"))
+    (finding,) = check_control(unknown, None)
+    assert finding.verdict is Verdict.WRONG
+    assert finding.remedy
+    assert "nobody-has-this-group" in finding.text
 
 
 async def test_what_answers_in_another_language_is_no_daemon(tmp_path: Path) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, NoReturn
 
 import fleet_arm
 import pyarrow as pa
@@ -15,7 +16,9 @@ from typer.testing import CliRunner
 
 from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.daemon.cli import app
-from regolithd.daemon.mismatch.fleet import begins_at, files_of_rovers, members_of
+from regolithd.daemon.mismatch import fleet
+from regolithd.daemon.mismatch.fleet import RoverFile, begins_at, files_of_rovers, members_of
+from regolithd.daemon.recording.mcap_file import DamagedRecordingError
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -98,3 +101,61 @@ def test_what_a_fleet_has_not_is_one_message(
     done = call(*two, "--simulation", fleet_arm.write_simulation(tmp_path), *words)
     assert done.exit_code == 65
     assert told in done.output.replace("\n", " ")
+
+
+def test_a_recording_of_the_daemon_names_its_rover_and_its_begin(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the configuration in it, and by its first snapshot; damage leaves the name empty, and the file's date."""
+    path = tmp_path / "rover-20260503T081500Z.mcap"
+    path.touch()
+    configured = json.dumps({"rover": {"name": "asper"}})
+    monkeypatch.setattr(fleet, "read_metadata", lambda _: {"configuration": configured})
+    assert files_of_rovers([path], None) == files_of_rovers([path], "metadata")
+    assert [(file.rover, file.of_column) for file in files_of_rovers([path], None)] == [("asper", False)]
+    with pytest.raises(RecordingError, match="it has no column that names a rover"):
+        files_of_rovers([path], "column")
+    monkeypatch.setattr(
+        fleet, "recorded_snapshots", lambda _: iter([SimpleNamespace(time_ns=1_700_000_000_500_000_000)])
+    )
+    assert begins_at(path) == datetime(2023, 11, 14, 22, 13, 20, 500_000, tzinfo=UTC)
+    for silent in ({}, {"configuration": "no JSON"}, {"configuration": "{}"}):
+        monkeypatch.setattr(fleet, "read_metadata", lambda _, silent=silent: silent)
+        assert [file.rover for file in files_of_rovers([path], None)] == [""]
+
+    def damaged(_: object) -> NoReturn:
+        raise DamagedRecordingError("damaged")
+
+    monkeypatch.setattr(fleet, "read_metadata", damaged)
+    monkeypatch.setattr(fleet, "recorded_snapshots", damaged)
+    assert [file.rover for file in files_of_rovers([path], None)] == [""]
+    assert begins_at(path) == datetime(2026, 5, 3, 8, 15, tzinfo=UTC)
+
+
+def test_a_date_may_be_in_the_folder_s_name(tmp_path: Path) -> None:
+    """Where the file's has none."""
+    folder = tmp_path / "2026-07-01"
+    folder.mkdir()
+    (folder / "drive.csv").touch()
+    assert begins_at(folder / "drive.csv") == datetime(2026, 7, 1, tzinfo=UTC)
+
+
+def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+    """Others keep the short name; a recording without a rover is of the only one."""
+    paths = [tmp_path / folder / "drive.csv" for folder in ("a", "b")]
+    for path in paths:
+        path.parent.mkdir()
+        path.write_text(path.parent.name)
+    apart = members_of([RoverFile(path, "asper") for path in paths], "wheel")
+    assert [member.name for member in apart] == [str(path) for path in paths]
+    assert len({member.digest for member in apart}) == 2
+    (alone,) = members_of([RoverFile(paths[0], "")], "wheel")
+    assert (alone.name, alone.rover) == ("drive.csv", "rover")
+
+
+@pytest.mark.parametrize(("name", "told"), [("absent.csv", "is not there"), ("folder", "is not a file")])
+def test_what_is_no_file_is_one_message(name: str, told: str, tmp_path: Path) -> None:
+    """Before anything is read."""
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(RecordingError, match=f"{name} {told}"):
+        files_of_rovers([tmp_path / name], None)
