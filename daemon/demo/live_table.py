@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+import textwrap
 from collections import deque
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from rich import box
-from rich.console import Console, Group
+from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 PLACES = ("front left", "front right", "middle left", "middle right", "rear left", "rear right")
 HISTORY = 12
 ALARM_WIDTH = 80
-_CONSOLE = Console(width=ALARM_WIDTH)
 BLOCKS = "▁▂▃▄▅▆▇█"
 LEGEND = "outside: load W, slip i or current I is not in the network's training range"
 SYMBOLS = {"load_N": "W", "slip": "i", "motor_current_A": "I", "wheel_torque_Nm": "T", "wheel_speed_rad_s": "ω"}
@@ -132,8 +132,8 @@ class LiveTable:
         """Return the first alarm, in four lines, so that the picture does not move."""
         lines = [Text()] * 4
         if self.alarms:
-            text = Text("▲ ALARM " + next(iter(self.alarms.values())), style="bold red")
-            lines = [*text.wrap(_CONSOLE, ALARM_WIDTH), *lines][:4]
+            text = "▲ ALARM " + next(iter(self.alarms.values())).replace(" %", "\N{NO-BREAK SPACE}%")
+            lines = [*(Text(line, style="bold red") for line in textwrap.wrap(text, ALARM_WIDTH)), *lines][:4]
         return lines
 
     def _footer(self) -> Text:

@@ -53,7 +53,13 @@ def test_each_topic_is_one_that_is_published_and_gets_its_name_as_measurement() 
         assert pattern["tags"].split("/")[1] == "rover"
     lengths = {len(pattern["topic"].split("/")) for pattern in MQTT["topic_parsing"]}
     assert {len(topic.split("/")) for topic in MQTT["topics"]} == lengths
-    assert MQTT["json_time_key"] in FIELDS["snapshot"]
+
+
+def test_the_time_of_every_message_is_read_to_the_nanosecond() -> None:
+    """InfluxDB keeps one point for each time and tags: two snapshots of one millisecond would be one."""
+    assert MQTT["json_time_format"] == "2006-01-02T15:04:05.999999999Z07:00"  # Go's way to write RFC 3339
+    for channel in CHANNELS:
+        assert re.fullmatch(r"\d{4}(-\d\d){2}T\d\d(:\d\d){2}\.\d{9}Z", example(channel)[MQTT["json_time_key"]])
 
 
 @pytest.mark.parametrize(("title", "query"), QUERIES, ids=[title for title, _ in QUERIES])

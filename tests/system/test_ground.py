@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.timeout(180)
 PATIENCE_MS = 20_000
+OUTAGE_S = 30
 EVIDENCE = {
     "onset": "2026-11-22T04:00:00.000000000Z",
     "direction": "fall",
@@ -88,6 +89,16 @@ def coloured(page: Page, place: str) -> int:
             if (data[k + 3] > 40 && Math.abs(data[k] - data[k + 1]) + Math.abs(data[k + 1] - data[k + 2]) > 25) count++;
         return count; }"""
     return int(page.locator(place).first.evaluate(script))
+
+
+def hatched(page: Page) -> int:
+    """Return how many pixels of the cohesion's plot are bluish: only the hatching of back-filled spans is."""
+    script = """canvas => {
+        const {data} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+        let count = 0;
+        for (let k = 0; k < data.length; k += 4) if (data[k + 3] > 40 && data[k + 2] > data[k] + 10) count++;
+        return count; }"""
+    return int(page.locator("#plots .three figure:nth-child(1) canvas").evaluate(script))
 
 
 def test_the_present_state_is_shown_and_moves(page: Page) -> None:
@@ -166,12 +177,15 @@ def test_the_last_comparison_is_on_the_page(page: Page, rig: GroundRig) -> None:
 
 
 def test_an_outage_of_the_broker_is_back_filled_and_marked(page: Page, rig: GroundRig) -> None:
-    """Without the broker the page says so; afterwards the gap is filled, marked, and each snapshot stored once."""
+    """Half a minute without the broker: the page says so; then the gap is filled and hatched, nothing stored twice."""
     expect(page.locator("#presence")).to_contain_text("online", timeout=PATIENCE_MS)
+    until(lambda: coloured(page, "#plots .three figure:nth-child(1) canvas") > 100, "the cohesion is drawn")
+    assert hatched(page) == 0
+    begun = time.monotonic()
     rig.broker.stop()
     expect(page.locator("#problem")).to_contain_text("connection refused", timeout=PATIENCE_MS)
     expect(page.locator("#presence")).to_contain_text("unknown: no connection")
-    time.sleep(4)
+    time.sleep(OUTAGE_S - (time.monotonic() - begun))
     rig.broker.start()
     expect(page.locator("#presence")).to_contain_text("online", timeout=2 * PATIENCE_MS)
 
@@ -180,18 +194,34 @@ def test_an_outage_of_the_broker_is_back_filled_and_marked(page: Page, rig: Grou
         return sum(columns["late"])
 
     until(lambda: late() > 0, "late messages are stored")
-    until(lambda: page.evaluate("document.querySelector('#plots .wheel-key') !== null"), "the plots exist")
+    until(lambda: hatched(page) > 100, "the back-filled span is hatched")
     now_ms = round(1000 * time.time())
-    history = rig.get(f"/api/history/kapvik?from={now_ms - 100_000}&to={now_ms}")["snapshot"]
+    history = rig.get(f"/api/history/kapvik?from={now_ms - 120_000}&to={now_ms}")["snapshot"]
     pauses = [later - earlier for earlier, later in zip(history["time_ms"], history["time_ms"][1:], strict=False)]
     assert max(pauses) < 1000, "no gap is left"
-    assert 20 < sum(history["late"]) < len(history["late"])
+    late_ms = [moment for moment, sent_late in zip(history["time_ms"], history["late"], strict=True) if sent_late]
+    assert late_ms[-1] - late_ms[0] > 900 * OUTAGE_S
+    assert len(late_ms) < len(history["late"])
     with closing(sqlite3.connect(rig.database)) as connection:
         ((count, different),) = connection.execute(
             "SELECT count(*), count(DISTINCT sequence) FROM message JOIN topic ON topic.id = topic"
             " WHERE name = 'snapshot'"
         )
     assert count == different
+
+
+def test_a_message_that_comes_again_changes_nothing(page: Page, rig: GroundRig) -> None:
+    """QoS 1 delivers at least once: of messages with the same session and sequence the first counts."""
+    begun_ns = time.time_ns()
+    for sequence, margin in ((1, 0.25), (2, 0.5), (1, 0.75), (2, 0.75), (3, 0.375)):
+        interval = dict.fromkeys(("low_90", "low_50", "median", "high_50", "high_90"), margin)
+        moment = begun_ns + 500_000_000 * sequence
+        rig.publish("posterior", "posterior", "twice", now_ns=moment, sequence=sequence, drawbar_margin=interval)
+    page.locator('[data-rover="twice"]').click()
+    expect(page.locator("#plots .three output").nth(2)).to_contain_text("0.375")
+    begun_ms = begun_ns // 1_000_000
+    history = rig.get(f"/api/history/twice?from={begun_ms}&to={begun_ms + 10_000}")["posterior"]
+    assert history["values"]["drawbar_margin_median"] == [0.25, 0.5, 0.375]
 
 
 def test_a_killed_ground_has_lost_nothing_and_the_page_finds_it_again(page: Page, rig: GroundRig) -> None:

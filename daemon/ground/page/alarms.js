@@ -1,6 +1,6 @@
 // Alarms with the states and words of ISA-18.2, and what an operator can do with each.
 import { content, el, replace } from "./dom.js";
-import { clock, moment, number, percent } from "./format.js";
+import { clock, moment, number, percent, unbroken } from "./format.js";
 
 const WORDS = {
   "unacknowledged": "active, unacknowledged",
@@ -63,13 +63,13 @@ function article(alarm, act) {
     el("h3", {}, el("span", { class: "symbol", "aria-hidden": "true" }, SYMBOLS[alarm.severity]),
       ` ${alarm.name} `, el("span", { class: "severity" }, alarm.severity), " ",
       el("span", { class: "state" }, WORDS[alarm.state])),
-    el("p", {}, alarm.text),
+    el("p", {}, unbroken(alarm.text)),
     el("p", { class: "remedy" }, alarm.remedy ? `${alarm.remedy} ` : "",
       el("a", { href: `/alarms/${alarm.name}`, target: "_blank", "aria-label": `About the alarm ${alarm.name}` },
         "What it means, and what to do")),
+    el("p", { class: "actions" }, ...buttons(alarm, act)),
     evidence(alarm.evidence),
-    el("p", { class: "history" }, history(alarm)),
-    el("p", { class: "actions" }, ...buttons(alarm, act)));
+    el("p", { class: "history" }, history(alarm)));
 }
 
 export function showAlarms(alarms, act) {

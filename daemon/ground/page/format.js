@@ -26,3 +26,8 @@ export function duration(ms) {
 export function percent(value) {
   return value === null || value === undefined ? "–" : `${Math.round(100 * value)} %`;
 }
+
+// Keeps a number and its unit on one line.
+export function unbroken(text) {
+  return text.replace(/(\d) (?=(%|s|m|N|kPa|°|rad)(?![a-z]))/g, "$1\u00a0");
+}

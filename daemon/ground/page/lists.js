@@ -1,6 +1,6 @@
 // Nodes, events, the last comparison with the simulation, and downloads.
 import { content, el, replace } from "./dom.js";
-import { moment, PLACES } from "./format.js";
+import { moment, PLACES, unbroken } from "./format.js";
 
 const KINDS = ["snapshot", "posterior", "odometry", "alarm", "event", "emcy", "node"];
 
@@ -25,7 +25,7 @@ export function showLog(lines) {
     if (!lines.length) return [el("p", { class: "none" }, "No event yet.")];
     return [el("ol", { reversed: true }, ...lines.map((line) =>
       el("li", {}, el("time", { datetime: new Date(line.time_ms).toISOString() }, moment(line.time_ms).slice(5, 19)), " ",
-        el("b", {}, line.kind), ` ${line.text}`, line.who ? el("em", {}, ` ${line.who}`) : null,
+        el("b", {}, line.kind), ` ${unbroken(line.text)}`, line.who ? el("em", {}, ` ${line.who}`) : null,
         line.late ? el("small", {}, " back-filled") : null)))];
   });
 }

@@ -1,4 +1,4 @@
-"""Programs of others read a recording: Foxglove's packages under Node.js, and the layout for Lichtblick."""
+"""Programs of others read a recording: Foxglove's packages under Node.js, Lichtblick's layout, PlotJuggler's rules."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from mcap.reader import make_reader
 from recorded_traverse import drive_traverse
 
 from regolithd.daemon.recording.layout import layout
@@ -85,3 +86,39 @@ def test_every_line_of_the_layout_is_a_field_of_the_recording(recordings: Path) 
     drawn = [path["value"] for panel in made["configById"].values() for path in panel["paths"]]
     assert len(drawn) == len(set(drawn)) == 33
     assert set(drawn) <= known
+
+
+def plotted(name: str, value: Any) -> Iterator[str]:
+    """Yield the series that PlotJuggler 3.17 makes of a JSON message: numbers and truth values; no text, no null."""
+    if isinstance(value, dict):
+        for key, each in value.items():
+            yield from plotted(f"{name}/{key}", each)
+    elif isinstance(value, int | float):
+        yield name
+
+
+def numbers(schema: dict[str, Any], place: str) -> Iterator[str]:
+    """Yield the path of every number and truth value of a schema, as PlotJuggler writes it."""
+    for name, field in schema["properties"].items():
+        if field["type"] == "object":
+            yield from numbers(field, f"{place}/{name}")
+        elif field["type"] != "string":
+            yield f"{place}/{name}"
+
+
+NOT_IN_THE_DRIVE = re.compile(r"/(motor_temperature_degC|bus_voltage_V|soil_change/.*)")
+"""What this drive has no sensor or no occasion for."""
+
+
+def test_plotjuggler_gets_a_series_of_every_number(recordings: Path) -> None:
+    """It takes its parser by the channel's encoding and the time from the file; arrays would have numbers for names."""
+    (recording,) = recordings.glob("*.mcap")
+    found: set[str] = set()
+    with recording.open("rb") as file:
+        for _, channel, message in make_reader(file).iter_messages():
+            assert channel.message_encoding == "json"
+            content = json.loads(message.data)
+            assert message.log_time == message.publish_time == content["time_ns"]
+            found |= set(plotted(channel.topic, content))
+    expected = {path for topic in ("snapshot", "estimate") for path in numbers(SCHEMAS[topic], topic)}
+    assert found == {path for path in expected if not NOT_IN_THE_DRIVE.search(path)}
