@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve, StatedCurve
     from regolithd.calibration.mismatch.problem.problem import LeftOut, Problem
 
 Array = NDArray[np.float64]
@@ -71,10 +72,31 @@ class Range:
 
 
 @dataclass(frozen=True)
+class Suggestion:
+    """A closed form that may describe an empirical curve: a hypothesis, no finding.
+
+    Attributes
+    ----------
+    form: its family in the grammar
+    parameters: by the names in `equation`
+    held_out_rmse: of the channel with this form in the place of the curve
+    bic_behind: Bayesian information criterion less that of the first suggestion
+    """
+
+    form: str
+    equation: str
+    parameters: Mapping[str, Parameter]
+    held_out_rmse: float
+    bic_behind: float
+
+
+@dataclass(frozen=True)
 class Unexplained:
     """A structure in the residual that no candidate explains: its covariate, wheels, time and share of the power.
 
     `range` is where it is confined to a range of the covariate; None: it varies over the whole of it.
+    `curve` is what it looks like over its covariate; None where it is periodic in time. `suggestions` are closed forms
+    that may describe the curve, best first.
     """
 
     channel: str
@@ -84,6 +106,8 @@ class Unexplained:
     to_s: float
     share_of_residual: float
     range: Range | None = None
+    curve: EmpiricalCurve | None = None
+    suggestions: tuple[Suggestion, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -255,6 +279,15 @@ class Contribution:
 
 
 @dataclass(frozen=True)
+class EmpiricalFit:
+    """A curve that stands for what stays unexplained, and all that was fitted beside it."""
+
+    curve: StatedCurve
+    values: Mapping[str, float]
+    contributions: tuple[Contribution, ...]
+
+
+@dataclass(frozen=True)
 class Curve:
     """A residual against a covariate, before and after the effects, in bins with equal numbers of values.
 
@@ -296,6 +329,7 @@ class Evidence:
     covariate_labels: axis labels with units, as the simulation gives them
     wheel_column: what the recording calls a wheel, an axis or a side
     others: of several channels, the evidence of the others
+    empirical: the empirical curves, each with the parameters and terms of the fit beside it
     """
 
     channel: str
@@ -316,3 +350,4 @@ class Evidence:
     covariate_labels: Mapping[str, str] = field(default_factory=dict, repr=False)
     wheel_column: str = "wheel"
     others: tuple[Evidence, ...] = field(default=(), repr=False)
+    empirical: tuple[EmpiricalFit, ...] = field(default=(), repr=False)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Change, Contribution
 from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.answer import Parameter
+    from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 Array = NDArray[np.float64]
@@ -55,6 +57,10 @@ class Stated:
                 f"[[effects]] {self.contribution.name}: {len(columns)} coefficients are needed, not {len(coefficients)}"
             )
         return np.einsum("c,ctw,w->tw", coefficients, columns, on)
+
+    def deviations(self, problem: Problem) -> tuple[Array, ...]:
+        """Return what one standard deviation of each number in the law, other than its size, adds to the prediction."""
+        return tuple(self.candidate.deviations(problem)) if isinstance(self.candidate, EmpiricalCurveLaw) else ()
 
     def _columns(self, problem: Problem) -> Array:
         """Return the candidate's columns; what never varies in this recording, a level drive's pitch, counts too."""
@@ -102,9 +108,12 @@ class ChangedSize(Candidate):
 
 
 def stated_in(
-    candidates: Sequence[Candidate], effects: Sequence[Contribution], in_simulation: Sequence[Contribution]
+    candidates: Sequence[Candidate],
+    effects: Sequence[Contribution],
+    in_simulation: Sequence[Contribution],
+    curves: Sequence[StatedCurve] = (),
 ) -> tuple[Stated, ...]:
-    """Return the effects that a simulation has: those to add on its output, and those that it predicts itself.
+    """Return the effects that a simulation has: those to add on its output, those that it predicts itself, and curves.
 
     Raises
     ------
@@ -118,6 +127,8 @@ def stated_in(
             if effect.name not in known:
                 raise SimulationError(f"there is no effect {effect.name!r}; known are {', '.join(sorted(known))}")
             found.append(Stated(known[effect.name], effect, inside))
+    laws = [EmpiricalCurveLaw(curve) for curve in curves]
+    found += [Stated(law, Contribution(law.name, {}, (1.0,), law.stated.wheels), in_simulation=False) for law in laws]
     return tuple(found)
 
 
@@ -147,6 +158,7 @@ def corrected_problem(problem: Problem, stated: Sequence[Stated]) -> Problem:
             column=each.column(problem),
             relative_std=each.contribution.relative_std,
             in_simulation=each.in_simulation,
+            deviations=each.deviations(problem),
         )
         for each in stated
     )

@@ -13,7 +13,9 @@ from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, with_changes
 from regolithd.calibration.mismatch.corrected import write_corrected
 from regolithd.calibration.mismatch.data.recording import as_recording
-from regolithd.calibration.mismatch.inference.evidence import evidence_of
+from regolithd.calibration.mismatch.empirical.found import curves_of
+from regolithd.calibration.mismatch.empirical.stated import beyond_the_range
+from regolithd.calibration.mismatch.inference.evidence import empirical_fits, evidence_of
 from regolithd.calibration.mismatch.inference.findings import answer_of
 from regolithd.calibration.mismatch.inference.held_out import earned
 from regolithd.calibration.mismatch.inference.several_channels import merged_answers
@@ -53,15 +55,17 @@ class Comparison:
         """Return what `regolithd mismatch --json` writes."""
         return self.answer.to_json()
 
-    def write_corrected(self, path: Path) -> None:
+    def write_corrected(self, path: Path, *, empirical: bool = False) -> None:
         """Write the corrected SIM.toml, as `regolithd mismatch --corrected` does.
+
+        With `empirical` it has curves of what stays unexplained too, as with `--empirical`.
 
         Raises
         ------
         SimulationError
-            When the simulation does not come from a SIM.toml.
+            When the simulation does not come from a SIM.toml, or a curve cannot be carried to another recording.
         """
-        write_corrected(path, self.answer, self.evidence, self.simulation)
+        write_corrected(path, self.answer, self.evidence, self.simulation, empirical=empirical)
 
     def _repr_html_(self) -> str:
         return notebook_html(self.answer, self.evidence)
@@ -115,7 +119,27 @@ def compare(
             for channel in simulation.channels
         ]
         return merged(found, simulation)
-    return searched(recorded, simulation, effects=effects, thresholds=thresholds, progress=progress).comparison
+    search = searched(recorded, simulation, effects=effects, thresholds=thresholds, progress=progress)
+    if search.decision.unnamed:
+        progress("fitting a curve to what stays unexplained")
+    return with_curves(search)
+
+
+def with_curves(found: Searched) -> Comparison:
+    """Return the comparison with the empirical curves of what stays unexplained."""
+    decision, comparison = found.decision, found.comparison
+    curves = curves_of(decision)
+    by_term = {id(each.term): each for each in curves}
+    told = []
+    for term, place in zip(decision.unnamed, comparison.answer.unexplained, strict=True):
+        of = by_term.get(id(term))
+        told.append(replace(place, curve=of.curve, suggestions=of.suggestions) if of else place)
+    notes = beyond_the_range(decision.equations.problem, comparison.simulation.empirical_curves)
+    return replace(
+        comparison,
+        answer=replace(comparison.answer, unexplained=tuple(told), notes=(*comparison.answer.notes, *notes)),
+        evidence=replace(comparison.evidence, empirical=empirical_fits(decision, curves)),
+    )
 
 
 def searched(
@@ -129,7 +153,7 @@ def searched(
     """Compare the one channel of a simulation, as `compare` does, and return the decision as well."""
     progress("simulating")
     candidates: Sequence[Candidate] = [each.form_for(simulation) for each in simulation.candidates(library())]
-    stated = stated_in(candidates, effects, simulation.stated_effects())
+    stated = stated_in(candidates, effects, simulation.stated_effects(), simulation.empirical_curves)
 
     def pose(values: Mapping[str, float] | None) -> Problem:
         return corrected_problem(build_problem(recorded, simulation, values, thresholds=thresholds), stated)
@@ -160,8 +184,13 @@ def searched(
 
 def _labelled(comparison: Comparison, channel: str) -> Comparison:
     """Return a comparison whose terms say which channel they are of."""
-    terms = tuple(replace(term, channel=channel) for term in comparison.evidence.contributions)
-    return replace(comparison, evidence=replace(comparison.evidence, contributions=terms))
+    evidence = comparison.evidence
+    terms = tuple(replace(term, channel=channel) for term in evidence.contributions)
+    fits = tuple(
+        replace(fit, contributions=tuple(replace(term, channel=channel) for term in fit.contributions))
+        for fit in evidence.empirical
+    )
+    return replace(comparison, evidence=replace(evidence, contributions=terms, empirical=fits))
 
 
 def merged(comparisons: Sequence[Comparison], simulation: Simulation) -> Comparison:

@@ -1,7 +1,8 @@
 """The corrected simulation: SIM.toml with calibrated parameters and the effects that were found.
 
 An effect that the simulation has parameters for goes into them (`Simulation.absorb_effects`). The others are written
-to `[[effects]]`, each with its shape, coefficients and wheels, and are added to the prediction when the file is read.
+to `[[effects]]`, each with its shape, coefficients and wheels, and are added to the prediction when the file is read;
+so are curves of what has no name, to `[[empirical_curves]]`, where they are asked for.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.empirical.written import summed, with_changed_sizes, with_curves
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.prior import own_name
+from regolithd.calibration.mismatch.simulation.corrected_curves import TABLE, entry_of, stated_curves
 from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects as stated_effects  # noqa: PLC0414  # for its users
 from regolithd.calibration.mismatch.simulation.load import model_folder, read_tables
 from regolithd.calibration.toml_document import with_tables
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from regolithd.calibration.mismatch.answer import Answer, Contribution, Effect, Evidence
+    from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]
@@ -34,22 +38,29 @@ INTERVAL_STDS = 2 * 1.645
 """Width of a 90 % interval of a normal density, in standard deviations."""
 
 
-def write_corrected(path: Path, answer: Answer, evidence: Evidence, simulation: Simulation) -> None:
+def write_corrected(
+    path: Path, answer: Answer, evidence: Evidence, simulation: Simulation, *, empirical: bool = False
+) -> None:
     """Write SIM.toml with the calibrated parameters and the effects; the user's comments and order stay.
 
-    In another folder than SIM.toml, `[simulation] path` leads to the user's class or FMU.
+    In another folder than SIM.toml, `[simulation] path` leads to the user's class or FMU. With `empirical`, it has the
+    curves of what stays unexplained too, and the parameters and effects as they were fitted beside these.
 
     Raises
     ------
     SimulationError
-        When the simulation does not come from a SIM.toml.
+        When the simulation does not come from a SIM.toml, or a curve cannot be carried to another recording.
     """
     source = simulation.source
     if source is None:
         raise SimulationError("a corrected simulation is a SIM.toml: load the simulation from one, by load_simulation")
     tables, terms = read_tables(source), evidence.contributions
-    imitating = bool(answer.unexplained)
-    new = corrected_tables(tables, simulation, evidence.values, terms, answer.effects, within_priors=imitating)
+    imitating, values = bool(answer.unexplained), evidence.values
+    curves: list[StatedCurve] = []
+    if empirical and answer.unexplained:
+        values, terms, curves = with_curves(answer, evidence)
+        imitating = False
+    new = corrected_tables(tables, simulation, values, terms, answer.effects, within_priors=imitating, curves=curves)
     if path.resolve().parent != source.resolve().parent and tables["simulation"]["model"] != "rover-wheel":
         folder = model_folder(tables, source.resolve().parent)
         new["simulation"] = {**new["simulation"], "path": os.path.relpath(folder.resolve(), path.resolve().parent)}
@@ -64,6 +75,7 @@ def corrected_tables(
     effects: Sequence[Effect] = (),
     *,
     within_priors: bool = True,
+    curves: Sequence[StatedCurve] = (),
 ) -> dict[str, Any]:
     """Return SIM.toml's tables with the calibrated parameters and every effect.
 
@@ -75,9 +87,11 @@ def corrected_tables(
     effects: the same, with their intervals, in the same order; left out, the terms have no standard deviation
     within_priors: whether parameters go no further than three standard deviations of their priors, for a fit that has
         moved them to imitate something unexplained; else the file has the values that the answer calls calibrated
+    curves: empirical curves to add
     """
     # Changes of effects that the simulation had already follow the named effects.
     named, changes = contributions[: len(effects)], contributions[len(effects) :]
+    held_curves, changes = with_changed_sizes(stated_curves(tables), changes)
     pairs = zip(named, effects, strict=True)
     contributions = [*(replace(term, relative_std=_relative_std(effect)) for term, effect in pairs), *changes]
     held = _within_three_std(simulation, values) if within_priors else values
@@ -86,6 +100,8 @@ def corrected_tables(
     before = list(tables.get("effects", []))
     if before or rest:
         corrected["effects"] = before + [_entry(effect) for effect in rest]
+    if held_curves or curves:
+        corrected[TABLE] = [entry_of(curve) for curve in summed([*held_curves, *curves])]
     return corrected
 
 

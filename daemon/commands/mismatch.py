@@ -26,6 +26,10 @@ def register(app: typer.Typer) -> None:
         json: Annotated[Path | None, typer.Option(help="Write the answer here, as JSON.")] = None,
         report: Annotated[Path | None, typer.Option(help="Write a self-contained HTML report here.")] = None,
         corrected: Annotated[Path | None, typer.Option(help="Write the corrected SIM.toml here.")] = None,
+        empirical: Annotated[
+            bool,
+            typer.Option("--empirical", help="Add a curve of what stays unexplained to --corrected, labelled as such."),
+        ] = False,
         catalogue: Annotated[
             Path | None,
             typer.Option(help="Write what was found in which recording here (.parquet); continues a stopped run."),
@@ -65,7 +69,7 @@ def register(app: typer.Typer) -> None:
             from regolithd.daemon.mismatch.run import run
 
             fleet = FleetOptions(rover_from, parameters, catalogue, scheduler)
-            run(recordings, simulation, Outputs(json, report, corrected), fleet)
+            run(recordings, simulation, Outputs(json, report, corrected, empirical=empirical), fleet)
         except (MismatchError, OSError) as error:
             typer.echo(f"regolithd mismatch: {error}", err=True)
             raise typer.Exit(EXIT_DATA) from error

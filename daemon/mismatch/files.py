@@ -20,11 +20,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """Paths to write to; None: not written."""
+    """Paths to write to; None: not written. `empirical`: whether the corrected simulation has curves without a name."""
 
     json: Path | None = None
     report: Path | None = None
     corrected: Path | None = None
+    empirical: bool = False
 
     def check(self) -> None:
         """Check that the folders are there, before minutes are spent.
@@ -32,8 +33,10 @@ class Outputs:
         Raises
         ------
         MismatchError
-            When one is not.
+            When one is not, or a curve was asked for and no file to write it to.
         """
+        if self.empirical and not self.corrected:
+            raise MismatchError("--empirical adds to a corrected simulation: give --corrected FILE too")
         for path in (self.json, self.report, self.corrected):
             if path and not path.resolve().parent.is_dir():
                 raise MismatchError(f"{path} cannot be written: there is no folder {path.parent}")

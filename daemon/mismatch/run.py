@@ -51,7 +51,7 @@ def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs, options:
     if outputs.json:
         write_json(outputs.json, found.answer)
     if outputs.corrected:
-        found.write_corrected(outputs.corrected)
+        found.write_corrected(outputs.corrected, empirical=outputs.empirical)
     if outputs.report:
         write_page(outputs.report, found, recordings, simulation)
     print_answer(Console(), found.answer)

@@ -9,7 +9,7 @@ from rich.markup import escape
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from regolithd.calibration.mismatch.answer import Answer
+    from regolithd.calibration.mismatch.answer import Answer, Unexplained
 
 
 def print_answer(console: Console, answer: Answer) -> None:
@@ -30,6 +30,20 @@ def sure_of(answer: Answer) -> str:
     return f"{text}; next: {' + '.join(names) or 'nothing'} ({other.probability:.2f})"
 
 
+def _curve_lines(rest: Unexplained) -> list[str]:
+    """Return what an empirical curve brings, and the closed forms that may describe it."""
+    if rest.curve is None:
+        return []
+    curve = rest.curve
+    reach = f"{curve.at[0]:.4g} to {curve.at[-1]:.4g} {curve.covariate_unit}".strip()
+    error = f"held-out error {curve.held_out_rmse_before:.5g} before, {curve.held_out_rmse_after:.5g} after"
+    lines = [f"with an empirical curve over {rest.covariate}, {reach}: {error}"]
+    for place, each in enumerate(rest.suggestions, 1):
+        numbers = ", ".join(f"{name} = {one.value:.4g} {one.unit}" for name, one in each.parameters.items())
+        lines.append(f"suggestion {place}: {each.equation}; {numbers}; held-out error {each.held_out_rmse:.5g}")
+    return lines
+
+
 def _lines(answer: Answer) -> list[str]:
     fit = answer.fit
     error = (
@@ -44,6 +58,7 @@ def _lines(answer: Answer) -> list[str]:
             f"{f'; only {rest.range.statement}' if rest.range else ''}"
             for rest in answer.unexplained
         ),
+        *(line for rest in answer.unexplained for line in _curve_lines(rest)),
         *(
             f"{' or '.join(pair.effects)}: this recording does not distinguish them. {pair.experiment}"
             for pair in answer.indistinguishable

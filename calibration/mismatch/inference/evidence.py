@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import Contribution, Curve, Evidence
+from regolithd.calibration.mismatch.answer import Contribution, Curve, EmpiricalFit, Evidence
 from regolithd.calibration.mismatch.changes import ChangedSize, contribution_of_change
+from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import WITHOUT_SMOOTH_TERM
@@ -17,6 +18,7 @@ from regolithd.calibration.mismatch.signal.binning import binned_means, even_edg
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from regolithd.calibration.mismatch.empirical.found import FoundCurve
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
@@ -54,6 +56,20 @@ def evidence_of(decision: Decision) -> Evidence:
         values=calibrated_values(equations, named),
         contributions=_contributions(equations, named),
         problem=problem,
+    )
+
+
+def empirical_fits(decision: Decision, curves: Sequence[FoundCurve]) -> tuple[EmpiricalFit, ...]:
+    """Return the curves as a corrected simulation has them, with what was fitted beside each."""
+    equations = decision.equations
+    channel = equations.problem.simulation.channel
+    return tuple(
+        EmpiricalFit(
+            curve=StatedCurve(channel, wheel_names(equations.problem, each.term.wheels), each.term.name, each.curve),
+            values=calibrated_values(equations, each.fit),
+            contributions=_contributions(equations, each.fit),
+        )
+        for each in curves
     )
 
 

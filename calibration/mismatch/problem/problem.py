@@ -41,6 +41,7 @@ class StatedEffect:
     column: what it adds to the prediction, shape (time, wheel)
     relative_std: relative standard deviation of its size, from the comparison that found it
     in_simulation: whether the simulation's own prediction has it; else it is added on the output
+    deviations: what one standard deviation of other numbers in its law adds, shape (time, wheel) each
     """
 
     name: str
@@ -48,6 +49,7 @@ class StatedEffect:
     column: Array
     relative_std: float
     in_simulation: bool = False
+    deviations: tuple[Array, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,8 @@ def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:
     # The coefficient of a column that was divided by its scale is the parameter's shift times that scale.
     precision = 1 / (np.array(stds) * design.scale[list(places)]) ** 2 if places else np.zeros(0)
     centre = away * design.scale[list(places)] if places else np.zeros(0)
-    stated = frozenset(stated_name(effect.name) for effect in design.problem.stated)
+    about = tuple(stated_name(effect.name) for effect in design.problem.stated)
+    stated = frozenset(name for name in names if name.startswith(about))
     return design, Nuisance(tuple(names), places, precision, centre, stated)
 
 
@@ -86,7 +87,12 @@ def tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
     uncertain = [effect for effect in problem.stated if effect.relative_std > 0]
     names += [stated_name(effect.name) for effect in uncertain]
     stds += [effect.relative_std for effect in uncertain]
-    return names, stds, found + [effect.column for effect in uncertain]
+    found += [effect.column for effect in uncertain]
+    for effect in problem.stated:
+        names += [f"{stated_name(effect.name)}, {number}" for number in range(1, len(effect.deviations) + 1)]
+        stds += [1.0] * len(effect.deviations)
+        found += effect.deviations
+    return names, stds, found
 
 
 def stated_name(effect: str) -> str:

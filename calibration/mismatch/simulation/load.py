@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.simulation.checked import checked
+from regolithd.calibration.mismatch.simulation.corrected_curves import stated_curves
 from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects
 from regolithd.calibration.mismatch.simulation.simulation import Simulation
 from regolithd.calibration.mismatch.simulation.toml_place import line_of
@@ -87,7 +88,8 @@ def _loaded(
         raise SimulationError(f"[simulation] {MODELS}, not {model!r}", ("simulation", "model"))
     _check_effects(tables.get("effects", []))
     made = _of_model(model, tables, model_folder(tables, beside), announce)
-    made.corrected_effects, made.source = stated_effects(tables), source
+    made.corrected_effects, made.empirical_curves = stated_effects(tables), stated_curves(tables)
+    made.source = source
     return checked(made)
 
 

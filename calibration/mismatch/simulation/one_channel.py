@@ -41,6 +41,7 @@ class OneChannel(Simulation):
             "sensors",
         ):
             setattr(self, name, getattr(simulation, name))
+        self.empirical_curves = [each for each in simulation.empirical_curves if each.channel == channel]
 
     def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
         """Return this channel of the prediction.

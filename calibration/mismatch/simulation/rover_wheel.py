@@ -36,6 +36,9 @@ POWER_TOLERANCE = 1e-9
 LIFTED_N = 1.0
 """Largest reading of a load cell under a wheel that hangs in its suspension (a choice: a few percent of a load)."""
 
+OF_THE_ENGINE = frozenset({"effects", "empirical_curves"})
+"""Tables that the engine adds to the prediction, whatever the simulation."""
+
 
 class SimulationTable(Table):
     """SIM.toml's `[simulation]`."""
@@ -97,7 +100,7 @@ class RoverWheel(Simulation):
     def from_tables(cls, tables: Mapping[str, Any]) -> Self:
         """Read SIM.toml's tables; one error names every mistake."""
         try:
-            return cls(RoverWheelTables(**{name: table for name, table in tables.items() if name != "effects"}))
+            return cls(RoverWheelTables(**{name: table for name, table in tables.items() if name not in OF_THE_ENGINE}))
         except ValidationError as error:
             raise _mistakes(error) from error
 

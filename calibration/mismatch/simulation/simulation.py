@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.data.slow_channels import Between
+    from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
     from regolithd.calibration.mismatch.problem.prior import Prior, SensorError
 
 Array = NDArray[np.float64]
@@ -80,6 +81,8 @@ class Simulation:
     """SIM.toml's tables, as read."""
     corrected_effects: Sequence[Contribution] = ()
     """The effects that SIM.toml's `[[effects]]` add to the prediction, as `--corrected` wrote them."""
+    empirical_curves: Sequence[StatedCurve] = ()
+    """The curves that SIM.toml's `[[empirical_curves]]` add to it, as `--corrected --empirical` wrote them."""
     source: Path | None = None
     """The SIM.toml that the simulation was loaded from."""
     sensors: Mapping[str, SensorError] = {}

@@ -12,7 +12,7 @@ from regolithd.calibration.mismatch.problem.prior import Prior
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-ENGINE_TABLES = ("simulation", "effects")
+ENGINE_TABLES = ("simulation", "effects", "empirical_curves")
 """Tables that are no parameters."""
 FIELDS = ("value", "std", "unit")
 """Keys of `[parameters.NAME]`."""

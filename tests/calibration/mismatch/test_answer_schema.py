@@ -15,6 +15,7 @@ from regolithd.calibration.mismatch import answer as answers
 from regolithd.calibration.mismatch.answer import Answer, answer_schema
 from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects
 from regolithd.calibration.mismatch.data.recording import as_recording
+from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ PARTS = {
     "change": answers.Change,
     "left_out": LeftOut,
     "other_answer": answers.OtherAnswer,
+    "suggestion": answers.Suggestion,
+    "empirical_curve": EmpiricalCurve,
 }
 """Data class of each part of the schema."""
 FEW = {"coulomb-friction", "viscous-friction", "cold-lubricant-friction"}

@@ -146,7 +146,7 @@ def _posed(
     effects = [
         each for each in simulation.corrected_effects if not simulation.channels or each.channel == of_channel.channel
     ]
-    stated = stated_in(forms_of(of_channel), effects, of_channel.stated_effects())
+    stated = stated_in(forms_of(of_channel), effects, of_channel.stated_effects(), of_channel.empirical_curves)
     return corrected_problem(build_problem(recording, of_channel, found.values, thresholds=thresholds), stated)
 
 

@@ -1,0 +1,166 @@
+"""The empirical curve and the suggestions of a decision's smooth term, as the answer and the report have them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.answer import Parameter, Suggestion
+from regolithd.calibration.mismatch.empirical.acting import ALONG, EACH_WAY, of_magnitude
+from regolithd.calibration.mismatch.empirical.spline import fit_spline, knots_of
+from regolithd.calibration.mismatch.empirical.suggestions import (
+    SUGGESTED,
+    FittedForm,
+    best_forms,
+    held_out_squares,
+    standard_deviations,
+)
+from regolithd.calibration.mismatch.empirical.sums import profile, squares_on_fold, sums_of
+from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
+from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.empirical.spline import Spline
+    from regolithd.calibration.mismatch.empirical.sums import CovariateSums
+    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.group import Fit, Term
+    from regolithd.calibration.mismatch.selection.decision import Decision
+
+Array = NDArray[np.float64]
+
+NINETY_PERCENT_STDS = 1.645
+"""Half the width of a 90 % interval of a normal density, in standard deviations."""
+X = re.compile(r"(?<![a-z])x(?![a-z])")
+"""The covariate in the text of a form."""
+
+
+@dataclass(frozen=True, eq=False)
+class FoundCurve:
+    """What a smooth term becomes.
+
+    Attributes
+    ----------
+    term: the smooth term
+    curve: with its band and held-out errors
+    suggestions: closed forms, best first
+    fit: of the free parameters and the named effects beside the curve
+    """
+
+    term: Term
+    curve: EmpiricalCurve
+    suggestions: tuple[Suggestion, ...]
+    fit: Fit
+
+
+def curves_of(decision: Decision) -> tuple[FoundCurve, ...]:
+    """Return the curves of what stays unexplained; a sine over time has none."""
+    return tuple(_found(decision, term) for term in decision.unnamed if term.group.coupling != PERIODIC)
+
+
+def _found(decision: Decision, term: Term) -> FoundCurve:
+    sums = sums_of(decision.equations, decision.named, term)
+    whole = profile(sums)
+    spline = fit_spline(whole, sums.at, knots_of(sums))
+    curve = _curve(decision.equations.problem, term, spline, _held_out(sums))
+    beside = replace(decision.named, coefficients=whole.others(spline.in_bins))
+    if term.name == "time":
+        # What happened at some time has no law over time.
+        return FoundCurve(term, curve, (), beside)
+    forms = best_forms(sums, decision.noise.autocorrelation_time)[:SUGGESTED]
+    best = forms[0][0] if forms else 0.0
+    told = [_suggestion(decision.equations.problem, curve, term, sums, form, bic - best) for bic, form in forms]
+    return FoundCurve(term, curve, tuple(told), beside)
+
+
+def _held_out(sums: CovariateSums) -> tuple[float, float]:
+    """Return the root-mean-square errors on held-out folds, without and with a curve that the others fitted."""
+    before, after = np.zeros(len(sums.weights)), np.zeros(len(sums.weights))
+    nothing = np.zeros(len(sums.at))
+    for fold in sums.folds:
+        train = profile(sums, sums.other_folds(fold))
+        values = fit_spline(train, sums.at, knots_of(sums)).in_bins
+        before += squares_on_fold(sums, fold, nothing, train.others(nothing))
+        after += squares_on_fold(sums, fold, values, train.others(values))
+    return _rms(sums, before), _rms(sums, after)
+
+
+def _rms(sums: CovariateSums, squares: Array) -> float:
+    return float(np.sqrt(max(float(squares.sum()), 0.0) / sums.counts.sum()))
+
+
+def _curve(problem: Problem, term: Term, spline: Spline, held_out: tuple[float, float]) -> EmpiricalCurve:
+    coupling, reach = term.group.coupling, NINETY_PERCENT_STDS * spline.std
+    return EmpiricalCurve(
+        coupling=coupling,
+        magnitude=of_magnitude(term.name, coupling),
+        unit="1" if coupling == "gain" else problem.simulation.unit,
+        covariate_unit=unit_of(problem, term.name),
+        at=tuple(spline.at.tolist()),
+        value=tuple(spline.value.tolist()),
+        low=tuple((spline.value - reach).tolist()),
+        high=tuple((spline.value + reach).tolist()),
+        held_out_rmse_before=held_out[0],
+        held_out_rmse_after=held_out[1],
+    )
+
+
+def unit_of(problem: Problem, covariate: str) -> str:
+    """Return a covariate's unit: what is in brackets at the end of its label, up to a comma; empty without one."""
+    if covariate == "time":
+        return "s"
+    found = re.search(r"\(([^(),]+)[^()]*\)$", problem.labels.get(covariate, ""))
+    return found[1] if found else ""
+
+
+def _suggestion(
+    problem: Problem, curve: EmpiricalCurve, term: Term, sums: CovariateSums, found: FittedForm, behind: float
+) -> Suggestion:
+    form = found.form
+    names = (*form.coefficients, *(("b",) if found.constant else ()), *form.names)
+    values = (*found.coefficients, *found.shape)
+    stds = standard_deviations(profile(sums), sums.at, found)
+    units = _units(found, curve.unit, curve.covariate_unit or term.name)
+    parameters = {
+        name: Parameter(
+            float(value), float(value - NINETY_PERCENT_STDS * std), float(value + NINETY_PERCENT_STDS * std), unit
+        )
+        for name, value, std, unit in zip(names, values, stds, units, strict=True)
+    }
+    return Suggestion(
+        form=form.family,
+        equation=_equation(problem, curve, term, found),
+        parameters=parameters,
+        held_out_rmse=_rms(sums, held_out_squares(sums, found)),
+        bic_behind=float(behind),
+    )
+
+
+def _units(found: FittedForm, unit: str, of_x: str) -> tuple[str, ...]:
+    """Return the units of the coefficients, of the constant, and of the shape parameters."""
+    exponent = "p" if "p" in found.form.names else f"{found.form.exponent:g}"
+    per = {"0": unit, "1": f"{unit}/({of_x})"}.get(exponent, f"{unit}/({of_x})^{exponent}")
+    shapes = tuple("1" if name == "p" else of_x for name in found.form.names)
+    return (*[per] * len(found.form.coefficients), *([unit] if found.constant else []), *shapes)
+
+
+def _equation(problem: Problem, curve: EmpiricalCurve, term: Term, found: FittedForm) -> str:
+    """Return the form as text with the names of channel, covariate and factor."""
+    x = f"|{term.name}|" if curve.magnitude else term.name
+    text = X.sub(x, found.form.text.replace("|x|", x) if curve.magnitude else found.form.text)
+    text += " + b" if found.constant else ""
+    factor = factor_in_words(curve.coupling, problem.simulation.channel)
+    return f"Δ{problem.simulation.channel} = " + (f"({text}) · {factor}" if factor else text)
+
+
+def factor_in_words(coupling: str, channel: str) -> str:
+    """Return the factor by which a curve acts, as text; empty where there is none."""
+    if coupling in {"offset", EACH_WAY}:
+        return ""
+    if coupling == "gain":
+        return f"{channel} predicted"
+    contrast = coupling.removeprefix(ALONG) if coupling.startswith(ALONG) else ""
+    return "sign(motion)" + (f" · ({contrast})" if contrast else "")

@@ -1,0 +1,108 @@
+"""Empirical curves that a corrected simulation has: what each adds to the prediction, and how well it is known.
+
+The curve as a whole is an effect whose size may have changed. Its shape is known as its band says: the value at each
+knot is a free parameter with that standard deviation, so that a later recording which agrees is consistent.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.empirical.acting import factor_of
+from regolithd.calibration.mismatch.errors import SimulationError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
+    from regolithd.calibration.mismatch.problem.problem import Problem
+
+Array = NDArray[np.float64]
+
+RELATIVE_SIZE = "relative_size"
+"""The curve's coefficient: 1 is as corrected."""
+INTERVAL_STDS = 2 * 1.645
+"""Width of a 90 % interval of a normal density, in standard deviations."""
+LEAST_TOLD = 0.01
+"""Share of the readings beyond a curve's range from which on that is told (a choice: its range leaves out 1 %)."""
+
+
+class EmpiricalCurveLaw(Candidate):
+    """An empirical curve as an effect with one coefficient, its relative size; no search names it."""
+
+    coefficients: ClassVar = (Coefficient(RELATIVE_SIZE, "1"),)
+
+    def __init__(self, stated: StatedCurve) -> None:
+        self.stated = stated
+        self.name = name_of(stated)  # type: ignore[misc]
+        self.covariate = stated.covariate  # type: ignore[misc]
+        self.equation = f"an empirical curve over {stated.covariate}"  # type: ignore[misc]
+        self.words = "what an empirical curve describes"  # type: ignore[misc]
+        self.signature = "the curve that was found"  # type: ignore[misc]
+        self.experiment = f"vary {{{stated.covariate}}} over the curve's range"  # type: ignore[misc]
+        self.source = "a comparison with a recording"  # type: ignore[misc]
+        self.label = self.name.replace("-", " ").replace("_", " ")  # type: ignore[misc]
+        self.along_motion = stated.curve.coupling.startswith("drag")  # type: ignore[misc]
+        self.vary = (stated.covariate,)  # type: ignore[misc]
+        self.requires = (stated.covariate,)  # type: ignore[misc]
+
+    def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002
+        """Return what the curve adds to the prediction; outside its range it keeps its end values."""
+        x, factor = self._course(problem)
+        curve = self.stated.curve
+        return np.where(np.isfinite(x), np.interp(x, curve.at, curve.value), 0.0)[None] * factor
+
+    def deviations(self, problem: Problem) -> Array:
+        """Return what one standard deviation of the value at each knot adds, shape (knot, time, wheel)."""
+        x, factor = self._course(problem)
+        curve = self.stated.curve
+        stds = (np.array(curve.high) - np.array(curve.low)) / INTERVAL_STDS
+        hats = [np.where(np.isfinite(x), np.interp(x, curve.at, row), 0.0) for row in np.diag(stds)]
+        on = np.isin(np.array(problem.recording.wheels, dtype=object), list(self.stated.wheels))
+        return np.where(problem.mask & on, np.stack(hats) * factor, 0.0)
+
+    def _course(self, problem: Problem) -> tuple[Array, Array]:
+        return course_of(problem, self.stated), factor_of(problem, self.stated.covariate, self.stated.curve.coupling)
+
+
+def name_of(stated: StatedCurve) -> str:
+    """Return what a curve is called among the changes: how it acts, and over what."""
+    how = stated.curve.coupling.replace(",", "").replace(" ", "-")
+    return f"empirical-{how}-over-{stated.covariate}"
+
+
+def course_of(problem: Problem, stated: StatedCurve) -> Array:
+    """Return a curve's covariate, or its magnitude, shape (time, wheel).
+
+    Raises
+    ------
+    SimulationError
+        When the recording does not have it.
+    """
+    values = {**problem.constants, **problem.covariates}.get(stated.covariate)
+    if values is None:
+        raise SimulationError(
+            f"[[empirical_curves]] depends on {stated.covariate}, which this recording does not have: record it, or "
+            "take the curve out of the file"
+        )
+    return np.abs(values) if stated.curve.magnitude else values
+
+
+def beyond_the_range(problem: Problem, curves: Sequence[StatedCurve]) -> tuple[str, ...]:
+    """Return a note of each curve whose range the recording leaves."""
+    notes = []
+    for stated in curves:
+        x, (low, high) = course_of(problem, stated), (stated.curve.at[0], stated.curve.at[-1])
+        on = np.isin(np.array(problem.recording.wheels, dtype=object), list(stated.wheels))
+        known = problem.mask & on & np.isfinite(x)
+        share = float(np.mean((x[known] < low) | (x[known] > high))) if known.any() else 0.0
+        if share > LEAST_TOLD:
+            notes.append(
+                f"{100 * share:.0f} % of the readings lie outside the range of the empirical curve over "
+                f"{stated.covariate} ({low:.4g} to {high:.4g}): there it keeps its end values, and proves nothing."
+            )
+    return tuple(notes)

@@ -1,0 +1,47 @@
+"""A curve over a covariate that stands for physics without a name: points, band and range, as data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class EmpiricalCurve:
+    """A piecewise linear function of a covariate, fitted to one recording; outside its range it keeps its end values.
+
+    What it adds to the prediction is its value times a factor. The factor is what `coupling` says: "offset" 1, "drag"
+    the direction of motion, "gain" the prediction, "drag, opposite sides" the direction times −1 on the left and +1 on
+    the right (the simulation's `contrasts`), "each way" 1 with a covariate that has its sign.
+
+    Attributes
+    ----------
+    coupling: how it acts
+    magnitude: whether it is a function of the covariate's magnitude
+    unit: of its values: the channel's, or "1" where it acts as a gain
+    covariate_unit: the covariate's; empty where nothing says it
+    at: the knots, ascending; the first and the last are the ends of its range
+    value, low, high: at the knots, with the ends of a 90 % band
+    held_out_rmse_before, held_out_rmse_after: root-mean-square error of the channel without and with the curve, on
+        blocks of time that fitted neither of them
+    """
+
+    coupling: str
+    magnitude: bool
+    unit: str
+    covariate_unit: str
+    at: tuple[float, ...]
+    value: tuple[float, ...]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    held_out_rmse_before: float
+    held_out_rmse_after: float
+
+
+@dataclass(frozen=True)
+class StatedCurve:
+    """An empirical curve that a corrected simulation has, and where: channel, wheels (their names) and covariate."""
+
+    channel: str
+    wheels: tuple[int | str, ...]
+    covariate: str
+    curve: EmpiricalCurve
