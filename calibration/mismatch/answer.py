@@ -278,13 +278,24 @@ class Contribution:
     channel: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EmpiricalFit:
-    """A curve that stands for what stays unexplained, and all that was fitted beside it."""
+    """A curve that stands for what stays unexplained, and all that was fitted beside it.
+
+    Attributes
+    ----------
+    values, contributions: the simulation's parameters and the effects' terms in that fit
+    at, mean, standard_error: what all but the curve leaves, over the curve's factor, in bins of the covariate
+    suggested: the first suggestion at the curve's knots; empty where there is none
+    """
 
     curve: StatedCurve
     values: Mapping[str, float]
     contributions: tuple[Contribution, ...]
+    at: Array
+    mean: Array
+    standard_error: Array
+    suggested: Array
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,13 @@ from regolithd.calibration.mismatch.empirical.suggestions import (
     held_out_squares,
     standard_deviations,
 )
-from regolithd.calibration.mismatch.empirical.sums import profile, squares_on_fold, sums_of
+from regolithd.calibration.mismatch.empirical.sums import points_beside, profile, squares_on_fold, sums_of
 from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.empirical.spline import Spline
-    from regolithd.calibration.mismatch.empirical.sums import CovariateSums
+    from regolithd.calibration.mismatch.empirical.sums import CovariateSums, Points
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.selection.decision import Decision
@@ -48,12 +48,16 @@ class FoundCurve:
     curve: with its band and held-out errors
     suggestions: closed forms, best first
     fit: of the free parameters and the named effects beside the curve
+    points: what these leave, in bins of the covariate
+    suggested: the first suggestion at the curve's knots; empty where there is none
     """
 
     term: Term
     curve: EmpiricalCurve
     suggestions: tuple[Suggestion, ...]
     fit: Fit
+    points: Points
+    suggested: Array
 
 
 def curves_of(decision: Decision) -> tuple[FoundCurve, ...]:
@@ -66,14 +70,18 @@ def _found(decision: Decision, term: Term) -> FoundCurve:
     whole = profile(sums)
     spline = fit_spline(whole, sums.at, knots_of(sums))
     curve = _curve(decision.equations.problem, term, spline, _held_out(sums))
-    beside = replace(decision.named, coefficients=whole.others(spline.in_bins))
-    if term.name == "time":
-        # What happened at some time has no law over time.
-        return FoundCurve(term, curve, (), beside)
-    forms = best_forms(sums, decision.noise.autocorrelation_time)[:SUGGESTED]
-    best = forms[0][0] if forms else 0.0
-    told = [_suggestion(decision.equations.problem, curve, term, sums, form, bic - best) for bic, form in forms]
-    return FoundCurve(term, curve, tuple(told), beside)
+    others = whole.others(spline.in_bins)
+    # What happened at some time has no law over time.
+    forms = best_forms(sums, decision.noise.autocorrelation_time)[:SUGGESTED] if term.name != "time" else []
+    told = [_suggestion(decision.equations.problem, curve, term, sums, form, bic - forms[0][0]) for bic, form in forms]
+    return FoundCurve(
+        term=term,
+        curve=curve,
+        suggestions=tuple(told),
+        fit=replace(decision.named, coefficients=others),
+        points=points_beside(sums, others),
+        suggested=forms[0][1].values(spline.at) if forms else np.zeros(0),
+    )
 
 
 def _held_out(sums: CovariateSums) -> tuple[float, float]:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+POINTS = 24
+"""Bins of a picture (a choice: one for each knot of a curve)."""
 BINS = 240
 """Bins of the covariate (a choice: a tenth of the width between the knots of a curve)."""
 
@@ -151,6 +153,25 @@ def profile(sums: CovariateSums, folds: Sequence[int] | None = None) -> Profile:
         against=against,
         cross=cross,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Means in bins of the covariate with their standard errors, shape (bin,) each."""
+
+    at: Array
+    mean: Array
+    standard_error: Array
+
+
+def points_beside(sums: CovariateSums, others: Array) -> Points:
+    """Return what the other columns, with these coefficients, leave of the residual, over the factor, in wider bins."""
+    left = np.einsum("w,fwb->b", sums.weights, sums.moment - sums.cross @ others)
+    power = np.einsum("w,fwb->b", sums.weights, sums.power)
+    parts = np.array_split(np.flatnonzero(power > 0), min(POINTS, int(np.count_nonzero(power))))
+    known = np.array([power[part].sum() for part in parts])
+    at = np.array([np.average(sums.at[part], weights=sums.readings[part]) for part in parts])
+    return Points(at, np.array([left[part].sum() for part in parts]) / known, 1 / np.sqrt(known))
 
 
 def squares_on_fold(sums: CovariateSums, fold: int, values: Array, others: Array) -> Array:

@@ -68,6 +68,10 @@ def empirical_fits(decision: Decision, curves: Sequence[FoundCurve]) -> tuple[Em
             curve=StatedCurve(channel, wheel_names(equations.problem, each.term.wheels), each.term.name, each.curve),
             values=calibrated_values(equations, each.fit),
             contributions=_contributions(equations, each.fit),
+            at=each.points.at,
+            mean=each.points.mean,
+            standard_error=each.points.standard_error,
+            suggested=each.suggested,
         )
         for each in curves
     )

@@ -11,6 +11,7 @@ from markupsafe import Markup
 from regolithd.calibration.mismatch.inference.statements import capital, listed
 from regolithd.calibration.mismatch.report.axes import number
 from regolithd.calibration.mismatch.report.curves import curve_of
+from regolithd.calibration.mismatch.report.empirical import EmpiricalSection, empirical_section
 from regolithd.calibration.mismatch.report.figures import curve_figure, fit_figure, interval_figure, map_figure
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ class UnexplainedSection:
 
     covariate: str
     facts: tuple[str, ...]
+    empirical: EmpiricalSection | None = None
 
 
 @dataclass(frozen=True)
@@ -213,7 +215,8 @@ def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> Unexp
         f"{first} to {last} {labels.time_unit}",
         f"{100 * place.share_of_residual:.1f} % of the residual’s power",
     )
-    return UnexplainedSection(labels.covariate(place.covariate), tuple(fact for fact in facts if fact))
+    curve = empirical_section(place, evidence, labels) if place.curve else None
+    return UnexplainedSection(labels.covariate(place.covariate), tuple(fact for fact in facts if fact), curve)
 
 
 def fit(answer: Answer, evidence: Evidence, labels: Labels) -> FitSection:

@@ -1,0 +1,46 @@
+"""The report's part about a curve without a name."""
+
+from __future__ import annotations
+
+import re
+from types import SimpleNamespace
+
+import numpy as np
+
+from regolithd.calibration.mismatch.answer import EmpiricalFit, Parameter, Suggestion, Unexplained
+from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve, StatedCurve
+from regolithd.calibration.mismatch.report.empirical import empirical_section
+from regolithd.calibration.mismatch.report.labels import Labels
+
+CURVE = EmpiricalCurve(
+    "drag", True, "A", "m/s", (0.1, 0.4, 0.7), (0.0, 0.1, 0.15), (-0.1, 0.05, 0.1), (0.1, 0.15, 0.2), 0.4, 0.2
+)
+FORM = Suggestion("power", "Δcurrent_A = c speed", {"c": Parameter(0.25, 0.2, 0.3, "A/(m/s)")}, 0.21, 0.0)
+PLACE = Unexplained("current_A", (1,), "speed", 0.0, 9.0, 0.4, CURVE, (FORM,))
+FIT = EmpiricalFit(
+    StatedCurve("current_A", (1,), "speed", CURVE),
+    {},
+    (),
+    at=np.array([0.05, 0.2, 0.6]),
+    mean=np.array([0.0, 0.03, 0.12]),
+    standard_error=np.full(3, 0.01),
+    suggested=np.array([0.025, 0.1, 0.175]),
+)
+
+
+def test_the_drawing_has_band_curve_points_and_the_first_suggestion() -> None:
+    """Points outside the curve's range are left out."""
+    told = empirical_section(PLACE, SimpleNamespace(unit="A", empirical=(FIT,)), Labels())  # type: ignore[arg-type]
+    assert told.svg.count("<polygon") == 1
+    assert told.svg.count("<circle") == 2
+    assert 'class="after line suggested"' in told.svg
+    assert "|speed|" in told.svg
+
+
+def test_the_texts_say_how_it_acts_and_what_it_brings() -> None:
+    """Errors without and with it, and each form with its interval."""
+    told = empirical_section(PLACE, SimpleNamespace(unit="A", empirical=()), Labels())  # type: ignore[arg-type]
+    assert (told.before, told.after, told.unit) == ("0.4", "0.2", "A")
+    assert re.match(r"It acts against the motion", told.acts)
+    assert told.forms[0].parameters == "c = 0.25 (0.2 … 0.3) A/(m/s)"
+    assert 'class="after line suggested"' not in told.svg
