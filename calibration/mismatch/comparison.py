@@ -129,10 +129,9 @@ def with_curves(found: Searched) -> Comparison:
     """Return the comparison with the empirical curves of what stays unexplained."""
     decision, comparison = found.decision, found.comparison
     curves = curves_of(decision)
-    by_term = {id(each.term): each for each in curves}
     told = []
     for term, place in zip(decision.unnamed, comparison.answer.unexplained, strict=True):
-        of = by_term.get(id(term))
+        of = next((each for each in curves if any(term is one for one in each.terms)), None)
         told.append(replace(place, curve=of.curve, suggestions=of.suggestions) if of else place)
     notes = beyond_the_range(decision.equations.problem, comparison.simulation.empirical_curves)
     return replace(

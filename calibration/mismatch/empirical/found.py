@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Parameter, Suggestion
-from regolithd.calibration.mismatch.empirical.acting import ALONG, EACH_WAY, of_magnitude
 from regolithd.calibration.mismatch.empirical.spline import fit_spline, knots_of
 from regolithd.calibration.mismatch.empirical.suggestions import (
     SUGGESTED,
@@ -34,6 +33,8 @@ Array = NDArray[np.float64]
 
 NINETY_PERCENT_STDS = 1.645
 """Half the width of a 90 % interval of a normal density, in standard deviations."""
+EACH_WAY, ALONG = "each way", "drag, "
+"""Coupling of a function of the signed speed, and the beginning of those that act oppositely on two parts."""
 X = re.compile(r"(?<![a-z])x(?![a-z])")
 """The covariate in the text of a form."""
 
@@ -44,7 +45,7 @@ class FoundCurve:
 
     Attributes
     ----------
-    term: the smooth term
+    terms: the smooth terms, several where it acts in several ranges of one covariate
     curve: with its band and held-out errors
     suggestions: closed forms, best first
     fit: of the free parameters and the named effects beside the curve
@@ -52,7 +53,7 @@ class FoundCurve:
     suggested: the first suggestion at the curve's knots; empty where there is none
     """
 
-    term: Term
+    terms: tuple[Term, ...]
     curve: EmpiricalCurve
     suggestions: tuple[Suggestion, ...]
     fit: Fit
@@ -62,10 +63,15 @@ class FoundCurve:
 
 def curves_of(decision: Decision) -> tuple[FoundCurve, ...]:
     """Return the curves of what stays unexplained; a sine over time has none."""
-    return tuple(_found(decision, term) for term in decision.unnamed if term.group.coupling != PERIODIC)
+    places: dict[tuple[str, str, tuple[int, ...]], list[Term]] = {}
+    for term in decision.unnamed:
+        if term.group.coupling != PERIODIC:
+            places.setdefault((term.name, term.group.coupling, term.wheels), []).append(term)
+    return tuple(_found(decision, tuple(terms)) for terms in places.values())
 
 
-def _found(decision: Decision, term: Term) -> FoundCurve:
+def _found(decision: Decision, terms: tuple[Term, ...]) -> FoundCurve:
+    term = terms[0]
     sums = sums_of(decision.equations, decision.named, term)
     whole = profile(sums)
     spline = fit_spline(whole, sums.at, knots_of(sums))
@@ -75,7 +81,7 @@ def _found(decision: Decision, term: Term) -> FoundCurve:
     forms = best_forms(sums, decision.noise.autocorrelation_time)[:SUGGESTED] if term.name != "time" else []
     told = [_suggestion(decision.equations.problem, curve, term, sums, form, bic - forms[0][0]) for bic, form in forms]
     return FoundCurve(
-        term=term,
+        terms=terms,
         curve=curve,
         suggestions=tuple(told),
         fit=replace(decision.named, coefficients=others),
@@ -104,7 +110,8 @@ def _curve(problem: Problem, term: Term, spline: Spline, held_out: tuple[float, 
     coupling, reach = term.group.coupling, NINETY_PERCENT_STDS * spline.std
     return EmpiricalCurve(
         coupling=coupling,
-        magnitude=of_magnitude(term.name, coupling),
+        # A speed counts by its magnitude, except where it acts one way only.
+        magnitude=term.name == "wheel_speed" and coupling != EACH_WAY,
         unit="1" if coupling == "gain" else problem.simulation.unit,
         covariate_unit=unit_of(problem, term.name),
         at=tuple(spline.at.tolist()),

@@ -6,14 +6,15 @@ knot is a free parameter with that standard deviation, so that a later recording
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
-from regolithd.calibration.mismatch.empirical.acting import factor_of
 from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.regression.smooth_groups import acting
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -66,7 +67,14 @@ class EmpiricalCurveLaw(Candidate):
         return np.where(problem.mask & on, np.stack(hats) * factor, 0.0)
 
     def _course(self, problem: Problem) -> tuple[Array, Array]:
-        return course_of(problem, self.stated), factor_of(problem, self.stated.covariate, self.stated.curve.coupling)
+        """Return the covariate and the factor, shape (time, wheel) each."""
+        course_of(problem, self.stated)
+        known = replace(problem, covariates={**problem.constants, **problem.covariates})
+        try:
+            return acting(known, self.stated.covariate, self.stated.curve.coupling)
+        except KeyError as error:
+            told = f"acts as {self.stated.curve.coupling!r}, which this machine cannot"
+            raise SimulationError(f"[[empirical_curves]] over {self.stated.covariate} {told}") from error
 
 
 def name_of(stated: StatedCurve) -> str:

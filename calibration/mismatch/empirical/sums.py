@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.empirical.acting import factor_of, of_magnitude
 from regolithd.calibration.mismatch.regression.normal_equations import membership
+from regolithd.calibration.mismatch.regression.smooth_groups import acting
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -185,12 +185,10 @@ def squares_on_fold(sums: CovariateSums, fold: int, values: Array, others: Array
 def _course(equations: NormalEquations, term: Term) -> tuple[Array, Array]:
     """Return covariate and factor, shape (wheel, time) in the order of folds; the factor is 0 where it does not act."""
     problem, group = equations.problem, term.group
-    values = problem.covariates[group.name]
-    if of_magnitude(group.name, group.coupling):
-        values = np.abs(values)
+    values, by = acting(problem, group.name, group.coupling)
     on = np.isin(np.arange(values.shape[1]), list(term.wheels))
     acts = problem.mask & np.isfinite(values) & on
-    factor = np.where(acts, factor_of(problem, group.name, group.coupling), 0.0)
+    factor = np.where(acts, by, 0.0)
     order = equations.design.order
     return np.where(acts, values, 0.0).T[:, order], factor.T[:, order]
 

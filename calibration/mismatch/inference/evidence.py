@@ -65,7 +65,9 @@ def empirical_fits(decision: Decision, curves: Sequence[FoundCurve]) -> tuple[Em
     channel = equations.problem.simulation.channel
     return tuple(
         EmpiricalFit(
-            curve=StatedCurve(channel, wheel_names(equations.problem, each.term.wheels), each.term.name, each.curve),
+            curve=StatedCurve(
+                channel, wheel_names(equations.problem, each.terms[0].wheels), each.terms[0].name, each.curve
+            ),
             values=calibrated_values(equations, each.fit),
             contributions=_contributions(equations, each.fit),
             at=each.points.at,

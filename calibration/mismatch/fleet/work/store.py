@@ -18,6 +18,7 @@ import numpy as np
 from regolithd.calibration.mismatch import answer as answers
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm, Shapes
 from regolithd.calibration.mismatch.fleet.work.sums import Sums
+from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ KINDS: Mapping[str, type] = {
         answers.Parameter,
         answers.Effect,
         answers.Range,
+        answers.Suggestion,
+        EmpiricalCurve,
         answers.Unexplained,
         answers.Indistinguishable,
         answers.Sensitivity,
