@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 OFFSET: Any = {"textcoords": "offset points", "fontsize": 10}
+TRUTH = "sandy-loam"
+"""The soil of `one_sample`."""
 CLASSICAL, SINGLE, SOIL_KNOWN = "#b08d57", "#e59866", "#922b21"
 
 
@@ -79,9 +81,7 @@ def calibration(found: Mapping[str, float], ranks: Array, path: Path) -> None:
         panels[0, 0].set_ylabel("rovers")
         panels[1, 0].set_ylabel("coverage (%)")
         handles, labels = panels[1, 2].get_legend_handles_labels()
-        made.legend(
-            handles, [*labels, "expected, ± 2 standard errors"], loc="outside lower left", ncols=5, fontsize=9.5
-        )
+        made.legend(handles, labels, loc="outside lower left", ncols=3, fontsize=9.5)
         save(made, path)
 
 
@@ -95,8 +95,8 @@ def _ranks(panel: Axes, ranks: Array, label: str) -> None:
 def _coverage(panel: Axes, found: Mapping[str, float], target: str) -> None:
     names = ["", *SOILS]
     for name, colour, fill, label in (
-        ("window", PAPER, "none", "true class"),
-        ("told_window", OURS, OURS, "true class, known"),
+        ("window", PAPER, "none", "class not known"),
+        ("told_window", OURS, OURS, "class known"),
     ):
         for level, marker in ((50, "o"), (90, "s")):
             values = [100 * found[f"{name}_coverage_{level}_{target}{'_' + each if each else ''}"] for each in names]
@@ -107,19 +107,19 @@ def _coverage(panel: Axes, found: Mapping[str, float], target: str) -> None:
                 "label": f"{label}, {level} %",
             }
             panel.plot(range(len(names)), values, marker, markersize=6, **style)
-    for level, legend in ((50, "expected"), (90, None)):
+    for level, legend in ((50, "expected (ranks: ± 2 standard errors; coverage: ± 2 %)"), (90, None)):
         panel.axhspan(level - 2, level + 2, color="black", alpha=0.15, label=legend)
     panel.set_xticks(range(len(names)), ["all", *(each.replace("-", "\n") for each in SOILS)], fontsize=9.5)
     panel.set_ylim(0, 102)
 
 
 def one_sample(estimator: PosteriorEstimator, path: Path, seed: int = 3) -> None:
-    """Draw the posterior of sandy loam from one instant of one wheel, and from ten seconds of six wheels."""
+    """Draw the posterior of `TRUTH` from one instant of one wheel, and from ten seconds of six wheels."""
     rng = np.random.default_rng(seed)
     wheel, drivetrain = Wheel(), Drivetrain()
     known = CalibrationUncertainty().deviations()
     rovers = simulated_rovers.draw_rovers(1, rng, known, no_load_A=NO_LOAD_A)
-    soils = soils_from([SOILS["sandy-loam"]], wheel.width_m)
+    soils = soils_from([SOILS[TRUTH]], wheel.width_m)
     rovers = simulated_rovers.SimulatedRovers(
         soils=soils,
         nearest_class=np.array([1]),
@@ -166,6 +166,8 @@ def _scatter(panel: Axes, prior: Soils, samples: Array, colour: str) -> None:
         label="posterior",
     )
     for (name, soil), shade, marker in zip(SOILS.items(), SOIL_COLOURS, SOIL_MARKERS, strict=True):
+        if name == TRUTH:
+            continue
         panel.plot(
             soil.cohesion_Pa / 1e3,
             soil.friction_angle_deg,
@@ -176,7 +178,10 @@ def _scatter(panel: Axes, prior: Soils, samples: Array, colour: str) -> None:
             markeredgecolor="white",
             label=name,
         )
-    panel.plot(3.15, 30.0, "*", color="black", markersize=16, label="truth")
+    truth = SOILS[TRUTH]
+    panel.plot(
+        truth.cohesion_Pa / 1e3, truth.friction_angle_deg, "*", color="black", markersize=16, label=f"truth: {TRUTH}"
+    )
 
 
 def alarm(delays: Mapping[str, Array], path: Path) -> None:
