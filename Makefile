@@ -12,7 +12,7 @@ RECORDINGS ?= ../shared/recordings
 .PHONY: interop first-day week
 .PHONY: figures chaos fuzz holds bench audit wheelhouse lock
 .PHONY: sizing reproduce evaluate loop prove prove-machines reliability real scaling thresholds mutations mutants frames pictures picture screenshots
-.PHONY: fleet
+.PHONY: fleet online
 
 help:
 	@awk -F ':.*## ' '/^## / { print "\n" substr($$0, 4) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -83,6 +83,9 @@ thresholds: $(DEV) ## each threshold of the mismatch engine halved and doubled, 
 
 scaling: $(DEV) ## time and memory of a comparison against rows and candidates
 	$(BIN)/python -m regolithd.calibration.validation.blind_trials.figures.cost_scaling build/figures/scaling.json docs/mismatch-scaling.svg
+
+online: $(DEV) ## false reports of `regolithd monitor`, and delays of drag that begins half way, beside the whole comparison (10 min)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.online_study build/figures/online.json docs/online.svg
 
 fleet: $(DEV) ## 100 recordings of five virtual rovers on a local Dask cluster, a worker killed half way (half an hour)
 	$(BIN)/python -m regolithd.calibration.validation.fleet_study $(if $(SEED),--seed $(SEED)) $(if $(CHECK),--check $(CHECK))

@@ -38,7 +38,7 @@ def monitor(
     """Follow a recording while it grows, and report drag (or another effect of the library) that begins.
 
     A sequential test: after each minute, every effect on every set of wheels from every minute on is held against
-    "nothing has begun". The threshold is for one false report in 100 h over all of them. The first ten minutes of
+    "nothing has begun". One threshold bounds the rate of false reports over all of them. The first ten minutes of
     driving show how strong the noise is. When the recording has ended, `regolithd mismatch` decides what it was.
     """
     from regolithd.calibration.mismatch.errors import MismatchError

@@ -12,7 +12,7 @@ from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.online.linearised import Linearised, check_comparable, learned
 from regolithd.calibration.mismatch.online.noise import NoiseHistory
 from regolithd.calibration.mismatch.online.report import Change, Report, change_of
-from regolithd.calibration.mismatch.online.scores import Place, Scores, scores
+from regolithd.calibration.mismatch.online.scores import Place, Scores, fitted_beside, scores
 from regolithd.calibration.mismatch.online.sums import Course, Interval, Suffixes, sums_of
 from regolithd.calibration.mismatch.online.thresholds import ONLINE_THRESHOLDS, OnlineThresholds
 
@@ -98,7 +98,7 @@ class SequentialTest:
         """Return what is fitted now, as coefficients of all columns, shape (column, wheel)."""
         search = self._linearised.search
         known = [place for place in places if place.onset_s in suffixes.starts_s]
-        fitted = scores(suffixes, weights, search, known).fitted
+        fitted = fitted_beside(suffixes, weights, search, known)
         tangents = len(search.precision)
         found = np.zeros((suffixes.gram.shape[2], len(self._linearised.wheels)))
         found[:tangents] = fitted[:tangents, None]

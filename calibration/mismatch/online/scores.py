@@ -64,14 +64,12 @@ class Scores:
     ----------
     statistic: Δχ²; 0 where a law may not be, has the wrong sign or is too small
     size, std: of the coefficient
-    fitted: coefficients of the tangents and of the places beside which it was fitted, shape (coefficient,)
     """
 
     starts_s: Array
     statistic: Array
     size: Array
     std: Array
-    fitted: Array
 
     def best(self) -> Place:
         """Return where the statistic is largest."""
@@ -87,11 +85,11 @@ def scores(sums: Suffixes, weights: Array, search: Search, beside: Sequence[Plac
     """Return the scores of every law beside the tangents and the places given; `weights` has shape (wheel,)."""
     count = len(search.precision)
     gram, moment = sums.gram * weights[:, None, None], sums.moment * weights[:, None]
-    fitted_beside = _beside(sums.starts_s, gram, moment, search, beside)
-    inverse = _inverse(fitted_beside.information)
-    fitted = inverse @ fitted_beside.target
+    others = _beside(sums.starts_s, gram, moment, search, beside)
+    inverse = _inverse(others.information)
+    fitted = inverse @ others.target
     own = np.einsum("sw,ewkk->esk", search.member, gram[:, :, count:, count:])
-    together = np.einsum("sw,ewkp->eskp", search.member, fitted_beside.products)
+    together = np.einsum("sw,ewkp->eskp", search.member, others.products)
     left = own - np.einsum("eskp,eskp->esk", together @ inverse, together)
     known = left > search.least_tolerance * np.maximum(own, 1e-300)
     left = np.where(known, left, np.inf)
@@ -99,7 +97,13 @@ def scores(sums: Suffixes, weights: Array, search: Search, beside: Sequence[Plac
     size = (rough - together @ fitted) / left
     statistic = size**2 * np.where(known, left, 0.0)
     counted = _may_be(search, len(gram)) & (size * search.signs >= 0) & _visible(sums, search, size)
-    return Scores(sums.starts_s, np.where(counted, statistic, 0.0), size, 1 / np.sqrt(left), fitted)
+    return Scores(sums.starts_s, np.where(counted, statistic, 0.0), size, 1 / np.sqrt(left))
+
+
+def fitted_beside(sums: Suffixes, weights: Array, search: Search, beside: Sequence[Place]) -> Array:
+    """Return the coefficients of the tangents and of the places given, fitted to all that is there."""
+    found = _beside(sums.starts_s, sums.gram * weights[:, None, None], sums.moment * weights[:, None], search, beside)
+    return _inverse(found.information) @ found.target
 
 
 @dataclass(frozen=True, eq=False)

@@ -112,6 +112,7 @@ class Course:
 
     most: int
     segments: list[Segment] = field(default_factory=list)
+    _suffixes: Suffixes | None = None
 
     def add(self, start_s: float, sums: Sums, kept_s: Collection[float] = ()) -> None:
         """Append an interval; where there are too many segments, two neighbours become one.
@@ -119,6 +120,7 @@ class Course:
         Those whose common length is the smallest share of their age: an onset long ago is known less precisely anyway.
         The boundaries at `kept_s`, of changes that were reported, stay.
         """
+        self._suffixes = None
         self.segments.append(Segment(start_s, sums))
         while len(self.segments) > self.most:
             shares = [self._share_of_age(at, kept_s) for at in range(1, len(self.segments) - 1)]
@@ -135,6 +137,11 @@ class Course:
 
     def suffixes(self) -> Suffixes:
         """Return the sums from each segment's start to now."""
+        if self._suffixes is None:
+            self._suffixes = self._made_suffixes()
+        return self._suffixes
+
+    def _made_suffixes(self) -> Suffixes:
         every = [segment.sums for segment in self.segments]
         from_here = [np.cumsum(np.stack(part)[::-1], axis=0)[::-1] for part in zip(*map(_arrays, every), strict=True)]
         gram, moment, acting = from_here

@@ -17,9 +17,9 @@ class OnlineThresholds:
     """The deciding numbers of the sequential test; `table` returns them with meaning and source."""
 
     alarm: float = _threshold(
-        30.0,
+        25.0,
         "Δχ² of the best law, wheels and onset together, above which a change is reported.",
-        "choice, provisional: above the largest of a few sound drives",
+        "choice, provisional: above the first sound drives of `make online`, which measures the rate",
     )
     interval_s: float = _threshold(
         60.0,
