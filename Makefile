@@ -13,6 +13,7 @@ RECORDINGS ?= ../shared/recordings
 .PHONY: figures chaos fuzz holds bench audit wheelhouse lock
 .PHONY: sizing reproduce evaluate loop prove prove-machines reliability real scaling thresholds mutations mutants frames pictures picture screenshots
 .PHONY: fleet online
+.PHONY: fleet unnamed
 
 help:
 	@awk -F ':.*## ' '/^## / { print "\n" substr($$0, 4) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -71,6 +72,9 @@ prove: $(DEV) ## blind trials of `regolithd mismatch` on 200 recordings; continu
 
 prove-machines: $(DEV) ## the same on five other machines, one of them an FMU (needs a C compiler; CASES=…)
 	$(BIN)/python -m regolithd.calibration.validation.machine_trials --cases $(or $(CASES),300) $(if $(SEED),--seed $(SEED))
+
+unnamed: $(DEV) ## what has no name: held-out error with an empirical curve, and the closed forms suggested (SEED=… LIBRARY=1)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.unnamed_effects --seed $(or $(SEED),1) $(if $(LIBRARY),--library) --picture docs/unnamed-effects.svg
 
 reliability: $(DEV) ## how often answers are right at their stated probability (BATCHES="folders of prove and prove-machines")
 	$(BIN)/python -m regolithd.calibration.validation.reliability build/figures/reliability.json docs/reliability.svg $(or $(BATCHES),build/prove $(wildcard build/prove-machines/*))

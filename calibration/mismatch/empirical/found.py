@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Parameter, Suggestion
-from regolithd.calibration.mismatch.empirical.spline import fit_spline, knots_of
+from regolithd.calibration.mismatch.empirical.spline import KNOTS, TIME_KNOTS, fit_spline, knots_of
 from regolithd.calibration.mismatch.empirical.suggestions import (
     SUGGESTED,
     FittedForm,
@@ -74,8 +74,9 @@ def _found(decision: Decision, terms: tuple[Term, ...]) -> FoundCurve:
     term = terms[0]
     sums = sums_of(decision.equations, decision.named, term)
     whole = profile(sums)
-    spline = fit_spline(whole, sums.at, knots_of(sums))
-    curve = _curve(decision.equations.problem, term, spline, _held_out(sums))
+    knots = knots_of(sums, TIME_KNOTS if term.name == "time" else KNOTS)
+    spline = fit_spline(whole, sums.at, knots)
+    curve = _curve(decision.equations.problem, term, spline, _held_out(sums, knots))
     others = whole.others(spline.in_bins)
     # What happened at some time has no law over time.
     forms = best_forms(sums, decision.noise.autocorrelation_time)[:SUGGESTED] if term.name != "time" else []
@@ -90,13 +91,13 @@ def _found(decision: Decision, terms: tuple[Term, ...]) -> FoundCurve:
     )
 
 
-def _held_out(sums: CovariateSums) -> tuple[float, float]:
+def _held_out(sums: CovariateSums, knots: Array) -> tuple[float, float]:
     """Return the root-mean-square errors on held-out folds, without and with a curve that the others fitted."""
     before, after = np.zeros(len(sums.weights)), np.zeros(len(sums.weights))
     nothing = np.zeros(len(sums.at))
     for fold in sums.folds:
         train = profile(sums, sums.other_folds(fold))
-        values = fit_spline(train, sums.at, knots_of(sums)).in_bins
+        values = fit_spline(train, sums.at, knots).in_bins
         before += squares_on_fold(sums, fold, nothing, train.others(nothing))
         after += squares_on_fold(sums, fold, values, train.others(values))
     return _rms(sums, before), _rms(sums, after)

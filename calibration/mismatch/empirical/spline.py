@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-KNOTS = 24
-"""Knots of a curve (a choice: the penalty, not their number, limits how much it bends)."""
+KNOTS, TIME_KNOTS = 24, 96
+"""Knots of a curve, and of one over time (a choice: the penalty, not their number, limits how much it bends; what comes
+and goes with time may do so within a hundredth of the recording)."""
 SMOOTHNESS = np.logspace(-8, 6, 57)
 """Precisions of the bends that are compared, relative to what the recording says of the values (four in a decade)."""
 LEVEL_SHARE = 1e-6
