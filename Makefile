@@ -12,8 +12,7 @@ RECORDINGS ?= ../shared/recordings
 .PHONY: interop first-day week
 .PHONY: figures chaos fuzz holds bench audit wheelhouse lock
 .PHONY: sizing reproduce evaluate loop prove prove-machines reliability real scaling thresholds mutations mutants frames pictures picture screenshots
-.PHONY: fleet online
-.PHONY: fleet unnamed
+.PHONY: fleet online unnamed
 
 help:
 	@awk -F ':.*## ' '/^## / { print "\n" substr($$0, 4) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
