@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Change, Contribution
-from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
@@ -29,6 +29,12 @@ Array = NDArray[np.float64]
 
 RELATIVE_CHANGE = "relative_change"
 """The change's coefficient: 0 is unchanged, 1 twice as large, −1 gone."""
+SECANT_CHANGE = "secant_change"
+"""The relative change over which a law that is not linear in its size is differenced; −1 is the whole effect."""
+SECANT_CHANGES = (-1.0, 0.5, 2.0)
+"""The grid of it: gone, half as large again and three times as large (a choice: the fitted change is iterated)."""
+SMALLEST_CHANGE, LARGEST_CHANGE = 0.05, 10.0
+"""Range of its size (a choice: a smaller change is linear, and an effect eleven times as large is another one)."""
 GONE_WITHIN = 0.1
 """Share of its size below which an effect whose interval holds 0 is called gone in words (a choice)."""
 
@@ -41,17 +47,17 @@ class Stated:
     contribution: Contribution
     in_simulation: bool
 
-    def column(self, problem: Problem) -> Array:
-        """Return what it adds to the prediction, shape (time, wheel).
+    def column(self, problem: Problem, times: float = 1.0) -> Array:
+        """Return what it adds to the prediction, so many times as large as it was corrected, shape (time, wheel).
 
         Raises
         ------
         SimulationError
             When the recording has not what the effect depends on, or the effect's shape or coefficients are incomplete.
         """
-        columns = np.where(problem.mask, self._columns(problem), 0.0)
+        coefficients = times * np.array(self.contribution.coefficients, np.float64)
+        columns = np.where(problem.mask, self._columns(problem, coefficients.tolist()), 0.0)
         on = np.isin(np.array(problem.recording.wheels, dtype=object), list(self.contribution.wheels))
-        coefficients = np.array(self.contribution.coefficients, np.float64)
         if len(coefficients) != len(columns):
             raise SimulationError(
                 f"[[effects]] {self.contribution.name}: {len(columns)} coefficients are needed, not {len(coefficients)}"
@@ -62,7 +68,12 @@ class Stated:
         """Return what one standard deviation of each number in the law, other than its size, adds to the prediction."""
         return tuple(self.candidate.deviations(problem)) if isinstance(self.candidate, EmpiricalCurveLaw) else ()
 
-    def _columns(self, problem: Problem) -> Array:
+    def bent(self, problem: Problem) -> bool:
+        """Return whether the law is not linear in its size: twice the coefficients would ask for another shape."""
+        shape, twice = self.contribution.shape, [2 * value for value in self.contribution.coefficients]
+        return self.candidate.self_consistent_shape(problem, shape, twice) != shape
+
+    def _columns(self, problem: Problem, coefficients: Sequence[float]) -> Array:
         """Return the candidate's columns; what never varies in this recording, a level drive's pitch, counts too."""
         known = replace(problem, covariates={**problem.constants, **problem.covariates})
         name, shape = self.contribution.name, self.contribution.shape
@@ -72,7 +83,7 @@ class Stated:
                 "record it, or take the effect out of the file"
             )
         try:
-            return self.candidate.columns(known, shape)
+            return self.candidate.columns(known, self.candidate.self_consistent_shape(known, shape, coefficients))
         except KeyError as error:
             raise SimulationError(
                 f"[[effects]] {name}: its shape lacks {error}; find the effect again with --corrected"
@@ -98,13 +109,34 @@ class ChangedSize(Candidate):
         """Return whether the effect can act in this recording at all."""
         return bool(np.any(problem.stated[self._place].column))
 
-    def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
-        """Return the shape that was corrected, alone."""
-        return [dict(self.stated.contribution.shape)]
+    def shapes(self, problem: Problem) -> Sequence[Shape]:
+        """Return the shape that was corrected; of a law that is not linear in its size, over several changes of it."""
+        shape = dict(self.stated.contribution.shape)
+        if self.stated.in_simulation or not self.stated.bent(problem):
+            return [shape]
+        return [{**shape, SECANT_CHANGE: change} for change in SECANT_CHANGES]
 
-    def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002
-        """Return the effect as the prediction has it: computed from the prediction without any stated effect."""
-        return problem.stated[self._place].column[None]
+    def shape_count(self, problem: Problem) -> float:  # noqa: ARG002
+        """Return 1: the change that a secant is taken over is the coefficient itself, and no choice beside it."""
+        return 1
+
+    def columns(self, problem: Problem, shape: Shape) -> Array:
+        """Return the effect's change per relative change of its size, from the prediction without stated effects."""
+        column = problem.stated[self._place].column
+        change = float(shape.get(SECANT_CHANGE, -1.0))
+        if change == -1.0:
+            return column[None]
+        before = replace(problem, prediction=problem.prediction - problem.added, stated=())
+        return ((self.stated.column(before, 1 + change) - column) / change)[None]
+
+    def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002
+        """Return the shape with the secant over the fitted change."""
+        if SECANT_CHANGE not in shape:
+            return shape
+        change = float(np.clip(values[0], -1.0, LARGEST_CHANGE))
+        change = float(np.copysign(max(abs(change), SMALLEST_CHANGE), change))
+        before = float(shape[SECANT_CHANGE])
+        return shape if abs(change - before) < SHAPE_TOLERANCE * abs(before) else {**shape, SECANT_CHANGE: change}
 
 
 def stated_in(

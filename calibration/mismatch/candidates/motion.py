@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from regolithd.calibration.mismatch.signal.noise import estimate_noise
 
@@ -20,10 +21,13 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-TRANSITIONS = (0.01, 0.02, 0.04)
+TRANSITIONS = (0.0025, 0.005, 0.01, 0.02, 0.04)
 """Speeds at which the friction has turned round by three quarters, as shares of the highest usual speed (a choice: from
-where it is a step for most readings to where it would be taken for viscous friction)."""
+where it is a step for most readings to where it would be taken for viscous friction); the best is refined between its
+neighbours."""
 USUAL_SPEED_QUANTILE = 0.98
+REFINED_TO = 0.05
+"""Relative tolerance of the refined transition (a choice: its effect on the residual is of second order)."""
 LEAST_WITHIN = 0.01
 """Share of the readings in motion that must be within a transition, to tell it from a step (a choice)."""
 LEAST_GAIN = 10.8
@@ -60,10 +64,24 @@ def _best_transition(problem: Problem) -> float:
     step = _left_beside_friction(problem, {})
     noise = estimate_noise(step, problem.mask, problem.thresholds)
     count = float(problem.mask.sum()) / noise.autocorrelation_time
-    squares = {width: _squares(_left_beside_friction(problem, {"transition_rad_s": width})) for width in widths}
-    best = min(squares, key=lambda width: squares[width])
-    gain = count * (1 - squares[best] / max(_squares(step), 1e-300))
+    best, left = _refined(problem, min(widths, key=lambda width: _squares_left(problem, width)))
+    gain = count * (1 - left / max(_squares(step), 1e-300))
     return best if gain > LEAST_GAIN else 0.0
+
+
+def _refined(problem: Problem, width: float) -> tuple[float, float]:
+    """Return the best transition between half and twice this one, and the sum of squares that it leaves."""
+    found = minimize_scalar(
+        lambda log: _squares_left(problem, float(np.exp(log))),
+        bounds=(np.log(width / 2), np.log(2 * width)),
+        method="bounded",
+        options={"xatol": REFINED_TO},
+    )
+    return float(np.exp(found.x)), float(found.fun)
+
+
+def _squares_left(problem: Problem, width: float) -> float:
+    return _squares(_left_beside_friction(problem, {"transition_rad_s": width}))
 
 
 def _left_beside_friction(problem: Problem, shape: Shape) -> Array:

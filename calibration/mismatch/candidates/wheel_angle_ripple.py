@@ -132,9 +132,20 @@ class WheelAngleRipple(Candidate):
         return usual / (wheels * (1 - 1 / (9 * wheels)) ** 3)
 
     def _strongest(self, problem: Problem, weighted: Array) -> float:
-        order, power = self._spectrum(problem, weighted)
-        sought = (order >= _lowest(problem)) & (order <= _resolved(problem))
-        return float(order[np.argmax(np.where(sought, power, 0.0))])
+        """Return the order of the strongest line, each octave of orders looked at in the readings that resolve it.
+
+        What does not resolve an order makes aliases of it: a constant drag at a constant speed is a line then.
+        """
+        lowest, highest, best = _lowest(problem), _resolved(problem), (-1.0, 0.0)
+        while highest > lowest:
+            resolving = _cycles_per_reading(problem) * highest * READINGS_PER_CYCLE <= 1
+            order, power = self._spectrum(problem, np.where(resolving, weighted, 0.0))
+            sought = (order >= max(lowest, highest / 2)) & (order <= highest)
+            if sought.any():
+                top = int(np.argmax(np.where(sought, power, 0.0)))
+                best = max(best, (float(power[top]), float(order[top])))
+            highest = lowest if resolving.all() else highest / 2
+        return best[1]
 
     def _lag(self, problem: Problem, weighted: Array, order: float) -> float:
         """Return the lag of the angle [readings] at which the line is strongest."""
@@ -170,9 +181,14 @@ def _lowest(problem: Problem) -> float:
 
 def _resolved(problem: Problem) -> float:
     """Return the highest order with enough readings in a cycle, in the slow part of the motion."""
-    speed = np.abs(problem.covariates["wheel_speed"][problem.mask])
-    slow = float(np.quantile(speed[speed > 0], RESOLVED_SHARE)) if np.any(speed > 0) else 0.0
-    return min(HIGHEST_ORDER, 2 * np.pi / (READINGS_PER_CYCLE * problem.recording.step_s * max(slow, 1e-9)))
+    cycles = _cycles_per_reading(problem)[problem.mask]
+    slow = float(np.quantile(cycles[cycles > 0], RESOLVED_SHARE)) if np.any(cycles > 0) else 0.0
+    return min(HIGHEST_ORDER, 1 / (READINGS_PER_CYCLE * max(slow, 1e-9)))
+
+
+def _cycles_per_reading(problem: Problem) -> Array:
+    """Return the turns between two readings, the cycles of order 1, shape (time, wheel)."""
+    return np.abs(np.nan_to_num(problem.covariates["wheel_speed"])) * problem.recording.step_s / (2 * np.pi)
 
 
 def _angle(problem: Problem, lag: float) -> Array:
