@@ -101,6 +101,7 @@ class ChangedSize(Candidate):
         for name in ("name", "covariate", "equation", "signature", "experiment", "source", "label", "along_motion"):
             setattr(self, name, getattr(of, name))
         self.vary, self.run_unloaded = of.vary, of.run_unloaded  # type: ignore[misc]
+        self.imitated_over = of.imitated_over  # type: ignore[misc]
         self.words = f"a change of a corrected effect: {of.words}"  # type: ignore[misc]
         self.sharing, self.channel = of.sharing, of.channel  # type: ignore[misc]
         self.acts_unloaded = of.acts_unloaded  # type: ignore[misc]

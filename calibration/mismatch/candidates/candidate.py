@@ -87,6 +87,9 @@ class Candidate:
     coefficients: ClassVar[tuple[Coefficient, ...]]
     """One for each column, in the order of the columns; `columns` may return fewer, where the machine lacks one."""
 
+    imitated_over: ClassVar[str] = ""
+    """The covariate over which a smooth curve can imitate the effect, by default `covariate`; `none` where no curve
+    can, as what follows how fast a channel changes is a function of no covariate."""
     label: ClassVar[str] = ""
     """The name as text for people; by default `name` with its last hyphen as a space: "multi-pass compaction"."""
     parameter_labels: ClassVar[Mapping[str, str]] = {}
@@ -116,6 +119,9 @@ class Candidate:
             cls.label = " ".join(cls.name.rsplit("-", 1)).replace("_", " ")
         if "covariate" in vars(cls) and "vary" not in vars(cls):
             cls.vary = () if cls.covariate == "none" else (cls.covariate,)
+        if "covariate" in vars(cls) and "imitated_over" not in vars(cls):
+            # The curve over speed, along the motion, holds a constant drag.
+            cls.imitated_over = "wheel_speed" if cls.covariate == "direction" else cls.covariate
 
     def form_for(self, simulation: Predictor) -> Candidate:  # noqa: ARG002  # subclasses look
         """Return the candidate in the form that it has for a simulation; by default it has only one."""

@@ -42,6 +42,7 @@ class SensorDelay(Candidate):
     experiment = "change speed and load in steps, both ways, twenty times"
     source = "filters, buses and polling: a first-order filter delays slow changes by its time constant"
     along_motion = False
+    imitated_over = "none"
     coefficients: ClassVar = (Coefficient("delay_s", "s", 1),)
     free: ClassVar = {"secant_s": (0.0, float("inf"))}
 

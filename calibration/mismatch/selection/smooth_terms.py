@@ -133,9 +133,8 @@ def unexplained_beside(equations: NormalEquations, named: Fit, *, tolerated: flo
 
 
 def _covariate(term: Term) -> str:
-    """Return the covariate whose curve can imitate a term: that of speed, along the motion, holds a constant drag."""
-    found = term.group.candidate.covariate if term.group.candidate else term.name
-    return "wheel_speed" if found == "direction" else found
+    """Return the covariate over which a curve can imitate a term."""
+    return term.group.candidate.imitated_over if term.group.candidate else term.name
 
 
 def drop_what_a_curve_explains(equations: NormalEquations, named: Fit, curve: Term) -> Fit:
@@ -160,9 +159,11 @@ def drop_what_a_curve_explains(equations: NormalEquations, named: Fit, curve: Te
 def _same_quantity(problem: Problem, term: Term, curve: Term) -> bool:
     """Return whether a term's covariate is a curve's on the same wheels: by name, or as an angle is a position."""
     wheels = sorted(set(term.wheels) & set(curve.wheels))
+    if not wheels or _covariate(term) == "none":
+        return False
     covariate = term.group.candidate.covariate if term.group.candidate else term.name
-    if not wheels or covariate == curve.name:
-        return bool(wheels)
+    if covariate == curve.name:
+        return True
     one, other = (problem.covariates.get(name) for name in (covariate, curve.name))
     if one is None or other is None:
         return False

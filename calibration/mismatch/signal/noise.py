@@ -12,6 +12,10 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 Array = NDArray[np.float64]
 
 
+LEAST_PAIRS = 0.05
+"""Share of pairs from which a lag can end the sum (a choice: at a tenth, a sensor has the lags that it is read at)."""
+
+
 @dataclass(frozen=True)
 class NoiseModel:
     """Stationary noise with a standard deviation of its own on each wheel.
@@ -36,16 +40,17 @@ def estimate_noise(residual: Array, mask: NDArray[np.bool_], thresholds: Thresho
     """Estimate the noise from a residual [time, wheel] that holds as little structure as possible.
 
     The autocorrelation is pooled over wheels and summed up to the lag at which it first falls below its own standard
-    error (Geyer, 1992): further lags would add variance and no bias.
+    error (Geyer, 1992): further lags would add variance and no bias. A lag counts by the share of its pairs that were
+    read: of a sensor that is read in every tenth row, readings are ten rows apart.
     """
     clean = np.where(mask, residual, 0.0)
     deviation = _deviation(clean, mask)
     lags = int(thresholds.longest_lag_share * len(clean))
-    correlation = _autocorrelation(clean / deviation, mask, lags)
+    correlation, share = _autocorrelation(clean / deviation, mask, lags)
     standard_error = thresholds.lag_significance / np.sqrt(max(float(mask.sum()), 1.0))
-    insignificant = np.flatnonzero(correlation[1:] < standard_error)
+    insignificant = np.flatnonzero((correlation[1:] < standard_error) & (share[1:] > LEAST_PAIRS))
     end = int(insignificant[0]) + 1 if insignificant.size else lags
-    return NoiseModel(deviation, float(max(1.0, 1 + 2 * np.sum(correlation[1:end]))))
+    return NoiseModel(deviation, float(max(1.0, 1 + 2 * np.sum((share * correlation)[1:end]))))
 
 
 def _deviation(clean: Array, mask: NDArray[np.bool_]) -> Array:
@@ -55,12 +60,17 @@ def _deviation(clean: Array, mask: NDArray[np.bool_]) -> Array:
     return np.where(deviation > 0, deviation, np.median(positive) if positive.size else 1.0)
 
 
-def _autocorrelation(scaled: Array, mask: NDArray[np.bool_], lags: int) -> Array:
-    """Return the autocorrelation at lags from 0, pooled over the wheels, shape (lag,)."""
+def _autocorrelation(scaled: Array, mask: NDArray[np.bool_], lags: int) -> tuple[Array, Array]:
+    """Return the autocorrelation at lags from 0, pooled over the wheels, and the share of pairs, each of shape (lag,).
+
+    The share is that of the readings which have another one so much later, among those that the recording's end allows.
+    """
     size = 2 ** int(np.ceil(np.log2(2 * len(scaled))))
 
     def summed(values: Array) -> Array:
         spectrum = np.fft.rfft(values, size, axis=0)
         return np.asarray(np.fft.irfft(np.abs(spectrum) ** 2, size, axis=0)[:lags].sum(axis=1))
 
-    return summed(scaled) / np.maximum(summed(mask.astype(np.float64)), 1)
+    pairs = np.rint(summed(mask.astype(np.float64)))
+    share = pairs / max(float(pairs[0]), 1.0) * len(scaled) / (len(scaled) - np.arange(len(pairs)))
+    return summed(scaled) / np.maximum(pairs, 1), share

@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import brentq
 
-from regolithd.calibration.validation.machine_trials.physics.signals import noise_spectrum
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -95,10 +93,22 @@ def of_strength(world: World, effect: Effect, strength: float) -> Effect:
 
 
 def whitened(values: Array, law: NoiseLaw, std: float, seen: Mask) -> Array:
-    """Return a channel's values in units of its noise, the noise's memory divided out; unseen rows count nothing."""
-    spectrum = noise_spectrum(len(values), law.phi, law.white)[:, None]
-    masked = np.where(seen, values, 0.0) / std
-    return np.asarray(np.fft.irfft(np.fft.rfft(masked, axis=0) / np.sqrt(spectrum), n=len(values), axis=0))
+    """Return a channel's values as innovations of its noise, in units of their deviation; 0 where nothing is seen.
+
+    Exact for any pattern of unseen rows (Kalman filter): a row of zeros in their place would look like a jump, which
+    noise with a memory does not have.
+    """
+    innovations, memory = np.zeros(values.shape), np.zeros(values.shape[1])
+    slow = 1 - law.white
+    variance = np.full(values.shape[1], slow)
+    for row, (now, known) in enumerate(zip(values / std, seen, strict=True)):
+        of_innovation = variance + law.white
+        surprise = np.where(known, now - memory, 0.0)
+        innovations[row] = surprise / np.sqrt(of_innovation)
+        gain = np.where(known, variance / of_innovation, 0.0)
+        memory = law.phi * (memory + gain * surprise)
+        variance = law.phi**2 * (1 - gain) * variance + slow * (1 - law.phi**2)
+    return innovations
 
 
 def difference(world: World, law: NoiseLaw, seen: dict[str, Mask], changed: Readings) -> Array:

@@ -35,7 +35,18 @@ def test_what_is_masked_has_no_part_in_the_estimate() -> None:
     one, other = estimate_noise(residual, mask), estimate_noise(spoilt, mask)
     np.testing.assert_array_equal(one.deviation, other.deviation)
     assert one.autocorrelation_time == other.autocorrelation_time
-    assert one.autocorrelation_time == pytest.approx(3.0, rel=0.2)
+    # Of (1 + 0.5)/(1 − 0.5) = 3, the part of the other lags counts by the share of readings: 1 + 0.7 · 2.
+    assert one.autocorrelation_time == pytest.approx(2.4, rel=0.1)
+
+
+def test_a_sensor_read_in_every_tenth_row_has_the_noise_of_its_own_readings() -> None:
+    """Its autocorrelation time is that of the readings alone, as if no other rows had been written."""
+    residual = autoregressive(0.95, (1.0, 1.0), 40_000)
+    every_tenth = (np.arange(len(residual)) % 10 == 0)[:, None] & np.ones_like(residual, bool)
+    own = residual[::10]
+    alone = estimate_noise(own, np.ones(own.shape, bool)).autocorrelation_time
+    assert estimate_noise(residual, every_tenth).autocorrelation_time == pytest.approx(alone, rel=0.02)
+    assert alone == pytest.approx((1 + 0.95**10) / (1 - 0.95**10), rel=0.2)
 
 
 def test_a_wheel_without_residual_takes_the_deviation_of_the_others() -> None:
