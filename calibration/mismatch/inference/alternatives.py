@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 UNEXPLAINED = "unexplained"
+NEVER: tuple[float, tuple[Term, ...]] = (-float("inf"), ())
 LARGEST_MARGIN = 40.0
 """Margin beyond which an answer is no alternative: it is e^20 times less probable."""
 
@@ -37,24 +38,26 @@ class Alternative:
     ----------
     effects: its names, sorted; "unexplained" stands for a smooth term
     margin: by how much its evidence is behind that of the answer that was given, in Δχ²; negative: it is ahead
+    terms: of its fit
     """
 
     effects: tuple[str, ...]
     margin: float
+    terms: tuple[Term, ...] = ()
 
 
 def alternatives(decision: Decision) -> tuple[Alternative, ...]:
     """Return the other answers of one step's difference, the best of each set of names, best first."""
     chosen = decision.whole
-    best: dict[tuple[str, ...], float] = {}
+    best: dict[tuple[str, ...], tuple[float, tuple[Term, ...]]] = {}
     ahead = _evidence(decision, chosen)
     for terms in _neighbours(decision):
         fit = decision.equations.fit(terms)
         names, evidence = _names(fit.terms), _evidence(decision, fit)
-        plausible = ahead - evidence < LARGEST_MARGIN and evidence > best.get(names, -float("inf"))
+        plausible = ahead - evidence < LARGEST_MARGIN and evidence > best.get(names, NEVER)[0]
         if names != _names(chosen.terms) and plausible and _admissible(decision, fit):
-            best[names] = evidence
-    found = [Alternative(names, ahead - evidence) for names, evidence in best.items()]
+            best[names] = evidence, fit.terms
+    found = [Alternative(names, ahead - evidence, of) for names, (evidence, of) in best.items()]
     return tuple(sorted(found, key=lambda each: each.margin))
 
 
