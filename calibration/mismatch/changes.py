@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Change, Contribution
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.motion import TRANSITION, transition_of
 from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
@@ -47,8 +48,10 @@ class Stated:
     contribution: Contribution
     in_simulation: bool
 
-    def column(self, problem: Problem, times: float = 1.0) -> Array:
+    def column(self, problem: Problem, times: float = 1.0, transition: Shape | None = None) -> Array:
         """Return what it adds to the prediction, so many times as large as it was corrected, shape (time, wheel).
+
+        A `transition` of the direction takes the place of the one that was corrected.
 
         Raises
         ------
@@ -56,7 +59,8 @@ class Stated:
             When the recording has not what the effect depends on, or the effect's shape or coefficients are incomplete.
         """
         coefficients = times * np.array(self.contribution.coefficients, np.float64)
-        columns = np.where(problem.mask, self._columns(problem, coefficients.tolist()), 0.0)
+        shape = {**self.contribution.shape, **(transition or {})}
+        columns = np.where(problem.mask, self._columns(problem, shape, coefficients.tolist()), 0.0)
         on = np.isin(np.array(problem.recording.wheels, dtype=object), list(self.contribution.wheels))
         if len(coefficients) != len(columns):
             raise SimulationError(
@@ -73,10 +77,14 @@ class Stated:
         shape, twice = self.contribution.shape, [2 * value for value in self.contribution.coefficients]
         return self.candidate.self_consistent_shape(problem, shape, twice) != shape
 
-    def _columns(self, problem: Problem, coefficients: Sequence[float]) -> Array:
+    def reverses(self, problem: Problem) -> bool:
+        """Return whether the law reverses with the motion, over a transition that is of the machine and not of it."""
+        return any(TRANSITION in shape for shape in self.candidate.shapes(problem))
+
+    def _columns(self, problem: Problem, shape: Shape, coefficients: Sequence[float]) -> Array:
         """Return the candidate's columns; what never varies in this recording, a level drive's pitch, counts too."""
         known = replace(problem, covariates={**problem.constants, **problem.covariates})
-        name, shape = self.contribution.name, self.contribution.shape
+        name = self.contribution.name
         if lacking := [covariate for covariate in self.candidate.requires if covariate not in known.covariates]:
             raise SimulationError(
                 f"[[effects]] {name} depends on {', '.join(lacking)}, which this recording does not have: "
@@ -113,21 +121,26 @@ class ChangedSize(Candidate):
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the shape that was corrected; of a law that is not linear in its size, over several changes of it."""
         shape = dict(self.stated.contribution.shape)
-        if self.stated.in_simulation or not self.stated.bent(problem):
+        if self.stated.in_simulation:
             return [shape]
-        return [{**shape, SECANT_CHANGE: change} for change in SECANT_CHANGES]
+        if self.stated.bent(problem):
+            return [{**shape, SECANT_CHANGE: change} for change in SECANT_CHANGES]
+        here = transition_of(problem) if self.stated.reverses(problem) else {}
+        return [shape, {**shape, **here}] if here and here[TRANSITION] != shape.get(TRANSITION) else [shape]
 
     def shape_count(self, problem: Problem) -> float:  # noqa: ARG002
-        """Return 1: the change that a secant is taken over is the coefficient itself, and no choice beside it."""
+        """Return 1: what a secant is taken over is the coefficient itself, and a transition is the machine's."""
         return 1
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the effect's change per relative change of its size, from the prediction without stated effects."""
         column = problem.stated[self._place].column
-        change = float(shape.get(SECANT_CHANGE, -1.0))
-        if change == -1.0:
+        if shape == self.stated.contribution.shape or shape.get(SECANT_CHANGE) == -1.0:
             return column[None]
         before = replace(problem, prediction=problem.prediction - problem.added, stated=())
+        if SECANT_CHANGE not in shape:
+            return self.stated.column(before, transition={TRANSITION: shape[TRANSITION]})[None]
+        change = float(shape[SECANT_CHANGE])
         return ((self.stated.column(before, 1 + change) - column) / change)[None]
 
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+TRANSITION = "transition_rad_s"
+"""The shape parameter of a law that reverses: the speed at which the friction has turned round by three quarters."""
 TRANSITIONS = (0.0025, 0.005, 0.01, 0.02, 0.04)
 """Speeds at which the friction has turned round by three quarters, as shares of the highest usual speed (a choice: from
 where it is a step for most readings to where it would be taken for viscous friction); the best is refined between its
@@ -40,13 +42,13 @@ def transition_of(problem: Problem) -> Shape:
     if key not in problem.made:
         problem.made[key] = np.array(_best_transition(problem))
     speed = float(problem.made[key])
-    return {"transition_rad_s": speed} if speed else {}
+    return {TRANSITION: speed} if speed else {}
 
 
 def along_motion(problem: Problem, shape: Shape) -> Array:
     """Return sign(ω), or tanh(ω/ω_t) where the shape has a transition, shape (time, wheel)."""
-    if "transition_rad_s" in shape:
-        return np.tanh(np.nan_to_num(problem.covariates["wheel_speed"]) / float(shape["transition_rad_s"]))
+    if TRANSITION in shape:
+        return np.tanh(np.nan_to_num(problem.covariates["wheel_speed"]) / float(shape[TRANSITION]))
     return np.asarray(np.nan_to_num(problem.covariates["direction"]))
 
 
@@ -81,7 +83,7 @@ def _refined(problem: Problem, width: float) -> tuple[float, float]:
 
 
 def _squares_left(problem: Problem, width: float) -> float:
-    return _squares(_left_beside_friction(problem, {"transition_rad_s": width}))
+    return _squares(_left_beside_friction(problem, {TRANSITION: width}))
 
 
 def _left_beside_friction(problem: Problem, shape: Shape) -> Array:
