@@ -66,9 +66,10 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
     chosen = named
     named, unnamed = weigh_against_smooth_terms(equations, chosen, simpler, threshold)
     kept = chosen if unnamed else named
-    if (freed := released(equations, kept)) is not None:
-        equations, named, unnamed = freed, freed.fit(kept.terms), ()
     whole = equations.fit((*named.terms, *unnamed))
+    if (freed := released(equations, kept, whole, threshold)) is not None:
+        equations, named, unnamed = freed, freed.fit(kept.terms), ()
+        whole = named
     noise = estimate_noise(residual_of(equations, whole), problem.mask, limits)
     equations = equations.weighted(noise.weights)
     return Decision(

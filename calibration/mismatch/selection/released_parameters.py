@@ -12,18 +12,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.selection.smooth_terms import unexplained_beside
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
+WRONG_STATEMENT_PENALTY = 9.2
+"""Δχ² charged for a parameter that was stated wrongly: odds of one in a hundred before the recording, 2 ln 100."""
 
-def released(equations: NormalEquations, named: Fit) -> NormalEquations | None:
+
+def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold: float) -> NormalEquations | None:
     """Return equations with the priors of those parameters widened that would have to leave them.
 
     None where no parameter would, where one would go further than a wrong statement explains
-    (`furthest_linearisation_stds`), or where something stays unexplained all the same.
+    (`furthest_linearisation_stds`), where something stays unexplained all the same, or where the evidence of `whole`,
+    names and curves within the priors, is larger.
     """
     limits, nuisance = equations.thresholds, equations.nuisance
     leaving = nuisance.leaving_their_priors(equations.fit(named.terms), equations.problem)
@@ -36,4 +43,17 @@ def released(equations: NormalEquations, named: Fit) -> NormalEquations | None:
     freed = equations.with_nuisance(wider)
     fit = freed.fit(named.terms)
     too_far = np.any(nuisance.prior_stds_away(fit)[leaving] > limits.furthest_linearisation_stds)
-    return None if too_far or unexplained_beside(freed, fit, tolerated=0.0) is not None else freed
+    if too_far or unexplained_beside(freed, fit, tolerated=0.0) is not None:
+        return None
+    within = _evidence(equations, whole, (), entry_threshold)
+    return freed if _evidence(equations, fit, leaving.tolist(), entry_threshold) >= within else None
+
+
+def _evidence(equations: NormalEquations, fit: Fit, free: Collection[int], entry_threshold: float) -> float:
+    """Return minus the χ² of readings and priors, less what terms and parameters outside their priors are charged."""
+    limits, terms = equations.thresholds, fit.terms
+    squares = np.sum(residual_of(equations, fit) ** 2, axis=0)
+    away = np.delete(equations.nuisance.prior_stds_away(fit), list(free))
+    entries = sum(entry_threshold if term.group.named else limits.smooth_term_entry for term in terms)
+    charged = entries + sum(map(equations.penalty, terms)) + WRONG_STATEMENT_PENALTY * len(free)
+    return -float(squares @ equations.weights + away @ away + charged)
