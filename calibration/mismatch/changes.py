@@ -48,10 +48,13 @@ class Stated:
     contribution: Contribution
     in_simulation: bool
 
-    def column(self, problem: Problem, times: float = 1.0, transition: Shape | None = None) -> Array:
+    def column(self, problem: Problem, times: float = 1.0) -> Array:
         """Return what it adds to the prediction, so many times as large as it was corrected, shape (time, wheel).
 
-        A `transition` of the direction takes the place of the one that was corrected.
+        Parameters
+        ----------
+        problem: without any stated effect in its prediction
+        times: factor on the coefficients
 
         Raises
         ------
@@ -59,8 +62,7 @@ class Stated:
             When the recording has not what the effect depends on, or the effect's shape or coefficients are incomplete.
         """
         coefficients = times * np.array(self.contribution.coefficients, np.float64)
-        shape = {**self.contribution.shape, **(transition or {})}
-        columns = np.where(problem.mask, self._columns(problem, shape, coefficients.tolist()), 0.0)
+        columns = np.where(problem.mask, self._columns(problem, coefficients.tolist()), 0.0)
         on = np.isin(np.array(problem.recording.wheels, dtype=object), list(self.contribution.wheels))
         if len(coefficients) != len(columns):
             raise SimulationError(
@@ -77,14 +79,19 @@ class Stated:
         shape, twice = self.contribution.shape, [2 * value for value in self.contribution.coefficients]
         return self.candidate.self_consistent_shape(problem, shape, twice) != shape
 
-    def reverses(self, problem: Problem) -> bool:
-        """Return whether the law reverses with the motion, over a transition that is of the machine and not of it."""
-        return any(TRANSITION in shape for shape in self.candidate.shapes(problem))
+    def shape(self, problem: Problem) -> Shape:
+        """Return the shape as corrected, with the transition of the direction that this recording shows, if it does.
 
-    def _columns(self, problem: Problem, shape: Shape, coefficients: Sequence[float]) -> Array:
+        How gradually friction turns round is found once for a recording, for every law that reverses.
+        """
+        here = {} if self.in_simulation else transition_of(problem)
+        reverses = here and any(TRANSITION in shape for shape in self.candidate.shapes(problem))
+        return {**self.contribution.shape, **(here if reverses else {})}
+
+    def _columns(self, problem: Problem, coefficients: Sequence[float]) -> Array:
         """Return the candidate's columns; what never varies in this recording, a level drive's pitch, counts too."""
         known = replace(problem, covariates={**problem.constants, **problem.covariates})
-        name = self.contribution.name
+        name, shape = self.contribution.name, self.shape(known)
         if lacking := [covariate for covariate in self.candidate.requires if covariate not in known.covariates]:
             raise SimulationError(
                 f"[[effects]] {name} depends on {', '.join(lacking)}, which this recording does not have: "
@@ -121,26 +128,21 @@ class ChangedSize(Candidate):
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the shape that was corrected; of a law that is not linear in its size, over several changes of it."""
         shape = dict(self.stated.contribution.shape)
-        if self.stated.in_simulation:
+        if self.stated.in_simulation or not self.stated.bent(problem):
             return [shape]
-        if self.stated.bent(problem):
-            return [{**shape, SECANT_CHANGE: change} for change in SECANT_CHANGES]
-        here = transition_of(problem) if self.stated.reverses(problem) else {}
-        return [shape, {**shape, **here}] if here and here[TRANSITION] != shape.get(TRANSITION) else [shape]
+        return [{**shape, SECANT_CHANGE: change} for change in SECANT_CHANGES]
 
     def shape_count(self, problem: Problem) -> float:  # noqa: ARG002
-        """Return 1: what a secant is taken over is the coefficient itself, and a transition is the machine's."""
+        """Return 1: the change that a secant is taken over is the coefficient itself, and no choice beside it."""
         return 1
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the effect's change per relative change of its size, from the prediction without stated effects."""
         column = problem.stated[self._place].column
-        if shape == self.stated.contribution.shape or shape.get(SECANT_CHANGE) == -1.0:
+        change = float(shape.get(SECANT_CHANGE, -1.0))
+        if change == -1.0:
             return column[None]
         before = replace(problem, prediction=problem.prediction - problem.added, stated=())
-        if SECANT_CHANGE not in shape:
-            return self.stated.column(before, transition={TRANSITION: shape[TRANSITION]})[None]
-        change = float(shape[SECANT_CHANGE])
         return ((self.stated.column(before, 1 + change) - column) / change)[None]
 
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002

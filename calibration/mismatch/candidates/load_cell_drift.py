@@ -40,6 +40,11 @@ RISES = (0.05, 0.15)
 """Time constants of a predicted load's creep, as shares of the recording (a choice: quick and slow)."""
 
 
+FURTHER_POWERS = (0.5, 2.0)
+"""Powers of the time since the onset that the onset's estimate takes in too (a choice: a factor of two either way of a
+steady drift)."""
+
+
 class LoadCellDrift(Candidate):
     """A load reading that drifts while the current does not follow it.
 
@@ -142,6 +147,11 @@ class DriftOfPredictedLoad(LoadCellDrift):
         ways: list[Shape] = [{"rise_s": share * problem.length_s} for share in RISES]
         ways.append({"full_at_s": problem.length_s})
         return [{"onset_s": t, **way} for t in onset_grid(problem) for way in ways]
+
+    def onset_profiles(self, problem: Problem) -> Sequence[Shape]:
+        """Add drifts that slow down and that speed up: the onset's estimate depends on how the drift grows after it."""
+        further: list[Shape] = [{"full_at_s": problem.length_s, "power": power} for power in FURTHER_POWERS]
+        return [*super().onset_profiles(problem), *further]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return g(t − t_0), 0 before the onset."""

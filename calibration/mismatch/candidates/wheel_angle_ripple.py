@@ -137,14 +137,18 @@ class WheelAngleRipple(Candidate):
         What does not resolve an order makes aliases of it: a constant drag at a constant speed is a line then.
         """
         lowest, highest, best = _lowest(problem), _resolved(problem), (-1.0, 0.0)
+        cycles = _cycles_per_reading(problem)
         while highest > lowest:
-            resolving = _cycles_per_reading(problem) * highest * READINGS_PER_CYCLE <= 1
-            order, power = self._spectrum(problem, np.where(resolving, weighted, 0.0))
-            sought = (order >= max(lowest, highest / 2)) & (order <= highest)
+            resolving = cycles * highest * READINGS_PER_CYCLE <= 1
+            # At rest, the readings of one angle are coherent at every order.
+            used = weighted if resolving.all() else np.where(resolving & (cycles > 0), weighted, 0.0)
+            order, power = self._spectrum(problem, used)
+            least = lowest if resolving.all() else max(lowest, highest / 2)
+            sought = (order >= least) & (order <= highest)
             if sought.any():
                 top = int(np.argmax(np.where(sought, power, 0.0)))
                 best = max(best, (float(power[top]), float(order[top])))
-            highest = lowest if resolving.all() else highest / 2
+            highest = least
         return best[1]
 
     def _lag(self, problem: Problem, weighted: Array, order: float) -> float:

@@ -1,7 +1,6 @@
-"""Answers that other answers outweigh: what is more probably there than not is said to be unexplained.
+"""A "consistent" that other answers outweigh: what is more probably there than not is said to be unexplained.
 
-The tests of single names are conditions, and a recording may fail one of them narrowly while the evidence for something
-is large: neither "consistent" nor a name is the most probable answer then.
+The tests of names are conditions, and an effect may fail one of them narrowly while the evidence for it is large.
 """
 
 from __future__ import annotations
@@ -9,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from regolithd.calibration.mismatch.inference.alternatives import UNEXPLAINED, alternatives
+from regolithd.calibration.mismatch.inference.alternatives import alternatives
 from regolithd.calibration.mismatch.inference.probability import probability
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 
@@ -23,22 +22,19 @@ EVEN = 0.5
 
 
 def doubted(decision: Decision) -> Decision:
-    """Return the decision, with an unexplained curve where all other answers together are more probable than it.
+    """Return the decision, with an unexplained curve where all other answers together outweigh "consistent".
 
-    Of "consistent", what the most probable other answer follows is unexplained. Names make way for a curve where that
-    is the most probable answer.
+    It is the curve that can hold the effect of the most probable other answer.
     """
+    equations, named = decision.equations, decision.named
+    # A parameter that left its prior is the answer then, and no effect that acts as it does.
+    if decision.whole.terms or equations.nuisance.leaving_their_priors(named, equations.problem).size:
+        return decision
     others = alternatives(decision)
-    if decision.unnamed or probability(others, decision.equations.thresholds) >= EVEN:
+    if probability(others, equations.thresholds) >= EVEN:
         return decision
-    if not decision.named.terms:
-        curve = _curve_like(decision, others[0])
-        return decision if curve is None else _with(decision, (), curve)
-    first = others[0]
-    if first.margin >= 0 or UNEXPLAINED not in first.effects:
-        return decision
-    names = tuple(term for term in first.terms if term.group.named)
-    return _with(decision, names, *(term for term in first.terms if not term.group.named))
+    curve = _curve_like(decision, others[0])
+    return decision if curve is None else replace(decision, unnamed=(curve,), whole=equations.fit((curve,)))
 
 
 def _curve_like(decision: Decision, other: Alternative) -> Term | None:
@@ -48,8 +44,3 @@ def _curve_like(decision: Decision, other: Alternative) -> Term | None:
     over = candidate.imitated_over if candidate else other.terms[0].name
     alike = [term for term in curves if term.name == over and term.wheels == other.terms[0].wheels]
     return next(iter((*alike, *curves)), None)
-
-
-def _with(decision: Decision, names: tuple[Term, ...], *curves: Term) -> Decision:
-    fit = decision.equations.fit
-    return replace(decision, named=fit(names), unnamed=curves, whole=fit((*names, *curves)))

@@ -24,8 +24,10 @@ Array = NDArray[np.float64]
 
 GRID = 48
 """Onsets of the likelihood's grid (a choice: one in each 2 % of the recording; the tolerance is a tenth)."""
-OVERCONFIDENCE = 2.0
-"""Factor by which Δχ² between onsets is too large (a choice: no development is exactly the true one)."""
+OVERCONFIDENCE = 4.0
+"""Factor by which Δχ² between onsets is too large: no development is exactly the true one. In 16 blind trials of drifts
+that wander by 15 % the true onset lay 5.5 below the best in the mean, and should have lain about 1 below; 4 and 8 place
+it equally well."""
 FIRST_STEP, LONGEST_STEP = 0.002, 0.3
 """Distance from the best onset at which the search begins and ends, as shares of the recording."""
 MARGIN = 0.01

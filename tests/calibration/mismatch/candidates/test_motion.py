@@ -38,6 +38,13 @@ def test_a_smooth_reversal_is_found() -> None:
     assert float(found["transition_rad_s"]) == pytest.approx(TRANSITIONS[-1] * FASTEST, rel=0.25)
 
 
+@pytest.mark.parametrize("between", [0.013, 0.03])
+def test_a_transition_between_those_that_are_tried_is_refined(between: float) -> None:
+    """What is left of a friction near standstill would else be taken for a law of low speeds."""
+    found = transition_of(problem_of(with_friction(between * FASTEST, noise=0.02)))
+    assert float(found["transition_rad_s"]) == pytest.approx(between * FASTEST, rel=0.15)
+
+
 def test_every_law_that_reverses_has_it_in_its_shape() -> None:
     """So that a corrected simulation gives the same on another recording, whatever that one shows."""
     problem = problem_of(with_friction(TRANSITIONS[-1] * FASTEST))

@@ -73,6 +73,18 @@ def test_an_order_is_found_with_as_few_bins_as_the_readings_resolve(order: float
     assert any(each == pytest.approx(order, abs=0.02) for each in found)
 
 
+def test_a_constant_at_a_speed_too_high_for_the_readings_is_no_ripple() -> None:
+    """Most readings turn by a third between two of them: order 3.14 is an alias of a constant there."""
+    time_s = 0.005 * np.arange(8000)
+    speed = np.where(time_s < 12, 20.0, 400.0)
+    columns = {"t_s": time_s, "thrust_N": np.ones(len(time_s)), "speed_rad_s": speed}
+    problem = build_problem(from_columns(columns), Propeller())
+    constant = np.where(speed > 20, 1.0, 0.0)[:, None]
+    ripple = 0.2 * np.cos(7.0 * problem.covariates["wheel_angle"]) * (1 - constant)
+    found = WheelAngleRipple().propose_shapes(problem, ripple + constant)
+    assert 7.0 in {round(float(shape["order"]), 1) for shape in found}
+
+
 @pytest.mark.parametrize("wheels", [1, 4])
 def test_white_noise_has_an_autocorrelation_time_of_one(wheels: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """The power of white noise, summed over the wheels, has the median of χ² with two degrees of freedom a wheel."""

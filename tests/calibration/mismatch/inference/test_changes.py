@@ -78,6 +78,35 @@ def test_a_corrected_effect_that_is_gone_is_called_gone() -> None:
     assert any("coulomb-friction is gone" in note for note in answer.notes)
 
 
+def late(by_s: float) -> Recording:
+    """Return an axis whose force is read so much later than it acts."""
+    recording = moving(6, 0.0)
+    time_s, force = recording.time_s, recording.channels["force_N"][:, 0]
+    return recording.with_channels(force_N=np.interp(time_s - by_s, time_s, force)[:, None])
+
+
+@pytest.mark.parametrize("now_s", [0.0, 0.3, 1.0])
+def test_a_change_of_a_law_that_is_not_linear_in_its_size_has_the_right_size(now_s: float) -> None:
+    """Half a second more of delay is another course of the channel, and not twice the same one."""
+    delay = Contribution("sensor-delay", {"late": "force_N", "secant_s": 0.5}, (0.5,), (1,), relative_std=0.04)
+    answer = compare(late(now_s), Axis(), effects=[delay]).answer
+    (change,) = answer.changes
+    assert (change.parameter, change.now) == ("delay_s", pytest.approx(now_s, abs=0.03))
+    assert change.low < now_s < change.high
+    assert not answer.effects
+    assert compare(late(0.5), Axis(), effects=[delay]).answer.verdict == "consistent"
+
+
+def test_a_change_is_told_over_the_transition_that_the_recording_shows() -> None:
+    """A friction that was corrected as a step turns round gradually: more of it is a change, and no further name."""
+    recording = moving(7, 0.0)
+    speed, force = recording.channels["speed_m_s"], recording.channels["force_N"]
+    answer = compare(recording.with_channels(force_N=force + np.tanh(speed / 0.15)), Axis(), effects=[COULOMB]).answer
+    (change,) = answer.changes
+    assert change.low < 1.0 < change.high
+    assert (answer.verdict, answer.effects) == ("missing-physics", ())
+
+
 def test_a_correction_of_a_correction_is_one_effect() -> None:
     """Entries of one name, shape and wheels are summed, their spreads in quadrature."""
     known = [candidate for candidate in library() if candidate.name == "coulomb-friction"]

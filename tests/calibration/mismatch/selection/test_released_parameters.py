@@ -9,6 +9,7 @@ import pytest
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
 from regolithd.calibration.mismatch.data.recording import from_columns
+from regolithd.calibration.mismatch.selection import released_parameters
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -64,3 +65,10 @@ def test_what_no_parameter_explains_stays_unexplained() -> None:
     found = answer(4.0, leak_W=60.0)
     assert found.verdict == "unexplained"
     assert [term.covariate for term in found.unexplained] == ["time"]
+
+
+def test_a_wrong_statement_has_a_price(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where it is dearer than names and curves within the priors, the parameter is not freed."""
+    monkeypatch.setattr(released_parameters, "WRONG_STATEMENT_PENALTY", 1e6)
+    loss = next(parameter for parameter in answer(3.4).parameters if parameter.name == "loss_W_K")
+    assert loss.value > 3.41

@@ -25,10 +25,12 @@ from regolithd.calibration.validation.machine_trials.cases.plan import (
     plan_case,
 )
 from regolithd.calibration.validation.machine_trials.cases.strength import (
+    NoiseLaw,
     delayed,
     of_strength,
     readings,
     relative_strength,
+    whitened,
 )
 from regolithd.calibration.validation.machine_trials.machines import MACHINES
 from regolithd.calibration.validation.machine_trials.physics.machine import Effect, Schedule, World
@@ -224,6 +226,20 @@ def test_noise_has_the_spectrum_that_the_margin_is_measured_with() -> None:
     stated = noise_spectrum(4096, 0.9, 0.2)
     for part in (slice(1, 60), slice(300, 600), slice(1500, 2000)):
         assert np.mean(power[part] / stated[part]) == pytest.approx(1, rel=0.05)
+
+
+@pytest.mark.parametrize("absent", ["none", "single rows", "a spell"])
+def test_margins_are_exact_with_rows_that_are_not_seen(absent: str) -> None:
+    """The squares of the innovations are what the noise's covariance over the seen rows gives."""
+    rng, rows, law = np.random.default_rng(3), 300, NoiseLaw(0.95, 0.2, {})
+    row = np.arange(rows)
+    seen = {"none": row >= 0, "single rows": rng.uniform(size=rows) < 0.7, "a spell": (row < 90) | (row > 150)}[absent]
+    values = np.cumsum(rng.standard_normal(rows))
+    covariance = 4.0 * (0.8 * law.phi ** np.abs(row[:, None] - row) + 0.2 * np.eye(rows))
+    exact = values[seen] @ np.linalg.solve(covariance[np.ix_(seen, seen)], values[seen])
+    found = whitened(values[:, None], law, 2.0, seen[:, None])
+    assert np.sum(found**2) == pytest.approx(exact, rel=1e-9)
+    assert not np.any(found[~seen])
 
 
 def test_a_delay_to_be_found_is_longer_than_a_row() -> None:
