@@ -12,6 +12,7 @@ from regolithd.daemon.check.finding import Finding, good, wrong
 from regolithd.daemon.control.protocol import CONNECTED
 from regolithd.daemon.publish.connection_errors import explain
 from regolithd.daemon.publish.credentials import password_of, tls_context
+from regolithd.daemon.publish.transport import transport_of
 
 if TYPE_CHECKING:
     from regolithd.daemon.config.configuration import Configuration
@@ -26,13 +27,16 @@ async def check_broker(configuration: Configuration, running: Status | None = No
     (A broker that takes the user name for the client identifier ends it when another client with this name connects.)
     """
     mqtt = configuration.mqtt
+    transport = transport_of(mqtt)
     if running is not None and running.broker == CONNECTED:
-        return [good("broker", f"{mqtt.host}:{mqtt.port}: the running daemon is connected")]
+        return [good("broker", f"{mqtt.address}: the running daemon is connected")]
     began = time.monotonic()
     try:
+        transport.check_accepts()
         client = Client(
-            mqtt.host,
-            mqtt.port,
+            transport.host,
+            transport.port,
+            transport=transport.kind,
             username=mqtt.username,
             password=password_of(mqtt),
             identifier=f"regolithd-check-{time.time_ns():x}",
@@ -45,6 +49,6 @@ async def check_broker(configuration: Configuration, running: Status | None = No
         place, _, rest = (await explain(error, mqtt)).partition(": ")
         text, _, remedy = rest.partition(". ")
         return [wrong("broker", f"{place.removeprefix('MQTT broker ')}: {text}", remedy)]
-    secured = "TLS" if mqtt.tls else "no TLS"
+    secured = "Unix socket" if mqtt.socket else "TLS" if mqtt.tls else "no TLS"
     who = mqtt.username or "anyone (no username)"
-    return [good("broker", f"{mqtt.host}:{mqtt.port} accepts {who}, {secured}, after {1e3 * took:.0f} ms")]
+    return [good("broker", f"{mqtt.address} accepts {who}, {secured}, after {1e3 * took:.0f} ms")]

@@ -101,7 +101,7 @@ def _run(settings: GroundSettings) -> None:
         listening = listen(settings.page)
         ground = Ground(settings)
         app = application(ground)
-        typer.echo(f"{settings.page.url} shows what {settings.mqtt.host}:{settings.mqtt.port} receives")
+        typer.echo(f"{settings.page.url} shows what {settings.mqtt.address} receives")
         await serve(ground, app, listening)
 
     try:

@@ -16,10 +16,12 @@ if TYPE_CHECKING:
 class BrokerSettings(Table):
     """Address, topics, credentials and TLS of a connection.
 
+    `socket` is the Unix socket of a broker on this computer; without it, `host` and `port` are used.
     `ca_file` holds the authorities whose broker certificates are accepted, by default those of the system. `cert_file`
     and `key_file` are the client's own certificate and its private key, which must have no passphrase.
     """
 
+    socket: Path | None = None
     host: Annotated[str, Field(min_length=1)] = "localhost"
     port: Annotated[int, Field(ge=1, le=65_535)] = 1883
     prefix: Annotated[str, Field(pattern=r"^[^#+\s]*[^#+/\s]$")] = "regolith"
@@ -30,6 +32,11 @@ class BrokerSettings(Table):
     cert_file: Path | None = None
     key_file: Path | None = None
     keepalive_s: Annotated[int, Field(ge=2, le=3600)] = 10
+
+    @property
+    def address(self) -> str:
+        """Where the broker is: the path of its socket, or host and port."""
+        return f"{self.host}:{self.port}" if self.socket is None else str(self.socket)
 
     @property
     def client(self) -> str:
@@ -46,6 +53,8 @@ def broker_contradictions(mqtt: BrokerSettings) -> Iterator[tuple[str, str, str,
     for given, missing in (("cert_file", "key_file"), ("key_file", "cert_file")):
         if getattr(mqtt, given) is not None and getattr(mqtt, missing) is None:
             yield f"mqtt.{missing}", f"a file beside {given}", "nothing", f"Set it, or remove {given}."
+    if mqtt.socket is not None and mqtt.tls:
+        yield "mqtt.tls", "false beside socket", "true", "A Unix socket has no TLS: set it to false, or remove socket."
     for key in ("ca_file", "cert_file", "key_file"):
         if getattr(mqtt, key) is not None and not mqtt.tls:
             yield (

@@ -16,9 +16,9 @@ from aiomqtt import Client, Message, MqttError
 from regolithd.daemon.ground.received import STORED, MessageError, parse
 from regolithd.daemon.messages.channels import CHANNELS
 from regolithd.daemon.publish.backoff import Backoff
-from regolithd.daemon.publish.connection import SOCKET_OPTIONS
 from regolithd.daemon.publish.connection_errors import explain
 from regolithd.daemon.publish.credentials import password_of, tls_context
+from regolithd.daemon.publish.transport import transport_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -73,10 +73,12 @@ class Subscription:
                 await asyncio.sleep(self._backoff.next())
 
     def _client(self) -> Client:
-        settings = self._settings
+        settings, transport = self._settings, transport_of(self._settings)
+        transport.check_accepts()
         client = Client(
-            settings.host,
-            settings.port,
+            transport.host,
+            transport.port,
+            transport=transport.kind,
             username=settings.username,
             password=password_of(settings),
             identifier=settings.client_id,
@@ -84,7 +86,7 @@ class Subscription:
             keepalive=settings.keepalive_s,
             timeout=TIMEOUT_S,
             tls_context=tls_context(settings),
-            socket_options=SOCKET_OPTIONS,
+            socket_options=transport.socket_options,
             logger=_aiomqtt_log,
         )
         client._client.manual_ack_set(on=True)  # noqa: SLF001  # paho's interface, which aiomqtt does not pass on

@@ -17,7 +17,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-import socket
 from contextlib import suppress
 from typing import TYPE_CHECKING, Protocol
 
@@ -25,6 +24,7 @@ from aiomqtt import MqttError, ProtocolVersion, Will
 
 from regolithd.daemon.publish.broker_client import BrokerClient
 from regolithd.daemon.publish.credentials import password_of, tls_context
+from regolithd.daemon.publish.transport import transport_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -46,9 +46,6 @@ ACKNOWLEDGE_TIMEOUT_S = 5.0
 
 DEATH_TIMEOUT_S = 0.5
 """Time for the death message, and as much for the DISCONNECT, of a connection that has failed or was cancelled."""
-
-SOCKET_OPTIONS = ((socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),)
-"""Without it a message waits until the one before it is acknowledged by TCP (Nagle's algorithm): up to 40 ms."""
 
 _AT_LEAST_ONCE = 1
 _LATE_BATCH = 20
@@ -115,10 +112,12 @@ class Connection:
                 await self._publish_death(client, reason)
 
     def _client(self) -> BrokerClient:
-        settings = self._settings
+        settings, transport = self._settings, transport_of(self._settings)
+        transport.check_accepts()
         client = BrokerClient(
-            settings.host,
-            settings.port,
+            transport.host,
+            transport.port,
+            transport=transport.kind,
             username=settings.username,
             password=password_of(settings),
             identifier=f"regolithd-{self._root.replace('/', '-')}",
@@ -131,7 +130,7 @@ class Connection:
             timeout=ACKNOWLEDGE_TIMEOUT_S,
             max_inflight_messages=WINDOW + OTHERS_WINDOW,
             tls_context=tls_context(settings),
-            socket_options=SOCKET_OPTIONS,
+            socket_options=transport.socket_options,
             logger=_aiomqtt_log,
         )
         client.pending_calls_threshold = 2 * (WINDOW + OTHERS_WINDOW)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 import ssl
 from typing import TYPE_CHECKING
@@ -42,7 +43,7 @@ _OF_VERIFICATION = {
 async def explain(error: Exception, settings: BrokerSettings) -> str:
     """Return what happened, and what to do where that is known; tries TLS where the error itself does not say it."""
     cause = _root(error)
-    if _may_be_tls(error, cause):
+    if settings.socket is None and _may_be_tls(error, cause):
         found = await tls_problem(settings)
         if isinstance(found, str):
             return f"{_place(settings)}: {found}."
@@ -53,25 +54,60 @@ async def explain(error: Exception, settings: BrokerSettings) -> str:
 
 def reason_of(error: Exception, settings: BrokerSettings) -> str:
     """Return what happened by the error alone, and what to do where that is known."""
-    place = _place(settings)
     cause = _root(error)
-    match cause:
+    if not isinstance(cause, OSError):
+        text = _refusal(error, settings)
+    elif settings.socket is not None and cause.filename is None:  # a file would be one of the credentials
+        text = _of_unix_socket(cause)
+    else:
+        text = _of_ip(cause)
+    return f"{_place(settings)}: {text}"
+
+
+def _of_ip(error: OSError) -> str:
+    match error:
+        case socket.gaierror() | OSError(errno=errno.EAFNOSUPPORT) if not _may_use_ip():
+            return (
+                "its unit allows this service no Internet sockets. Set [mqtt] socket to that of a broker on this"
+                " computer, or copy broker-over-ip.conf (docs/how-to/install.md)."
+            )
         case socket.gaierror():
-            return f"{place}: the name cannot be resolved. Correct [mqtt] host, or the name service."
+            return "the name cannot be resolved. Correct [mqtt] host, or the name service."
         case ConnectionRefusedError():
-            return f"{place}: connection refused. Start the broker, or correct [mqtt] port."
+            return "connection refused. Start the broker, or correct [mqtt] port."
         case ssl.SSLError():
-            return f"{place}: {_tls_text(cause)}."
+            return f"{_tls_text(error)}."
         case TimeoutError():
-            return f"{place}: no answer. Check the network, and that the broker responds."
-        case OSError():
-            return f"{place}: {cause}."
+            return "no answer. Check the network, and that the broker responds."
         case _:
-            return f"{place}: {_refusal(error, settings)}"
+            return f"{error}."
+
+
+def _of_unix_socket(error: OSError) -> str:
+    match error:
+        case FileNotFoundError():
+            return "there is no such socket. Start the broker, or correct [mqtt] socket."
+        case PermissionError():
+            return "this user may not open it. Its folder must belong to the group of this user: `ls -ld`."
+        case ConnectionRefusedError():
+            return "connection refused. Start the broker, or correct [mqtt] socket."
+        case TimeoutError() | BlockingIOError():
+            return "no answer. Check that the broker responds."
+        case _:
+            return f"{error}."
+
+
+def _may_use_ip() -> bool:
+    """Return whether this process may open Internet sockets (`RestrictAddressFamilies=` of its unit)."""
+    try:
+        socket.socket(socket.AF_INET, socket.SOCK_STREAM).close()
+    except OSError:
+        return False
+    return True
 
 
 def _place(settings: BrokerSettings) -> str:
-    return f"MQTT broker {settings.host}:{settings.port}"
+    return f"MQTT broker {settings.address}"
 
 
 def _may_be_tls(error: Exception, cause: BaseException) -> bool:

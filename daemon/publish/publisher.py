@@ -242,10 +242,7 @@ class Publisher:
     def _on_connected(self) -> None:
         self._up_since = time.monotonic()
         _log.info(
-            "connected to the MQTT broker %s:%d; %d messages are waiting",
-            self._settings.host,
-            self._settings.port,
-            self._stores.queued,
+            "connected to the MQTT broker %s; %d messages are waiting", self._settings.address, self._stores.queued
         )
 
     def _on_disconnected(self, reason: str) -> None:

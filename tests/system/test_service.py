@@ -30,6 +30,7 @@ ROOT = Path(__file__).resolve().parents[2]
 RMEM_MAX = Path("/proc/sys/net/core/rmem_max")
 RECEIVE_BUFFER_BYTES = 4 << 20
 CONFIGURATION = Path("/etc/regolithd/rover.toml")
+OVER_IP = Path("/usr/local/lib/systemd/system/regolithd.service.d/broker-over-ip.conf")
 REGOLITHD = "/usr/local/bin/regolithd"
 PASSWORD = "a secret"
 TIMEOUT_s = 60
@@ -75,6 +76,13 @@ def set_line(key: str, value: str) -> None:
     CONFIGURATION.write_text(text)
 
 
+def set_broker_socket(*, used: bool) -> None:
+    """Let the daemon reach the broker by its Unix socket, or by host and port."""
+    line, commented = 'socket = "/run/regolithd-mqtt/', '# socket = "/run/regolithd-mqtt/'
+    text = CONFIGURATION.read_text().replace(commented, line)
+    CONFIGURATION.write_text(text if used else text.replace(line, commented))
+
+
 @pytest.fixture(scope="module", autouse=True)
 def _machine() -> Iterator[None]:
     """A machine set up by docs/how-to/install.md, with broker, daemon and virtual rover."""
@@ -87,7 +95,11 @@ def _machine() -> Iterator[None]:
     for path in (passwords, Path("/etc/mosquitto/regolith.acl")):
         shutil.chown(path, "mosquitto")
     run("install", "-m", "640", "-g", "regolithd", "/dev/stdin", "/etc/regolithd/mqtt-password", text=PASSWORD)
+    tmpfiles = Path("/etc/tmpfiles.d/regolithd-mqtt.conf")
+    shutil.copy(ROOT / "systemd/mosquitto/tmpfiles.conf", tmpfiles)
+    run("systemd-tmpfiles", "--create", tmpfiles)
     set_line("channel", '"vcan0"')
+    set_broker_socket(used=True)
     set_line("username", '"kapvik"')
     set_line("password_file", '"/etc/regolithd/mqtt-password"')
     done = run("systemctl", "restart", "mosquitto", check=False)
@@ -207,12 +219,12 @@ async def test_it_is_ready_and_acquires_under_the_hardening(pid: int) -> None:
 
 
 def test_the_running_service_exposes_little(pid: int) -> None:
-    """The loaded unit's exposure is 2.0 or less, and its process has no capabilities and a seccomp filter."""
+    """The loaded unit's exposure is 1.0 or less; its process has no capabilities and a seccomp filter."""
     assert pid
     listed = run("systemd-analyze", "security", "regolithd.service", "--no-pager").stdout
     exposure = re.search(r"Overall exposure level for \S+: ([\d.]+)", listed)
     assert exposure
-    assert float(exposure[1]) <= 2.0
+    assert float(exposure[1]) <= 1.0
     status = Path(f"/proc/{pid}/status").read_text()
     assert re.search(r"NoNewPrivs:\s*1", status)
     assert re.search(r"CapBnd:\s*0+\n", status)
@@ -286,7 +298,7 @@ def test_with_an_invalid_configuration_the_service_is_not_restarted(pid: int) ->
 
 @pytest.mark.timeout(600)  # two installations
 def test_an_upgrade_keeps_the_configuration(pid: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A version that refuses the configuration is not installed; one that reads it replaces the running one."""
+    """A version that refuses it is not installed; one that reads it is, and reaches a broker over IP as before."""
     monkeypatch.setenv("PIP_NO_COMPILE", "1")  # halves the time
     configured = CONFIGURATION.read_text()
     before = Path("/opt/regolithd/current").resolve()
@@ -298,12 +310,17 @@ def test_an_upgrade_keeps_the_configuration(pid: int, monkeypatch: pytest.Monkey
     assert Path("/opt/regolithd/current").resolve() == before
     assert int(unit_properties("MainPID")["MainPID"]) == pid
 
+    assert not OVER_IP.exists()
+    set_broker_socket(used=False)
+    configured = CONFIGURATION.read_text()
     run("systemd/install")
     assert CONFIGURATION.read_text() == configured
+    assert OVER_IP.exists()
     assert Path("/opt/regolithd/previous").resolve() == before
     assert Path("/opt/regolithd/current").resolve() != before
     until(lambda: unit_properties("ActiveState")["ActiveState"] == "active", "the new version is ready")
     assert int(unit_properties("MainPID")["MainPID"]) != pid
+    asyncio.run(snapshot())
 
 
 def test_zz_uninstalling_keeps_configuration_and_recordings(pid: int) -> None:
@@ -312,6 +329,7 @@ def test_zz_uninstalling_keeps_configuration_and_recordings(pid: int) -> None:
     run("systemd/uninstall")
     assert not Path("/opt/regolithd").exists()
     assert run("systemctl", "cat", "regolithd", check=False).returncode
+    assert not OVER_IP.exists()
     assert not list(Path("/usr/local/lib").glob("*.d/*regolithd*"))
     assert CONFIGURATION.exists()
     assert any(Path("/var/lib/regolithd/recordings").iterdir())

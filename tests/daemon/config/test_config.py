@@ -101,6 +101,7 @@ PATH_KEYS = (
     "posterior.model",
     "recording.directory",
     "mqtt.password_file",
+    "mqtt.socket",
     "mqtt.ca_file",
     "mqtt.cert_file",
     "mqtt.key_file",
