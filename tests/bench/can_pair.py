@@ -10,6 +10,7 @@ takes is that of a real link. What a real link adds is missing: arbitration, bit
 from __future__ import annotations
 
 import asyncio
+import gc
 import signal
 import socket
 import sys
@@ -60,6 +61,7 @@ async def run_daemon(path: Path) -> None:
     configuration = read_configuration(path)
     service = Service(configuration, load_models(configuration))
     connect_sinks(service)
+    gc.freeze()  # as `regolithd run` does
     task = asyncio.create_task(service.run())
     asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
     await asyncio.wait([task])

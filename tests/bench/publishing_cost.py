@@ -1,4 +1,4 @@
-"""Measure the CPU time of publishing one SYNC: encode, store and send one QoS 1 and six QoS 0 messages.
+"""Measure the CPU time of publishing one SYNC: encode, store and send a snapshot, and the six wheels up to 20 times a second.
 
     python -m tests.bench.publishing_cost [RATE_Hz] [SECONDS]
 
@@ -14,7 +14,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from regolithd.daemon.config.configuration import Configuration, Mqtt
+from regolithd.daemon.config.configuration import Configuration, Mqtt, SyncTiming
 from regolithd.daemon.publish.encode import encode
 from regolithd.daemon.publish.publisher import Publisher
 from regolithd.daemon.publish.spool import Spool
@@ -51,7 +51,8 @@ async def measure(rate_Hz: float, seconds: float) -> dict[str, float | int]:
         place = Path(folder)
         broker = Mosquitto(place)
         broker.start()
-        configuration = Configuration(mqtt=Mqtt(host=broker.host, port=broker.port, spool_directory=place / "spool"))
+        mqtt = Mqtt(host=broker.host, port=broker.port, spool_directory=place / "spool")
+        configuration = Configuration(sync=SyncTiming(rate_Hz=rate_Hz), mqtt=mqtt)
         stores = Stores.open(configuration.mqtt.spool_directory, 100_000_000)
         publisher = Publisher(configuration, stores)
         task = asyncio.create_task(publisher.run())
