@@ -1,4 +1,4 @@
-"""Measure the CPU time of publishing one SYNC: encode, store and send a snapshot, and the six wheels up to 20 times a second.
+"""Measure the CPU time of publishing one SYNC: encode, store and send its snapshot, and the wheels' messages.
 
     python -m tests.bench.publishing_cost [RATE_Hz] [SECONDS]
 

@@ -1,8 +1,9 @@
 """`make fuzz SECONDS=3600 SEED=1`: random damage to everything that the program reads from others.
 
 Each input must be taken, or refused by the error that its reader documents; anything else is a defect: another
-exception, no end within `HANG_S`, another exit status than 78 for a configuration, or memory that grows. The seed of a
-defective input is printed; `--only NAME --seed N --inputs 1` repeats it. The figures are in build/figures/fuzz.json.
+exception, no end within `HANG_S` or `WAIT_S`, another exit status than 78 for a configuration, or memory that grows.
+The seed of a defective input is printed; `--only NAME --seed N --inputs 1` repeats it. The figures are in
+build/figures/fuzz.json.
 """
 
 from __future__ import annotations
@@ -34,6 +35,9 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 HANG_S = 20
+"""Processor time for one input."""
+WAIT_S = 180
+"""Time for one input, waiting included: another program's load must not look like a hang."""
 GROWTH_MB = 20.0
 """Memory that a kind of input may gain from the end of its first quarter to its end: caches and fragmentation."""
 PAGE_MB = resource.getpagesize() / 1e6
@@ -79,7 +83,8 @@ def main() -> None:
 
 def fuzz(seconds: float, seed: int, inputs: int | None = None, only: str | None = None) -> dict[str, Result]:
     """Return the result of each kind of input."""
-    signal.signal(signal.SIGALRM, _hang)
+    for number in (signal.SIGALRM, signal.SIGPROF):
+        signal.signal(number, _hang)
     targets = [target for target in (*TARGETS, *SERVERS) if only in {None, target.name}]
     whole = sum(target.share for target in targets)
     results = {}
@@ -115,7 +120,8 @@ def fuzz_one(target: Target, seconds: float, seed: int, inputs: int | None, fold
 
 def read_one(target: Target, seed: str, folder: Path, result: Result) -> None:
     """Feed one input, and note what came of it."""
-    signal.alarm(HANG_S)
+    signal.alarm(WAIT_S)
+    signal.setitimer(signal.ITIMER_PROF, HANG_S)
     try:
         target.one(Random(f"{target.name} {seed}"), folder)
     except target.allowed:
@@ -130,6 +136,7 @@ def read_one(target: Target, seed: str, folder: Path, result: Result) -> None:
             result.defects[text + "\n" + traceback.format_exc()[-1500:]] = seed
         result.counts[text] += 1
     finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
         signal.alarm(0)
 
 

@@ -45,3 +45,16 @@ def test_defects_are_counted(tmp_path: Path) -> None:
     assert result.hangs > 10
     assert result.counts["KeyError at test_fuzzing.py:37"] > 10
     assert len(result.defects) == 2
+
+
+def test_an_input_that_computes_without_end_is_a_hang(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is interrupted after its processor time."""
+
+    def one(_random: Random, _folder: Path) -> None:
+        while True:
+            pass
+
+    monkeypatch.setattr(fuzzing, "HANG_S", 0.05)
+    monkeypatch.setattr(fuzzing, "WAIT_S", 100)
+    fuzzing.fuzz(0.0, 1, 0, "no such target")  # sets the handlers
+    assert fuzzing.fuzz_one(Target("endless", one, ()), 0.0, 1, 1, tmp_path).hangs == 1
