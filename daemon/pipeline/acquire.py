@@ -123,6 +123,7 @@ class Acquisition:
         self._counts: dict[int, _PdoCount] = {}
         self._heard: list[set[int]] = []
         self._awaited: set[int] = set()
+        self._due: set[int] = set()  # of those, PDOs whose answer to this SYNC has not come
         self._taken: set[int] = set()
         self._snapshots = self._accepted = self._late = self._duplicate = self._unexpected = self._missing = 0
         self._doubtful = 0
@@ -161,6 +162,7 @@ class Acquisition:
         if self._sequence >= 0:
             self._heard = [*self._heard[1 - AWAITED_WINDOWS :], self._received_pdos]
             self._awaited = set().union(*self._heard)
+            self._due = self._awaited.copy()
         for cob_id, count in self._counts.items():
             count.begin_window(self._ambiguous_windows)
             if not count.has_two_senders:
@@ -191,6 +193,8 @@ class Acquisition:
             self._note_duplicate(count, reading)
             return None
         count.outstanding -= 1
+        if not count.outstanding:
+            self._due.discard(reading.cob_id)
         in_window = reading.time_ns - self._sync_ns <= self._window_ns
         if count.outstanding or not in_window or self._open is None:
             self._late += 1
@@ -201,7 +205,7 @@ class Acquisition:
             self._accepted += 1
             self._taken.add(reading.cob_id)
             self._write(self._open, reading)
-        return self._close_window() if self._awaited and self._complete() else None
+        return self._close_window() if self._awaited and not self._due else None
 
     def _note_duplicate(self, count: _PdoCount, reading: Reading) -> None:
         """Note that a PDO came more often than one node sends it; from the second window on, drop the node's values."""
@@ -214,10 +218,6 @@ class Acquisition:
             if self._open is not None:
                 for quantity, _ in reading.values:
                     self._open[ROW[quantity], slice(None) if wheel is None else wheel] = np.nan
-
-    def _complete(self) -> bool:
-        counts = [self._counts[cob_id] for cob_id in self._awaited]
-        return all(count.received and not count.outstanding for count in counts)
 
     def _write(self, values: Array, reading: Reading) -> None:
         wheel = self._wheels[reading.node_id]

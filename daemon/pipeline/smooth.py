@@ -115,7 +115,7 @@ class Smoother:
     def step(self, time_ns: int, driving_torque: Array, load: Array, slip: Array) -> Smoothed:
         """Return the filtered values at `time_ns`. The torque is positive where it drives the wheel as it turns."""
         torque = self._rejector.step(driving_torque)
-        return Smoothed(*self._low_pass.step(time_ns, np.stack([torque, load, slip])))
+        return Smoothed(*self._low_pass.step(time_ns, np.array([torque, load, slip])))
 
 
 def _median(window: Array) -> Array:

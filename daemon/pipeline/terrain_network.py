@@ -34,25 +34,21 @@ class Terrain:
 
 
 class TerrainNetwork:
-    """A terrain network, ready to run."""
+    """A terrain network, ready to run; `input_names` are in the order of its inputs."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._session = open_session(path, REMEDY)
         self.card = _card(path, self._session)
+        self.input_names = tuple(variable.name for variable in self.card.inputs)
         self._low = np.array([[variable.low] for variable in self.card.inputs])
         self._high = np.array([[variable.high] for variable in self.card.inputs])
         self._name = self._session.get_inputs()[0].name
         self._run_once()
 
-    @property
-    def input_names(self) -> tuple[str, ...]:
-        """Return the names of the network's inputs, in its order."""
-        return tuple(variable.name for variable in self.card.inputs)
-
     def estimate(self, inputs: Mapping[str, Array]) -> Terrain:
         """Return the soil estimate under six wheels; `inputs` has an array of shape (6,) for each of `input_names`."""
-        batch = np.stack([inputs[name] for name in self.input_names])
+        batch = np.array([inputs[name] for name in self.input_names])
         answer = self._run(batch)
         missing = np.isnan(batch).any(axis=0)
         cohesion, tangent = np.where(missing, np.nan, answer)
