@@ -40,7 +40,7 @@ class EmpiricalCurveLaw(Candidate):
     def __init__(self, stated: StatedCurve) -> None:
         self.stated = stated
         self.name = name_of(stated)  # type: ignore[misc]
-        self.covariate = stated.covariate  # type: ignore[misc]
+        self.covariate = self.imitated_over = stated.covariate  # type: ignore[misc]
         self.equation = f"an empirical curve over {stated.covariate}"  # type: ignore[misc]
         self.words = "what an empirical curve describes"  # type: ignore[misc]
         self.signature = "the curve that was found"  # type: ignore[misc]

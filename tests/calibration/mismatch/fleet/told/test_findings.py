@@ -139,7 +139,7 @@ def test_what_is_told_of_the_fit_is_on_recordings_that_did_not_fit_it(season: Ch
     [("shared", [("rover 0", "rover 1")]), ("rover", [("rover 0",), ("rover 1",)]), ("recording", [])],
 )
 def test_parameters_are_told_of_their_owners(level: Level, owners: list[tuple[str, ...]]) -> None:
-    """Of the fleet, or of each rover; of every recording they would be too many. What is known exactly stays."""
+    """Of the fleet or of each rover, those of every recording being too many; what is known exactly stays."""
     told = answer_of_fleet(consistent(level)).parameters
     assert [parameter.rovers for parameter in told] == [owner for owner in owners for _ in range(2)]
     for parameter in told:
