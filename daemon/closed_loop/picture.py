@@ -43,11 +43,6 @@ POINTS = 100
 """Points of a trace: a window of 10 s changes little from one half second to the next."""
 SYMBOLS = (("c", "kPa"), ("φ", "°"))
 TITLE = "Friction hidden in the drivetrain, found by one drive on a known soil – then the same rover on other soils"
-CAPTION = (
-    "Lines: posterior mean of the last 10 s, six wheels; bands: its 90 % interval, wide for φ because one torque does "
-    "not tell c and φ apart. Errors: rms while the window is on one soil.\nThe paper's network does not gain: it was "
-    "trained on 50–100 mA, all of it from soil, and less current lies outside its training range."
-)
 
 
 def draw(runs: Sequence[LoopResult], path: Path) -> None:
@@ -64,7 +59,6 @@ def draw(runs: Sequence[LoopResult], path: Path) -> None:
                 _trace(panels[1 + k], result, k, label)
                 _errors(panels[3 + k], result, k)
         made.legend(handles=_legend(), loc="outside lower left", ncols=4)
-        made.supxlabel(CAPTION, x=0.008, ha="left", fontsize=12, color="#444444")
         save(made, path, dpi=130)
 
 
@@ -141,9 +135,9 @@ def _errors(panel: Axes, result: LoopResult, k: int) -> None:
         found_here = figures(estimates)
         values = [found_here[f"{estimator}_rmse_{UNITS[k]}"] for estimator in ("posterior", "network")]
         places = [step, step + 4]
-        panel.bar(places, values, color=colour, width=0.85, alpha=0.85, label=label)
+        panel.bar(places, values, color=colour, width=0.9, alpha=0.85, label=label)
         for at, value in zip(places, values, strict=True):
-            panel.text(at, value + 0.015 * HIGHEST_ERROR[k], f"{value:.1f}", ha="center", fontsize=10.5)
+            panel.text(at, value + 0.015 * HIGHEST_ERROR[k], f"{value:.1f}", ha="center", fontsize=9.5)
     panel.set(ylim=(0, HIGHEST_ERROR[k]), title=f"error of {symbol} [{unit}]")
     panel.set_xticks([1, 5], ["posterior", "paper's\nnetwork"])
     panel.tick_params(axis="x", length=0)

@@ -30,6 +30,8 @@ let brokerProblem = "";
 let connected = true; // to the server
 let user = null;
 let lastRead = 0;
+let reading = 0; // requests of the present state under way
+let meanwhile = []; // updates that came during one: they may be newer than its answer
 let dirty = false;
 
 const plots = new Plots(series.posterior, series.snapshot, (from, to) => {
@@ -166,7 +168,8 @@ function setSpan(seconds) {
 }
 
 async function readState() {
-  const state = await read("/api/state");
+  reading++;
+  const state = await read("/api/state").finally(() => reading--);
   offset_ms = state.now_ms - Date.now();
   brokerProblem = state.broker;
   user = state.user;
@@ -174,6 +177,8 @@ async function readState() {
   byId("who").parentElement.hidden = Boolean(user);
   setText(byId("user"), user ?? "");
   Object.assign(rovers, state.rovers);
+  meanwhile.forEach(take);
+  if (!reading) meanwhile = [];
   const first = rovers[wanted] ? wanted : selected ?? Object.keys(rovers).sort()[0];
   if (first && first !== selected) return select(first);
   if (selected !== null) await Promise.all([readHistory(), readLog()]);
@@ -217,7 +222,11 @@ function follow() {
     connected = true;
     readState().catch(() => {});
   };
-  events.onmessage = (event) => take(JSON.parse(event.data));
+  events.onmessage = (event) => {
+    const update = JSON.parse(event.data);
+    if (reading) meanwhile.push(update);
+    take(update);
+  };
   events.addEventListener("reload", () => readState().catch(() => {}));
   events.onerror = () => {
     connected = false;
