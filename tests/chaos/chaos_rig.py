@@ -233,5 +233,9 @@ def new_rig(folder: Path) -> Rig:
     threading.Thread(target=lambda: asyncio.run(rig.messages.run()), daemon=True).start()
     until(rig.messages.ready.is_set, "the subscriber is connected")
     rig.start_daemon()
-    until(stack.ready, lambda: f"every node is operational: {stack.output('daemon')}")
+    try:
+        until(stack.ready, lambda: f"every node is operational: {stack.output('daemon')}")
+    except AssertionError:
+        rig.close()  # a mounted disk would hide why
+        raise
     return rig
