@@ -43,6 +43,8 @@ def _type(value: Mapping[str, Any]) -> str:
         return ", ".join(f"`{each}`" for each in value["enum"])
     if "$ref" in value:
         return _linked(value["$ref"])
+    if either := value.get("anyOf") or value.get("oneOf"):
+        return " or ".join(_type(each) for each in either)
     if value["type"] == "array":
         return f"list of {_type(value['items'])}"
     if value["type"] == "object":
