@@ -45,6 +45,11 @@ def _type(value: Mapping[str, Any]) -> str:
         return _linked(value["$ref"])
     if either := value.get("anyOf") or value.get("oneOf"):
         return " or ".join(_type(each) for each in either)
+    return _json_type(value)
+
+
+def _json_type(value: Mapping[str, Any]) -> str:
+    """Return what `type` says, with what is inside a list or an object."""
     if value["type"] == "array":
         return f"list of {_type(value['items'])}"
     if value["type"] == "object":
