@@ -91,9 +91,12 @@ class RangeSums:
         energy = local @ own[:, powers[:, None] + powers] @ np.swapaxes(local, 1, 2)
         fitted = local @ cross
         complement = energy - (fitted @ self.covariance) @ np.swapaxes(fitted, 1, 2)
-        size = np.sqrt(np.maximum(np.einsum("nkk->nk", energy), 1e-300))
-        moment = np.einsum("nkj,nj->nk", local, left) / size
-        return moment, complement / (size[:, :, None] * size[:, None, :])
+        squares = np.einsum("nkk->nk", energy)
+        # What a range without readings has is rounding.
+        some = (self.readings[last] > self.readings[first])[:, None] & (squares > 0)
+        scale = np.where(some, 1 / np.sqrt(np.where(some, squares, 1.0)), 0.0)
+        moment = np.einsum("nkj,nj->nk", local, left) * scale
+        return moment, complement * scale[:, :, None] * scale[:, None, :]
 
     def _together(self, moment: Array, complement: Array) -> Array:
         """Return the Δχ² of columns together; nearly undetermined directions are left out."""

@@ -41,3 +41,15 @@ def test_shares_are_of_the_readings() -> None:
     sums = range_sums(equations, equations.fit(()), "wheel_speed", "offset", (0, 1), edges)
     share = sums.share(Ranges(np.array([0, 2]), np.array([10, 3])))
     assert share == pytest.approx([1.0, 0.1], abs=0.01)
+
+
+def test_a_range_without_readings_gains_nothing() -> None:
+    """A covariate that jumps over it leaves sums there that are rounding alone."""
+    equations = equations_of(problem_of(table()))
+    values = known_values(equations, "wheel_speed", "offset", (0, 1))
+    top = float(values.max())
+    sums = range_sums(
+        equations, equations.fit(()), "wheel_speed", "offset", (0, 1), np.array([0.0, top + 0.1, top + 0.2])
+    )
+    gains = sums.delta_chi2(Ranges(np.array([2]), np.array([3])), FORMS)
+    assert [float(gain[0]) for gain in gains] == [0.0] * len(FORMS)
