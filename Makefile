@@ -12,7 +12,7 @@ RECORDINGS ?= ../shared/recordings
 .PHONY: interop first-day week
 .PHONY: figures chaos fuzz holds bench audit wheelhouse lock
 .PHONY: sizing reproduce evaluate loop prove prove-machines reliability real scaling thresholds mutations mutants frames pictures picture screenshots
-.PHONY: fleet online unnamed
+.PHONY: fleet online unnamed regions
 
 help:
 	@awk -F ':.*## ' '/^## / { print "\n" substr($$0, 4) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -77,6 +77,9 @@ unnamed: $(DEV) ## what has no name: held-out error with an empirical curve, and
 
 reliability: $(DEV) ## how often answers are right at their stated probability (BATCHES="folders of prove and prove-machines")
 	$(BIN)/python -m regolithd.calibration.validation.reliability build/figures/reliability.json docs/reliability.svg $(or $(BATCHES),build/prove $(wildcard build/prove-machines/*))
+
+regions: $(DEV) ## laws that fail in regions: localisation and bias of the parameters, beside LISDD (SEEDS=…)
+	$(BIN)/python -m regolithd.calibration.validation.region_study build/figures/regions.json docs/regions.svg $(if $(SEEDS),--seeds $(SEEDS))
 
 real: $(DEV) ## worked examples on recordings that are not part of this project (RECORDINGS=… ONLY="…")
 	$(BIN)/python docs/examples/run.py $(RECORDINGS) build/figures/real.json build/real $(ONLY)

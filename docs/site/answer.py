@@ -41,6 +41,8 @@ def _type(value: Mapping[str, Any]) -> str:
         return f"`{value['const']}`"
     if "enum" in value:
         return ", ".join(f"`{each}`" for each in value["enum"])
+    if "oneOf" in value:
+        return " or ".join(_type(each) for each in value["oneOf"])
     if "$ref" in value:
         return _linked(value["$ref"])
     if either := value.get("anyOf") or value.get("oneOf"):

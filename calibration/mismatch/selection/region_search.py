@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.regression.group import Group, Term
 from regolithd.calibration.mismatch.regression.range_sums import Ranges, known_values, range_sums
 from regolithd.calibration.mismatch.regression.region import FORMS, GROWTH
+from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, acting
 
 if TYPE_CHECKING:
@@ -88,11 +89,11 @@ def _one_after_another(
 
 
 def best_region(equations: NormalEquations, fit: Fit, forms: Forms) -> Found | None:
-    """Return the region with the best score beside a fit, if it is significant as a smooth term has to be."""
+    """Return the region with the best score beside a fit, over the covariates of significant smooth terms."""
     curves = significant_curves(equations, fit)[:CURVES_TRIED]
     found = [region for curve in curves if (region := _region_of(equations, fit, curve, forms)) is not None]
     best = max(found, key=lambda each: each.score, default=None)
-    return best if best is not None and best.score > equations.thresholds.smooth_term_entry else None
+    return best if best is not None and best.score > 0 else None
 
 
 def significant_curves(equations: NormalEquations, fit: Fit) -> list[Term]:
@@ -117,10 +118,10 @@ def _searched_again(equations: NormalEquations, fit: Fit, index: int) -> tuple[N
 
 
 def _significant(equations: NormalEquations, fit: Fit, first: int) -> Fit:
-    """Return the fit without regions, its terms from `first` on, that are not significant beside the others."""
+    """Return the fit without regions, its terms from `first` on, that score nothing beside the others."""
     for index in reversed(range(first, len(fit.terms))):
         rest = equations.fit(fit.without(index))
-        if equations.score(fit) - equations.score(rest) <= equations.thresholds.smooth_term_entry:
+        if equations.score(fit) - equations.score(rest) <= 0:
             fit = rest
     return fit
 
@@ -128,12 +129,15 @@ def _significant(equations: NormalEquations, fit: Fit, first: int) -> Fit:
 def everywhere_score(
     equations: NormalEquations, named: Fit, covariate: str, coupling: str, wheels: Sequence[int]
 ) -> float:
-    """Return the score that the best of the simplest smooth laws over a covariate adds to the named effects."""
+    """Return what the best of the simplest smooth laws over a covariate adds to the named effects' score.
+
+    Its coefficients are paid for by Schwarz's criterion, as those of regions.
+    """
     sums = range_sums(equations, named, covariate, coupling, wheels, np.zeros(1))
     whole = Ranges(np.array([0]), np.array([2]))
-    penalty = equations.thresholds.coefficient_penalty
+    of_each = schwarz_penalty(equations, named, wheels)
     gains = sums.delta_chi2(whole, EVERYWHERE)
-    return max(float(gain[0]) - penalty * len(powers) for gain, powers in zip(gains, EVERYWHERE, strict=True))
+    return max(float(gain[0]) - of_each * len(powers) for gain, powers in zip(gains, EVERYWHERE, strict=True))
 
 
 def with_region(equations: NormalEquations, found: Found) -> tuple[NormalEquations, Term]:
@@ -160,11 +164,16 @@ def _region_of(equations: NormalEquations, fit: Fit, curve: Term, forms: Forms) 
     if not len(edges):
         return None
     sums = range_sums(equations, fit, covariate, coupling, wheels, edges)
-    first, last = np.triu_indices(len(edges) + 2, 1)
-    coarse = sorted(_best_of_each_form(equations, sums, _allowed(sums, Ranges(first, last), fit), forms), key=_rank)
+    ranges = _allowed(sums, Ranges(*np.triu_indices(len(edges) + 2, 1)), fit)
+    of_each = schwarz_penalty(equations, fit, wheels)
+    coarse = sorted(_best_of_each_form(equations, sums, ranges, forms, of_each), key=_rank)
     refined = (_refined(equations, fit, wheels, choice, edges) for choice in coarse[:REFINED])
     best = min(refined, key=_rank, default=None)
-    return None if best is None else Found(best.score, best.region, wheels, best.penalty)
+    if best is None:
+        return None
+    # What a smooth term on these wheels pays beyond its coefficients, a region on them pays too.
+    of_wheels = equations.penalty(curve) - equations.thresholds.coefficient_penalty * len(curve.group.columns)
+    return Found(best.score - of_wheels, best.region, wheels, best.penalty)
 
 
 @dataclass(frozen=True)
@@ -180,26 +189,36 @@ def _rank(choice: _Choice) -> float:
     return -choice.score
 
 
-def _best_of_each_form(equations: NormalEquations, sums: RangeSums, ranges: Ranges, forms: Forms) -> list[_Choice]:
+def _best_of_each_form(
+    equations: NormalEquations, sums: RangeSums, ranges: Ranges, forms: Forms, of_each: float
+) -> list[_Choice]:
     """Return the best range with one bound, and with two, for each form.
 
-    Each pays for its coefficients, for the choice among its kind, and for holding more readings than it leaves: what
-    acts in a range may be said of the rest as well, where a parameter of the simulation makes up for it.
+    Each pays for its coefficients and bounds by Schwarz's criterion (`of_each`), for the choice of its form, and for
+    holding more readings than it leaves: what acts in a range may be said of the rest as well, where a parameter of
+    the simulation makes up for it.
     """
     found, share = [], sums.share(ranges)
     odds = 2 * np.log(np.maximum(share / (1 - share), 1.0))
     open_ended = (ranges.first == 0) | (ranges.last == len(sums.edges) + 1)
     for powers, gains in zip(forms, sums.delta_chi2(ranges, forms), strict=True):
-        for kind in (open_ended, ~open_ended) if powers != GROWTH else (open_ended,):
+        for kind, bounds in ((open_ended, 1), (~open_ended, 2)) if powers != GROWTH else ((open_ended, 1),):
             if kind.any():
                 scores = np.where(kind, gains - odds, -np.inf)
                 at = int(np.argmax(scores))
-                choice = 2 * float(np.log(2 * len(FORMS) * kind.sum()))
-                penalty = choice + float(odds[at])
-                score = float(gains[at]) - penalty - equations.thresholds.coefficient_penalty * len(powers)
+                whole = (bounds + len(powers)) * of_each + 2 * float(np.log(len(FORMS))) + float(odds[at])
+                penalty = whole - equations.thresholds.coefficient_penalty * len(powers)
+                score = float(gains[at]) - whole
                 region = sums.region(int(ranges.first[at]), int(ranges.last[at]), powers)
                 found.append(_Choice(score, region, penalty))
     return found
+
+
+def schwarz_penalty(equations: NormalEquations, fit: Fit, wheels: Sequence[int]) -> float:
+    """Return ln n, with n the number of independent readings on some wheels: Σ weight × what the fit leaves²."""
+    on = list(wheels)
+    readings = float(np.sum(residual_of(equations, fit)[:, on] ** 2 * equations.weights[on]))
+    return float(np.log(max(readings, np.e)))
 
 
 def _refined(equations: NormalEquations, fit: Fit, wheels: tuple[int, ...], choice: _Choice, edges: Array) -> _Choice:

@@ -1,9 +1,9 @@
 """In a range or everywhere: whether what stays unexplained is confined to regions of a covariate.
 
 A law that fails beyond an angle, or below a temperature, leaves a smooth term over that covariate. Regions describe it
-better where they score more than the smooth term and than the simplest laws that hold everywhere, each paying for its
-coefficients and for the choice of its bounds. The parameters are then fitted together with the regions, and what the
-simulation leaves out in them does not bias the parameters.
+better where they score more, by `lead_margin`, than the smooth term and than the simplest laws that hold everywhere.
+All pay for their coefficients, and regions for their bounds, by Schwarz's criterion (1978). The parameters are then
+fitted together with the regions, so that what the simulation leaves out there does not bias them.
 """
 
 from __future__ import annotations
@@ -14,10 +14,16 @@ from typing import TYPE_CHECKING
 from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
 from regolithd.calibration.mismatch.selection.cross_validation import transfer_margin
 from regolithd.calibration.mismatch.selection.region_bounds import with_median_bounds
-from regolithd.calibration.mismatch.selection.region_search import everywhere_score, regions_beside
+from regolithd.calibration.mismatch.selection.region_search import (
+    everywhere_score,
+    regions_beside,
+    schwarz_penalty,
+)
 from regolithd.calibration.mismatch.selection.smooth_terms import unexplained_beside
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.selection.decision import Decision
@@ -28,9 +34,11 @@ def in_regions(decision: Decision) -> Decision:
     if not decision.unnamed or decision.unnamed[0].group.coupling == PERIODIC:
         return decision
     named, curve = decision.named, decision.unnamed[0]
-    smooth = decision.equations.score(decision.equations.fit((*named.terms, curve)))
-    equations, fit = regions_beside(decision.equations, named, smooth)
-    if len(fit.terms) == len(named.terms) or not _favoured(equations, named, fit, curve):
+    needed = _curve_score(decision.equations, named, curve)
+    equations, fit = regions_beside(decision.equations, named, needed)
+    regions = fit.terms[len(named.terms) :]
+    lead = equations.score(fit) - _smooth_score(equations, named, curve, regions)
+    if not regions or lead < equations.thresholds.lead_margin:
         return decision
     equations, fit = with_median_bounds(equations, fit)
     if not _holds(equations, fit, len(named.terms), decision.entry_threshold):
@@ -38,12 +46,18 @@ def in_regions(decision: Decision) -> Decision:
     return replace(decision, equations=equations, unnamed=fit.terms[len(named.terms) :], whole=fit)
 
 
-def _favoured(equations: NormalEquations, named: Fit, fit: Fit, curve: Term) -> bool:
-    """Return whether regions lead the smooth term and the simplest laws everywhere by more than chance gives."""
-    smooth = [equations.score(equations.fit((*named.terms, curve)))]
-    places = {(term.name, term.group.coupling, term.wheels) for term in (*fit.terms[len(named.terms) :], curve)}
-    smooth += [equations.score(named) + everywhere_score(equations, named, *place) for place in places]
-    return equations.score(fit) > max(smooth) + equations.thresholds.lead_margin
+def _curve_score(equations: NormalEquations, named: Fit, curve: Term) -> float:
+    """Return the score with a smooth term, its coefficients paid for as those of regions: by Schwarz's criterion."""
+    fit = equations.fit((*named.terms, curve))
+    of_each = schwarz_penalty(equations, fit, curve.wheels) - equations.thresholds.coefficient_penalty
+    return equations.score(fit) - of_each * len(curve.group.columns)
+
+
+def _smooth_score(equations: NormalEquations, named: Fit, curve: Term, regions: Sequence[Term]) -> float:
+    """Return the best score without a bound: of the smooth term, and of the simplest laws that hold everywhere."""
+    places = {(term.name, term.group.coupling, term.wheels) for term in (*regions, curve)}
+    laws = (equations.score(named) + everywhere_score(equations, named, *place) for place in places)
+    return max(_curve_score(equations, named, curve), *laws)
 
 
 def _holds(equations: NormalEquations, fit: Fit, named: int, entry_threshold: float) -> bool:
