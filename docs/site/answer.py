@@ -37,10 +37,8 @@ def _table(part: Mapping[str, Any]) -> Iterator[str]:
 
 def _type(value: Mapping[str, Any]) -> str:
     """Return a value's type in words."""
-    if "const" in value:
-        return f"`{value['const']}`"
-    if "enum" in value:
-        return ", ".join(f"`{each}`" for each in value["enum"])
+    if "const" in value or "enum" in value:
+        return ", ".join(f"`{each}`" for each in value.get("enum", [value.get("const")]))
     if "oneOf" in value:
         return " or ".join(_type(each) for each in value["oneOf"])
     if "$ref" in value:
