@@ -39,8 +39,8 @@ def _type(value: Mapping[str, Any]) -> str:
     """Return a value's type in words."""
     if "const" in value or "enum" in value:
         return ", ".join(f"`{each}`" for each in value.get("enum", [value.get("const")]))
-    if "oneOf" in value:
-        return " or ".join(_type(each) for each in value["oneOf"])
+    if any_of := value.get("oneOf", value.get("anyOf")):
+        return " or ".join(_type(each) for each in any_of)
     if "$ref" in value:
         return _linked(value["$ref"])
     if either := value.get("anyOf") or value.get("oneOf"):

@@ -16,14 +16,14 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from regolithd.calibration.validation.region_study.machines import MACHINES, Case, case_of
+from regolithd.calibration.validation.region_study.machines import MACHINES, Case, Group, case_of
 from regolithd.calibration.validation.region_study.picture import picture
 from regolithd.calibration.validation.region_study.score import METHODS, Score, scores_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-GROUPS = ("none", "everywhere", "one", "two")
+GROUPS: tuple[Group, ...] = ("none", "everywhere", "one", "two")
 """Regions in which the law fails; "everywhere": over the whole of a covariate, smoothly."""
 
 

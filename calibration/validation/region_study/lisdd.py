@@ -106,7 +106,7 @@ def _confirmed(residual: Array, covariates: dict[str, Array], regimes: _Regimes,
     tested = [rows for rows in regions if rows.sum() >= FEWEST_ROWS]
     library = _library(covariates)
     levels = np.array([_level(residual[rows], library[rows], rng) for rows in tested])
-    confirmed = _discoveries(levels) if len(levels) else []
+    confirmed = _discoveries(levels)
     found = np.zeros(len(residual), np.bool_)
     for rows, sure in zip(tested, confirmed, strict=True):
         found |= rows & bool(sure)
@@ -138,8 +138,8 @@ def _library(covariates: dict[str, Array]) -> Array:
 
 def _robust(tangents: Array, reading: Array) -> Array:
     """Fit by least absolute deviations (iteratively reweighted)."""
-    weights = np.ones(len(reading))
-    parameters = np.zeros(tangents.shape[1])
+    weights: Array = np.ones(len(reading))
+    parameters: Array = np.zeros(tangents.shape[1])
     for _ in range(MOST_FITS):
         parameters = np.linalg.lstsq(tangents * weights[:, None], reading * weights, rcond=None)[0]
         off = np.abs(reading - tangents @ parameters)
@@ -166,7 +166,7 @@ def _discoveries(levels: Array) -> Mask:
     return found
 
 
-def _runs(flagged: Mask) -> list[Array]:
+def _runs(flagged: Mask) -> list[NDArray[np.int64]]:
     """Return the runs of neighbouring flagged bins."""
     places = np.flatnonzero(flagged)
     return [run for run in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if run.size]

@@ -52,7 +52,8 @@ def scores_of(case: Case) -> tuple[Score, ...]:
     engine = np.array([values[name] for name in machine.parameters])
     peer = lisdd(tangents, reading, covariates)
     everywhere, known = (
-        np.linalg.lstsq(tangents[rows], reading[rows], rcond=None)[0] for rows in (case.failing | True, ~case.failing)
+        np.asarray(np.linalg.lstsq(tangents[rows], reading[rows], rcond=None)[0], np.float64)
+        for rows in (np.ones_like(case.failing), ~case.failing)
     )
     none = np.zeros(len(reading), np.bool_)
     return (
