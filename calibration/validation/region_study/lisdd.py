@@ -141,10 +141,12 @@ def _robust(tangents: Array, reading: Array) -> Array:
     weights: Array = np.ones(len(reading))
     parameters: Array = np.zeros(tangents.shape[1])
     for _ in range(MOST_FITS):
-        parameters = np.linalg.lstsq(tangents * weights[:, None], reading * weights, rcond=None)[0]
+        parameters = np.asarray(
+            np.linalg.lstsq(tangents * weights[:, None], reading * weights, rcond=None)[0], np.float64
+        )
         off = np.abs(reading - tangents @ parameters)
         weights = 1 / np.sqrt(np.maximum(off, 1e-3 * np.median(off) + 1e-12))
-    return np.asarray(parameters)
+    return parameters
 
 
 def _fitted(tangents: Array, reading: Array, rows: Mask) -> Array:
