@@ -19,7 +19,8 @@ class OnlineThresholds:
     alarm: float = _threshold(
         25.0,
         "Δχ² of the best law, wheels and onset together, above which a change is reported.",
-        "choice, provisional: above the first sound drives of `make online`, which measures the rate",
+        "simulation (`make online`): of 100 sound drives, 183 h, two pass it, and the tail of their largest statistics "
+        "gives 25.3 ± 1.1 for one false report in 100 h",
     )
     interval_s: float = _threshold(
         60.0,

@@ -28,10 +28,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="regolithd.calibration.validation.online_study")
     parser.add_argument("figures", type=Path)
     parser.add_argument("drawing", type=Path)
-    parser.add_argument("--drives", type=int, default=20, help="sound drives of two hours (20)")
+    parser.add_argument("--drives", type=int, default=10, help="sound drives of two hours (10)")
     parser.add_argument("--draws", type=int, default=10, help="draws of the noise for each (10)")
-    parser.add_argument("--drags", type=int, default=20, help="drives with drag, at each size (20)")
-    parser.add_argument("--offline", type=int, default=5, help="of these compared offline as well (5)")
+    parser.add_argument("--drags", type=int, default=10, help="drives with drag, at each size (10)")
+    parser.add_argument("--offline", type=int, default=3, help="of these compared offline as well (3)")
     asked = parser.parse_args()
     flat = sound(asked.drives, asked.draws) if asked.drives else {}
     flat |= drags(asked.drags, asked.offline, asked.drawing) if asked.drags else {}
