@@ -94,7 +94,7 @@ def test_a_line_belongs_to_the_lines_of_its_statement() -> None:
 
 
 def test_tests_of_the_line_run_the_nearest_and_quickest_first(root: Path) -> None:
-    """Where an import executes the line, those of its file and folder run as well."""
+    """The module's own test file first; where an import executes the line, those of its file and folder run as well."""
     far, slow, quick, other = (
         "tests/drivers/master/test_boot.py::test_far",
         "tests/drivers/can/test_limits.py::test_slow",
@@ -102,7 +102,7 @@ def test_tests_of_the_line_run_the_nearest_and_quickest_first(root: Path) -> Non
         "tests/drivers/can/test_bus.py::test_other",
     )
     lines = {"7": [""], "13": [far, quick, slow], "10": ["", far]}
-    found = CoverageMap({far: 0.1, slow: 2.0, quick: 1.0, other: 3.0}, {FILE: lines})
+    found = CoverageMap({far: 0.1, slow: 2.0, quick: 1.0, other: 0.05}, {FILE: lines})
     within, constant = Mutation(FILE, 13, 14, "", 0), Mutation(FILE, 7, 9, "", 0)
     assert selected_tests(within, root, found) == [quick, slow, far]
     assert selected_tests(constant, root, found) == [quick, slow, other, far]

@@ -66,7 +66,7 @@ def mirrored_folder(root: Path, file: str) -> str:
 def selected_tests(mutation: Mutation, root: Path, found: CoverageMap) -> list[str]:
     """Return the fast tests to run: those that execute the line; where an import does, also those of file and folder.
 
-    Those of the mirrored folder go first, then the quickest.
+    Those of the module's own test file go first, then those of the mirrored folder, then the quickest.
     """
     lines = statement_lines((root / mutation.file).read_text(), mutation.line)
     names = found.of_lines(mutation.file, lines)
@@ -74,12 +74,18 @@ def selected_tests(mutation: Mutation, root: Path, found: CoverageMap) -> list[s
     if not names or AT_IMPORT in names or mutation.file.startswith(OWN_PROCESS):
         names |= found.of_file(mutation.file) | {test for test in found.seconds if test.startswith(folder)}
     names.discard(AT_IMPORT)
-    ordered = sorted(names, key=lambda test: (not test.startswith(folder), found.seconds[test]))
+    own = own_file(mutation)
+    ordered = sorted(names, key=lambda test: (own not in test, not test.startswith(folder), found.seconds[test]))
     kept: list[str] = []
     for test in ordered:
         if sum(found.seconds[each] for each in kept) < LONGEST_S:
             kept.append(test)
     return kept
+
+
+def own_file(mutation: Mutation) -> str:
+    """Return what the names of the tests in the module's own file contain."""
+    return f"/test_{Path(mutation.file).stem}.py::"
 
 
 def outside_the_room(mutation: Mutation, original: str) -> tuple[str, ...]:
@@ -93,11 +99,12 @@ def try_mutant(mutation: Mutation, checkout: Checkout, found: CoverageMap) -> Re
     original = (checkout.root / mutation.file).read_text()
     mutated = mutation.applied(original)
     tests = selected_tests(mutation, checkout.root, found)
+    nearest = [test for test in tests if own_file(mutation) in test]
+    batches = (nearest, [*outside_the_room(mutation, original), *(test for test in tests if test not in nearest)])
     cpu_s = STARTING_CPU_S + math.ceil(SLOWER * sum(found.seconds[test] for test in tests))
     started = time.monotonic()
     with checkout.changed(mutation.file, mutated):
-        every = [*outside_the_room(mutation, original), *tests]
-        run, failed = _failing_run(checkout, every, cpu_s, repeated=room_of(mutation.file) != ONLY_COMPUTES)
+        run, failed = _failing_run(checkout, batches, cpu_s, repeated=room_of(mutation.file) != ONLY_COMPUTES)
     verdict: Verdict = "survived" if run is None else "killed"
     if run is not None and run.timed_out and not _run(checkout, failed, cpu_s).passed:
         verdict = "undecided"
@@ -115,6 +122,20 @@ def try_mutant(mutation: Mutation, checkout: Checkout, found: CoverageMap) -> Re
 
 
 def _failing_run(
+    checkout: Checkout, batches: Iterable[Sequence[str]], cpu_s: int, *, repeated: bool
+) -> tuple[Run | None, Sequence[str]]:
+    """Return the first run that failed, and its tests; None where all pass.
+
+    The nearest tests are a batch of their own: to collect the others often takes longer than they run.
+    """
+    for tests in filter(None, batches):
+        run, failed = _failing_batch(checkout, tests, cpu_s, repeated=repeated)
+        if run is not None:
+            return run, failed
+    return None, ()
+
+
+def _failing_batch(
     checkout: Checkout, tests: Sequence[str], cpu_s: int, *, repeated: bool
 ) -> tuple[Run | None, Sequence[str]]:
     """Return the run that failed, and its tests; None where all pass.

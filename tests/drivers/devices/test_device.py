@@ -46,6 +46,12 @@ def test_a_pdo_that_states_nothing_is_sent_at_each_sync() -> None:
     assert (Commanded(0x60FF).subindex, Commanded(0x60FF).scale) == (0, 1.0)
 
 
+def test_a_quantity_that_states_nothing_is_one_for_each_wheel_and_may_stay_constant() -> None:
+    """It is no bit field, keeps its sign on a mirrored motor, and raises no stuck-sensor alarm."""
+    plain = Quantity("x")
+    assert (plain.per_wheel, plain.mirrored, plain.flags, plain.noisy) == (True, False, False, False)
+
+
 def test_a_node_that_states_nothing_is_required_and_turns_forward() -> None:
     """Without diagnostic PDOs, and with any serial number."""
     node = NodeDescription(40, device(), None)
