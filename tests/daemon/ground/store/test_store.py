@@ -38,6 +38,16 @@ def test_a_repeated_message_is_stored_once(writer: sqlite3.Connection, history: 
     assert history.points("kapvik", "posterior", START_NS, START_NS + HOUR_NS).late.sum() == 0
 
 
+def test_the_newest_message_of_a_topic_is_the_one_with_the_last_number(
+    writer: sqlite3.Connection, history: History
+) -> None:
+    """Whatever arrived last; it is told as current, with its session, number and time."""
+    MessageStore(writer).add([received("posterior", 4, 2.0), received("posterior", 3, 1.5, late=True)])
+    newest = history.latest("kapvik")["posterior"]
+    assert (newest.topic, newest.session, newest.sequence, newest.late) == ("posterior", SESSION, 4, False)
+    assert newest.time_ns == START_NS + 2_000_000_000
+
+
 def test_what_comes_late_goes_into_its_place(writer: sqlite3.Connection, history: History) -> None:
     """In any order of arrival the means are the same, and the back-filled ones are marked."""
     store = MessageStore(writer)
