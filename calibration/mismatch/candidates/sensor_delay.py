@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 FINEST_READINGS = 2.0
 """Shortest delay in the grid, in readings (a choice)."""
-LEAST_READINGS = 1.5
+LEAST_READINGS = 1.25
 """Shortest delay that is named, in readings: what a sampled input does between two readings is not recorded, and a
-solver that holds it, or interpolates it, is early or late by up to one (a choice: half a reading more)."""
+solver that holds it, or interpolates it, is early or late by up to one (a choice: a quarter of a reading more)."""
 RATIO_OF_CHANNEL, RATIO_OF_INPUT = 2.0, 4.0
 """Ratio of neighbouring delays in the grid, for the predicted channel and for an input (a choice: a fitted delay is
 refined from the nearest; each delay of an input costs a run of the simulation)."""
