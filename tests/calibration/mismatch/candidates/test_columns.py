@@ -229,10 +229,10 @@ def test_a_shape_follows_its_coefficient_until_both_agree(
 
 
 def test_a_delay_is_longer_than_sampling_leaves_open() -> None:
-    """A reading and a half at least; it is sought from half to twice the grid's, up to a tenth of the recording."""
+    """A reading and a quarter at least; it is sought from half to twice the grid's, up to a tenth of the recording."""
     delay = CANDIDATES["sensor-delay"]
     shape: Shape = {"late": "current_A", "secant_s": 2.0}
-    assert [delay.plausible(P, shape, [seconds]) for seconds in (0.74, 0.75, 3.0)] == [False, True, True]
+    assert [delay.plausible(P, shape, [seconds]) for seconds in (0.62, 0.63, 3.0)] == [False, True, True]
     bounds = delay.bounds(P, shape)["secant_s"]
     assert bounds == pytest.approx((0.05, 6.0))
     assert delay.search_range(P, shape, "secant_s", bounds) == pytest.approx((1.0, 4.0))
