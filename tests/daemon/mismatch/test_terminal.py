@@ -21,7 +21,7 @@ def test_mismatch_prints_the_answer() -> None:
         effects=[SimpleNamespace(name="coulomb-friction", statement="37 mA")],
         unexplained=[
             Unexplained("current", (1, 4), "time", 3.4, 99.6, 0.123),
-            Unexplained("current", (1,), "height", 0.0, 9.0, 0.4, CURVE, SUGGESTIONS),
+            Unexplained("current", (1,), "height", 0.0, 9.0, 0.4, curve=CURVE, suggestions=SUGGESTIONS),
         ],
         indistinguishable=[SimpleNamespace(effects=("one", "other"), experiment="Drive backwards.")],
         fit=SimpleNamespace(

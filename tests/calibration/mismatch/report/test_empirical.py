@@ -16,7 +16,7 @@ CURVE = EmpiricalCurve(
     "drag", True, "A", "m/s", (0.1, 0.4, 0.7), (0.0, 0.1, 0.15), (-0.1, 0.05, 0.1), (0.1, 0.15, 0.2), 0.4, 0.2
 )
 FORM = Suggestion("power", "Δcurrent_A = c speed", {"c": Parameter(0.25, 0.2, 0.3, "A/(m/s)")}, 0.21, 0.0)
-PLACE = Unexplained("current_A", (1,), "speed", 0.0, 9.0, 0.4, CURVE, (FORM,))
+PLACE = Unexplained("current_A", (1,), "speed", 0.0, 9.0, 0.4, curve=CURVE, suggestions=(FORM,))
 FIT = EmpiricalFit(
     StatedCurve("current_A", (1,), "speed", CURVE),
     {},
