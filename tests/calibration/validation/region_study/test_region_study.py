@@ -14,7 +14,7 @@ from regolithd.calibration.validation.region_study.picture import picture
 from regolithd.calibration.validation.region_study.score import METHODS, Score, scores_of
 
 
-@pytest.mark.parametrize(("machine", "group"), product(MACHINES, ("one", "two")))
+@pytest.mark.parametrize(("machine", "group"), [*product(MACHINES, ("one", "two"))])
 def test_outside_of_its_regions_a_case_is_the_law_and_noise(machine: Machine, group: Group) -> None:
     """And inside it is not: the residual's power there is larger."""
     case = case_of(machine, 3, group, correlated=False)
