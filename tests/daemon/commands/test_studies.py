@@ -122,7 +122,7 @@ def test_loop_runs_the_wanted_cases(
     monkeypatch.setattr(summary, "sentence", lambda result: f"sentence of {result}")
     monkeypatch.setattr(summary, "figures_of", lambda results: {"cases": len(results)})
     monkeypatch.setattr(picture, "draw", lambda results, path: drawn.append((results, path)))
-    out, figures = tmp_path / "out", tmp_path / "folder" / "loop.json"
+    out, figures = tmp_path / "out", tmp_path / "folder" / "deeper" / "loop.json"
     done = regolithd("loop", "--seed", 7, "--out", out, "--figures", figures, *options)
     assert asked == [(name, 7, out / name, lengths) for name in names]
     assert json.loads(figures.read_text()) == {"seed": 7, "cases": len(names)}

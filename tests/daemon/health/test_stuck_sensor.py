@@ -55,6 +55,12 @@ def test_a_load_that_stays_the_same_is_stuck(rate_Hz: float) -> None:
     assert watch(snapshots(rate_Hz, 4.9, frozen=(3,))) == ()
 
 
+def test_at_a_slow_sync_twenty_repetitions_are_awaited() -> None:
+    """At 2 Hz, five seconds are ten readings, which may be equal by chance."""
+    assert watch(snapshots(2.0, 10, frozen=(3,))) == ()
+    assert watch(snapshots(2.0, 10.5, frozen=(3,))) == ((LOAD, 3),)
+
+
 def test_it_is_over_with_the_first_reading_that_differs() -> None:
     """The first reading that differs ends the detection."""
     assert watch(snapshots(10, 12, frozen=(3,)), snapshots(10, 0.3, seed=6)) == ()

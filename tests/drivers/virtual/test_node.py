@@ -322,3 +322,12 @@ def test_counts_are_told_by_node_and_for_the_bus() -> None:
     assert json.loads(alone.rover.inject_fault("counts")) == counts
     counts[str(NODE)]["nmt"] = 9
     assert alone.node.counts["nmt"] == 1
+
+
+def test_what_is_not_delayed_is_due_at_once(alone: Alone) -> None:
+    """Heartbeats and SDO answers; a frame with a time would wait for it."""
+    alone.write(0x1017, 0, 100, 2 * BOOT_NS)
+    alone.node.tick(3 * BOOT_NS + 200_000_000)
+    alone.send(0x600 + NODE, bytes((0x40, 0x00, 0x10, 0, 0, 0, 0, 0)), 4 * BOOT_NS)
+    assert {due for due, _, _ in alone.frames} == {0}
+    assert {can_id for _, can_id, _ in alone.frames} == {0x700 + NODE, 0x580 + NODE}
