@@ -28,7 +28,7 @@ def test_mismatch_prints_the_answer() -> None:
             channel="current", held_out_rmse_before=0.00412345, held_out_rmse_after=0.001, noise_floor_rmse=0.0009
         ),
         probability=0.914,
-        alternatives=[SimpleNamespace(effects=("other",), unexplained=True, probability=0.05)],
+        next_best=SimpleNamespace(effects=("other",), unexplained=True, probability=0.05),
         notes=["short"],
     )
     console = Console(record=True, width=200, quiet=False)
