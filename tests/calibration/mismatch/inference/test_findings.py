@@ -43,10 +43,11 @@ def test_a_named_effect_has_its_place_size_and_errors(dragging: Comparison) -> N
 
 
 def test_what_has_no_name_is_unexplained_with_its_covariate(bumpy: Comparison) -> None:
-    """Where it acts, from when to when, and how much of the residual it is."""
+    """Where it acts, from when to when, and its share of the residual; a shoulder is a small range of its own."""
     answer = bumpy.answer
     assert answer.verdict == "unexplained"
-    (rest,) = answer.unexplained
+    rest, *shoulders = answer.unexplained
+    assert all((each.covariate, each.share_of_residual < 0.02) == ("wheel_speed", True) for each in shoulders)
     assert (rest.covariate, rest.wheels) == ("wheel_speed", (1, 2))
     assert 0.3 < rest.share_of_residual <= 1
     assert 0 <= rest.from_s < 40
