@@ -27,7 +27,7 @@ from law_problem import (
 
 from regolithd.calibration.mismatch.candidates.candidate import growth, onset_grid
 from regolithd.calibration.mismatch.candidates.library import library
-from regolithd.calibration.mismatch.candidates.load_cell_drift import OFFSETS, LoadCellDrift
+from regolithd.calibration.mismatch.candidates.load_cell_drift import OFFSETS, DriftOfPredictedLoad, LoadCellDrift
 from regolithd.calibration.mismatch.problem.problem import Problem
 
 if TYPE_CHECKING:
@@ -112,6 +112,20 @@ def test_a_column_is_its_law(name: str, shape: Shape, law: Array) -> None:
     """One column per law, with the coefficient 1."""
     (column,) = CANDIDATES[name].columns(P, shape)
     np.testing.assert_allclose(column, law, rtol=1e-9, atol=1e-12)
+
+
+def test_a_predicted_load_s_drift_begins_at_its_onset_and_never_shrinks() -> None:
+    """As creep does, quickly or slowly, or as a ramp that is 1 at the end of the recording."""
+    drift = DriftOfPredictedLoad()
+    ways = {tuple(key for key in shape if key != "onset_s") for shape in drift.shapes(P)}
+    assert ways == {("rise_s",), ("full_at_s",)}
+    for shape in drift.shapes(P):
+        (column,) = drift.columns(P, shape)
+        assert not column[float(shape["onset_s"]) > TIME_S].any()
+        assert np.all(np.diff(column, axis=0) >= 0)
+        assert 0 < column[-1, 0] <= 1
+    rises = {float(shape["rise_s"]) for shape in drift.shapes(P) if "rise_s" in shape}
+    assert sorted(rises) == pytest.approx([0.05 * P.length_s, 0.15 * P.length_s])
 
 
 def shown(value: object) -> str:
