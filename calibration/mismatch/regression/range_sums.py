@@ -179,8 +179,11 @@ def range_sums(
         at = np.searchsorted(edges, values[rows, w], side="right")
         scaled, acts, weight = (values[rows, w] - centre) / half, factor[rows, w], equations.weights[w]
         readings += np.bincount(at, minlength=bins)
-        own += np.stack([np.bincount(at, weight * acts**2 * scaled**k, bins) for k in range(2 * powers - 1)], axis=1)
-        column = [weight * acts * scaled**k for k in range(powers)]
+        column = [weight * acts]
+        for _ in range(2 * powers - 2):
+            column.append(column[-1] * scaled)
+        own += np.stack([np.bincount(at, acts * each, bins) for each in column], axis=1)
+        column = column[:powers]
         known = design.residual[w, rows].astype(np.float64)
         moment += np.stack([np.bincount(at, each * known, bins) for each in column], axis=1)
         for c, (place, of_column) in enumerate(fit.columns):
