@@ -62,6 +62,7 @@ def test_the_threshold_is_that_of_the_tail() -> None:
 
 
 def test_the_picture_has_a_curve_for_each_size() -> None:
-    """Also for one that was never reported."""
+    """Also for one that was never reported; and a line of the legend."""
     delays = [Delay(0.1, None, False, 100.0), Delay(0.5, 120.0, True, 60.0), Delay(0.5, 240.0, True, 60.0)]
-    assert picture(delays, (0.1, 0.5)).count('class="curve"') == 2
+    drawn = picture(delays, (0.1, 0.5))
+    assert [drawn.count(f'"curve size{place}"') for place in (0, 1, 2)] == [2, 2, 0]
