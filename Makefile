@@ -78,7 +78,7 @@ unnamed: $(DEV) ## what has no name: held-out error with an empirical curve, and
 reliability: $(DEV) ## how often answers are right at their stated probability (BATCHES="folders of prove and prove-machines")
 	$(BIN)/python -m regolithd.calibration.validation.reliability build/figures/reliability.json docs/reliability.svg $(or $(BATCHES),build/prove $(wildcard build/prove-machines/*))
 
-regions: $(DEV) ## laws that fail in regions: localisation and bias of the parameters, beside LISDD (SEEDS=…)
+regions: $(DEV) ## laws that fail in regions: localisation and bias of the parameters, beside LISDD; 4 minutes (SEEDS=8)
 	$(BIN)/python -m regolithd.calibration.validation.region_study build/figures/regions.json docs/regions.svg $(if $(SEEDS),--seeds $(SEEDS))
 
 real: $(DEV) ## worked examples on recordings that are not part of this project (RECORDINGS=… ONLY="…")

@@ -1,6 +1,6 @@
 """F1 of localisation and bias of the parameters where laws fail in regions, beside LISDD.
 
-python -m regolithd.calibration.validation.region_study build/figures/regions.json docs/regions.svg --seeds 3
+python -m regolithd.calibration.validation.region_study build/figures/regions.json docs/regions.svg --seeds 8
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("figures", type=Path)
     parser.add_argument("picture", type=Path)
-    parser.add_argument("--seeds", type=int, default=3, help="cases of each machine, number of regions and noise")
+    parser.add_argument("--seeds", type=int, default=8, help="cases of each machine, number of regions and noise")
     chosen = parser.parse_args()
     scores = [score for case in track([*cases(chosen.seeds)], "comparing") for score in scores_of(case)]
     figures = figures_of(scores)
