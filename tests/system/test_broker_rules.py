@@ -98,6 +98,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         ("/etc/mosquitto/ca_certificates/", f"{folder}/"),
         ("/etc/mosquitto/certs/", f"{folder}/"),
         ("/etc/mosquitto/regolith", f"{folder}/regolith"),
+        ("/run/regolithd-mqtt/", f"{folder}/"),
         ("listener 1883 localhost", f"listener {port} 127.0.0.1"),
         ("listener 8883", f"listener {tls_port} 127.0.0.1"),
     ):
@@ -197,6 +198,6 @@ async def test_without_a_name_or_a_certificate_nobody_connects(site: Site) -> No
 
 
 def test_the_broker_sends_at_once() -> None:
-    """The example sets TCP_NODELAY; `SOCKET_OPTIONS` is the daemon's side."""
+    """The example sets TCP_NODELAY; `TCP_OPTIONS` are the daemon's side."""
     lines = (EXAMPLE / "regolith.conf").read_text().splitlines()
     assert "set_tcp_nodelay true" in lines

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -218,7 +219,7 @@ def schwarz_penalty(equations: NormalEquations, fit: Fit, wheels: Sequence[int])
     """Return ln n, with n the number of independent readings on some wheels: Σ weight × what the fit leaves²."""
     on = list(wheels)
     readings = float(np.sum(residual_of(equations, fit)[:, on] ** 2 * equations.weights[on]))
-    return float(np.log(max(readings, np.e)))
+    return float(np.log(max(readings, math.e)))
 
 
 def _refined(equations: NormalEquations, fit: Fit, wheels: tuple[int, ...], choice: _Choice, edges: Array) -> _Choice:

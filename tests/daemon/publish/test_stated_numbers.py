@@ -20,9 +20,9 @@ NUMBERS = {
         "WINDOW": 64,
         "OTHERS_WINDOW": 16,
         "MAX_LATE_PER_S": 1000,
-        "SOCKET_OPTIONS": ((socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),),
         "_AT_LEAST_ONCE": 1,
     },
+    "transport": {"TCP_OPTIONS": ((socket.IPPROTO_TCP, socket.TCP_NODELAY, 1),)},
     "publisher": {"STABLE_CONNECTION_S": 5, "DISK_SYNC_PERIOD_S": 1},
     "mqtt_sink": {
         "HEALTH_PERIOD_S": 1,

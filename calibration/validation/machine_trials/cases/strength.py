@@ -98,17 +98,22 @@ def whitened(values: Array, law: NoiseLaw, std: float, seen: Mask) -> Array:
     Exact for any pattern of unseen rows (Kalman filter): a row of zeros in their place would look like a jump, which
     noise with a memory does not have.
     """
-    innovations, memory = np.zeros(values.shape), np.zeros(values.shape[1])
-    slow = 1 - law.white
-    variance = np.full(values.shape[1], slow)
-    for row, (now, known) in enumerate(zip(values / std, seen, strict=True)):
-        of_innovation = variance + law.white
-        surprise = np.where(known, now - memory, 0.0)
-        innovations[row] = surprise / np.sqrt(of_innovation)
-        gain = np.where(known, variance / of_innovation, 0.0)
-        memory = law.phi * (memory + gain * surprise)
-        variance = law.phi**2 * (1 - gain) * variance + slow * (1 - law.phi**2)
-    return innovations
+    columns = [_innovations(values[:, axis] / std, seen[:, axis], law) for axis in range(values.shape[1])]
+    return np.stack(columns, axis=1)
+
+
+def _innovations(values: Array, seen: Mask, law: NoiseLaw) -> Array:
+    """Return the innovations of one axis, shape (time,): a recursion in plain numbers, which arrays would slow down."""
+    slow, phi, white = 1 - law.white, law.phi, law.white
+    memory, variance, found = 0.0, slow, []
+    for value, known in zip(values.tolist(), seen.tolist(), strict=True):
+        surprise = gain = 0.0
+        if known:
+            surprise, gain = value - memory, variance / (variance + white)
+        found.append(surprise / (variance + white) ** 0.5)
+        memory = phi * (memory + gain * surprise)
+        variance = phi * phi * (1 - gain) * variance + slow * (1 - phi * phi)
+    return np.array(found)
 
 
 def difference(world: World, law: NoiseLaw, seen: dict[str, Mask], changed: Readings) -> Array:
