@@ -29,7 +29,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from chaos_faults import CAN, DAEMON, SIGTERM_TIMEOUT_S, Fault, possible
+from chaos_faults import CAN, COMPUTER, DAEMON, SIGTERM_TIMEOUT_S, Fault, possible
 from chaos_recordings import check_recordings
 from chaos_rig import Rig, new_rig
 
@@ -162,7 +162,7 @@ def one_round(rig: Rig, faults: list[Fault], outcome: Outcome, *, drive: bool, h
         outcome.normal_after_s.append(after)
     say(f"{what:60} {'driving' if driving else '':8} {f'{after:.1f} s' if after is not None else 'NEVER'}")
     for fault in faults:
-        if fault.heard is not None and not (fault.name == "disk full" and "link down" in what):  # nothing to write
+        if fault.heard is not None and not unnoticed(fault, faults):
             topic, fields = fault.heard
             rig.check(rig.messages.heard(topic, begun, **fields), f"{what}: not heard: {topic} {fields}")
     rig.end_drive()
@@ -171,6 +171,14 @@ def one_round(rig: Rig, faults: list[Fault], outcome: Outcome, *, drive: bool, h
         while rig.turning() and time.monotonic() < deadline:
             time.sleep(0.1)
         rig.check(not rig.turning(), f"{what}: wheels turn after the client has gone")
+
+
+def unnoticed(fault: Fault, faults: list[Fault]) -> bool:
+    """Return whether the daemon cannot notice a fault: it does not run meanwhile, or has nothing to write."""
+    if fault.kind != COMPUTER:
+        return False
+    nothing_to_write = fault.name == "disk full" and any(other.name == "link down" for other in faults)
+    return nothing_to_write or any(other.kind == DAEMON and other.stops for other in faults)
 
 
 def check_standstill(rig: Rig, what: str, begun: float) -> None:

@@ -62,7 +62,7 @@ class BusObserver:
         self.windows: dict[int, Window] = {}  # by the time of the SYNC in us
         self._order: deque[int] = deque()
         self._open: Window | None = None
-        self.speeds: dict[int, float] = {}  # of the motors, by wheel (0-5): newest
+        self.speeds: dict[int, tuple[float, float]] = {}  # of the motors, by wheel (0-5): newest, and when it came (s)
         self.syncs = 0
         threading.Thread(target=self._read, daemon=True).start()
 
@@ -96,7 +96,7 @@ class BusObserver:
         for quantity, value in signal.values:
             self._open.values.setdefault((quantity.name, wheel), set()).add(value)
             if quantity.name == "motor_speed_rad_s":
-                self.speeds[wheel] = value
+                self.speeds[wheel] = (value, time.monotonic())
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,11 +135,15 @@ class MessageObserver(Subscriber):
             self.others.append((now, topic, content))
 
     def heard(self, topic: str, since_s: float, **fields: object) -> bool:
-        """Return whether a message of this topic has come since then with these values."""
-        return any(
-            at >= since_s and name == topic and all(content.get(key) == value for key, value in fields.items())
-            for at, name, content in self.others
-        )
+        """Return whether a message of this topic has come since then with these values, or an alarm had them already.
+
+        An alarm is published when it begins: one that a fault of the round before has left active begins only once.
+        """
+        messages = [(at, content) for at, name, content in self.others if name == topic]
+        told = [content for at, content in messages if at >= since_s]
+        if topic.startswith("alarm/"):
+            told += [content for at, content in messages if at < since_s][-1:]
+        return any(all(content.get(key) == value for key, value in fields.items()) for content in told)
 
 
 def _snapshot(content: dict[str, Any], dup: bool, now_s: float) -> Snapshot:

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 RATE_HZ = 10.0
 NORMAL_SNAPSHOTS = 10
 NORMAL_TIMEOUT_S = 120.0
+SPEED_COUNTS_S = 2.0
+"""Age at which a speed says nothing any more: twenty SYNCs."""
 DISK = "size=48M"
 BROKER = (
     "allow_anonymous true\npersistence true\npersistence_location {folder}/\nmax_queued_messages 100000\n"
@@ -119,8 +121,9 @@ class Rig:
             self.client = None
 
     def turning(self) -> bool:
-        """Return whether any wheel turns, as the PDOs say."""
-        return any(abs(speed) > STANDSTILL_RAD_S for speed in self.bus.speeds.values())
+        """Return whether any wheel turns, as its PDOs say; a drive without power sends none, and stands still."""
+        now = time.monotonic()
+        return any(abs(speed) > STANDSTILL_RAD_S for speed, at in self.bus.speeds.values() if now - at < SPEED_COUNTS_S)
 
     def stopped_by_sdo(self) -> bool:
         """Return whether all drives that answer stand still: read by SDO, while no master runs."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from chaos import lost, plan
+from chaos import lost, plan, unnoticed
 from chaos_faults import FAULTS, possible
 from chaos_observers import MessageObserver, Snapshot, Window
 from chaos_rig import Rig
@@ -86,6 +87,37 @@ def test_a_seed_gives_the_same_faults_and_every_fault_comes() -> None:
     assert rounds == [next(again) for _ in possible()]
     assert rounds != [next(other) for _ in possible()]
     assert {faults[0].name for faults, _, _ in rounds} == {fault.name for fault in possible()}
+
+
+def test_an_alarm_that_was_active_already_is_heard() -> None:
+    """It is published when it begins, which may have been in the round before; one that has ended is not heard."""
+    observer = MessageObserver(0, others=[(1.0, "alarm/recording", {"active": True}), (1.5, "event", {"kind": "x"})])
+    assert observer.heard("alarm/recording", 2.0, active=True)
+    assert not observer.heard("event", 2.0, kind="x")
+    observer.others.append((1.8, "alarm/recording", {"active": False}))
+    assert not observer.heard("alarm/recording", 2.0, active=True)
+    observer.others.append((2.1, "alarm/recording", {"active": True}))
+    assert observer.heard("alarm/recording", 2.0, active=True)
+
+
+def test_a_speed_that_no_longer_comes_says_nothing() -> None:
+    """A drive without power stands still; one whose PDOs come is believed."""
+    rig = rig_with([])
+    rig.bus.speeds[1] = (0.5, time.monotonic())
+    assert rig.turning()
+    rig.bus.speeds[1] = (0.5, time.monotonic() - 3.0)
+    assert not rig.turning()
+
+
+def test_what_happens_while_no_daemon_runs_is_not_noticed_by_it() -> None:
+    """A full disk beside a stopped broker is an alarm, beside a killed daemon it is not."""
+    named = {fault.name: fault for fault in FAULTS}
+    disk = named["disk full"]
+    assert not unnoticed(disk, [disk, named["broker stopped"]])
+    assert not unnoticed(disk, [disk, named["two hundred control clients"]])
+    assert not unnoticed(named["daemon killed"], [named["daemon killed"], disk])
+    for other in ("daemon killed", "daemon suspended", "link down"):
+        assert unnoticed(disk, [named[other], disk])
 
 
 def test_faults_name_messages_that_there_are() -> None:
