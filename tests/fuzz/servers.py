@@ -72,8 +72,12 @@ async def _control_socket(random: Random, folder: Path) -> None:
 
 def hostile_broker(random: Random, folder: Path) -> None:
     """A broker that accepts, and then says anything: the publisher takes every estimate, and ends when told."""
-    logging.getLogger("regolithd").setLevel(logging.CRITICAL)
-    asyncio.run(_hostile_broker(random, folder))
+    log = logging.getLogger("regolithd")
+    log.setLevel(logging.CRITICAL)
+    try:
+        asyncio.run(_hostile_broker(random, folder))
+    finally:
+        log.setLevel(logging.NOTSET)
 
 
 async def _hostile_broker(random: Random, folder: Path) -> None:

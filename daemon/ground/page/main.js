@@ -32,6 +32,7 @@ let user = null;
 let lastRead = 0;
 let reading = 0; // requests of the present state under way
 let meanwhile = []; // updates that came during one: they may be newer than its answer
+let asked = 0; // requests of a history so far
 let dirty = false;
 
 const plots = new Plots(series.posterior, series.snapshot, (from, to) => {
@@ -55,11 +56,12 @@ async function read(path) {
 
 async function act(name, action) {
   const who = byId("who").value;
-  const answer = await fetch(`/api/alarms/${encodeURIComponent(selected)}/${encodeURIComponent(name)}`, {
+  const rover = selected;
+  const answer = await fetch(`/api/alarms/${encodeURIComponent(rover)}/${encodeURIComponent(name)}`, {
     method: "POST", body: JSON.stringify({ ...action, who }),
   });
   const content = await answer.json();
-  if (answer.ok) rovers[selected].alarms = content;
+  if (answer.ok) rovers[rover].alarms = content;
   showProblem(answer.ok ? "" : content.error);
   if (!answer.ok && !user && !who) byId("who").focus();
   show();
@@ -128,14 +130,19 @@ async function readHistory() {
   if (selected === null) return;
   lastRead = Date.now();
   const [from, to] = range().map((time) => Math.round(time * 1000));
+  const question = ++asked;
   const columns = await read(`/api/history/${encodeURIComponent(selected)}?from=${from}&to=${to}`);
+  if (question !== asked) return; // another rover or range was chosen meanwhile
   for (const name of Object.keys(series)) series[name].load(columns[name]);
   showDownloads(selected, from, to);
   showPlots();
 }
 
 async function readLog() {
-  if (selected !== null) showLog(await read(`/api/log/${encodeURIComponent(selected)}`));
+  const rover = selected;
+  if (rover === null) return;
+  const log = await read(`/api/log/${encodeURIComponent(rover)}`);
+  if (rover === selected) showLog(log); // another rover may have been chosen meanwhile
 }
 
 let due = {};
