@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import Parameter, Suggestion
+from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, Parameter, Suggestion
 from regolithd.calibration.mismatch.empirical.spline import KNOTS, TIME_KNOTS, fit_spline, knots_of
 from regolithd.calibration.mismatch.empirical.suggestions import (
     SUGGESTED,
@@ -20,6 +20,7 @@ from regolithd.calibration.mismatch.empirical.suggestions import (
 )
 from regolithd.calibration.mismatch.empirical.sums import points_beside, profile, squares_on_fold, sums_of
 from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
+from regolithd.calibration.mismatch.problem.words import unit_in_label
 from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
 
 if TYPE_CHECKING:
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-NINETY_PERCENT_STDS = 1.645
-"""Half the width of a 90 % interval of a normal density, in standard deviations."""
 EACH_WAY, ALONG = "each way", "drag, "
 """Coupling of a function of the signed speed, and the beginning of those that act oppositely on two parts."""
 X = re.compile(r"(?<![a-z])x(?![a-z])")
@@ -114,7 +113,7 @@ def _curve(problem: Problem, term: Term, spline: Spline, held_out: tuple[float, 
         # A speed counts by its magnitude, except where it acts one way only.
         magnitude=term.name == "wheel_speed" and coupling != EACH_WAY,
         unit="1" if coupling == "gain" else problem.simulation.unit,
-        covariate_unit=unit_of(problem, term.name),
+        covariate_unit=unit_in_label(term.name, problem.labels),
         at=tuple(spline.at.tolist()),
         value=tuple(spline.value.tolist()),
         low=tuple((spline.value - reach).tolist()),
@@ -122,14 +121,6 @@ def _curve(problem: Problem, term: Term, spline: Spline, held_out: tuple[float, 
         held_out_rmse_before=held_out[0],
         held_out_rmse_after=held_out[1],
     )
-
-
-def unit_of(problem: Problem, covariate: str) -> str:
-    """Return a covariate's unit: what is in brackets at the end of its label, up to a comma; empty without one."""
-    if covariate == "time":
-        return "s"
-    found = re.search(r"\(([^(),]+)[^()]*\)$", problem.labels.get(covariate, ""))
-    return found[1] if found else ""
 
 
 def _suggestion(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import Parameter, Range
-from regolithd.calibration.mismatch.problem.words import ANGULAR_SPEED, word_for
+from regolithd.calibration.mismatch.problem.words import ANGULAR_SPEED, unit_in_label, word_for
 from regolithd.calibration.mismatch.selection.region_bounds import bounds_of
 
 if TYPE_CHECKING:
@@ -16,7 +15,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
 
-UNIT_IN_LABEL = re.compile(r"\(([^()]+)\)$")
 DIGITS = 2
 """Significant digits of an interval's width that a sentence shows."""
 CLOSE_TO_NUMBER = ("°", "%")
@@ -39,11 +37,8 @@ def range_of(decision: Decision, term: Term) -> Range | None:
 
 def covariate_unit(problem: Problem, covariate: str) -> str:
     """Return a covariate's unit, as its label has it in brackets; 1 where it is not known."""
-    if covariate == "time":
-        return "s"
-    found = UNIT_IN_LABEL.search(problem.labels.get(covariate, ""))
-    if found:
-        return found[1]
+    if unit := unit_in_label(covariate, problem.labels):
+        return unit
     if covariate == "wheel_speed":
         return ANGULAR_SPEED
     return problem.simulation.unit if covariate == "torque" else "1"

@@ -33,6 +33,7 @@ DIVISORS = frozenset({"s", "s2", "min", "h"})
 """Unit words that divide what stands before them: `m_s` is m/s."""
 ANGULAR_SPEED = "rad/s"
 """The unit of `wheel_speed` where nothing says another: the contract's."""
+UNIT_IN_LABEL = re.compile(r"\(([^(),]+)[^()]*\)$")
 WORD_IN_BRACES = re.compile(r"\{(\w+)\}")
 
 
@@ -67,6 +68,14 @@ def label_of_column(column: str) -> str:
         joined = "/" if part in DIVISORS else "·"
         unit += (joined if unit else "") + SPELLINGS.get(base, base) + power.translate(SUPERSCRIPTS)
     return name.replace("_", " ") + (f" ({unit})" if unit else "")
+
+
+def unit_in_label(covariate: str, labels: Mapping[str, str]) -> str:
+    """Return a covariate's unit: what its label has in brackets, up to a comma; empty where nothing says it."""
+    if covariate == "time":
+        return "s"
+    found = UNIT_IN_LABEL.search(labels.get(covariate, ""))
+    return found[1] if found else ""
 
 
 def word_for(covariate: str, labels: Mapping[str, str]) -> str:

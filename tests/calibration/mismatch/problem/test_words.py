@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from regolithd.calibration.mismatch.problem.words import in_units, in_words, label_of_column, labels_of
+from regolithd.calibration.mismatch.problem.words import in_units, in_words, label_of_column, labels_of, unit_in_label
 
 
 @pytest.mark.parametrize(
@@ -54,3 +54,10 @@ def test_a_coefficient_s_unit_follows_the_speed_s(label: str, viscous: str, quad
     units = "{unit} {per_speed}", "{unit} {per_speed2}", "{unit} {per_acceleration}"
     found = [in_units(unit, "N", {"wheel_speed": label}) for unit in units]
     assert found == [viscous, quadratic, inertia]
+
+
+def test_a_unit_is_what_the_label_has_in_brackets_up_to_a_comma() -> None:
+    """Time is in seconds; what has no label has no unit."""
+    labels = {"pitch": "pitch (rad, nose up)", "load": "wheel load (N)", "slip": "slip"}
+    units = {name: unit_in_label(name, labels) for name in ("pitch", "load", "slip", "yaw", "time")}
+    assert units == {"pitch": "rad", "load": "N", "slip": "", "yaw": "", "time": "s"}
