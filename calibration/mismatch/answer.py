@@ -21,6 +21,10 @@ Array = NDArray[np.float64]
 Verdict = Literal["consistent", "missing-physics", "unexplained"]
 
 
+NINETY_PERCENT_STDS = 1.645
+"""Half the width of a 90 % interval of a normal density, in standard deviations."""
+
+
 @dataclass(frozen=True)
 class Parameter:
     """A value with its 90 % interval."""

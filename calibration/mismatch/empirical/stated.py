@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.regression.smooth_groups import acting
@@ -26,8 +27,6 @@ Array = NDArray[np.float64]
 
 RELATIVE_SIZE = "relative_size"
 """The curve's coefficient: 1 is as corrected."""
-INTERVAL_STDS = 2 * 1.645
-"""Width of a 90 % interval of a normal density, in standard deviations."""
 LEAST_TOLD = 0.01
 """Share of the readings beyond a curve's range from which on that is told (a choice: its range leaves out 1 %)."""
 
@@ -61,7 +60,7 @@ class EmpiricalCurveLaw(Candidate):
         """Return what one standard deviation of the value at each knot adds, shape (knot, time, wheel)."""
         x, factor = self._course(problem)
         curve = self.stated.curve
-        stds = (np.array(curve.high) - np.array(curve.low)) / INTERVAL_STDS
+        stds = (np.array(curve.high) - np.array(curve.low)) / (2 * NINETY_PERCENT_STDS)
         hats = [np.where(np.isfinite(x), np.interp(x, curve.at, row), 0.0) for row in np.diag(stds)]
         on = np.isin(np.array(problem.recording.wheels, dtype=object), list(self.stated.wheels))
         return np.where(problem.mask & on, np.stack(hats) * factor, 0.0)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING
 
+from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.fleet.told.estimates import estimates_of
-from regolithd.calibration.mismatch.inference.findings import NINETY_PERCENT_STDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

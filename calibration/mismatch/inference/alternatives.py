@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_candidate,
     best_of_each_smooth_term,
+    entry_cost,
 )
 from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
 from regolithd.calibration.mismatch.selection.smooth_terms import drop_what_a_curve_explains
@@ -75,9 +76,8 @@ def _admissible(decision: Decision, fit: Fit) -> bool:
 
 def _evidence(decision: Decision, fit: Fit) -> float:
     """Return the score of a fit less what each of its terms had to gain to enter."""
-    limits = decision.equations.thresholds
-    entry = sum(decision.entry_threshold if term.group.named else limits.smooth_term_entry for term in fit.terms)
-    return decision.equations.score(fit) - entry
+    equations = decision.equations
+    return equations.score(fit) - entry_cost(equations, fit.terms, decision.entry_threshold)
 
 
 def _neighbours(decision: Decision) -> Iterator[tuple[Term, ...]]:

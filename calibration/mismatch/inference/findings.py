@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import (
+    NINETY_PERCENT_STDS,
     Answer,
     CalibratedParameter,
     Effect,
@@ -35,9 +36,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
     from regolithd.calibration.mismatch.thresholds import Thresholds
-
-NINETY_PERCENT_STDS = 1.645
-"""Half the width of a 90 % interval of a normal density, in standard deviations."""
 
 
 def answer_of(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.inference.doubt import doubted
+from regolithd.calibration.mismatch.inference.improbable import unexplained_if_improbable
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_candidate,
@@ -134,7 +134,8 @@ def chosen_effects(train: NormalEquations, entry_threshold: float) -> tuple[Term
 def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOutErrors]:
     """Return the decision without names that lower no held-out error, the worst dropped first; and those errors.
 
-    What is then outweighed by other answers is doubted. `grid` are the groups before any data optimised their shapes.
+    Without any name left, what is more probably there than not is unexplained. `grid` are the groups before any data
+    optimised their shapes.
     """
     equations, threshold = decision.equations, decision.entry_threshold
     problem, kept = equations.problem, set(map(id, grid))
@@ -143,11 +144,7 @@ def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOut
     while (idle := held_out.without_gain()) is not None:
         decision = without_name(replace(decision, equations=equations), idle)
         equations, held_out = held_out_errors(equations, decision.named, choice, threshold)
-    decision = replace(decision, equations=equations)
-    if (open_question := doubted(decision)) is not decision:
-        equations, held_out = held_out_errors(equations, open_question.named, choice, threshold)
-        decision = replace(open_question, equations=equations)
-    return decision, held_out
+    return unexplained_if_improbable(replace(decision, equations=equations)), held_out
 
 
 def _only_proposed(problem: Problem, group: Group) -> bool:

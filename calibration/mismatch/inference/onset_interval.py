@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.selection.shape_optimisation import shape_profile
+from regolithd.calibration.mismatch.signal.density import quantiles
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -64,8 +65,7 @@ def onset_interval(equations: NormalEquations, fit: Fit, index: int) -> tuple[fl
 def _median(grid: Array, gains: Array) -> float:
     """Return the median onset of the likelihood exp(Δχ²/2), every development as likely before, shape (onset, way)."""
     density = np.exp((gains - gains.max()) / (2 * OVERCONFIDENCE)).sum(axis=1)
-    below = np.cumsum(density) - 0.5 * density
-    return float(np.interp(0.5 * density.sum(), below, grid))
+    return quantiles(grid, density, (0.5,))[0]
 
 
 def _distance(inside: Callable[[float], bool], length_s: float) -> float:

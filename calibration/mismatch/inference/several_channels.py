@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import prod
 from typing import TYPE_CHECKING, TypeVar
 
-from regolithd.calibration.mismatch.answer import Answer, OtherAnswer
+from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, Answer, OtherAnswer
 from regolithd.calibration.mismatch.inference.probability import TOLD
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import CalibratedParameter, Verdict
 
 AnyAnswer = TypeVar("AnyAnswer", bound=Answer)
-NINETY_PERCENT_STDS = 1.645
-"""Half the width of a 90 % interval of a normal density, in standard deviations."""
 WORST_FIRST: tuple[Verdict, ...] = ("unexplained", "missing-physics", "consistent")
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from regolithd.calibration.mismatch.inference.findings import NINETY_PERCENT_STDS
+from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.inference.statements import wheels_in_words
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 

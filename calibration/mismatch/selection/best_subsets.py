@@ -171,6 +171,12 @@ def passes_entry_test(equations: NormalEquations, more: Fit, less: Fit, entry_th
     return equations.score(more) - equations.score(less) > needed
 
 
+def entry_cost(equations: NormalEquations, terms: Sequence[Term], entry_threshold: float) -> float:
+    """Return what terms had to gain to enter: a threshold for each name, and one for each smooth term."""
+    smooth = equations.thresholds.smooth_term_entry
+    return sum(entry_threshold if term.group.named else smooth for term in terms)
+
+
 def wheels_of_faulty_sensors(fit: Fit) -> set[int]:
     """Return the wheels with a named fault of another channel.
 

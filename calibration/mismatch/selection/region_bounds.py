@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.range_sums import Ranges, known_values, range_sums
 from regolithd.calibration.mismatch.selection.region_search import FEWEST_SHARE, Found, between, edges_of, with_region
+from regolithd.calibration.mismatch.signal.density import quantiles
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Fit
@@ -32,7 +33,7 @@ WIDENINGS = 4
 MOST_AT_THE_END = 0.02
 """Share of the density in the outermost places of a grid, from which on it is widened."""
 OVERCONFIDENCE = 2.0
-"""Factor by which Δχ² between bounds is too large, as between onsets (a choice: no form is exactly the true one)."""
+"""Factor by which Δχ² between bounds is too large (a choice: no form is exactly the true one)."""
 QUANTILES = (0.05, 0.5, 0.95)
 """Of a bound: the ends of its 90 % interval, and its estimate."""
 
@@ -122,7 +123,6 @@ def _bound(grid: Array, density: Array) -> Bound | None:
     """Return the median and the 90 % interval of a density on a grid."""
     if not len(grid):
         return None
-    cumulative = np.cumsum(density) - 0.5 * density
-    low, value, high = (float(np.interp(q * density.sum(), cumulative, grid)) for q in QUANTILES)
+    low, value, high = quantiles(grid, density, QUANTILES)
     half_step = 0.5 * float(grid[1] - grid[0])
     return Bound(value, low - half_step, high + half_step)

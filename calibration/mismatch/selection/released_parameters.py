@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.selection.best_subsets import entry_cost
 from regolithd.calibration.mismatch.selection.smooth_terms import unexplained_beside
 
 if TYPE_CHECKING:
@@ -51,9 +52,8 @@ def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold
 
 def _evidence(equations: NormalEquations, fit: Fit, free: Collection[int], entry_threshold: float) -> float:
     """Return minus the χ² of readings and priors, less what terms and parameters outside their priors are charged."""
-    limits, terms = equations.thresholds, fit.terms
     squares = np.sum(residual_of(equations, fit) ** 2, axis=0)
     away = np.delete(equations.nuisance.prior_stds_away(fit), list(free))
-    entries = sum(entry_threshold if term.group.named else limits.smooth_term_entry for term in terms)
-    charged = entries + sum(map(equations.penalty, terms)) + WRONG_STATEMENT_PENALTY * len(free)
+    entries = entry_cost(equations, fit.terms, entry_threshold)
+    charged = entries + sum(map(equations.penalty, fit.terms)) + WRONG_STATEMENT_PENALTY * len(free)
     return -float(squares @ equations.weights + away @ away + charged)

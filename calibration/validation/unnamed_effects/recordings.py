@@ -6,12 +6,10 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns, read_recording
 from regolithd.calibration.mismatch.simulation.load import load_simulation
-from regolithd.calibration.validation.blind_trials.recordings.files import COLUMNS
-from regolithd.calibration.validation.blind_trials.recordings.generator import Plan, Trial, make_trial
+from regolithd.calibration.validation.blind_trials.recordings.files import COLUMNS, recording_columns
+from regolithd.calibration.validation.blind_trials.recordings.generator import Plan, make_trial
 from regolithd.calibration.validation.blind_trials.recordings.out_of_library import OUT_OF_LIBRARY
 from regolithd.calibration.validation.machine_trials.cases.files import write_recording, write_simulation
 from regolithd.calibration.validation.machine_trials.cases.generator import make_case
@@ -83,28 +81,9 @@ def rover_recordings(seed: int, of_each: int) -> Iterator[Concealed]:
             covariate=effect.covariate,
             channel="motor_current_A",
             true_rmse=trial.true_rmse_A,
-            recording=_recorded(trial),
+            recording=from_columns(dict(zip(COLUMNS, recording_columns(trial), strict=True))),
             simulation=simulation,
         )
-
-
-def _recorded(trial: Trial) -> Recording:
-    """Return a trial as a recording, without a file."""
-    traverse = trial.traverse
-    gears = float(trial.tables["drivetrain"]["planetary_ratio"]) * float(trial.tables["drivetrain"]["harmonic_ratio"])
-    rows, wheels = traverse.load_N.shape
-    columns = [
-        np.repeat(traverse.t_s, wheels),
-        np.tile(np.arange(1.0, wheels + 1), rows),
-        trial.current_A.ravel(),
-        (traverse.wheel_speed_rad_s * gears).ravel(),
-        trial.load_N.ravel(),
-        trial.ground_speed_m_s.ravel(),
-        *(np.repeat(each, wheels) for each in (trial.pitch_rad, trial.roll_rad, trial.yaw_rate_rad_s)),
-        trial.temperature_degC.ravel(),
-        np.repeat(traverse.voltage_V, wheels),
-    ]
-    return from_columns(dict(zip(COLUMNS, columns, strict=True)))
 
 
 def machine_recordings(seed: int, folder: Path) -> Iterator[Concealed]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import FitImprovement, Parameter, Sensitivity
+from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, FitImprovement, Parameter, Sensitivity
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm
 from regolithd.calibration.mismatch.fleet.choice.search import penalty
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser, folds_of, relative_size, without
@@ -22,7 +22,7 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
 from regolithd.calibration.mismatch.fleet.told.intervals import onset_places, size_stds
 from regolithd.calibration.mismatch.fleet.told.recordings import shown_beside
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
-from regolithd.calibration.mismatch.inference.findings import NINETY_PERCENT_STDS, beyond_prior
+from regolithd.calibration.mismatch.inference.findings import beyond_prior
 from regolithd.calibration.mismatch.inference.statements import capital, size_and_cost, wheels_in_words
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS

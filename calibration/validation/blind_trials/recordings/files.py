@@ -11,6 +11,8 @@ import tomlkit
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
     from regolithd.calibration.validation.blind_trials.recordings.generator import Tables, Trial
 
 COLUMNS = (
@@ -34,25 +36,27 @@ def toml_text(tables: Tables) -> str:
     return tomlkit.dumps(tables)
 
 
-def recording_text(trial: Trial) -> str:
-    """Return the recording as CSV: one row for each instant and wheel, seven significant digits."""
+def recording_columns(trial: Trial) -> list[NDArray[np.float64]]:
+    """Return the recording's columns in the order of `COLUMNS`, one row for each instant and wheel."""
     traverse = trial.traverse
     gears = float(trial.tables["drivetrain"]["planetary_ratio"]) * float(trial.tables["drivetrain"]["harmonic_ratio"])
     rows, wheels = traverse.load_N.shape
-    body = [np.repeat(each, wheels) for each in (trial.pitch_rad, trial.roll_rad, trial.yaw_rate_rad_s)]
-    table = np.column_stack(
-        [
-            np.repeat(traverse.t_s, wheels),
-            np.tile(np.arange(1, wheels + 1), rows),
-            trial.current_A.ravel(),
-            (traverse.wheel_speed_rad_s * gears).ravel(),
-            trial.load_N.ravel(),
-            trial.ground_speed_m_s.ravel(),
-            *body,
-            trial.temperature_degC.ravel(),
-            np.repeat(traverse.voltage_V, wheels),
-        ]
-    )
+    return [
+        np.repeat(traverse.t_s, wheels),
+        np.tile(np.arange(1.0, wheels + 1), rows),
+        trial.current_A.ravel(),
+        (traverse.wheel_speed_rad_s * gears).ravel(),
+        trial.load_N.ravel(),
+        trial.ground_speed_m_s.ravel(),
+        *(np.repeat(each, wheels) for each in (trial.pitch_rad, trial.roll_rad, trial.yaw_rate_rad_s)),
+        trial.temperature_degC.ravel(),
+        np.repeat(traverse.voltage_V, wheels),
+    ]
+
+
+def recording_text(trial: Trial) -> str:
+    """Return the recording as CSV, with seven significant digits."""
+    table = np.column_stack(recording_columns(trial))
     line = ",".join(["%.6g", "%d", *["%.7g"] * (len(COLUMNS) - 2)])
     return ",".join(COLUMNS) + "\n" + "\n".join(line % tuple(row) for row in table) + "\n"
 

@@ -64,10 +64,3 @@ def correlated_noise(rng: Generator, rows: int, axes: int, phi: float, white: fl
     innovations[0] /= np.sqrt(1 - phi**2)
     slow = lfilter([1], [1, -phi], innovations, axis=0)
     return np.sqrt(1 - white) * slow + np.sqrt(white) * rng.standard_normal((rows, axes))
-
-
-def noise_spectrum(rows: int, phi: float, white: float) -> Array:
-    """Return that noise's power at the frequencies of a real Fourier transform, relative to its variance."""
-    angle = 2 * np.pi * np.fft.rfftfreq(rows)
-    slow = (1 - phi**2) / (1 - 2 * phi * np.cos(angle) + phi**2)
-    return (1 - white) * slow + white

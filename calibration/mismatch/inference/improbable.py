@@ -21,7 +21,7 @@ EVEN = 0.5
 """Probability below which the answer is more probably wrong than right."""
 
 
-def doubted(decision: Decision) -> Decision:
+def unexplained_if_improbable(decision: Decision) -> Decision:
     """Return the decision, with an unexplained curve where all other answers together outweigh "consistent".
 
     It is the curve that can hold the effect of the most probable other answer.
