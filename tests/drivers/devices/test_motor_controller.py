@@ -7,6 +7,18 @@ import struct
 import pytest
 from virtual_master import MASTER_ID, DriveUnderTest
 
+from regolithd.drivers.canopen.emcy import error_text
+from regolithd.drivers.devices.motor_controller import MOTOR_CONTROLLER
+
+
+@pytest.mark.parametrize(
+    ("code", "part"),
+    [(0xFF01, "Hall sensor error"), (0xFF02, "encoder index"), (0xFF03, "resolution"), (0xFF04, "Hall sensor not")],
+)
+def test_a_sensor_s_error_is_told_by_its_own_text(code: int, part: str) -> None:
+    """Codes of the EPOS's manufacturer, of which CiA 301 knows the class alone."""
+    assert part in error_text(code, MOTOR_CONTROLLER.error_texts)
+
 
 def test_it_follows_its_ramps() -> None:
     """Speed rises by 0x6083 and falls by 0x6084 [rpm/s], to the target and no further."""

@@ -161,6 +161,7 @@ async def test_a_lost_drive_stops_the_others_and_returns_without_a_restart() -> 
         r.rover.inject_fault("on 3")
         await r.wait_for_event(NodeReturned, node_id=3)
         await until(lambda: r.network.status[3].boots == 2, "node 3 booted a second time")
+        assert not r.events_of(NodeReturned)  # told once
         assert [r.network.status[node].boots for node in range(1, 7)] == [1, 1, 2, 1, 1, 1]
         await r.network.enable()
         await r.network.set_speed(CREEP_rad_s)

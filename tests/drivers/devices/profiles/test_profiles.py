@@ -17,6 +17,7 @@ from regolithd.drivers.devices.eds.write import SHEETS, text
 from regolithd.drivers.devices.load_cell import LOAD
 from regolithd.drivers.devices.motor_controller import MOTOR_CURRENT, MOTOR_SPEED
 from regolithd.drivers.devices.profiles.choice import DeviceChoice, Placement
+from regolithd.drivers.devices.profiles.identity import expected_identity
 from regolithd.drivers.master.events import NodeBooted, NodeBootFailed
 from regolithd.drivers.virtual.plant import Measurement
 
@@ -69,6 +70,17 @@ async def test_a_profile_of_a_load_cell_measures(profile: str) -> None:
         await r.wait_for_event(NodeBooted)
         await until(lambda: np.isfinite(r.latest(14, LOAD)), "a load")
         assert r.latest(14, LOAD) == pytest.approx(47.5, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("node", "number"),
+    [(motor(CHOICES["cia402"]), 402), (load_cell(CELLS["cia404"]), 404), (load_cell(CELLS["cia401"]), 401)],
+)
+def test_a_device_of_a_standard_tells_the_standard_s_number(node: NodeDescription, number: int) -> None:
+    """The low word of the device type: drives, measuring devices, and modules of inputs and outputs."""
+    expected = expected_identity(node.device)
+    assert expected.device_type is not None
+    assert expected.device_type & 0xFFFF == number
 
 
 async def test_mixed_drives_share_one_bus() -> None:
