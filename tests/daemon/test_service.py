@@ -7,21 +7,24 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
 from regolithd.daemon.cli import app
-from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.config.configuration import Configuration, Recording
 from regolithd.daemon.pipeline.onnx_models import load_models
 from regolithd.daemon.pipeline.snapshot import Estimate
 from regolithd.daemon.recording.digest import Digest
 from regolithd.daemon.recording.export import HEADER, ExportError, export
 from regolithd.daemon.recording.mcap_file import read_messages
-from regolithd.daemon.service import Service, event_json
+from regolithd.daemon.service import NETWORK, Service, event_json
 from regolithd.drivers.can.open_bus import open_bus
 from regolithd.drivers.canopen.emcy import Emergency
+from regolithd.drivers.canopen.sync import SyncCounters
 from regolithd.drivers.master.events import NetworkEvent, NodeEmergency
 from regolithd.drivers.virtual import Bench, VirtualRover
 
@@ -173,6 +176,22 @@ async def test_a_slow_task_starves_the_watchdog(running: Callable, monkeypatch: 
         assert told.count("WATCHDOG=1") == fed
     assert told[0].startswith("READY=1\n")
     assert told[-1] == "STOPPING=1"
+
+
+@pytest.mark.parametrize("counter", ["produced", "failed", "skipped"])
+def test_the_network_task_runs_while_a_sync_is_tried(counter: str, configuration: Configuration) -> None:
+    """A SYNC that cannot be sent, or that is left out, shows as well as one that is sent that the task is alive."""
+    settings = configuration.model_copy(update={"recording": Recording(enabled=False)})
+    service, sync = Service(settings, load_models(settings)), SyncCounters()
+    told: list[str] = []
+    service.liveness.beat = told.append  # type: ignore[method-assign]
+    network: Any = SimpleNamespace(counters=SimpleNamespace(sync=sync))
+    for _ in range(3):
+        setattr(sync, counter, getattr(sync, counter) + 1)
+        service._check_sync_progress(network)
+    assert told == [NETWORK] * 3
+    service._check_sync_progress(network)
+    assert told == [NETWORK] * 3
 
 
 def test_events_are_json() -> None:

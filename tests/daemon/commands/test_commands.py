@@ -6,7 +6,7 @@ import inspect
 import json
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
@@ -19,9 +19,8 @@ from regolithd.calibration.drivetrain.bench.line_fit import BenchError
 from regolithd.daemon.check.finding import Finding
 from regolithd.daemon.cli import app
 from regolithd.daemon.commands import bench, check, mismatch, prove
-
-if TYPE_CHECKING:
-    from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.config.configuration import Configuration
+from regolithd.daemon.simulator.brake import BrakeDescription
 
 # What docs and --help promise: the defaults of each command's options.
 DEFAULTS: dict[str, dict[str, Any]] = {
@@ -320,6 +319,14 @@ def test_a_bench_scenario_is_the_files_with_the_options_changes(tmp_path: Path) 
         with pytest.raises(typer.Exit) as ended:
             bench._scenario(path, soils, None, no_noise=False)
         assert ended.value.exit_code == 78
+
+
+def test_a_brake_loads_the_wheel_that_it_is_configured_for() -> None:
+    """Wheels count from 1 in `rover.toml` and from 0 in the program; gear and direction are handed on."""
+    configuration = Configuration.model_validate({"brakes": {"31": {"wheel": 2, "gear_ratio": 5.0, "mirrored": True}}})
+    world: Any = SimpleNamespace(truth=None)
+    brakes = bench.brakes_of(configuration, configuration.described(), {11, 12, 13, 14, 15, 16}, world)
+    assert brakes._descriptions == (BrakeDescription(31, wheel=1, gear_ratio=5.0, mirrored=True),)
 
 
 def test_a_bench_fault_without_a_bench_is_an_error(tmp_path: Path) -> None:

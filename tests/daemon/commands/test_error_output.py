@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import ast
+import socket
+import subprocess
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -71,6 +74,21 @@ def test_a_password_is_asked_twice_and_not_shown(ground: Path, monkeypatch: pyte
     ), done.output
     assert "anna can log in" in done.stdout
     assert "anna" in (ground.parent / "users").read_text()
+
+
+def test_a_store_that_cannot_be_used_is_one_message(tmp_path: Path) -> None:
+    """The status is 1, and there is no traceback."""
+    (tmp_path / "ground.sqlite").write_text("no database, but a text of more than a hundred bytes. " * 5)
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    config = tmp_path / "ground.toml"
+    config.write_text(f'[page]\nport = {port}\n[store]\ndirectory = "{tmp_path}"\n')
+    line = [sys.executable, "-m", "regolithd", "ground", "--config", str(config)]
+    done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 1
+    assert "ground.sqlite: file is not a database. Set [store] directory" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_a_user_needs_a_file_and_a_broker_a_host(tmp_path: Path) -> None:

@@ -91,7 +91,7 @@ def test_train_posterior_hands_seed_and_numbers_on(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr(training, "fit", fit)
     monkeypatch.setattr(onnx_export, "export_onnx", export)
     monkeypatch.setattr(digest, "with_digest", lambda model: model + b" with its digest")
-    out = tmp_path / "folder" / "posterior.onnx"
+    out = tmp_path / "folder" / "deeper" / "posterior.onnx"
     done = regolithd("train-posterior", "--rovers", 2000, "--steps", 60, "--seed", 9, "--out", out)
     assert asked == [2000, ("examples", 9, 60), ("parameters", "standardisation", 0.075)]
     assert out.read_text() == "model with its digest"

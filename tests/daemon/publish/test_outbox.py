@@ -125,6 +125,24 @@ def test_what_is_sent_soon_is_live_and_what_waited_is_late(outbox: Outbox, monke
     assert next(letters).late
 
 
+def test_what_is_sent_soon_is_live_also_behind_messages_of_an_earlier_process(tmp_path: Path) -> None:
+    """The first message that a new process stores and sends is not late, whatever its place in the store is."""
+    before = Outbox(Spool(tmp_path, 1_000_000))
+    for number in range(3):
+        before.store("snapshot", message(number))
+    before.connected()
+    for letter in before.waiting():
+        before.sent(letter)
+        before.acknowledged(letter)
+    before.spool.close()
+    after = Outbox(Spool(tmp_path, 1_000_000))
+    after.connected()
+    after.store("snapshot", message(3))
+    (letter,) = after.waiting()
+    assert (letter.index, letter.late) == (3, False)
+    after.spool.close()
+
+
 def test_only_the_newest_of_a_retained_topic_is_retained_when_late(outbox: Outbox) -> None:
     """An older state must not overwrite the current one at the broker."""
     outbox.store("node/3", message(0))

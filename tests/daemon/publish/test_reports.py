@@ -45,6 +45,8 @@ class Publisher:
 
     report: PublishingReport = REPORT
     store_problem: str = ""
+    session: str = "20261122T000000Z-aaaa"
+    connected: bool = False
     problem: str = ""
     published: list[tuple[str, dict[str, Any]]] = field(default_factory=list)
 
@@ -291,3 +293,15 @@ def test_tasks_are_overdue_after_their_own_time() -> None:
     liveness.beat("quick")
     assert liveness.overdue() == []
     assert liveness.ages_s() == {"quick": 0.0, "slow": 1.5}
+
+
+def test_the_metrics_have_health_nodes_and_alarms(service: Any, clock: Clock) -> None:
+    """Here of a node that has not booted, without a broker, and of the SYNC."""
+    service.network.status = {3: NodeStatus(MOTOR)}
+    told = MqttSink(service, Publisher(), monotonic_ns=clock).metrics().splitlines()  # type: ignore[arg-type]
+    for name, value in (
+        ('regolithd_sync_total{rover="kapvik",result="skipped"}', 2.0),
+        ('regolithd_mqtt_connected{rover="kapvik"}', 0.0),
+        ('regolithd_node_operational{rover="kapvik",node_id="3"}', 0.0),
+    ):
+        assert f"{name} {value}" in told

@@ -89,6 +89,23 @@ def test_a_whole_segment_gives_all_its_records(data: bytes) -> None:
     assert (contents.end, contents.damaged, contents.torn) == (9, 0, False)
 
 
+@pytest.mark.parametrize(
+    ("rest", "torn"),
+    [
+        (b"\x07", True),
+        (bytes(40), True),
+        (struct.pack("<IIH", 90, 0, 5) + b"event{", True),
+        (struct.pack("<IIH", 4, 0, 1) + b"e{}!", False),
+    ],
+    ids=["part of a head", "zeros", "part of a record", "a wrong checksum"],
+)
+def test_what_a_power_cut_left_of_version_0_1_is_no_damage(rest: bytes, torn: bool) -> None:
+    """The records before it are read; its place is where the next one is written."""
+    contents = unpack(written_by_version_0_1() + rest, 5)
+    assert messages(contents) == MESSAGES
+    assert (contents.torn, contents.damaged) == (torn, not torn)
+
+
 def test_a_copy_of_an_earlier_record_is_passed_over() -> None:
     """What a write that was repeated has left; the records behind it are delivered, and none is counted as damaged."""
     records = [pack(5 + k, *message) for k, message in enumerate(MESSAGES)]
