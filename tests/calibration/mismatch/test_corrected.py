@@ -10,7 +10,7 @@ import pytest
 from rover_drives import TABLES, columns, simulation
 from servo import ServoAxis
 
-from regolithd.calibration.mismatch.answer import Contribution
+from regolithd.calibration.mismatch.answer import Contribution, Parameter
 from regolithd.calibration.mismatch.comparison import Comparison, compare
 from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects, write_corrected
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
@@ -75,6 +75,18 @@ def test_parameters_that_left_their_priors_are_written_as_they_were_run() -> Non
     servo = {"simulation": {"model": "servo:ServoAxis"}}
     tables = corrected_tables(servo, ServoAxis(), {"mass_kg": 70.0}, (), within_priors=False)
     assert tables["parameters"]["mass_kg"] == {"value": 70.0, "std": 2.0}
+    tables = corrected_tables(servo, ServoAxis(), {"mass_kg": 700.0}, ())  # three standard deviations otherwise
+    assert tables["parameters"]["mass_kg"]["value"] == ServoAxis.parameters["mass_kg"].value + 3 * 2.0
+
+
+@pytest.mark.parametrize("size", [None, Parameter(0.0, -0.1, 0.1, "1")])
+def test_an_effect_without_a_relative_size_has_no_standard_deviation(size: Parameter | None) -> None:
+    """Where the size is not known, or nothing, there is nothing that it could be relative to."""
+    term = Contribution("coulomb-friction", {}, (0.5,), (1,), 0.1)
+    effect: Any = SimpleNamespace(parameters={} if size is None else {"relative_size": size})
+    servo = {"simulation": {"model": "servo:ServoAxis"}}
+    tables = corrected_tables(servo, ServoAxis(), {"mass_kg": 96.0}, (term,), (effect,))
+    assert [each["relative_std"] for each in tables["effects"]] == [0.0]
 
 
 def test_the_user_s_comments_and_order_stay(found: Comparison) -> None:

@@ -21,6 +21,13 @@ def test_each_recording_is_a_run_of_its_own() -> None:
     assert found.notes[:2] == ("a.csv: runs 1 to 2.", "b.csv: run 3.")
 
 
+def test_a_first_run_of_a_single_instant_is_counted() -> None:
+    """As is every other."""
+    one = from_columns({"t_s": [0.0, 1, 2], "run": [5.0, 7, 7], "y": [1.0, 2, 3]})
+    two = from_columns({"t_s": [10.0, 11], "y": [5.0, 6]})
+    assert joined([one, two], ["a.csv", "b.csv"]).notes[0] == "a.csv: runs 1 to 2."
+
+
 def test_what_one_recording_lacks_is_not_measured_there() -> None:
     """Wheels and channels are those of all recordings."""
     one = from_columns({"t_s": [0.0, 1], "wheel": [1.0, 1], "y": [1.0, 2]})

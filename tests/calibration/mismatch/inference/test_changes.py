@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pytest
@@ -10,7 +10,13 @@ import pytest
 from regolithd.calibration.mismatch import Prior, Simulation, compare
 from regolithd.calibration.mismatch.answer import Change, Contribution
 from regolithd.calibration.mismatch.candidates.library import library
-from regolithd.calibration.mismatch.changes import change_in_words, direction_of, stated_in
+from regolithd.calibration.mismatch.changes import (
+    SECANT_CHANGE,
+    ChangedSize,
+    change_in_words,
+    direction_of,
+    stated_in,
+)
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.errors import SimulationError
 
@@ -76,6 +82,16 @@ def test_a_corrected_effect_that_is_gone_is_called_gone() -> None:
     (change,) = answer.changes
     assert change.low < 0 < change.high
     assert any("coulomb-friction is gone" in note for note in answer.notes)
+
+
+@pytest.mark.parametrize(("fitted", "secant"), [(0.4, 0.4), (-0.7, -0.7), (-1.6, -1.0)])
+def test_a_law_that_is_not_linear_is_linearised_over_its_change_down_to_nothing(fitted: float, secant: float) -> None:
+    """Less than nothing of an effect is not asked of its law."""
+    delay = Contribution("sensor-delay", {"delay_s": 0.5}, (1.0,), (1,))
+    (stated,) = stated_in(library(), [delay], [])
+    changed = ChangedSize(stated, 0)
+    problem: Any = None  # of no account
+    assert changed.self_consistent_shape(problem, {SECANT_CHANGE: -0.3}, [fitted]) == {SECANT_CHANGE: secant}
 
 
 def late(by_s: float) -> Recording:

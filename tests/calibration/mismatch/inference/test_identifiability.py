@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.inference.collinearity import (
 from regolithd.calibration.mismatch.inference.experiment import rounded_up, seconds_needed, with_experiment
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable, rivals, wrong_choice_rate
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities, smallest_detectable
+from regolithd.calibration.mismatch.selection.best_subsets import acceptable
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
@@ -91,6 +92,25 @@ def test_a_named_effect_has_those_rivals_that_fit_as_well() -> None:
 def test_a_clear_effect_has_no_rivals() -> None:
     """Speeds of many sizes tell the drag from all others."""
     equations = equations_of(problem_of(table(drag=0.3)), (Drag(), Power()))
+    assert rivals(equations, equations.fit([term_of(equations, "drag")]), THRESHOLD)[1] == ()
+
+
+class HalfTheTime(Drag):
+    """A drag that ends after half of the recording."""
+
+    name = "half-the-time"
+
+    def columns(self, problem: object, shape: object) -> np.ndarray:
+        """Return sign(ω) before the middle."""
+        before = problem.time_s < 0.5 * problem.length_s  # type: ignore[attr-defined]
+        return super().columns(problem, shape) * before  # type: ignore[arg-type]
+
+
+def test_what_explains_a_part_of_an_effect_is_no_rival_of_it() -> None:
+    """It has its sign and is large enough, but the recording speaks for the whole effect."""
+    equations = equations_of(problem_of(table(drag=0.3)), (Drag(), HalfTheTime()))
+    part = equations.fit([term_of(equations, "half-the-time")])
+    assert acceptable(equations, part)
     assert rivals(equations, equations.fit([term_of(equations, "drag")]), THRESHOLD)[1] == ()
 
 

@@ -6,11 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from linear_machine import STEP_S as LINEAR_STEP_S
+from linear_machine import equations_of, problem_of, table
 from winch import Winch
 
 from regolithd.calibration.mismatch import compare
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
-from regolithd.calibration.mismatch.inference.located import largest_stretch
+from regolithd.calibration.mismatch.inference.located import largest_stretch, spell_of
+from regolithd.calibration.mismatch.regression.group import Term
+from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -56,6 +60,18 @@ def test_what_lasts_is_located_from_end_to_end(size: float) -> None:
     assert found.from_s < 0.1 * TIME_S[-1]
     assert found.to_s > 0.9 * TIME_S[-1]
     assert found.share_of_residual == pytest.approx(share, abs=0.1)
+
+
+def test_a_spell_that_acts_by_a_factor_is_located_between_the_knots() -> None:
+    """A gain over time: its ends are found to some instants, where the curve's knots are fifty and more apart."""
+    columns = table()
+    during = (columns["t_s"] > 130) & (columns["t_s"] < 275)
+    columns["reading_V"] = columns["reading_V"] * (1 + 0.4 * during)
+    equations = equations_of(problem_of(columns))
+    equations = equations.over(with_smooth_terms(equations.design))
+    (group,) = (each for each in equations.design.groups if (each.name, each.coupling) == ("time", "gain"))
+    term = Term(group, (0, 1))
+    assert spell_of(equations, equations.fit([term]), term) == pytest.approx((130.0, 275.0), abs=4 * LINEAR_STEP_S)
 
 
 @pytest.mark.parametrize(

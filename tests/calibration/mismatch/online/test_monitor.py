@@ -10,6 +10,7 @@ from linear_machine import STEP_S, Drag, Level, table
 
 from regolithd.calibration.mismatch import SimulationError
 from regolithd.calibration.mismatch.online.channels import monitors_of
+from regolithd.calibration.mismatch.online.linearised import learned
 from regolithd.calibration.mismatch.online.monitor import Monitor
 from regolithd.calibration.mismatch.online.pieces import Cutter
 from regolithd.calibration.mismatch.online.thresholds import ONLINE_THRESHOLDS, OnlineThresholds
@@ -149,3 +150,16 @@ def test_each_threshold_says_what_it_decides_and_how_it_was_found() -> None:
         assert len(row.meaning) > 20
         assert len(row.found) > 20, row.name
         assert row.value == getattr(ONLINE_THRESHOLDS, row.name)
+
+
+def test_what_is_not_compared_counts_nowhere() -> None:
+    """A blank reading takes no part in the sums: not by its residual, and not by the columns beside it."""
+    columns = recorded()
+    columns["reading_V"][100:160] = np.nan
+    pieces = list(Cutter(LIMITS.interval_s, "axis").add(columns))
+    _, intervals = learned(pieces[:3], Level())
+    blank = [~interval.mask for interval in intervals]
+    assert any(np.any(each) for each in blank)
+    for interval, nowhere in zip(intervals, blank, strict=True):
+        assert not np.any(interval.columns[:, nowhere])
+        assert not np.any(interval.residual[nowhere])

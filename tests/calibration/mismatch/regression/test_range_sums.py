@@ -53,3 +53,23 @@ def test_a_range_without_readings_gains_nothing() -> None:
     )
     gains = sums.delta_chi2(Ranges(np.array([2]), np.array([3])), FORMS)
     assert [float(gain[0]) for gain in gains] == [0.0] * len(FORMS)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "lower", "upper", "origin"),
+    [
+        ((1, 4), 0.2, 1.4, 0.8),
+        ((0, 4), -np.inf, 1.4, 1.4),
+        ((1, 5), 0.2, np.inf, 0.2),
+        ((4, 5), 1.4, np.inf, 1.4),
+    ],
+)
+def test_a_range_has_the_edges_as_its_bounds(
+    bounds: tuple[int, int], lower: float, upper: float, origin: float
+) -> None:
+    """The last one too; its polynomial counts the distance from the middle, or from the bound where there is one."""
+    equations = equations_of(problem_of(table()))
+    edges = np.array([0.2, 0.6, 1.0, 1.4])
+    region = range_sums(equations, equations.fit(()), "wheel_speed", "offset", (0, 1), edges).region(*bounds, (1,))
+    assert (region.lower, region.upper) == (lower, upper)
+    assert region.origin == pytest.approx(origin)

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from linear_machine import NOISE, equations_of, problem_of, table, term_of
 
+from regolithd.calibration.mismatch.regression.range_sums import range_sums
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.decision import Decision
 from regolithd.calibration.mismatch.selection.region_bounds import bounds_of
+from regolithd.calibration.mismatch.selection.region_search import between
 from regolithd.calibration.mismatch.selection.regions import in_regions
 from regolithd.calibration.mismatch.signal.noise import NoiseModel
 
@@ -33,6 +35,23 @@ def decision_with(added: Callable[[Array], Array], *, seed: int = 0, drag: float
     curve = best_of_each_smooth_term(equations, named.terms)[0][1]
     noise = NoiseModel(np.full(2, NOISE), 1.0)
     return Decision(equations, noise, 8.0, named, (curve,), equations.fit((*named.terms, curve)))
+
+
+def test_ranges_between_bounds_have_these_bounds() -> None:
+    """Every lower one with every upper one; none stands for an open end."""
+    equations = equations_of(problem_of(table()))
+    edges = np.linspace(0.0, 2.0, 21)
+    sums = range_sums(equations, equations.fit(()), "wheel_speed", "offset", (0, 1), edges)
+
+    def found(lower: Array, upper: Array) -> set[tuple[float, float]]:
+        ranges = between(edges, lower, upper)
+        regions = [sums.region(int(a), int(b), (0,)) for a, b in zip(ranges.first, ranges.last, strict=True)]
+        return {(region.lower, region.upper) for region in regions}
+
+    low, high, none = edges[[2, 5]], edges[[9, 20]], np.zeros(0)
+    assert found(low, high) == {(a, b) for a in low for b in high}
+    assert found(none, high) == {(-np.inf, b) for b in high}
+    assert found(low, none) == {(a, np.inf) for a in low}
 
 
 @pytest.mark.parametrize("drag", [0.0, 0.4])

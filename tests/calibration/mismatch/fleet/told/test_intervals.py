@@ -22,12 +22,12 @@ def test_a_size_that_is_the_same_everywhere_has_the_noise_s_error() -> None:
     assert stds[-1] < 2 * noise[-1]
 
 
-def test_a_size_that_differs_between_recordings_has_the_error_of_their_mean() -> None:
-    """Their standard deviation over the root of their number."""
-    sizes = np.array([0.1, 0.3, 0.2, 0.4, 0.15, 0.35])
-    of = equations_of([drive(n, on_both(1, size)) for n, size in enumerate(sizes)], (0,) * 6)
+@pytest.mark.parametrize("sizes", [(0.1, 0.3, 0.2, 0.4, 0.15, 0.35), (0.1, 0.4)])
+def test_a_size_that_differs_between_recordings_has_the_error_of_their_mean(sizes: tuple[float, ...]) -> None:
+    """Their standard deviation over the root of their number, down to two of them."""
+    of = equations_of([drive(n, on_both(1, size)) for n, size in enumerate(sizes)], (0,) * len(sizes))
     fit = of.fit((term(DRAG, Course("always")),))
-    assert size_stds(of, fit)[-1] == pytest.approx(np.std(sizes, ddof=1) / np.sqrt(6), rel=0.15)
+    assert size_stds(of, fit)[-1] == pytest.approx(np.std(sizes, ddof=1) / np.sqrt(len(sizes)), rel=0.15)
 
 
 def test_of_a_single_recording_the_error_is_the_noise_s() -> None:
