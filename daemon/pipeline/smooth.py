@@ -54,7 +54,7 @@ class DropRejector:
 
     def step(self, values: Array) -> Array:
         """Return the values without drops."""
-        if len(self._recent) == 1 or self._threshold == 0:
+        if self._threshold == 0:
             return values
         if self._count % self._every == 0:
             self._recent[self._count // self._every % len(self._recent)] = values

@@ -91,7 +91,7 @@ def scores(sums: Suffixes, weights: Array, search: Search, beside: Sequence[Plac
     own = np.einsum("sw,ewkk->esk", search.member, gram[:, :, count:, count:])
     together = np.einsum("sw,ewkp->eskp", search.member, others.products)
     left = own - np.einsum("eskp,eskp->esk", together @ inverse, together)
-    known = left > search.least_tolerance * np.maximum(own, 1e-300)
+    known = left > search.least_tolerance * own
     left = np.where(known, left, np.inf)
     rough = np.einsum("sw,ewk->esk", search.member, moment[:, :, count:])
     size = (rough - together @ fitted) / left

@@ -30,7 +30,7 @@ def size_stds(equations: FleetEquations, fit: FleetFit) -> Array:
         scores[i] = np.einsum("jw,wj->j", fit.factors[:, i], left[i][:, fit.columns])
     correction = equations.count / max(equations.count - 1, 1)
     sandwich = correction * fit.covariance @ (scores.T @ scores) @ fit.covariance
-    return np.sqrt(np.maximum(np.maximum(np.diag(sandwich), np.diag(fit.covariance)), 0.0))
+    return np.sqrt(np.maximum(np.diag(sandwich), np.diag(fit.covariance)))
 
 
 def onset_places(equations: FleetEquations, fit: FleetFit, index: int) -> tuple[int, int]:
