@@ -99,8 +99,9 @@ fleet: $(DEV) ## 100 recordings of five virtual rovers on a local Dask cluster, 
 mutations: $(DEV) ## `regolithd mismatch` on a thousand damaged files of each kind, and in other units (half an hour)
 	MUTATIONS=1000 INVARIANCES=1000 $(BIN)/python -m pytest tests/daemon/mismatch tests/calibration/mismatch/test_invariance.py
 
-mutants: $(DEV) ## mutation testing on a random sample (SEED=… COUNT=… ONLY=drivers/can)
-	$(BIN)/python tests/mutation/sample.py --seed $(or $(SEED),1) --count $(or $(COUNT),200) $(if $(ONLY),--only $(ONLY))
+mutants: $(DEV) ## mutation testing on a random sample (SEED=… COUNT=… ONLY=drivers/can; RETRY=1 tries survivors again)
+	$(BIN)/python tests/mutation/sample.py --seed $(or $(SEED),1) --count $(or $(COUNT),200) $(if $(ONLY),--only $(ONLY)) \
+	    $(if $(RETRY),--retry)
 
 bench: $(DEV) ## CPU, memory and delays of the daemon, beside python-can with canopen and mosquitto; build/figures/bench.json (SECONDS=20)
 	PYTHONPATH=src:tests/bench $(BIN)/python tests/bench/speed.py --seconds $(or $(SECONDS),20)

@@ -141,6 +141,20 @@ def _status(server: subprocess.Popen[str], order: str) -> int:
     return status if ended else ENDED
 
 
+def renew_tests(source: Path, copy: Checkout) -> list[str]:
+    """Copy what is new or changed among the tests, and nothing else; return the names of these files."""
+    listed = subprocess.run(["git", "ls-files", "tests"], cwd=source, check=True, capture_output=True, text=True)
+    changed = [name for name in listed.stdout.split() if not _same(source / name, copy.root / name)]
+    for name in changed:
+        (copy.root / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(source / name, copy.root / name, follow_symlinks=False)
+    return changed
+
+
+def _same(one: Path, other: Path) -> bool:
+    return other.is_file() and one.read_bytes() == other.read_bytes()
+
+
 def copy_of(source: Path, folder: Path) -> Checkout:
     """Copy the tracked files of a checkout, and make an environment that imports the copy; nothing, if it is there."""
     made = Checkout(folder)

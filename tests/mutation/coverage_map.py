@@ -13,7 +13,7 @@ from fast_tests import FAST_S, LONGEST_CLOCK_S, WRITTEN_TO
 from mutants import ROOMS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from checkout import Checkout
 
@@ -47,12 +47,38 @@ class CoverageMap:
 def coverage_map(checkout: Checkout, room: str, kept: Path) -> CoverageMap:
     """Return a room's map, from `kept` where it was written before."""
     if not kept.exists():
-        kept.write_text(json.dumps(asdict(_measured(checkout, room, kept.with_suffix(".jsonl")))))
+        times = kept.with_suffix(".jsonl")
+        kept.write_text(json.dumps(asdict(_measured(checkout, room, times, [ROOMS[room]], known_to_be_slow(kept)))))
     return CoverageMap(**json.loads(kept.read_text()))
 
 
-def _measured(checkout: Checkout, room: str, times: Path) -> CoverageMap:
-    """Run a room's tests under coverage."""
+def renew(checkout: Checkout, room: str, kept: Path, files: Sequence[str]) -> None:
+    """Measure some of a room's test files anew, which were changed or added, and keep the map with them."""
+    before = CoverageMap(**json.loads(kept.read_text()))
+    after = _measured(checkout, room, kept.with_name(f"{kept.stem}-renewed.jsonl"), files, known_to_be_slow(kept))
+    kept.write_text(json.dumps(asdict(merged(before, after, files))))
+
+
+def merged(before: CoverageMap, after: CoverageMap, files: Sequence[str]) -> CoverageMap:
+    """Return a map in which the tests of some files are those of another map."""
+
+    def stays(test: str) -> bool:
+        return test.partition("::")[0] not in files
+
+    lines = {
+        file: {
+            line: sorted(
+                {*filter(stays, before.lines.get(file, {}).get(line, ())), *after.lines.get(file, {}).get(line, ())}
+            )
+            for line in {**before.lines.get(file, {}), **after.lines.get(file, {})}
+        }
+        for file in {**before.lines, **after.lines}
+    }
+    return CoverageMap({test: s for test, s in before.seconds.items() if stays(test)} | dict(after.seconds), lines)
+
+
+def _measured(checkout: Checkout, room: str, times: Path, tests: Sequence[str], known_slow: set[str]) -> CoverageMap:
+    """Run tests of a room under coverage."""
     times.unlink(missing_ok=True)
     data_file = checkout.root / f".coverage.{room.replace('/', '-')}"
     package = f"regolithd.{room.replace('/', '.')}"
@@ -63,8 +89,8 @@ def _measured(checkout: Checkout, room: str, times: Path) -> CoverageMap:
         "COVERAGE_FILE": str(data_file),
         "COVERAGE_CORE": "ctrace",
     }
-    slow = [f"--deselect={test}" for test in known_to_be_slow(times)]
-    run = checkout.pytest([*under_coverage, *slow, ROOMS[room]], LONGEST_CPU_S, settings)
+    slow = [f"--deselect={test}" for test in known_slow]
+    run = checkout.pytest([*under_coverage, *slow, *tests], LONGEST_CPU_S, settings)
     if run.status not in ENDED_BY_ITSELF:
         raise SystemExit(f"the tests of {room} ended early, with status {run.status}\n{run.output[-4000:]}")
     rows = [json.loads(line) for line in times.read_text().splitlines()]
@@ -75,14 +101,14 @@ def _measured(checkout: Checkout, room: str, times: Path) -> CoverageMap:
     return CoverageMap(seconds, _lines(data_file, checkout.root.resolve(), set(seconds)))
 
 
-def known_to_be_slow(times: Path) -> set[str]:
-    """Return the tests that took too long in the run of another seed: to find that out again is half of the time.
+def known_to_be_slow(kept: Path) -> set[str]:
+    """Return the tests of a room that took too long under any seed: to find that out again is half of the time.
 
     A test that failed there may pass now.
     """
     rows = (
         json.loads(line)
-        for path in times.parent.parent.glob(f"*/{times.name}")
+        for path in kept.parent.parent.glob(f"*/{kept.stem}.jsonl")
         for line in path.read_text().splitlines()
     )
     return {row["test"] for row in rows if row["cpu_s"] >= FAST_S or row["clock_s"] >= LONGEST_CLOCK_S}

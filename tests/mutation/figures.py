@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from mutants import ROOMS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from trial import Result
 
@@ -25,10 +25,14 @@ another comparison, another operator, another number, a `not` added, a decorator
 the same room that execute the changed line (at most {fast_s:g} s of CPU time each), and counts the changes after which
 a test fails.
 
+Then tests are written for the survivors, and `make mutants SEED=… RETRY=1` tries each survivor again, in the same copy
+of the code with the tests of today. The first number is an estimate for all of the code, because the places are random;
+the second one is not: it says what was done about the places that were drawn.
+
 {line}
 
-| room | mutants | killed |
-|---|---|---|
+| room | mutants | killed | with the tests that were added |
+|---|---|---|---|
 {rows}
 {earlier}
 The mutation score leaves equal programs out, which no test can kill (DeMillo, Lipton and Sayward, 1978).
@@ -59,9 +63,16 @@ def read_words() -> Words:
     return Words({(each["file"], each["diff"].strip()): each["word"] for each in listed})
 
 
-def score(results: Sequence[Result], seed: int, words: Words) -> dict[str, Any]:
-    """Return the figures of a sample."""
+def score(
+    results: Sequence[Result], seed: int, words: Words, noticed: Collection[Result] | None = None
+) -> dict[str, Any]:
+    """Return the figures of a sample; `noticed` are the survivors that were killed when they were tried again.
+
+    None where they were not tried again: then the words count.
+    """
     survivors = [each for each in results if each.verdict == "survived"]
+    if noticed is None:
+        noticed = [each for each in survivors if words.word(each).startswith("test")]
     rooms = {room: [each for each in results if each.file.startswith(room + "/")] for room in ROOMS}
     return {
         "seed": seed,
@@ -69,9 +80,13 @@ def score(results: Sequence[Result], seed: int, words: Words) -> dict[str, Any]:
         "killed": len(results) - len(survivors),
         "share_killed": 1 - len(survivors) / max(len(results), 1),
         "equal": sum(words.word(each).startswith("equal") for each in survivors),
-        "test_added": sum(words.word(each).startswith("test") for each in survivors),
+        "test_added": len(noticed),
         "rooms": {
-            room: {"mutants": len(mine), "killed": sum(each.verdict == "killed" for each in mine)}
+            room: {
+                "mutants": len(mine),
+                "killed": sum(each.verdict == "killed" for each in mine),
+                "since": sum(each.verdict == "killed" or each in noticed for each in mine),
+            }
             for room, mine in rooms.items()
         },
     }
@@ -101,7 +116,10 @@ def write_page(figures: Mapping[str, Any], fast_s: float, path: Path) -> None:
     earlier = "".join(f"- {line}\n" for line in before)
     if earlier:
         earlier = f"\nSamples before it, each of the code and the tests of its day:\n\n{earlier}"
-    rows = "\n".join(f"| `{room}/` | {each['mutants']} | {each['killed']} |" for room, each in figures["rooms"].items())
+    rows = "\n".join(
+        f"| `{room}/` | {each['mutants']} | {each['killed']} | {each['since']} |"
+        for room, each in figures["rooms"].items()
+    )
     path.write_text(PAGE.format(line=line_of(figures), rows=rows, earlier=earlier, fast_s=fast_s), encoding="utf-8")
 
 

@@ -6,16 +6,18 @@ import ast
 import json
 import re
 import signal
+import subprocess
 import sys
 import tomllib
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
-from checkout import USAGE_ERROR, Checkout, Run
-from coverage_map import CoverageMap, known_to_be_slow, statement_lines
+from checkout import USAGE_ERROR, Checkout, Run, renew_tests
+from coverage_map import CoverageMap, known_to_be_slow, merged, statement_lines
 from figures import SURVIVORS, Words, line_of, score, write_page
 from mutants import Mutation, left_out, mutations, sample
+from sample import place_of, read_results
 from trial import Result, selected_tests
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -176,9 +178,52 @@ def test_the_page_tells_seed_share_and_words(tmp_path: Path) -> None:
     write_page(figures, 6.0, tmp_path / "page.md")
     page = (tmp_path / "page.md").read_text()
     assert line_of(figures) in page
-    assert "| `drivers/` | 3 | 3 |" in page
-    assert "| `daemon/` | 1 | 0 |" in page
+    assert "| `drivers/` | 3 | 3 | 3 |" in page
+    assert "| `daemon/` | 1 | 0 | 0 |" in page
     assert "before it" not in page
+
+
+def test_a_survivor_that_was_tried_again_counts_by_what_was_found() -> None:
+    """Not by its word, which may be wrong."""
+    lived = [replace(KILLED, verdict="survived", file=f"daemon/{name}.py") for name in "ab"]
+    words = Words({(each.file, each.diff): "test: tests/daemon/test_a.py::test_a" for each in lived})
+    assert score([KILLED, *lived], 7, words)["test_added"] == 2
+    tried = score([KILLED, *lived], 7, words, noticed=lived[:1])
+    assert (tried["killed"], tried["test_added"]) == (1, 1)
+    assert tried["rooms"]["daemon"] == {"mutants": 2, "killed": 0, "since": 1}
+
+
+def test_the_last_result_of_a_mutant_counts(tmp_path: Path) -> None:
+    """One that was tried again has several; another place is another mutant."""
+    rows = [replace(KILLED, verdict="survived"), replace(KILLED, column=3), KILLED]
+    (tmp_path / "log").write_text("".join(json.dumps(asdict(row)) + "\n" for row in rows))
+    assert [each.verdict for each in read_results(tmp_path / "log").values()] == ["killed", "killed"]
+    assert set(read_results(tmp_path / "log")) == {place_of(KILLED), place_of(rows[1])}
+
+
+def test_renewed_test_files_take_the_place_of_what_was_known_of_them() -> None:
+    """A test that is gone covers nothing; new ones are added, and those of other files stay."""
+    stays, gone, new = "tests/a/test_x.py::test_1", "tests/a/test_y.py::test_2", "tests/a/test_y.py::test_3"
+    before = CoverageMap({stays: 1.0, gone: 2.0}, {"a.py": {"1": ["", stays], "2": [gone]}})
+    after = CoverageMap({new: 3.0}, {"a.py": {"1": ["", new], "4": [new]}})
+    found = merged(before, after, ["tests/a/test_y.py"])
+    assert found.seconds == {stays: 1.0, new: 3.0}
+    assert found.lines == {"a.py": {"1": ["", stays, new], "2": [], "4": [new]}}
+
+
+def test_only_the_tests_of_a_copy_are_renewed(tmp_path: Path) -> None:
+    """The code stays that of the mutants that were drawn."""
+    source, copy = tmp_path / "source", tmp_path / "copy"
+    for folder, text in ((source, "new"), (copy, "old")):
+        for name in ("code.py", "tests/test_changed.py", "tests/test_same.py"):
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text("same" if "same" in name else text)
+    (source / "tests/test_added.py").write_text("new")
+    for line in (["git", "init", "-q"], ["git", "add", "."]):
+        subprocess.run(line, cwd=source, check=True)
+    assert renew_tests(source, Checkout(copy)) == ["tests/test_added.py", "tests/test_changed.py"]
+    assert [(copy / name).read_text() for name in ("code.py", "tests/test_changed.py")] == ["old", "new"]
+    assert renew_tests(source, Checkout(copy)) == []
 
 
 def test_the_page_keeps_what_it_says_of_earlier_samples(tmp_path: Path) -> None:
@@ -209,8 +254,8 @@ def test_every_mutant_of_the_page_is_killed_noticed_now_or_equal() -> None:
     killed, mutants, since, equal = map(int, told.groups())
     assert killed <= since
     assert since + equal == mutants
-    rows = re.findall(r"^\| `[a-z/]+` \| (\d+) \| (\d+) \|$", page, flags=re.MULTILINE)
-    assert (sum(int(row[0]) for row in rows), sum(int(row[1]) for row in rows)) == (mutants, killed)
+    rows = re.findall(r"^\| `[a-z/]+` \| (\d+) \| (\d+) \| (\d+) \|$", page, flags=re.MULTILINE)
+    assert [sum(int(row[column]) for row in rows) for column in range(3)] == [mutants, killed, since]
 
 
 def test_only_tests_that_took_too_long_are_left_out_in_the_next_sample(tmp_path: Path) -> None:
@@ -223,4 +268,4 @@ def test_only_tests_that_took_too_long_are_left_out_in_the_next_sample(tmp_path:
     ]
     (tmp_path / "seed-1").mkdir()
     (tmp_path / "seed-1" / "daemon.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    assert known_to_be_slow(tmp_path / "seed-2" / "daemon.jsonl") == {"computes", "waits"}
+    assert known_to_be_slow(tmp_path / "seed-2" / "daemon.json") == {"computes", "waits"}

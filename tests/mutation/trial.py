@@ -94,8 +94,11 @@ def outside_the_room(mutation: Mutation, original: str) -> tuple[str, ...]:
     return (*of_decorators, *(path for part, paths in ALSO.items() if mutation.file.startswith(part) for path in paths))
 
 
-def try_mutant(mutation: Mutation, checkout: Checkout, found: CoverageMap) -> Result:
-    """Run the tests for a mutant in the copy."""
+def try_mutant(mutation: Mutation, checkout: Checkout, found: CoverageMap, *, confirmed: bool = False) -> Result:
+    """Run the tests for a mutant in the copy.
+
+    `confirmed`: tests that fail have to pass without the mutant; else that is asked only where they waited too long.
+    """
     original = (checkout.root / mutation.file).read_text()
     mutated = mutation.applied(original)
     tests = selected_tests(mutation, checkout.root, found)
@@ -106,7 +109,7 @@ def try_mutant(mutation: Mutation, checkout: Checkout, found: CoverageMap) -> Re
     with checkout.changed(mutation.file, mutated):
         run, failed = _failing_run(checkout, batches, cpu_s, repeated=room_of(mutation.file) != ONLY_COMPUTES)
     verdict: Verdict = "survived" if run is None else "killed"
-    if run is not None and run.timed_out and not _run(checkout, failed, cpu_s).passed:
+    if run is not None and (confirmed or run.timed_out) and not _run(checkout, failed, cpu_s).passed:
         verdict = "undecided"
     return Result(
         file=mutation.file,
