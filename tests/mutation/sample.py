@@ -90,23 +90,28 @@ class Trials:
         """Return where a room's coverage map is kept."""
         return self.folder / f"{room.replace('/', '-')}.json"
 
-    def first(self, chosen: Sequence[Mutation]) -> list[Result]:
-        """Try each mutant that has no result yet; return all results."""
+    def first(self, chosen: Sequence[Mutation], *, shown: bool = True) -> list[Result]:
+        """Try each mutant that has no result yet; return all results, those from before `shown` as well."""
         log, results = self.folder / "results.jsonl", []
         known = read_results(log)
         for number, mutation in enumerate(chosen, 1):
-            result = known.get(place_of(mutation)) or self._tried(mutation, log, confirmed=False)
-            show(number, result, self.words)
+            before = known.get(place_of(mutation))
+            result = before or self._tried(mutation, log, confirmed=False)
+            if shown or before is None:
+                show(number, result, self.words)
             results.append(result)
         return results
 
     def again(self, chosen: Sequence[Mutation], survived: Collection[Place]) -> None:
         """Renew the tests of the copy, and try each of the survivors."""
-        changed = renew_tests(ROOT, self.checkout)
+        pending = self.folder / "renewed-tests.json"  # stays where this run is interrupted before they are measured
+        changed = {*renew_tests(ROOT, self.checkout), *(json.loads(pending.read_text()) if pending.exists() else ())}
+        pending.write_text(json.dumps(sorted(changed)))
         for room, folder in ROOMS.items():
-            files = [name for name in changed if name.startswith(folder + "/") and Path(name).name.startswith("test_")]
+            files = [name for name in sorted(changed) if name.startswith(folder + "/") and "/test_" in name]
             if files and self.map_of(room).exists():
                 renew(self.checkout, room, self.map_of(room), files)
+        pending.unlink()
         for number, mutation in enumerate(chosen, 1):
             if place_of(mutation) in survived:
                 show(number, self._tried(mutation, self.folder / "retried.jsonl", confirmed=True), self.words)
@@ -142,7 +147,7 @@ def main() -> None:
     lock = alone_in(folder)
     trials = Trials(folder, copy_of(ROOT, folder / "copy"), read_words())
     chosen = drawn(trials.checkout.root, given.count, given.seed, given.only)
-    results = trials.first(chosen)
+    results = trials.first(chosen, shown=not given.retry)
     if given.retry:
         noticed = trials.noticed(results) or []
         trials.again(chosen, {place_of(each) for each in results if each.verdict == "survived" and each not in noticed})

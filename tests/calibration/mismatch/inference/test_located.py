@@ -63,10 +63,11 @@ def test_what_lasts_is_located_from_end_to_end(size: float) -> None:
 
 
 def test_a_spell_that_acts_by_a_factor_is_located_between_the_knots() -> None:
-    """A gain over time: its ends are found to some instants, where the curve's knots are fifty and more apart."""
+    """A gain over time, with blank readings: its ends are found to some instants, knots are a hundred apart."""
     columns = table()
     during = (columns["t_s"] > 130) & (columns["t_s"] < 275)
     columns["reading_V"] = columns["reading_V"] * (1 + 0.4 * during)
+    columns["reading_V"][::7] = np.nan
     equations = equations_of(problem_of(columns))
     equations = equations.over(with_smooth_terms(equations.design))
     (group,) = (each for each in equations.design.groups if (each.name, each.coupling) == ("time", "gain"))
