@@ -103,7 +103,8 @@ def check(dictionary: Dictionary, key: Key, value: int) -> None:
 def _compile(dictionary: Dictionary, communication: int, mapping: int) -> list[EnabledPdo]:
     pdos = []
     for number in range(0x200):
-        if communication + number not in dictionary.indices or mapping + number not in dictionary.indices:
+        mandatory = {(communication + number, 1), (communication + number, 2), (mapping + number, 0)}
+        if not mandatory <= dictionary.entries.keys():
             continue
         cob_id = dictionary.get(communication + number, 1)
         count = dictionary.get(mapping + number, 0)

@@ -85,6 +85,16 @@ def test_a_whole_file_gives_devices_or_sentences_with_a_cure(path: Path) -> None
         assert ". " in text, text
 
 
+@pytest.mark.parametrize("entry", ["1400sub1", "1800sub1", "1800sub2", "1A00sub0"])
+def test_a_record_of_a_pdo_without_a_mandatory_entry_is_no_pdo(entry: str, tmp_path: Path) -> None:
+    """COB-ID, transmission type, and number of mapped objects (CiA 301): a device uses its other PDOs."""
+    before, _, rest = (EDS_FOLDER / "cia402.eds").read_text().partition(f"[{entry}]")
+    assert rest
+    (tmp_path / "lacking.eds").write_text(before + rest[rest.index("\n[") + 1 :])
+    for text in use(tmp_path / "lacking.eds"):
+        assert ". " in text, text
+
+
 @settings(max_examples=60)
 @given(seed=st.integers(0, 2**32), sheet=st.integers(0, len(SHEETS) - 1))
 def test_a_damaged_file_gives_devices_or_sentences(
