@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.normal_equations import membership
+from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.smooth_groups import acting
 
 if TYPE_CHECKING:
@@ -97,25 +97,27 @@ class Profile:
 
 def sums_of(equations: NormalEquations, beside: Fit, term: Term) -> CovariateSums:
     """Return the sums for a smooth term's covariate and factor, on its wheels, beside a fit."""
-    design = equations.design
-    place = np.array([column for column, _ in beside.columns], np.int64)
-    share = membership(beside.columns, len(equations.weights))
+    design, read = equations.design, as_read(equations, beside)
     values, factor = _course(equations, term)
     at, index = _bins(values, factor != 0)
-    folds, wheels, bins = len(design.gram), len(equations.weights), len(at)
+    folds, wheels, bins = len(design.cuts) - 1, len(read.weights), len(at)
     power, moment = np.zeros((folds, wheels, bins)), np.zeros((folds, wheels, bins))
-    cross = np.zeros((folds, wheels, bins, len(place)))
+    cross = np.zeros((folds, wheels, bins, len(read.columns)))
+    gram = np.zeros((folds, wheels, len(read.columns), len(read.columns)))
+    column_moment = np.zeros((folds, wheels, len(read.columns)))
+    energy = np.zeros((folds, wheels))
     for fold, (a, b) in enumerate(zip(design.cuts[:-1], design.cuts[1:], strict=True)):
         for w in term.wheels:
             here, by = index[w, a:b], factor[w, a:b]
             power[fold, w] = np.bincount(here, by**2, bins)
-            moment[fold, w] = np.bincount(here, by * design.residual[w, a:b], bins)
-            for k, column in enumerate(place):
-                if share[k, w]:
-                    cross[fold, w, :, k] = np.bincount(here, by * design.columns[column, w, a:b], bins)
-    both = np.einsum("pw,qw->wpq", share, share)
-    priors = len(equations.nuisance.columns)
-    beyond = np.zeros(len(place) - priors)
+            moment[fold, w] = np.bincount(here, by * read.residual[w, a:b], bins)
+            for k, column in enumerate(read.columns):
+                cross[fold, w, :, k] = np.bincount(here, by * column[w, a:b], bins)
+        part, left = read.columns[:, :, a:b], read.residual[:, a:b]
+        gram[fold] = np.einsum("pwt,qwt->wpq", part, part, optimize=True)
+        column_moment[fold] = np.einsum("pwt,wt->wp", part, left)
+        energy[fold] = np.sum(left**2, axis=1)
+    beyond = np.zeros(len(read.columns) - len(equations.nuisance.columns))
     readings = np.bincount(index[factor != 0], minlength=bins).astype(np.float64)
     return CovariateSums(
         at=at,
@@ -123,13 +125,13 @@ def sums_of(equations: NormalEquations, beside: Fit, term: Term) -> CovariateSum
         power=power,
         moment=moment,
         cross=cross,
-        gram=design.gram[:, :, place][:, :, :, place] * both,
-        column_moment=design.moment[:, :, place] * share.T,
-        energy=design.energy,
+        gram=gram,
+        column_moment=column_moment,
+        energy=energy,
         counts=design.counts,
         precision=np.concatenate((equations.nuisance.precision, beyond)),
         centre=np.concatenate((equations.nuisance.centre, beyond)),
-        weights=equations.weights,
+        weights=read.weights,
     )
 
 

@@ -64,9 +64,9 @@ def representatives(equations: NormalEquations) -> dict[str, list[Term]]:
 
 def energy_apart(equations: NormalEquations, given: Sequence[Term], term: Term, factor: float = 1.0) -> float:
     """Return the Δχ² of a term outside the span of all else, at `factor` times the size worth telling apart."""
-    counts = equations.weights @ equations.design.counts.sum(axis=0)
     size = equations.thresholds.effect_to_tell_apart * equations.problem.mean_size
-    return float(factor * equations.tolerance(given, term) * size**2 * counts)
+    _, complement = equations.own_and_complement(given, term)
+    return float(factor * complement[0, 0] * size**2)
 
 
 def imitates(equations: NormalEquations, given: Fit, one: list[Term], two: list[Term]) -> bool:

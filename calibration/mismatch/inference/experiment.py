@@ -10,6 +10,7 @@ import numpy as np
 from regolithd.calibration.mismatch.answer import Indistinguishable
 from regolithd.calibration.mismatch.inference.statements import capital
 from regolithd.calibration.mismatch.problem.words import in_words
+from regolithd.calibration.mismatch.regression.as_read import long_run_weights
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -65,7 +66,7 @@ def seconds_needed(equations: NormalEquations, entry_threshold: float) -> float:
     problem, limits = equations.problem, equations.thresholds
     needed = (sqrt(entry_threshold + limits.coefficient_penalty) + limits.detection_quantile) ** 2
     size = limits.effect_of_experiment * problem.mean_size
-    gained = limits.experiment_tolerance * float(equations.weights.sum()) * size**2
+    gained = limits.experiment_tolerance * float(long_run_weights(equations, equations.fit(())).sum()) * size**2
     within = limits.shortest_experiment * problem.length_s, limits.longest_experiment * problem.length_s
     return float(np.clip(problem.recording.step_s * needed / gained, *within))
 

@@ -14,7 +14,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     best_of_each_candidate,
     passes_entry_test,
 )
-from regolithd.calibration.mismatch.selection.cross_validation import squares_on_fold, training_equations
+from regolithd.calibration.mismatch.selection.cross_validation import squares_left, training_equations
 from regolithd.calibration.mismatch.selection.decision import without_name
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
 
@@ -73,13 +73,12 @@ def held_out_errors(
         train = training_equations(equations, fold)
         chosen = of_names(chosen_effects(train.with_groups(groups), entry_threshold), named)
         train, chosen = with_optimised_shapes(train, chosen)
-        design = train.design
-        equations = equations.over(design.with_groups(equations.design.groups))
-        before += squares_on_fold(design, train.fit(()), fold)
-        after += squares_on_fold(design, train.fit(chosen), fold)
+        equations = equations.over(train.design.with_groups(equations.design.groups))
+        before += squares_left(train, train.fit(()), fold)
+        after += squares_left(train, train.fit(chosen), fold)
         for index, term in enumerate(named.terms):
             rest = tuple(other for other in chosen if other.name != term.name)
-            without[index] += squares_on_fold(design, train.fit(rest), fold)
+            without[index] += squares_left(train, train.fit(rest), fold)
     counts = equations.design.counts.sum(axis=0)
     on = [list(term.wheels) for term in named.terms]
     return equations, HeldOutErrors(

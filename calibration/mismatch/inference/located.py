@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import couplings_of
 
@@ -23,11 +24,12 @@ def share_of_residual(equations: NormalEquations, whole: Fit, term: Term) -> flo
     What it leaves is counted at the parameters of the fit with all terms: those of a fit without them absorb a part.
     From the term's own power that is taken which its coefficients have by chance, a long-run variance each.
     """
-    on = list(term.wheels)
+    on, read = list(term.wheels), as_read(equations, whole)
+    whole = read.fit
     terms = [contribution(equations, whole, index)[:, on] for index in range(len(whole.terms))]
     left = residual_of(equations, whole)[:, on] + sum(terms)
     own = np.sum(terms[whole.terms.index(term)] ** 2)
-    by_chance = len(term.group.columns) * float(np.mean(1 / equations.weights[on]))
+    by_chance = len(term.group.columns) * float(np.mean(1 / read.weights[on]))
     return float(np.clip((own - by_chance) / max(float(np.sum(left**2)), 1e-300), 0.0, 1.0))
 
 
@@ -38,9 +40,11 @@ def spell_of(equations: NormalEquations, whole: Fit, term: Term) -> tuple[float,
     are charged for it by Akaike's criterion, each for its part of the time.
     """
     on, limits = list(term.wheels), equations.thresholds
+    read = as_read(equations, whole)
+    whole, weights = read.fit, read.weights[on]
     own = contribution(equations, whole, whole.terms.index(term))[:, on]
     left = residual_of(equations, whole)[:, on]
-    gained = ((left + own) ** 2 - left**2) @ equations.weights[on]
+    gained = ((left + own) ** 2 - left**2) @ weights
     charged = limits.coefficient_penalty * len(term.group.columns) / len(gained)
     first, last = largest_stretch(gained - charged)
     time_s = equations.problem.time_s[:, 0]
@@ -48,7 +52,7 @@ def spell_of(equations: NormalEquations, whole: Fit, term: Term) -> tuple[float,
     if region is not None and term.name == "time":
         return max(region.lower, float(time_s[0])), min(region.upper, float(time_s[-1]))
     if region is None and term.name == "time" and term.group.coupling in couplings_of(equations.problem):
-        first, last = _between_knots(_level(equations, term, own, left), first, last, len(term.group.columns))
+        first, last = _between_knots(_level(equations, term, own, left, weights), first, last, len(term.group.columns))
     return float(time_s[first]), float(time_s[last])
 
 
@@ -67,11 +71,11 @@ def _between_knots(level: Array, first: int, last: int, knots: int) -> tuple[int
     return _edge(level, first, knot, half), end - _edge(level[:, ::-1], end - last, knot, half)
 
 
-def _level(equations: NormalEquations, term: Term, own: Array, left: Array) -> Array:
+def _level(equations: NormalEquations, term: Term, own: Array, left: Array, weights: Array) -> Array:
     """Return, at each instant, the curve over its factor, the factor's power, and its product with the data."""
     on = list(term.wheels)
     factor = np.where(equations.problem.mask, couplings_of(equations.problem)[term.group.coupling], 0.0)[:, on]
-    weighted = factor * equations.weights[on]
+    weighted = factor * weights
     power = np.sum(weighted * factor, axis=1)
     level = np.sum(weighted * own, axis=1) / np.where(power > 0, power, np.inf)
     return np.stack((level, power, np.sum(weighted * (own + left), axis=1)))

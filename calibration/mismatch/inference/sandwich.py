@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.discrepancy_basis import discrepancy_basis
-from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.regression.residuals import whitened_residual_of
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
 
 if TYPE_CHECKING:
@@ -93,8 +93,8 @@ def _coefficient_columns(equations: NormalEquations, fit: Fit) -> Iterator[Array
     design = equations.design
     for column, wheels in fit.columns:
         values = np.zeros(design.residual.shape)
-        for w in wheels:
-            values[w] = design.columns[column, w]
+        on = list(wheels)
+        values[on] = design.unwhitened(design.columns[column, on].astype(np.float64), on)
         yield design.in_time(values)
 
 
@@ -125,10 +125,11 @@ def sandwich(equations: NormalEquations, fit: Fit, linearisation: Linearisation,
 
     The fit's own coefficients are at their optimum, priors included, and do not move; what was not fitted does.
     """
-    columns, precision, weights = linearisation.columns, linearisation.precision, equations.weights
+    design, precision, weights = equations.design, linearisation.precision, equations.weights
+    columns = design.whitened_in_time(linearisation.columns)
     information = np.einsum("atw,w,btw->ab", columns, weights, columns, optimize=True)
     inverse = pseudo_inverse(information + np.diag(precision), SINGULAR)
-    scores = columns * (residual_of(equations, fit) * weights)[None]
+    scores = columns * (design.in_time(whitened_residual_of(equations, fit)) * weights)[None]
     sums = block_sums(scores, blocks)
     count = int(blocks.max()) + 1
     middle = sums.T @ sums * count / max(count - 1, 1) + np.diag(precision)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
     from regolithd.calibration.mismatch.regression.group import Group
     from regolithd.calibration.mismatch.regression.nuisance import Nuisance
+    from regolithd.calibration.mismatch.signal.whitening import Whitening
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
 Array = NDArray[np.float64]
@@ -90,6 +91,10 @@ class NormalEquations:
         if np.array_equal(weights, self.weights):
             return self
         return normal_equations(self.design, self.nuisance, weights, self.folds)
+
+    def whitened(self, whitening: Whitening, weights: Array) -> NormalEquations:
+        """Return the equations under another whitening, with the weights of the whitened wheels."""
+        return normal_equations(self.design.whitened_by(whitening), self.nuisance, weights, self.folds)
 
     def over(self, design: DesignMatrix) -> NormalEquations:
         """Return the equations of a design matrix that this one was extended to."""

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.region import HIGHEST_POWER, Region
 from regolithd.calibration.mismatch.regression.smooth_groups import acting
 
@@ -163,7 +164,8 @@ def known_values(equations: NormalEquations, covariate: str, coupling: str, whee
 def range_sums(
     equations: NormalEquations, fit: Fit, covariate: str, coupling: str, wheels: Sequence[int], edges: Array
 ) -> RangeSums:
-    """Sum over the bins between edges, on some wheels, beside a fit."""
+    """Sum over the bins between edges, on some wheels, beside a fit, of the readings as they were read."""
+    read = as_read(equations, fit)
     problem, design = equations.problem, equations.design
     values, factor = (each[design.order] for each in acting(problem, covariate, coupling))
     mask = problem.mask[design.order] & np.isfinite(values)
@@ -177,18 +179,18 @@ def range_sums(
     for w in on:
         rows = np.flatnonzero(mask[:, w])
         at = np.searchsorted(edges, values[rows, w], side="right")
-        scaled, acts, weight = (values[rows, w] - centre) / half, factor[rows, w], equations.weights[w]
+        scaled, acts, weight = (values[rows, w] - centre) / half, factor[rows, w], read.weights[w]
         readings += np.bincount(at, minlength=bins)
         column = [weight * acts]
         for _ in range(2 * powers - 2):
             column.append(column[-1] * scaled)
         own += np.stack([np.bincount(at, acts * each, bins) for each in column], axis=1)
         column = column[:powers]
-        known = design.residual[w, rows].astype(np.float64)
+        known = read.residual[w, rows]
         moment += np.stack([np.bincount(at, each * known, bins) for each in column], axis=1)
-        for c, (place, of_column) in enumerate(fit.columns):
+        for c, (_, of_column) in enumerate(fit.columns):
             if w in of_column:
-                fitted = design.columns[place, w, rows].astype(np.float64)
+                fitted = read.columns[c, w, rows]
                 cross[:, :, c] += np.stack([np.bincount(at, each * fitted, bins) for each in column], axis=1)
     return RangeSums(
         covariate=covariate,
@@ -198,9 +200,9 @@ def range_sums(
         high=high,
         readings=_up_to(readings),
         own=_up_to(own),
-        left=_up_to(moment - cross @ fit.coefficients),
+        left=_up_to(moment - cross @ read.fit.coefficients),
         cross=_up_to(cross),
-        covariance=fit.covariance,
+        covariance=read.fit.covariance,
     )
 
 

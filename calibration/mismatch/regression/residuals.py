@@ -17,11 +17,22 @@ Array = NDArray[np.float64]
 def residual_of(equations: NormalEquations, fit: Fit) -> Array:
     """Return measured less fitted, shape (time, wheel), 0 outside the mask."""
     design = equations.design
+    return np.where(design.problem.mask, design.in_time(design.unwhitened(whitened_residual_of(equations, fit))), 0.0)
+
+
+def whitened_residual_of(equations: NormalEquations, fit: Fit) -> Array:
+    """Return measured less fitted, whitened, shape (wheel, time in the order of folds)."""
+    design = equations.design
     left = design.residual.astype(np.float64)
     for (column, wheels), value in zip(fit.columns, fit.coefficients, strict=True):
         for w in wheels:
             left[w] -= value * design.columns[column, w]
-    return np.where(design.problem.mask, design.in_time(left), 0.0)
+    return left
+
+
+def chi2_of(equations: NormalEquations, fit: Fit) -> Array:
+    """Return the weighted sum of squares that a fit leaves, shape (wheel,)."""
+    return np.asarray(np.sum(whitened_residual_of(equations, fit) ** 2, axis=1) * equations.weights)
 
 
 def contribution(equations: NormalEquations, fit: Fit, index: int) -> Array:
@@ -31,7 +42,7 @@ def contribution(equations: NormalEquations, fit: Fit, index: int) -> Array:
     for column, value in zip(term.group.columns, fit.coefficients[fit.of_term(index)], strict=True):
         for w in term.wheels:
             total[w] += value * design.columns[column, w]
-    return design.in_time(total)
+    return design.in_time(design.unwhitened(total))
 
 
 def where_it_acts(equations: NormalEquations, fit: Fit, index: int) -> Array:

@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from regolithd.calibration.mismatch.regression.residuals import relative_size, residual_of
+from regolithd.calibration.mismatch.regression.residuals import chi2_of, relative_size
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
 
 if TYPE_CHECKING:
@@ -161,7 +159,7 @@ def _best_optimised(equations: NormalEquations, sets: Sequence[tuple[Term, ...]]
 def passes_entry_test(equations: NormalEquations, more: Fit, less: Fit, entry_threshold: float) -> bool:
     """Return whether a larger set scores enough more than a smaller one for its further effects."""
     limits = equations.thresholds
-    remaining = float(np.sum(residual_of(equations, less) ** 2 * equations.weights))
+    remaining = float(chi2_of(equations, less).sum())
     worthwhile = min(limits.further_share * less.delta_chi2, limits.remaining_share * remaining)
     faulty = wheels_of_faulty_sensors(more)
     if any(term.group.own_channel is None and set(term.wheels) <= faulty for term in more.terms):

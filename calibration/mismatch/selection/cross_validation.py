@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations, normal_equations
+from regolithd.calibration.mismatch.regression.residuals import whitened_residual_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,8 +23,15 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def squares_on_fold(design: DesignMatrix, fit: Fit, fold: int) -> Array:
+def squares_left(equations: NormalEquations, fit: Fit, fold: int) -> Array:
     """Return the sum of squared errors of a fit on a fold, shape (wheel,)."""
+    design = equations.design
+    left = design.unwhitened(whitened_residual_of(equations, fit))
+    return np.asarray(np.sum(left[:, design.cuts[fold] : design.cuts[fold + 1]] ** 2, axis=1))
+
+
+def squares_on_fold(design: DesignMatrix, fit: Fit, fold: int) -> Array:
+    """Return the sum of squared errors of a fit on a fold, whitened, shape (wheel,)."""
     total = design.energy[fold].copy()
     for w in range(len(total)):
         on = [(c, v) for (c, wheels), v in zip(fit.columns, fit.coefficients, strict=True) if w in wheels]

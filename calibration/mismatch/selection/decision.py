@@ -14,7 +14,7 @@ from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import with_periodic_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_subsets, passes_entry_test
 from regolithd.calibration.mismatch.selection.cross_validation import drop_what_does_not_transfer
-from regolithd.calibration.mismatch.selection.noise_estimation import noise_beside_terms
+from regolithd.calibration.mismatch.selection.noise_estimation import noise_beside_terms, noise_of_whitened, whitened
 from regolithd.calibration.mismatch.selection.released_parameters import released
 from regolithd.calibration.mismatch.selection.sign_flip_test import entry_threshold
 from regolithd.calibration.mismatch.selection.smooth_terms import weigh_against_smooth_terms
@@ -56,8 +56,8 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
     """Choose the named effects, and the smooth terms that nothing named explains."""
     problem, limits = equations.problem, equations.thresholds
     noise, left = noise_beside_terms(equations)
-    equations = equations.weighted(noise.weights)
-    threshold = entry_threshold(equations, left, blocks_of_time(problem, noise))
+    equations = whitened(equations, left)
+    threshold = entry_threshold(equations, left, blocks_of_time(problem, noise_of_whitened(equations.design, left)))
     equations = with_proposed_shapes(equations, candidates)
     equations, subsets = best_subsets(equations)
     named = _largest_that_passes(equations, subsets, threshold)
@@ -70,8 +70,9 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
     if (freed := released(equations, kept, whole, threshold)) is not None:
         equations, named, unnamed = freed, freed.fit(kept.terms), ()
         whole = named
-    noise = estimate_noise(residual_of(equations, whole), problem.mask, limits)
-    equations = equations.weighted(noise.weights)
+    left = residual_of(equations, whole)
+    noise = estimate_noise(left, problem.mask, limits)
+    equations = equations.weighted(noise_of_whitened(equations.design, left).weights)
     return Decision(
         equations=equations,
         noise=noise,
@@ -104,19 +105,19 @@ def with_proposed_shapes(equations: NormalEquations, candidates: Sequence[Candid
     """Return equations with the shapes and the sines over time that the residual of the free parameters suggests."""
     problem = equations.problem
     residual = residual_of(equations, equations.fit(()))
-    autocorrelation_time = _autocorrelation_time(equations, residual)
-    design = equations.design
+    design, white = equations.design, equations.design.whitened_in_time(residual)
+    autocorrelation_time = _autocorrelation_time(equations, white)
     for candidate in candidates:
         if shapes := candidate.propose_shapes(problem, residual):
             reductions = [
-                max(autocorrelation_time / candidate.autocorrelation_time_at(problem, residual, shape), 1.0)
+                max(autocorrelation_time / candidate.autocorrelation_time_at(problem, white, shape), 1.0)
                 for shape in shapes
             ]
             design, _ = with_candidate(design, candidate, shapes, reductions)
     return equations.over(with_periodic_terms(design, residual))
 
 
-def _autocorrelation_time(equations: NormalEquations, residual: Array) -> float:
-    """Return the autocorrelation time that the weights imply for a residual [time, wheel]."""
+def _autocorrelation_time(equations: NormalEquations, white: Array) -> float:
+    """Return the autocorrelation time that the weights imply for a whitened residual [time, wheel]."""
     counts = np.maximum(equations.problem.mask.sum(axis=0), 1)
-    return float(np.median(counts / np.maximum(equations.weights * np.sum(residual**2, axis=0), 1e-300)))
+    return float(np.median(counts / np.maximum(equations.weights * np.sum(white**2, axis=0), 1e-300)))

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
+from regolithd.calibration.mismatch.signal.whitening import estimate_whitening
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
@@ -35,6 +37,22 @@ def noise_beside_terms(equations: NormalEquations) -> tuple[NoiseModel, Array]:
     least_score = limits.noise_term_share * limits.smooth_term_entry
     terms = _most_significant(weighted, 2 * limits.provisional_terms, least_score)
     return _noise_beside(weighted, terms), residual_of(weighted, weighted.fit(terms))
+
+
+def whitened(equations: NormalEquations, residual: Array) -> NormalEquations:
+    """Return the equations whitened by the noise of a residual [time, wheel]."""
+    courses = []
+    for (places, runs), values in zip(equations.design.readings, equations.design.in_folds(residual), strict=True):
+        deviation = float(np.sqrt(np.mean(values[places] ** 2))) if len(places) else 0.0
+        if deviation > 0:
+            courses.append((values[places] / deviation, runs))
+    equations = equations.whitened(estimate_whitening(courses), equations.weights)
+    return equations.weighted(noise_of_whitened(equations.design, residual).weights)
+
+
+def noise_of_whitened(design: DesignMatrix, residual: Array) -> NoiseModel:
+    """Return the noise of a residual [time, wheel] once it is whitened."""
+    return estimate_noise(design.whitened_in_time(residual), design.problem.mask, design.problem.thresholds)
 
 
 def _noise_beside(equations: NormalEquations, terms: Sequence[Term]) -> NoiseModel:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.group import Group, Term
 from regolithd.calibration.mismatch.regression.range_sums import Ranges, known_values, range_sums
-from regolithd.calibration.mismatch.regression.region import FORMS, GROWTH
-from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.regression.region import FORMS, GROWTH, Region
+from regolithd.calibration.mismatch.regression.residuals import chi2_of
 from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, acting
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.regression.range_sums import RangeSums
-    from regolithd.calibration.mismatch.regression.region import Region
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -82,10 +81,13 @@ def _one_after_another(
     fit = named
     for further in reversed(range(MOST_REGIONS)):
         found = best_region(equations, fit, forms)
-        if found is None or equations.score(fit) + (1 + further) * found.score < needed:
+        if found is None:
             break
         equations, term = with_region(equations, found)
-        fit = equations.fit((*fit.terms, term))
+        more = equations.fit((*fit.terms, term))
+        if equations.score(more) + further * (equations.score(more) - equations.score(fit)) < needed:
+            break
+        fit = more
     return equations, fit
 
 
@@ -112,10 +114,10 @@ def _searched_again(equations: NormalEquations, fit: Fit, index: int) -> tuple[N
     """Return the fit with the best region in the place of one of it, beside the others."""
     rest = equations.fit(fit.without(index))
     found = best_region(equations, rest, FORMS)
-    if found is None or found.score <= equations.score(fit) - equations.score(rest):
+    if found is None:
         return equations, fit
     equations, term = with_region(equations, found)
-    return equations, equations.fit((*fit.terms[:index], term, *fit.terms[index + 1 :]))
+    return equations, max(fit, equations.fit((*fit.terms[:index], term, *fit.terms[index + 1 :])), key=equations.score)
 
 
 def _significant(equations: NormalEquations, fit: Fit, first: int) -> Fit:
@@ -134,11 +136,16 @@ def everywhere_score(
 
     Its coefficients are paid for by Schwarz's criterion, as those of regions.
     """
-    sums = range_sums(equations, named, covariate, coupling, wheels, np.zeros(1))
-    whole = Ranges(np.array([0]), np.array([2]))
+    values = known_values(equations, covariate, coupling, wheels)
+    low, high = float(values.min()), float(values.max())
     of_each = schwarz_penalty(equations, named, wheels)
-    gains = sums.delta_chi2(whole, EVERYWHERE)
-    return max(float(gain[0]) - of_each * len(powers) for gain, powers in zip(gains, EVERYWHERE, strict=True))
+    scores = []
+    for powers in EVERYWHERE:
+        everywhere = Region(covariate, coupling, -np.inf, np.inf, powers, 0.5 * (low + high), max(high - low, 1e-300))
+        equations, law = with_region(equations, Found(0.0, everywhere, tuple(wheels), 0.0))
+        gain = equations.fit((*named.terms, law)).delta_chi2 - named.delta_chi2
+        scores.append(gain - of_each * len(powers))
+    return max(scores)
 
 
 def with_region(equations: NormalEquations, found: Found) -> tuple[NormalEquations, Term]:
@@ -218,7 +225,7 @@ def _best_of_each_form(
 def schwarz_penalty(equations: NormalEquations, fit: Fit, wheels: Sequence[int]) -> float:
     """Return ln n, with n the number of independent readings on some wheels: Σ weight × what the fit leaves²."""
     on = list(wheels)
-    readings = float(np.sum(residual_of(equations, fit)[:, on] ** 2 * equations.weights[on]))
+    readings = float(chi2_of(equations, fit)[on].sum())
     return float(np.log(max(readings, math.e)))
 
 

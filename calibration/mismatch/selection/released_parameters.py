@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.regression.residuals import chi2_of
 from regolithd.calibration.mismatch.selection.best_subsets import entry_cost
 from regolithd.calibration.mismatch.selection.smooth_terms import unexplained_beside
 
@@ -52,8 +52,7 @@ def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold
 
 def _evidence(equations: NormalEquations, fit: Fit, free: Collection[int], entry_threshold: float) -> float:
     """Return minus the χ² of readings and priors, less what terms and parameters outside their priors are charged."""
-    squares = np.sum(residual_of(equations, fit) ** 2, axis=0)
     away = np.delete(equations.nuisance.prior_stds_away(fit), list(free))
     entries = entry_cost(equations, fit.terms, entry_threshold)
     charged = entries + sum(map(equations.penalty, fit.terms)) + WRONG_STATEMENT_PENALTY * len(free)
-    return -float(squares @ equations.weights + away @ away + charged)
+    return -float(chi2_of(equations, fit).sum() + away @ away + charged)

@@ -68,7 +68,8 @@ class ShapeProfile:
         problem, design = self.equations.problem, self.equations.design
         columns = np.asarray(self.candidate.columns(problem, shape), np.float64)
         kept = np.where(problem.mask, columns, 0.0)[:, :, list(self.wheels)]
-        fresh = np.swapaxes(kept, 1, 2)[:, :, design.order[_fitted_instants(self.equations)]].astype(np.float32)
+        fresh = design.whitened(design.in_folds(kept).astype(np.float32), self.wheels)
+        fresh = fresh[:, :, _fitted_instants(self.equations)]
         return (fresh * _root_weights(self.equations, self.wheels)).reshape(len(fresh), -1)
 
 

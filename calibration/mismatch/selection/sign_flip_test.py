@@ -90,7 +90,8 @@ def block_scores(equations: NormalEquations, columns: Index, residual: Array, bl
     in_order = blocks[design.order]
     by_block = np.argsort(in_order, kind="stable")
     starts = np.flatnonzero(np.diff(in_order[by_block], prepend=-1))
-    weighted = (residual * equations.weights)[design.order].T[:, by_block].astype(np.float32)
+    white = design.whitened(design.in_folds(residual)) * equations.weights[:, None]
+    weighted = white[:, by_block].astype(np.float32)
     sums = [np.add.reduceat(design.columns[c][:, by_block] * weighted, starts, axis=1).T for c in columns]
     return np.stack(sums, axis=2).astype(np.float64)
 

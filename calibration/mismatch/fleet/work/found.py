@@ -116,7 +116,7 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
 def _found_term(decision: Decision, term: Term) -> FoundTerm:
     equations = decision.equations
     design = equations.design
-    columns = design.in_time(design.columns[term.group.span]).astype(np.float32)
+    columns = design.in_time(design.unwhitened(design.columns[term.group.span])).astype(np.float32)
     columns[:, :, [wheel for wheel in equations.all_wheels if wheel not in term.wheels]] = 0.0
     return FoundTerm(
         name=term.name,

@@ -1,0 +1,73 @@
+"""A fit to the readings as they were read, not whitened: ordinary least squares, weighted by the long-run variance.
+
+Sums over ranges of a covariate have no order in time, so they cannot be whitened. Nor does the size of a structure
+that has no law hang on how quickly it changes, as it would where a curve that is not quite its form is fitted to
+whitened readings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
+from regolithd.calibration.mismatch.signal.noise import estimate_noise
+from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+Array = NDArray[np.float64]
+
+SINGULAR = 1e-10
+"""Relative eigenvalue below which a direction counts as undetermined: rounding of float32."""
+
+
+@dataclass(frozen=True, eq=False)
+class AsRead:
+    """A fit's terms, fitted to the readings as they were read.
+
+    Attributes
+    ----------
+    fit: with these coefficients and their covariance
+    columns: of the fit, 0 on wheels that they do not act on, shape (column, wheel, time in the order of folds)
+    residual: measured less predicted, shape (wheel, time in the order of folds)
+    weights: one over the long-run variance of what a fit leaves, shape (wheel,)
+    """
+
+    fit: Fit
+    columns: Array
+    residual: Array
+    weights: Array
+
+
+def long_run_weights(equations: NormalEquations, fit: Fit) -> Array:
+    """Return one over the long-run variance of what a fit leaves, shape (wheel,); the weights, where not whitened."""
+    if equations.design.whitening is NOT_WHITENED:
+        return equations.weights
+    problem = equations.problem
+    return estimate_noise(residual_of(equations, fit), problem.mask, problem.thresholds).weights
+
+
+def as_read(equations: NormalEquations, fit: Fit) -> AsRead:
+    """Fit the terms of a fit to the readings as they were read."""
+    design, nuisance = equations.design, equations.nuisance
+    weights = long_run_weights(equations, fit)
+    residual = design.unwhitened(design.residual.astype(np.float64))
+    columns = np.zeros((len(fit.columns), *residual.shape))
+    for row, (column, wheels) in zip(columns, fit.columns, strict=True):
+        on = list(wheels)
+        row[on] = design.unwhitened(design.columns[column, on].astype(np.float64), on)
+    weighted = columns * weights[:, None]
+    matrix = np.einsum("awt,bwt->ab", weighted, columns, optimize=True)
+    moment = np.einsum("awt,wt->a", weighted, residual, optimize=True)
+    base = len(nuisance.columns)
+    matrix[range(base), range(base)] += nuisance.precision
+    moment[:base] += nuisance.precision * nuisance.centre
+    inverse = pseudo_inverse(matrix, SINGULAR)
+    return AsRead(replace(fit, coefficients=inverse @ moment, covariance=inverse), columns, residual, weights)

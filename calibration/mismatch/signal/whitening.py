@@ -1,0 +1,129 @@
+"""Whitening: an autoregression of the noise, and what it leaves of any course of readings.
+
+Noise with a memory hides what changes slowly, and hardly hides what changes quickly. A sum of squares over readings
+that are whitened by an autoregression of the noise weighs each frequency by the noise there (generalised least squares;
+Aitken, 1935). The correlation that is left goes into the long-run variance of the whitened readings (prewhitening;
+Andrews and Monahan, 1992).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+SINGLE_LAGS, LONGEST = 8, 128
+"""Readings before, each with a coefficient of its own; and the furthest one. Those between share one in each octave: a
+long memory is many small correlations, of which none is significant alone (after Corsi, 2009)."""
+LEAST_READINGS_PER_LAG = 20
+"""Readings for each lag of the autoregression (a choice)."""
+LEAST_WHITE = 3.0
+"""White noise, in variances of the noise, that is added before its autoregression is estimated. Without it,
+quick changes are believed to a precision that no law, time stamp or controlled input has: with 0.1, laws that are 10 %
+off left a second effect, and 3 of 45 sound blind recordings were not consistent. With 3, evidence was 1.1 to 1.8 times
+that of readings as they were read; with 0.1, up to 2.6 times."""
+
+
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """An autoregression of noise: readings less what the readings before them let expect.
+
+    Attributes
+    ----------
+    coefficients: of the readings before, the last one first, shape (order,)
+    beginning: factors of the first readings of a run, which have fewer before them and vary more, shape (order,)
+    """
+
+    coefficients: Array
+    beginning: Array
+
+    def apply(self, values: NDArray[Any], runs: Sequence[slice]) -> NDArray[Any]:
+        """Return readings of shape (…, reading), whitened along the last axis, each run for itself."""
+        from scipy.signal import oaconvolve  # noqa: PLC0415  # the laptop's; reading a recording must not load SciPy
+
+        order, count = len(self.coefficients), values.shape[-1]
+        # With so many zeros before each run, one convolution serves all of them.
+        at, factors = np.arange(count), np.ones(count, values.dtype)
+        for run in runs:
+            at[run.start :] += order
+            factors[run][:order] = self.beginning[: run.stop - run.start]
+        apart = np.zeros((*values.shape[:-1], count + order * len(runs)), values.dtype)
+        apart[..., at] = values
+        response = np.append(1.0, -self.coefficients).astype(values.dtype)
+        white = oaconvolve(apart, response.reshape((1,) * (values.ndim - 1) + response.shape), axes=-1)
+        return np.asarray(white[..., at] * factors)
+
+    def undo(self, values: NDArray[Any], runs: Sequence[slice]) -> NDArray[Any]:
+        """Return what became these readings."""
+        from scipy.signal import lfilter  # noqa: PLC0415  # the laptop's; reading a recording must not load SciPy
+
+        found = values.copy()
+        for run in runs:
+            length = run.stop - run.start
+            found[..., run][..., : len(self.beginning)] /= self.beginning[:length].astype(values.dtype)
+            found[..., run] = lfilter([1.0], np.append(1.0, -self.coefficients), found[..., run], axis=-1)
+        return found
+
+
+NOT_WHITENED = Whitening(np.zeros(0), np.zeros(0))
+"""Leaves readings as they are."""
+
+
+def estimate_whitening(courses: Sequence[tuple[Array, Sequence[slice]]]) -> Whitening:
+    """Estimate an autoregression from courses of readings, each with its runs, scaled alike; its order by Akaike's AIC.
+
+    Readings follow each other as they were read: of a sensor that is read in every tenth row, ten rows apart.
+    """
+    count = sum(len(values) for values, _ in courses)
+    highest = int(min(LONGEST, count // LEAST_READINGS_PER_LAG))
+    covariance = np.zeros(highest + 1)
+    for values, runs in courses:
+        for run in runs:
+            part = values[run]
+            for lag in range(min(highest + 1, len(part))):
+                covariance[lag] += part[: len(part) - lag] @ part[lag:]
+    if not covariance[0] > 0:
+        return NOT_WHITENED
+    correlation = covariance / covariance[0] / (1 + LEAST_WHITE)
+    correlation[0] = 1.0
+    fits = [_fitted(correlation, groups) for groups in _nested(highest)]
+    criterion = [count * np.log(variance) + 2 * groups for groups, (_, variance) in enumerate(fits)]
+    coefficients, variance = fits[int(np.argmin(criterion))]
+    return Whitening(coefficients, np.sqrt(variance / _beginning_variances(coefficients, correlation)))
+
+
+def _nested(highest: int) -> Iterator[Array]:
+    """Yield groups of lags that share a coefficient, none first, then one more each, shape (lag, group)."""
+    ends = [*range(min(SINGLE_LAGS, highest) + 1)]
+    while 2 * ends[-1] <= highest and ends[-1]:
+        ends.append(2 * ends[-1])
+    for count, longest in enumerate(ends):
+        groups = np.zeros((longest, count))
+        for group, (first, last) in enumerate(pairwise(ends[: count + 1])):
+            groups[first:last, group] = 1.0
+        yield groups
+
+
+def _fitted(correlation: Array, groups: Array) -> tuple[Array, float]:
+    """Return the coefficient of each lag, and the variance of what is left."""
+    lags, own = len(groups), correlation[1 : len(groups) + 1]
+    matrix = correlation[np.abs(np.subtract.outer(np.arange(lags), np.arange(lags)))]
+    coefficients = groups @ np.linalg.solve(groups.T @ matrix @ groups, groups.T @ own)
+    return coefficients, float(1 - 2 * own @ coefficients + coefficients @ matrix @ coefficients)
+
+
+def _beginning_variances(coefficients: Array, correlation: Array) -> Array:
+    """Return the variance that the filter leaves of each reading that has fewer readings before it than the order."""
+    filtered = np.append(1.0, -coefficients)
+    lags = np.abs(np.subtract.outer(np.arange(len(filtered)), np.arange(len(filtered))))
+    matrix = correlation[: len(filtered)][lags]
+    return np.array([filtered[:k] @ matrix[:k, :k] @ filtered[:k] for k in range(1, len(filtered))])
