@@ -91,6 +91,8 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
             "Chosen",
         ),
         "Searched",
+        "AsRead",
+        "Whitening",
         *("Piece", "Law", "Linearised", "Interval", "Segment", "Suffixes", "Search", "Scores", "_Beside"),
         *("CovariateSums", "Profile", "Points", "_Points", "Spline", "FittedForm", "FoundCurve", "EmpiricalFit"),
     }
