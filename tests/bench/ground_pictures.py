@@ -61,7 +61,7 @@ def photograph(browser: Browser, rig: GroundRig, folder: Path) -> None:
         page = browser.new_page(**look)  # type: ignore[arg-type]
         page.goto(f"{rig.url}/#kapvik")
         page.locator("#who").fill("Ada")
-        page.locator("h1").click()
+        page.locator("#who").blur()
         page.wait_for_timeout(2500)
         page.screenshot(path=folder / f"ground-{name}.png")
         page.close()
