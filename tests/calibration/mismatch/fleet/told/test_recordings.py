@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.fleet.choice.courses import Course
 from regolithd.calibration.mismatch.fleet.choice.equations import fleet_equations
 from regolithd.calibration.mismatch.fleet.told.recordings import gain_beside, shown_beside
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
@@ -87,7 +88,7 @@ def test_a_finding_must_gain_what_was_asked_there_and_for_the_choice_among_recor
     fit = of.fit(())
     asked = gain_beside(of, fit, 1, 0) - 2 * np.log(3) - margin
     named = shown("viscous-friction", named=True, penalty=asked - 10.0)
-    curve = shown("voltage", named=False, penalty=asked - 16.0)
+    curve = shown("voltage", named=False, penalty=asked - THRESHOLDS.smooth_term_entry)
     for of_recording, part in ((named, "effects"), (curve, "unexplained")):
         result = shown_beside(of, fit, [found(), found(of_recording), found()], ["a", "b", "c"])
         assert len(getattr(result, part)) == (margin > 0)
