@@ -39,7 +39,7 @@ def prove(  # each is an option of the command line
     duration: Annotated[float, typer.Option(help="Duration of each recording in s.")] = 1800.0,
     figures: Annotated[Path | None, typer.Option(help="Also write the score here, as one JSON object.")] = None,
 ) -> None:
-    """Run blind trials of `regolithd mismatch`: recordings with hidden effects, scored beside three baselines.
+    """Run blind trials of `regolithd mismatch`: recordings with hidden effects, scored beside four baselines.
 
     A digest of each ground truth is written before its recording is analysed, so that the score can be verified.
     """

@@ -7,6 +7,6 @@
 | `isolation` | runs the solver where it has no access to the truth |
 | `batch` | one batch: generate, commit, solve, open, in this order |
 | `score`, `table` | compares answers with the truth; tables for the terminal |
-| `baselines` | other tools on the same recordings: PySINDy, stepwise BIC, lasso |
+| `baselines` | other tools on the same recordings: PySINDy, stepwise BIC, lasso, LISDD |
 | `figures` | figures for the documentation |
 """

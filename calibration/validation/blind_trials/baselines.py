@@ -1,11 +1,11 @@
-"""Baselines on the same two files: PySINDy, stepwise BIC, lasso with stability selection.
+"""Baselines on the same two files: PySINDy, stepwise BIC, lasso with stability selection, LISDD.
 
     python -m regolithd.calibration.validation.blind_trials.baselines RECORDING SIM.toml OUT.json
 
 Each is given a library of columns: for every effect that can be named the usual term of a textbook, for effects on one
 wheel a column for each wheel, with onset and order of the ripple already determined by a search. The parameters of the
 base simulation (gain, cohesion, friction angle) are always in the model and are no names. The answer of a tool is the
-set of names of the columns that it selects.
+set of names of the columns that it selects; LISDD selects one for each region in which the simulation fails.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.validation.blind_trials.recordings.files import COLUMNS
 from regolithd.calibration.validation.blind_trials.recordings.ground import Ground, TorqueTable
 from regolithd.calibration.validation.blind_trials.recordings.traverse import FORE_AFT
+from regolithd.calibration.validation.lisdd import lisdd
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -33,19 +34,35 @@ Array = NDArray[np.float64]
 
 BLOCK_S = 30.0
 """Length of the blocks that stability selection draws, longer than the noise's correlation time [s]."""
+COVARIATES = ("t_s", "load_N", "pitch_rad", "roll_rad", "yaw_rate_rad_s", "motor_temperature_degC")
+"""Columns of the recording over which LISDD looks for regions, beside speed and slip."""
 
 
 @dataclass(frozen=True)
 class Regression:
     """A regression: residual [A] (rows,), columns of unit rms (rows, columns), their names, each row's block.
 
-    The derivatives with respect to the base parameters are projected out of residual and columns.
+    `tangents` are the derivatives with respect to the base parameters [A], shape (rows, 3); `covariates` are by name.
     """
 
     residual: Array
     columns: Array
     names: tuple[str, ...]
     block: NDArray[np.int64]
+    tangents: Array
+    covariates: dict[str, Array]
+
+    def projected(self) -> Regression:
+        """Return it with the tangents projected out of residual and columns, which have unit rms again."""
+        basis = np.linalg.qr(self.tangents)[0]
+        columns = self.columns - basis @ (basis.T @ self.columns)
+        residual = self.residual - basis @ (basis.T @ self.residual)
+        return replace(self, residual=residual, columns=of_unit_rms(columns))
+
+
+def of_unit_rms(columns: Array) -> Array:
+    """Return the columns over their root mean squares."""
+    return np.asarray(columns / (np.sqrt(np.mean(columns**2, axis=0)) + 1e-15))
 
 
 def read_recording(path: Path) -> dict[str, Array]:
@@ -88,19 +105,25 @@ def regression_of(recording: dict[str, Array], tables: dict[str, Any]) -> Regres
     stronger = current(replace(ground, cohesion_Pa=1.02 * ground.cohesion_Pa), load) - base
     steeper = current(replace(ground, friction_angle_rad=1.02 * ground.friction_angle_rad), load) - base
     residual = recording["motor_current_A"] - base
-    tangents = np.column_stack([column[moving] for column in (base, stronger, steeper)])
     per_newton = current(ground, load + 1) - base
     library = write_library(
         recording, speed=speed, slip=slip, base=base, per_newton=per_newton, residual=np.where(moving, residual, 0.0)
     )
     names = tuple(name for name, _ in library)
-    columns = np.column_stack([np.broadcast_to(column, base.shape)[moving] for _, column in library])
-    basis = np.linalg.qr(tangents)[0]
-    columns -= basis @ (basis.T @ columns)
-    left = residual[moving] - basis @ (basis.T @ residual[moving])
-    columns /= np.sqrt(np.mean(columns**2, axis=0)) + 1e-15
-    block = (np.broadcast_to(recording["t_s"], base.shape)[moving] // BLOCK_S).astype(np.int64)
-    return Regression(left, columns, names, block)
+    covariates = {name: recording[name] for name in COVARIATES} | {"speed": speed, "slip": slip}
+    return Regression(
+        residual=residual[moving],
+        columns=of_unit_rms(_rows([column for _, column in library], moving)),
+        names=names,
+        block=(recording["t_s"][moving] // BLOCK_S).astype(np.int64),
+        tangents=_rows([base, stronger, steeper], moving),
+        covariates={name: values[moving] for name, values in covariates.items()},
+    )
+
+
+def _rows(columns: list[Array], moving: NDArray[np.bool_]) -> Array:
+    """Return columns of shape (time, 6), or that broadcast to it, at the rows that move, shape (rows, columns)."""
+    return np.column_stack([np.broadcast_to(column, moving.shape)[moving] for column in columns])
 
 
 def write_library(
@@ -153,6 +176,7 @@ def pysindy_aic(regression: Regression) -> set[str]:
     """Return the names that sequentially thresholded least squares keeps, with the threshold of the lowest AIC."""
     from pysindy import STLSQ  # noqa: PLC0415  # loaded only when this baseline runs
 
+    regression = regression.projected()
     rows = len(regression.residual)
     scale = float(np.sqrt(np.mean(regression.residual**2)))
     best, chosen = np.inf, np.zeros(len(regression.names), bool)
@@ -173,6 +197,7 @@ def pysindy_aic(regression: Regression) -> set[str]:
 
 def stepwise_bic(regression: Regression) -> set[str]:
     """Return the names that forward selection adds while the Bayesian information criterion decreases."""
+    regression = regression.projected()
     rows = len(regression.residual)
     gram, towards = regression.columns.T @ regression.columns, regression.columns.T @ regression.residual
     total = float(regression.residual @ regression.residual)
@@ -196,6 +221,7 @@ def lasso_stability(regression: Regression, *, draws: int = 60, first: int = 6, 
     """Return the names among the first columns of the lasso path in at least `often` of random halves of the blocks."""
     from sklearn.linear_model import lars_path_gram  # noqa: PLC0415  # loaded only when this baseline runs
 
+    regression = regression.projected()
     blocks = np.unique(regression.block)
     parts = [regression.block == block for block in blocks]
     grams = np.array([regression.columns[part].T @ regression.columns[part] for part in parts])
@@ -211,10 +237,17 @@ def lasso_stability(regression: Regression, *, draws: int = 60, first: int = 6, 
     return {name for name, share in zip(regression.names, seen / draws, strict=True) if share >= often}
 
 
+def lisdd_terms(regression: Regression) -> set[str]:
+    """Return the names of the columns that LISDD selects in the regions where it finds the simulation to fail."""
+    found = lisdd(regression.tangents, regression.residual, regression.covariates, regression.columns)
+    return {regression.names[term] for term in found.terms}
+
+
 BASELINES: dict[str, Callable[[Regression], set[str]]] = {
     "pysindy-stlsq-aic": pysindy_aic,
     "stepwise-bic": stepwise_bic,
     "lasso-stability-selection": lasso_stability,
+    "lisdd": lisdd_terms,
 }
 """The baselines by name."""
 

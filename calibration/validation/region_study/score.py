@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch import compare
-from regolithd.calibration.validation.region_study.lisdd import lisdd
+from regolithd.calibration.validation.lisdd import lisdd
 from regolithd.calibration.validation.region_study.machines import Array, Case, Mask, Stated
 
 if TYPE_CHECKING:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from regolithd.calibration.validation.blind_trials.baselines import (
     BASELINES,
     lasso_stability,
+    lisdd_terms,
     main,
     pysindy_aic,
     read_recording,
@@ -35,7 +37,7 @@ def test_the_library_has_every_name(tmp_path: Path) -> None:
     assert "[soil]" in toml_text(trial.tables)
 
 
-@pytest.mark.parametrize("baseline", [pysindy_aic, stepwise_bic, lasso_stability], ids=list(BASELINES))
+@pytest.mark.parametrize("baseline", [pysindy_aic, stepwise_bic, lasso_stability, lisdd_terms], ids=list(BASELINES))
 def test_each_baseline_finds_an_obvious_effect(baseline: object, tmp_path: Path) -> None:
     """With white noise and the effect's exact column in the library, every baseline selects the effect."""
     trial = make_trial(Plan(1, 2, "nothing", ()), duration_s=240)
@@ -43,7 +45,7 @@ def test_each_baseline_finds_an_obvious_effect(baseline: object, tmp_path: Path)
     regression = regression_of(read_recording(recording), trial.tables)
     noise = np.random.default_rng(1).normal(size=regression.residual.shape)
     column = regression.columns[:, regression.names.index("viscous-friction")]
-    plain = type(regression)(column + 0.1 * noise, regression.columns, regression.names, regression.block)
+    plain = replace(regression, residual=column + 0.1 * noise)
     assert callable(baseline)
     assert "viscous-friction" in baseline(plain)
 

@@ -7,8 +7,8 @@ from itertools import product
 import numpy as np
 import pytest
 
+from regolithd.calibration.validation.lisdd import lisdd
 from regolithd.calibration.validation.region_study.__main__ import bias, figures_of, table
-from regolithd.calibration.validation.region_study.lisdd import lisdd
 from regolithd.calibration.validation.region_study.machines import MACHINES, Case, Group, Machine, case_of
 from regolithd.calibration.validation.region_study.picture import picture
 from regolithd.calibration.validation.region_study.score import METHODS, Score, scores_of

@@ -37,16 +37,27 @@ FEWEST_ROWS = 30
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """The parameters from the clean regime, and the rows in which the law fails."""
+    """The parameters from the clean regime, the rows in which the law fails, and the terms confirmed there.
+
+    `terms` are columns of the library, one for each region.
+    """
 
     parameters: Array
     failing: Mask
+    terms: tuple[int, ...]
 
 
-def lisdd(tangents: Array, reading: Array, covariates: dict[str, Array], seed: int = 0) -> Found:
-    """Run the procedure; `tangents` is ∂reading/∂parameter, shape (row, parameter)."""
+def lisdd(
+    tangents: Array, reading: Array, covariates: dict[str, Array], library: Array | None = None, seed: int = 0
+) -> Found:
+    """Run the procedure; `tangents` is ∂reading/∂parameter, shape (row, parameter).
+
+    The library has shape (row, term); without one it is powers of the covariates.
+    """
     rng = np.random.default_rng(seed)
+    library = _library(covariates) if library is None else library
     failing = np.zeros(len(reading), np.bool_)
+    terms: tuple[int, ...] = ()
     left = dict(covariates)
     parameters = _robust(tangents, reading)
     for _ in range(MOST_COVARIATES):
@@ -55,12 +66,13 @@ def lisdd(tangents: Array, reading: Array, covariates: dict[str, Array], seed: i
         regimes = tried.pop(name)
         del left[name]
         parameters = regimes.parameters
-        found = _confirmed(reading - tangents @ parameters, covariates, regimes, rng)
-        if not found.any():
+        confirmed = _confirmed(reading - tangents @ parameters, library, regimes, rng)
+        if not confirmed:
             break
-        failing |= found
+        failing |= np.any([region.rows for region in confirmed], axis=0)
+        terms += tuple(region.term for region in confirmed)
         parameters = _fitted(tangents, reading, ~failing)
-    return Found(parameters, failing)
+    return Found(parameters, failing, terms)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,31 +112,38 @@ def _regimes(tangents: Array, reading: Array, values: Array, known: Mask) -> _Re
     return _Regimes(bins, flagged, parameters, contrast)
 
 
-def _confirmed(residual: Array, covariates: dict[str, Array], regimes: _Regimes, rng: np.random.Generator) -> Mask:
-    """Return the rows of those regions in which a term of the library passes the F-test."""
+@dataclass(frozen=True, eq=False)
+class _Region:
+    """Rows of neighbouring flagged bins, the term of the library that describes them best, and its F-test's level."""
+
+    rows: Mask
+    term: int
+    level: float
+
+
+def _confirmed(residual: Array, library: Array, regimes: _Regimes, rng: np.random.Generator) -> list[_Region]:
+    """Return those regions in which a term of the library passes the F-test."""
     regions = [np.isin(regimes.bins, run) for run in _runs(regimes.flagged)]
-    tested = [rows for rows in regions if rows.sum() >= FEWEST_ROWS]
-    library = _library(covariates)
-    levels = np.array([_level(residual[rows], library[rows], rng) for rows in tested])
-    confirmed = _discoveries(levels)
-    found = np.zeros(len(residual), np.bool_)
-    for rows, sure in zip(tested, confirmed, strict=True):
-        found |= rows & bool(sure)
-    return found
+    tested = [
+        _Region(rows, *_tested(residual[rows], library[rows], rng)) for rows in regions if rows.sum() >= FEWEST_ROWS
+    ]
+    sure = _discoveries(np.array([region.level for region in tested]))
+    return [region for region, discovered in zip(tested, sure, strict=True) if discovered]
 
 
-def _level(residual: Array, library: Array, rng: np.random.Generator) -> float:
-    """Return the level of the F-test of the term that does best on held-out rows."""
+def _tested(residual: Array, library: Array, rng: np.random.Generator) -> tuple[int, float]:
+    """Return the term that does best on held-out rows, and the level of its F-test on others."""
     third = rng.permutation(len(residual)) % 3
     fit, held, test = (third == part for part in range(3))
     factors = np.sum(library[fit] * residual[fit, None], axis=0) / np.maximum(np.sum(library[fit] ** 2, axis=0), 1e-12)
     errors = np.sum((residual[held, None] - library[held] * factors) ** 2, axis=0)
-    term = library[test, int(np.argmin(errors))]
+    best = int(np.argmin(errors))
+    term = library[test, best]
     factor = float(term @ residual[test]) / max(float(term @ term), 1e-12)
     after = float(np.sum((residual[test] - factor * term) ** 2))
     before = float(np.sum(residual[test] ** 2))
     rows = int(test.sum())
-    return float(stats.f.sf((before - after) / (after / (rows - 1)), 1, rows - 1))
+    return best, float(stats.f.sf((before - after) / (after / (rows - 1)), 1, rows - 1))
 
 
 def _library(covariates: dict[str, Array]) -> Array:
