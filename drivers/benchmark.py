@@ -7,7 +7,7 @@ Both get the same motor TPDOs and end at the same three SI values, which is chec
 
     decode    from the frame to the values; no bus
     burst     200 frames wait in the socket, as after a SYNC on a busy bus: read and decode them all
-    single    one frame at a time, wake-up included
+    single    one frame at a time, each alone on a quiet bus (`PAUSE_S`), wake-up included
 
 Both run in the same process, in turns; the best of the rounds counts, as other load on the machine only adds time. In
 User Mode Linux a system call (locks among them) takes some 200 times as long as natively, which raises the ratios.
@@ -30,6 +30,7 @@ import can
 import canopen
 
 from regolithd.drivers.can.frame import Frame
+from regolithd.drivers.can.moderated_reader import INTERVAL_S
 from regolithd.drivers.can.open_bus import open_bus
 from regolithd.drivers.can.recvmmsg import CAN_FRAME
 from regolithd.drivers.devices.decoding.decoder import Decoder
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 
 NODE_ID, COB_ID = 1, 0x181
 FRAMES, ROUNDS = 200, 15
+PAUSE_S = 2 * INTERVAL_S
 FIGURES = Path("build/figures/reader_benchmark.json")
 DATA = [struct.pack("<Hhi", 0x0637, number, -number) for number in range(FRAMES)]
 Values = tuple[float, float, float]
@@ -143,6 +145,7 @@ async def reading_time(
             burst_s = time.perf_counter() - start
             singly_s = 0.0
             for frame in frames:
+                time.sleep(PAUSE_S)  # noqa: ASYNC251  # nothing else is to run
                 sender.send(frame)
                 start = time.perf_counter()
                 await decoded.more(1)

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 from regolithd.drivers.can.bus import Bus, BusState
 from regolithd.drivers.can.error_frame import error_classes, reported_state
+from regolithd.drivers.can.moderated_reader import ModeratedReader
 from regolithd.drivers.can.recvmmsg import BATCH, CAN_FRAME, SO_RXQ_OVFL, SO_TIMESTAMPNS, RecvmmsgBuffers
 from regolithd.drivers.errors import BusDownError, BusFullError, BusOpenError
 
@@ -48,7 +49,7 @@ class SocketCanBus(Bus):
         self._batch = RecvmmsgBuffers()
         self._socket = _open_socket(channel)
         self._reopening: asyncio.TimerHandle | None = None
-        self._loop.add_reader(self._socket, self._drain)
+        self._reader = ModeratedReader(self._socket, self._drain)
 
     async def send(self, frame: Frame) -> None:
         """See `Bus.send`."""
@@ -79,28 +80,31 @@ class SocketCanBus(Bus):
         """Close the socket."""
         if self._reopening is not None:
             self._reopening.cancel()
-        self._loop.remove_reader(self._socket)
+        self._reader.stop()
         self._socket.close()
 
     def resume_reading(self) -> None:
         """Resume reading after the consumer has caught up; the kernel has counted what it dropped meanwhile."""
-        self._loop.add_reader(self._socket, self._drain)
+        self._reader.start()
 
     def pause_reading(self) -> None:
         """Stop reading; the kernel keeps frames, and counts what it drops."""
-        self._loop.remove_reader(self._socket)
+        self._reader.stop()
 
-    def _drain(self) -> None:
-        """Read the frames waiting at the socket, batch by batch."""
+    def _drain(self) -> bool:
+        """Read the frames waiting at the socket, batch by batch; return whether there were any."""
+        found = False
         try:
             for _ in range(_ROUNDS):
                 frames = self._batch.receive(self._socket.fileno(), self.counters)
                 if frames:
                     self._take(frames)
+                    found = True
                 if len(frames) < BATCH:
                     break
         except OSError as error:
             self._lost(error)
+        return found
 
     def _take(self, frames: list[Frame]) -> None:
         for frame in frames:
@@ -128,7 +132,7 @@ class SocketCanBus(Bus):
         """Set the state to down; where the network device is gone, try to open it again."""
         self.change_state(BusState.DOWN)
         if error.errno in (errno.ENODEV, errno.ENXIO) and self._reopening is None:
-            self._loop.remove_reader(self._socket)
+            self._reader.stop()
             self._reopening = self._loop.call_later(_REOPEN_S, self._reopen)
 
     def _reopen(self) -> None:
@@ -141,7 +145,7 @@ class SocketCanBus(Bus):
         self._socket.close()
         self._socket = fresh
         self._batch = RecvmmsgBuffers()
-        self._loop.add_reader(fresh, self._drain)
+        self._reader = ModeratedReader(fresh, self._drain)
 
 
 def _open_socket(channel: str) -> socket.socket:

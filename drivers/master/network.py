@@ -40,6 +40,7 @@ from regolithd.drivers.master.events import (
     NodeEmergency,
     NodeLost,
 )
+from regolithd.drivers.master.heartbeat_consumer import HeartbeatConsumer
 from regolithd.drivers.master.intruders import IntruderWatch
 from regolithd.drivers.master.motion import Motion, each
 from regolithd.drivers.master.remote_node import RemoteNode
@@ -105,6 +106,7 @@ class Network:
         self.intruders = IntruderWatch(
             {node.node_id for node in settings.nodes} | settings.other_node_ids, master_id=settings.master_id
         )
+        self._heartbeats = HeartbeatConsumer(settings.node_lost_after_s)
         self._counters = NetworkCounters()
         self._on_frames = on_frames
         self._on_signals = on_signals
@@ -143,6 +145,7 @@ class Network:
             try:
                 async with asyncio.TaskGroup() as tasks:
                     tasks.create_task(produce_sync(self.bus, settings.sync_rate_Hz, self._counters.sync))
+                    tasks.create_task(self._heartbeats.run())
                     tasks.create_task(self._stop_when_requested())
                     for supervisor in self._supervisors.values():
                         tasks.create_task(supervisor.run())
@@ -195,7 +198,7 @@ class Network:
     def _add(self, node: NodeDescription) -> None:
         node_id = node.node_id
         remote = RemoteNode(self.bus, node, sdo_timeout_s=self.settings.sdo_timeout_s)
-        self._supervisors[node_id] = Supervisor(remote, self.settings, self._emit)
+        self._supervisors[node_id] = Supervisor(remote, self.settings, self._heartbeats, self._emit)
         self._sdo_clients[remote.answer_cob_id] = remote.sdo
         if node.device.commanded:
             self._drives[node_id] = Drive(self.bus, remote)

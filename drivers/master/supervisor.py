@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING
 from regolithd.drivers.master.boot import BootSettings, boot
 from regolithd.drivers.master.boot_error import BootError, BootReason
 from regolithd.drivers.master.events import NetworkEvent, NodeBooted, NodeBootFailed, NodeLost, NodeReturned
-from regolithd.drivers.master.heartbeat_consumer import until_lost
 from regolithd.drivers.master.identity import reservations
 from regolithd.drivers.master.status import NetworkSettings, NodePhase, NodeStatus
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from regolithd.drivers.master.heartbeat_consumer import HeartbeatConsumer
     from regolithd.drivers.master.remote_node import RemoteNode
 
 _SILENT = (BootReason.NO_BOOT_UP, BootReason.NO_SDO_ANSWER, BootReason.FELL_SILENT, BootReason.BUS_DOWN)
@@ -34,7 +34,13 @@ _PAUSE_S = 0.1  # before a node that sends again is booted: it may restart sever
 class Supervisor:
     """Supervises one node."""
 
-    def __init__(self, remote: RemoteNode, settings: NetworkSettings, emit: Callable[[NetworkEvent], None]) -> None:
+    def __init__(
+        self,
+        remote: RemoteNode,
+        settings: NetworkSettings,
+        heartbeats: HeartbeatConsumer,
+        emit: Callable[[NetworkEvent], None],
+    ) -> None:
         self.remote = remote
         self.attempts = 0
         self._settings = settings
@@ -44,6 +50,7 @@ class Supervisor:
             master_lost_after_s=settings.master_lost_after_s,
             boot_up_timeout_s=settings.boot_up_timeout_s,
         )
+        self._heartbeats = heartbeats
         self._emit = emit
         self._status = NodeStatus(remote.node)
         self._retry_s = settings.retry_after_s
@@ -101,7 +108,7 @@ class Supervisor:
     async def _monitor(self) -> bool:
         """Wait until the node is lost, and return whether its heartbeat stopped."""
         self._retry_s = self._settings.retry_after_s
-        loss = await until_lost(self.remote, self._settings.node_lost_after_s)
+        loss = await self._heartbeats.until_lost(self.remote)
         node_id = self.remote.node.node_id
         text = f"node {node_id} ({self.remote.node.kind}) lost: {loss.text}"
         self._status = replace(self._status, phase=NodePhase.LOST, text=text)

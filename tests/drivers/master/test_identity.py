@@ -17,7 +17,7 @@ from regolithd.drivers.errors import SdoAbortError, SdoTimeoutError
 from regolithd.drivers.master.boot_error import REMEDIES, BootReason
 from regolithd.drivers.master.bus_load import bus_load
 from regolithd.drivers.master.events import Identity
-from regolithd.drivers.master.heartbeat_consumer import Loss, until_lost
+from regolithd.drivers.master.heartbeat_consumer import HeartbeatConsumer, Loss
 from regolithd.drivers.master.identity import compare_identity, read_identity
 from regolithd.drivers.master.remote_node import RemoteNode
 from regolithd.drivers.master.scan import _result
@@ -118,7 +118,9 @@ def test_a_boot_up_message_is_counted_and_means_pre_operational() -> None:
 async def test_a_node_is_lost_by_silence_a_restart_or_another_state(state: NmtState | None, loss: Loss) -> None:
     """Only silence means that it cannot be booted at once."""
     remote = remote_node()
-    waiting = asyncio.ensure_future(until_lost(remote, 0.02 if state is None else 20.0))
+    consumer = HeartbeatConsumer(0.02 if state is None else 20.0)
+    running = asyncio.ensure_future(consumer.run())
+    waiting = asyncio.ensure_future(consumer.until_lost(remote))
     await asyncio.sleep(0)
     if state is not None:
         remote.take_state(NodeState(6, 4, NmtState.OPERATIONAL))
@@ -127,6 +129,7 @@ async def test_a_node_is_lost_by_silence_a_restart_or_another_state(state: NmtSt
         remote.take_state(NodeState(7, 4, state))
     async with asyncio.timeout(20):
         assert await waiting == loss
+    running.cancel()
 
 
 @pytest.mark.parametrize(
