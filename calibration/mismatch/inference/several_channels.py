@@ -42,8 +42,15 @@ def joined(answers: Sequence[AnyAnswer]) -> AnyAnswer:
         left_out=tuple(each for answer in answers for each in answer.left_out),
         probability=joint([answer.probability for answer in answers]),
         alternatives=other_answers(answers),
-        notes=tuple(dict.fromkeys(note for answer in answers for note in answer.notes)),
+        notes=notes_of(answers),
     )
+
+
+def notes_of(answers: Sequence[Answer]) -> tuple[str, ...]:
+    """Return the notes of all channels; one that is not of all of them is told with its channel."""
+    of_all = set.intersection(*(set(answer.notes) for answer in answers))
+    notes = (note if note in of_all else f"{answer.fit.channel}: {note}" for answer in answers for note in answer.notes)
+    return tuple(dict.fromkeys(notes))
 
 
 def other_answers(answers: Sequence[Answer]) -> tuple[OtherAnswer, ...]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pytest
+from sample_answer import ANSWER
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
 from regolithd.calibration.mismatch.answer import CalibratedParameter
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.inference.several_channels import combined
+from regolithd.calibration.mismatch.inference.several_channels import combined, notes_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -87,3 +89,10 @@ def test_two_channels_that_say_the_same_of_a_parameter_say_it_more_surely() -> N
     assert (both.high - both.low) / 2 == pytest.approx(1.645 / total**0.5)
     untold = posterior(2.0, 0.5)
     assert combined(once, untold).value == pytest.approx(2.2)
+
+
+def test_a_note_of_one_channel_is_told_with_the_channel() -> None:
+    """And a note of all channels once, as it is."""
+    current = replace(ANSWER, notes=("a gap", "no speed"), fit=replace(ANSWER.fit, channel="current_A"))
+    heat = replace(ANSWER, notes=("a gap",), fit=replace(ANSWER.fit, channel="heat_W"))
+    assert notes_of([current, heat]) == ("a gap", "current_A: no speed")
