@@ -164,7 +164,7 @@ def one_round(rig: Rig, faults: list[Fault], outcome: Outcome, *, drive: bool, h
     for fault in faults:
         if fault.heard is not None and not unnoticed(fault, faults):
             topic, fields = fault.heard
-            rig.check(rig.messages.heard(topic, begun, **fields), f"{what}: not heard: {topic} {fields}")
+            rig.check(rig.until_heard(topic, begun, **fields), f"{what}: not heard: {topic} {fields}")
     rig.end_drive()
     if driving:
         deadline = time.monotonic() + STOP_TIMEOUT_S

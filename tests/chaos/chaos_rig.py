@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 RATE_HZ = 10.0
 NORMAL_SNAPSHOTS = 10
 NORMAL_TIMEOUT_S = 120.0
+HEARD_TIMEOUT_S = 10.0
 SPEED_COUNTS_S = 2.0
 """Age at which a speed says nothing any more: twenty SYNCs."""
 DISK = "size=48M"
@@ -161,6 +162,15 @@ class Rig:
                 return self.messages.snapshots[-NORMAL_SNAPSHOTS].arrived_s - begun
             time.sleep(0.05)
         return None
+
+    def until_heard(self, topic: str, since_s: float, **fields: object) -> bool:
+        """Wait for a message as `MessageObserver.heard` does: what was queued meanwhile comes behind live snapshots."""
+        begun = time.monotonic()
+        while not self.messages.heard(topic, since_s, **fields):
+            if time.monotonic() - begun > HEARD_TIMEOUT_S:
+                return False
+            time.sleep(0.05)
+        return True
 
     def compare_with_bus(self, snapshots: list[Snapshot], what: str = "") -> None:
         """Check that each published value came on the bus between this SYNC and the next."""
