@@ -33,6 +33,7 @@ class Verdict:
     kind: str
     index: int
     problems: tuple[str, ...]
+    onset_problems: tuple[str, ...]
     named: tuple[str, ...]
     verdict: str
     named_on_nothing: bool
@@ -46,7 +47,7 @@ class Verdict:
     @property
     def right(self) -> bool:
         """Whether nothing is wrong with it."""
-        return not self.problems
+        return not self.problems and not self.onset_problems
 
 
 def judge(outcome: Outcome) -> Verdict:
@@ -63,6 +64,7 @@ def judge(outcome: Outcome) -> Verdict:
         truth["kind"],
         truth["index"],
         tuple(problems),
+        tuple(problem for said in outcome.answers for problem in onset_problems(truth, said)),
         tuple(sorted(names(last))),
         "no answer" if "failed" in last else str(last.get("verdict")),
         nothing and any(names(said) for said in outcome.answers),
@@ -151,8 +153,14 @@ def effect_problems(truth: Truth, true: Answer, found: Answer, at: int) -> Itera
     channel = truth["units"][at]["channels"][true["channel"]]
     if found.get("channel") != channel:
         yield f"{true['name']} in {found.get('channel')}, not {channel}"
-    if true["onset_s"] is not None:
+
+
+def onset_problems(truth: Truth, said: Answer) -> Iterator[str]:
+    """Yield the onsets of rightly named effects that are not within a tenth of the recording's length."""
+    for true, found in matched(truth, said):
         onset = found.get("onset_s")
+        if true["onset_s"] is None:
+            continue
         if onset is None or abs(onset - true["onset_s"]) > ONSET_TOLERANCE * truth["duration_s"]:
             yield f"{true['name']} from {onset} s, not {true['onset_s']:.0f} s of {truth['duration_s']:.0f} s"
 
@@ -295,6 +303,7 @@ def figures(verdicts: list[Verdict]) -> Figures:
     score: Figures = {
         "cases": len(verdicts),
         "right": share(v.right for v in verdicts),
+        "right_but_for_onsets": share(not v.problems for v in verdicts),
         "no_answer": share(v.verdict == "no answer" for v in verdicts),
         "consistent_over_effect": sum(v.consistent_over_effect for v in verdicts),
         "named_on_nothing": sum(v.named_on_nothing for v in verdicts),

@@ -19,6 +19,7 @@ GRAVE = (
 )
 SHARES = (
     ("right", "right"),
+    ("right_but_for_onsets", "right but for onsets"),
     ("no_answer", "no answer"),
     ("outside_located", "outside the list: located"),
     ("intervals_hold", "90 % intervals of effects that hold the truth"),
@@ -70,7 +71,9 @@ def line(verdict: Verdict) -> str:
     head = f"{verdict.machine} {verdict.kind} {verdict.index}"
     if verdict.right:
         return escape(f"{head}: right ({listed_names(verdict)}), {verdict.seconds:.0f} s")
-    return escape(f"{head}: {grave}{'; '.join(' '.join(p.split()) for p in verdict.problems)}")
+    return escape(
+        f"{head}: {grave}{'; '.join(' '.join(p.split()) for p in (*verdict.problems, *verdict.onset_problems))}"
+    )
 
 
 def listed_names(verdict: Verdict) -> str:

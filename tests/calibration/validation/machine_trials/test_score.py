@@ -155,7 +155,15 @@ def test_each_error_is_told(sealed: Answer, said: Answer, problem: str) -> None:
     """Wrong, missing and surplus names, wrong places, onsets and changes are problems, in words."""
     told = verdict(sealed, said, first=answer(MISSING, named()) if sealed["corrected"] else None)
     assert not told.right
-    assert any(problem in one for one in told.problems), told.problems
+    assert any(problem in one for one in (*told.problems, *told.onset_problems)), told
+
+
+def test_an_onset_that_is_off_is_told_apart_from_all_else() -> None:
+    """A case with the right names and a wrong onset is not right, and right but for onsets."""
+    off = verdict(truth("single", concealed(onset_s=80.0)), answer(MISSING, named(onset_s=105.0)))
+    near = verdict(truth("single", concealed(onset_s=80.0)), answer(MISSING, named(onset_s=95.0)))
+    score = figures([off, near])
+    assert (score["right"], score["right_but_for_onsets"]) == (0.5, 1.0)
 
 
 def test_consistent_over_an_effect_and_a_name_on_nothing_are_grave() -> None:
