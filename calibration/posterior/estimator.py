@@ -100,7 +100,7 @@ class Buffer:
         if self._slot is not None and not 0 <= slot - self._slot <= self.instants:
             self._completed.clear()  # a gap as long as the window, or time going backwards: start again
         self._slot = slot
-        self._current.append(np.stack([load_N, slip, torque_Nm]).astype(np.float64))
+        self._current.append(np.array([load_N, slip, torque_Nm], np.float64))
         return completed
 
     @property

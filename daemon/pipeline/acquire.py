@@ -144,7 +144,7 @@ class Acquisition:
     @property
     def shared_node_ids(self) -> tuple[int, ...]:
         """Node-IDs that two nodes have at present."""
-        return tuple(sorted(node_id for node_id, pdos in self._shared.items() if pdos))
+        return tuple(sorted(self._shared))
 
     def accept(self, item: Sync | Reading) -> Snapshot | None:
         """Take the next SYNC or reading; return the snapshot that it completes, if any."""
@@ -163,16 +163,23 @@ class Acquisition:
             self._heard = [*self._heard[1 - AWAITED_WINDOWS :], self._received_pdos]
             self._awaited = set().union(*self._heard)
             self._due = self._awaited.copy()
-        for cob_id, count in self._counts.items():
+        for count in self._counts.values():
             count.begin_window(self._ambiguous_windows)
-            if not count.has_two_senders:
-                for pdos in self._shared.values():
-                    pdos.discard(cob_id)
+        if self._shared:
+            self._shared = self._still_shared()
         self._foreign_sync_windows = max(self._foreign_sync_windows - 1, 0)
         self._taken = set()
         self._sequence += 1
         self._sync_ns = time_ns
         self._open = np.full((len(QUANTITIES), WHEELS), np.nan)
+
+    def _still_shared(self) -> dict[int, set[int]]:
+        """Return the PDOs that still have two senders, by node-ID."""
+        shared = {
+            node_id: {cob_id for cob_id in pdos if self._counts[cob_id].has_two_senders}
+            for node_id, pdos in self._shared.items()
+        }
+        return {node_id: pdos for node_id, pdos in shared.items() if pdos}
 
     @property
     def _received_pdos(self) -> set[int]:
@@ -199,7 +206,7 @@ class Acquisition:
         if count.outstanding or not in_window or self._open is None:
             self._late += 1
             return None
-        if self._foreign_sync_windows or self._shared.get(reading.node_id):
+        if self._foreign_sync_windows or reading.node_id in self._shared:
             self._doubtful += 1
         else:
             self._accepted += 1

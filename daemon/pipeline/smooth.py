@@ -47,10 +47,12 @@ class DropRejector:
         self._recent = np.full((max(1, length // self._every // 2 * 2 + 1), WHEELS), np.nan)
         self._threshold = threshold
         self._count = 0
+        self._middle = self._lowest = np.full(WHEELS, np.nan)  # of `_recent`, which changes with every n-th sample
 
     def reset(self, wheels: Mask) -> None:
         """Forget earlier samples of the wheels of a mask of shape (6,)."""
         self._recent[:, wheels] = np.nan
+        self._update()
 
     def step(self, values: Array) -> Array:
         """Return the values without drops."""
@@ -58,11 +60,15 @@ class DropRejector:
             return values
         if self._count % self._every == 0:
             self._recent[self._count // self._every % len(self._recent)] = values
+            self._update()
         self._count += 1
+        return np.where(values < self._lowest, self._middle, values)  # NaN is not less than anything
+
+    def _update(self) -> None:
         middle = _median(self._recent)
         spread = MAD_TO_STD * _median(np.abs(self._recent - middle))
-        lowest = middle - self._threshold * np.maximum(spread, MIN_SPREAD * np.abs(middle))
-        return np.where(values < lowest, middle, values)  # NaN is not less than anything
+        self._middle = middle
+        self._lowest = middle - self._threshold * np.maximum(spread, MIN_SPREAD * np.abs(middle))
 
 
 class LowPass:

@@ -49,15 +49,15 @@ class TerrainNetwork:
     def estimate(self, inputs: Mapping[str, Array]) -> Terrain:
         """Return the soil estimate under six wheels; `inputs` has an array of shape (6,) for each of `input_names`."""
         batch = np.array([inputs[name] for name in self.input_names])
-        answer = self._run(batch)
-        missing = np.isnan(batch).any(axis=0)
-        cohesion, tangent = np.where(missing, np.nan, answer)
+        missing = np.isnan(batch)
+        answer = self._run(np.where(missing, 0.0, batch))
+        cohesion, tangent = np.where(missing.any(axis=0), np.nan, answer)
         with np.errstate(invalid="ignore"):
             outside = (batch < self._low) | (batch > self._high)
         return Terrain(cohesion, np.arctan(tangent), outside)
 
     def _run(self, inputs: Array) -> Array:
-        batch = np.ascontiguousarray(np.nan_to_num(inputs).T, dtype=np.float32)
+        batch = np.ascontiguousarray(inputs.T, dtype=np.float32)
         (answer,) = self._session.run(None, {self._name: batch})
         return np.asarray(answer, np.float64).T
 
