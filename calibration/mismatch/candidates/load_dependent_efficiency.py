@@ -48,7 +48,7 @@ class LoadDependentEfficiency(Candidate):
     equation = "ΔI = a |I_sim| |I_sim/I_ref|^p sign(ω), or |I_sim| (1/(1 − a x) − 1) sign(ω), x = |I_sim|/I_ref − 1"
     words = "a loss that depends on the transmitted torque"
     signature = "a residual along the predicted current, curved against it"
-    experiment = "run at one {wheel_speed} with at least three different loads"
+    experiment = "carry at least three different loads at each {wheel_speed}"
     source = "CSF-11 efficiency over load (maker's chart): 0.3 to 0.7 from a tenth of rated torque to rated"
     requires = ("torque",)
     coefficients: ClassVar = (Coefficient("relative_loss", "1", 0),)

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.answer import Indistinguishable
+    from regolithd.calibration.mismatch.experiments.choice import Experimenter
+    from regolithd.calibration.mismatch.inference.alternatives import Alternative
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
@@ -18,11 +20,17 @@ EXACT = 1e12
 """Prior precision of a scaled coefficient that counts as known exactly."""
 
 
-def collinear_sets(equations: NormalEquations, given: Fit, entry_threshold: float) -> tuple[Indistinguishable, ...]:
+def collinear_sets(
+    equations: NormalEquations,
+    given: Fit,
+    experimenter: Experimenter,
+    others: Sequence[Alternative] = (),
+    taken: frozenset[str] = frozenset(),
+) -> tuple[Indistinguishable, ...]:
     """Return sets of effects of which each could stand for each, were it there at a size worth telling apart.
 
     What the simulation's free parameters can imitate belongs to a set as well: constant speed on flat ground makes
-    Coulomb friction, viscous friction and cohesion one.
+    Coulomb friction, viscous friction and cohesion one. A set with one of the names in `taken` is left out.
     """
     terms = representatives(equations)
     like = {
@@ -37,8 +45,8 @@ def collinear_sets(equations: NormalEquations, given: Fit, entry_threshold: floa
         seen.add(frozenset(members))
         first = [terms[member][0] for member in members]
         names = (*members, *parameters_like(equations, given.terms, first))
-        if len(names) > 1:
-            found.append(with_experiment(names, equations, given.terms, first, entry_threshold))
+        if len(names) > 1 and not taken & set(names):
+            found.append(with_experiment(names, experimenter.on(equations), given.terms, first, others))
     return tuple(found)
 
 

@@ -8,32 +8,137 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import Indistinguishable
-from regolithd.calibration.mismatch.inference.statements import capital
-from regolithd.calibration.mismatch.problem.words import in_words
+from regolithd.calibration.mismatch.experiments.margins import of_effect, of_parameter, predictable
+from regolithd.calibration.mismatch.inference.statements import capital, listed
+from regolithd.calibration.mismatch.problem.words import in_words, label_of_column, unit_in_label, word_for
 from regolithd.calibration.mismatch.regression.as_read import long_run_weights
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate
+    from regolithd.calibration.mismatch.experiments.choice import Choice, Experimenter
+    from regolithd.calibration.mismatch.experiments.margins import Hypothesis
+    from regolithd.calibration.mismatch.experiments.settings import Setting
+    from regolithd.calibration.mismatch.inference.alternatives import Alternative
+    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 UNITS_S = {"hours": 3600.0, "minutes": 60.0, "s": 1.0}
 LEAST_IN_UNIT = 5.0
 """Durations are told in the largest unit of which they are so many, rounded up to as many again (a choice)."""
+LIKELY_MARGIN = 6.0
+"""Margin of evidence up to which another answer is held against a set of effects: odds of one in twenty (a choice)."""
+MOST_OTHERS = 4
+"""Other answers that are held against a set (a choice: computing time)."""
 
 
 def with_experiment(
     names: tuple[str, ...],
+    experimenter: Experimenter,
+    given: Sequence[Term],
+    members: Sequence[Term],
+    others: Sequence[Alternative] = (),
+) -> Indistinguishable:
+    """Return a set of effects with the experiment that tells its members, and other likely answers, apart.
+
+    It is the predicted drive with the largest expected margin between the two closest of them. What follows from no
+    drive (a fault that grows with time), and all where drives cannot be predicted, is told by its own experiment.
+    """
+    equations = experimenter.equations
+    choice = experimenter.choose(
+        _hypotheses(names, experimenter.equations, given, members, others),
+        [term for term in given if predictable(term)],
+    )
+    if choice is None:
+        return _own_experiments(names, experimenter, given, members)
+    problem, unloaded = equations.problem, equations.problem.simulation.unloaded_experiment
+    left = [member.group.candidate for member in members if not predictable(member)]
+    apart = [candidate for candidate in left if candidate is not None]
+    drives = [
+        *_instructions(problem, choice.varied, [*members, *_terms(others)]),
+        *(in_words(candidate.experiment, problem.labels) for candidate in apart),
+    ]
+    lift = bool(unloaded) and (choice.lift or any(candidate.run_unloaded for candidate in apart))
+    duration_s, in_all = rounded_up(choice.duration_s)
+    sentence = "; then ".join(dict.fromkeys([*drives, unloaded] if lift else drives))
+    ranges = listed([_range(problem, setting) for setting in choice.settings]) if choice.settings else ""
+    return Indistinguishable(
+        effects=names,
+        experiment=f"{capital(sentence)}; {in_all} in all{ranges and f' ({ranges})'}. {_expectation(choice)}",
+        vary=tuple(dict.fromkeys((*choice.varied, *(name for each in apart for name in each.varied(problem))))),
+        duration_s=duration_s,
+        lift=lift,
+    )
+
+
+def _hypotheses(
+    names: Iterable[str],
     equations: NormalEquations,
     given: Sequence[Term],
     members: Sequence[Term],
-    entry_threshold: float,
+    others: Sequence[Alternative],
+) -> list[Hypothesis]:
+    """Return what may be true: the members, the parameters among the names, and other likely answers."""
+    found = {member.name: of_effect(equations, given, member) for member in members if predictable(member)}
+    effects = {member.name for member in members}
+    parameters = [of_parameter(equations, given, name) for name in names if name not in effects]
+    kept = {term.name for term in given}
+    likely = [other for other in others if other.margin < LIKELY_MARGIN + min(each.margin for each in (*others,))]
+    for other in likely[:MOST_OTHERS]:
+        instead = [term for term in other.terms if term.name not in kept and term.group.named]
+        if len(instead) == 1 and instead[0].name not in found and predictable(instead[0]):
+            found[instead[0].name] = of_effect(equations, other.terms, instead[0])
+    return [*found.values(), *(each for each in parameters if each is not None)]
+
+
+def _instructions(problem: Problem, varied: Iterable[str], first: Sequence[Term]) -> list[str]:
+    """Return instructions that vary these covariates: those of the terms' candidates, as few as do it, then others."""
+    wanted = set(varied)
+    found: list[str] = []
+    candidates = dict.fromkeys(term.group.candidate for term in first if term.group.candidate is not None)
+    left = set(wanted)
+    while left:
+        best = max(candidates, key=lambda each: _covered(each, problem, wanted, left), default=None)
+        if best is None or not _covered(best, problem, wanted, left):
+            words = [word_for(name, problem.labels) for name in sorted(left)]
+            return [*found, f"hold at least four values of the {listed(words)}"]
+        left -= set(best.varied(problem))
+        found.append(in_words(best.experiment, problem.labels))
+    return found
+
+
+def _covered(candidate: Candidate, problem: Problem, wanted: set[str], left: set[str]) -> int:
+    """Return how many covariates that are left an experiment varies; 0 where it varies others than are wanted."""
+    varied = set(candidate.varied(problem))
+    return len(varied & left) if varied <= wanted else 0
+
+
+def _range(problem: Problem, setting: Setting) -> str:
+    """Return between which values a covariate is varied."""
+    ends = f"{setting.low:.2g} to {setting.high:.2g}"
+    if setting.covariate == "torque":
+        return f"{label_of_column(setting.channel).split(' (')[0]} {ends} times the usual"
+    unit = unit_in_label(setting.covariate, problem.labels)
+    return f"{word_for(setting.covariate, problem.labels)} {ends} {unit}".strip()
+
+
+def _expectation(choice: Choice) -> str:
+    """Return how well the closest pair is told apart."""
+    times = int(np.ceil(choice.needed / max(choice.margin, 1e-9)))
+    told = f"{choice.needed:.0f} tells them apart nine times in ten" + (f": {times} times as long" if times > 1 else "")
+    return f"Expected Δχ² between {listed(choice.pair)}, the closest two: {choice.margin:.0f} ({told})."
+
+
+def _own_experiments(
+    names: tuple[str, ...], experimenter: Experimenter, given: Sequence[Term], members: Sequence[Term]
 ) -> Indistinguishable:
-    """Return a set of effects with the experiment that varies each member's covariate alone.
+    """Return a set with the experiments that its members' candidates state, where none can be predicted.
 
     Where the simulation's free parameters can imitate a member, a part without load is added: there they have no part.
     """
+    equations = experimenter.equations
     problem = equations.problem
     candidates = [member.group.candidate for member in members if member.group.candidate is not None]
     drives = [in_words(candidate.experiment, problem.labels) for candidate in candidates]
@@ -41,14 +146,19 @@ def with_experiment(
     hidden = any(_imitated(equations, given, member) for member in members)
     lift = bool(unloaded) and (hidden or any(candidate.run_unloaded for candidate in candidates))
     sentence = "; then ".join(dict.fromkeys([*drives, unloaded] if lift else drives))
-    duration_s, in_all = rounded_up(seconds_needed(equations, entry_threshold))
+    duration_s, in_all = rounded_up(seconds_needed(equations, experimenter.entry_threshold))
+    why = experimenter.unpredictable or "no drive that can be predicted does it"
     return Indistinguishable(
         effects=names,
-        experiment=f"{capital(sentence)}; {in_all} in all.",
+        experiment=f"{capital(sentence)}; {in_all} in all. How well that tells them apart is not predicted: {why}.",
         vary=tuple(dict.fromkeys(name for candidate in candidates for name in candidate.varied(problem))),
         duration_s=duration_s,
         lift=lift,
     )
+
+
+def _terms(others: Sequence[Alternative]) -> list[Term]:
+    return [term for other in others for term in other.terms if term.group.named]
 
 
 def _imitated(equations: NormalEquations, given: Sequence[Term], member: Term) -> bool:
@@ -58,7 +168,7 @@ def _imitated(equations: NormalEquations, given: Sequence[Term], member: Term) -
 
 
 def seconds_needed(equations: NormalEquations, entry_threshold: float) -> float:
-    """Return how long an experiment must last before the smallest effect shows nine times in ten [s].
+    """Return how long an experiment that is not predicted must last to show the smallest effect nine times in ten [s].
 
     Varying the right covariates leaves a tenth of an effect outside the span of the free parameters; each reading then
     adds to its Δχ² what the noise of this recording allows.

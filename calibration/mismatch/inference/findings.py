@@ -16,11 +16,12 @@ from regolithd.calibration.mismatch.answer import (
     Unexplained,
 )
 from regolithd.calibration.mismatch.changes import ChangedSize, change_in_words, changes_of
+from regolithd.calibration.mismatch.inference.alternatives import alternatives
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values, wheel_names
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
 from regolithd.calibration.mismatch.inference.intervals import parameters_of
 from regolithd.calibration.mismatch.inference.located import share_of_residual, spell_of
-from regolithd.calibration.mismatch.inference.probability import probability_of
+from regolithd.calibration.mismatch.inference.probability import other_answers, probability
 from regolithd.calibration.mismatch.inference.ranges import range_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
 from regolithd.calibration.mismatch.inference.statements import statement
@@ -47,9 +48,9 @@ def answer_of(
     effects, changes = named_effects(decision, held_out)
     parameters = calibrated_parameters(decision)
     moved = beyond_prior(parameters, equations.thresholds)
-    extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold)
+    rest = alternatives(decision)
+    extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold, rest)
     channel, floor = problem.simulation.channel, noise_floor(decision)
-    probability, others = probability_of(decision)
     return Answer(
         verdict=verdict_of(decision, moved),
         effects=effects,
@@ -60,8 +61,8 @@ def answer_of(
         parameters=parameters,
         changes=changes,
         left_out=problem.left_out,
-        probability=probability,
-        alternatives=others,
+        probability=probability(rest, equations.thresholds),
+        alternatives=other_answers(rest, equations.thresholds),
         notes=(
             *map(_beyond_prior_in_words, moved),
             *map(change_in_words, changes),

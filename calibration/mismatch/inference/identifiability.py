@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regolithd.calibration.mismatch.experiments.choice import experimenter_of
 from regolithd.calibration.mismatch.inference.collinearity import collinear_sets, parameters_like
 from regolithd.calibration.mismatch.inference.experiment import with_experiment
 from regolithd.calibration.mismatch.regression.candidate_groups import implausibility
@@ -17,38 +18,43 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from regolithd.calibration.mismatch.answer import Indistinguishable
+    from regolithd.calibration.mismatch.experiments.choice import Experimenter
+    from regolithd.calibration.mismatch.inference.alternatives import Alternative
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 
 def indistinguishable(
-    equations: NormalEquations, named: Fit, whole: Fit, entry_threshold: float
+    equations: NormalEquations, named: Fit, whole: Fit, entry_threshold: float, others: Sequence[Alternative] = ()
 ) -> tuple[NormalEquations, tuple[Indistinguishable, ...]]:
     """Return what could stand for the named effects, and what could not be told apart were it there.
 
-    Shapes of rivals are optimised: the equations that come back have their columns.
+    Shapes of rivals are optimised: the equations that come back have their columns. The experiments tell `others`,
+    the most probable other answers, apart as well.
     """
-    equations, found = rivals(equations, named, entry_threshold)
-    names = {name for one in found for name in one.effects}
-    sets = collinear_sets(equations, whole, entry_threshold)
-    return equations, (*found, *(one for one in sets if not names & set(one.effects)))
+    experimenter = experimenter_of(equations, entry_threshold)
+    equations, found = rivals(equations, named, experimenter, others)
+    taken = frozenset(name for one in found for name in one.effects)
+    return equations, (*found, *collinear_sets(equations, whole, experimenter.on(equations), others, taken))
 
 
 def rivals(
-    equations: NormalEquations, named: Fit, entry_threshold: float
+    equations: NormalEquations, named: Fit, experimenter: Experimenter, others: Sequence[Alternative] = ()
 ) -> tuple[NormalEquations, tuple[Indistinguishable, ...]]:
     """Return, for each named effect that has rivals, the set of effects that explain the recording as well."""
     found = []
     for index in range(len(named.terms)):
-        others = named.without(index)
+        rest = named.without(index)
         equations, members = _in_its_place(equations, named, index)
         taken = {member.name for member in (*named.terms, *members)}
         equations, additions = _takes_over(equations, named, index)
         members += [more for more in additions if more.name not in taken]
-        names = (*(member.name for member in members), *parameters_like(equations, others, members))
+        names = (*(member.name for member in members), *parameters_like(equations, rest, members))
         if len(names) > 1:
-            found.append(with_experiment(names, equations, others, members, entry_threshold))
+            found.append(with_experiment(names, experimenter.on(equations), rest, members, others))
     return equations, tuple(found)
 
 

@@ -12,24 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import OtherAnswer
-from regolithd.calibration.mismatch.inference.alternatives import LARGEST_MARGIN, UNEXPLAINED, alternatives
+from regolithd.calibration.mismatch.inference.alternatives import LARGEST_MARGIN, UNEXPLAINED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.inference.alternatives import Alternative
-    from regolithd.calibration.mismatch.selection.decision import Decision
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
 TOLD = 3
 """Other answers that are told."""
-
-
-def probability_of(decision: Decision) -> tuple[float, tuple[OtherAnswer, ...]]:
-    """Return the probability that the set of names is right, and the most probable other answers."""
-    others = alternatives(decision)
-    limits = decision.equations.thresholds
-    return probability(others, limits), other_answers(others, limits)
 
 
 def probability(others: Sequence[Alternative], thresholds: Thresholds) -> float:

@@ -76,6 +76,10 @@ class Predictor(Protocol):
     def unloaded_experiment(self) -> str:
         """How to run the machine without its load, as an instruction; empty where that cannot be done."""
 
+    @property
+    def experiment_spans(self) -> Mapping[str, float]:
+        """How far from its usual value, each way, an experiment can move a covariate."""
+
     def prepare(self, recording: Recording) -> Recording:
         """Return the recording with the channels that the prediction needs."""
 

@@ -35,6 +35,7 @@ class OneChannel(Simulation):
             "unlikely_effects",
             "covariate_labels",
             "unloaded_experiment",
+            "experiment_spans",
             "between_readings",
             "undefined_at_times",
             "zero_means_nothing",

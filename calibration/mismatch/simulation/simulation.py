@@ -68,6 +68,10 @@ class Simulation:
     """Axis labels with units for the report, by covariate: {"wheel_speed": "carriage speed (m/s)"}."""
     unloaded_experiment: ClassVar[str] = ""
     """How to run the machine without its load, as an instruction: what free parameters of the load hide shows there."""
+    experiment_spans: ClassVar[Mapping[str, float]] = {}
+    """How far from its usual value, each way, an experiment can move a covariate: {"temperature": 15.0, "pitch": 0.1}.
+    Where nothing is said, a speed, load, torque or slip is varied from half to one and a half times the usual one, and
+    everything else over what the recording has of it."""
     between_readings: ClassVar[Mapping[str, Between]] = {}
     """What to do between the readings of a column that is sampled less often than the rows: `linear` (the default),
     `hold` or `blank`."""

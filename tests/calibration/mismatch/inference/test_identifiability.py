@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from linear_machine import AXES, CANDIDATES, INSTANTS, Constant, Drag, Power, equations_of, problem_of, table, term_of
 
+from regolithd.calibration.mismatch.experiments.choice import Experimenter, experimenter_of
+from regolithd.calibration.mismatch.inference.alternatives import Alternative
 from regolithd.calibration.mismatch.inference.collinearity import (
     collinear_sets,
     energy_apart,
@@ -49,7 +51,7 @@ class LikeDrag(Drag):
 def test_a_pair_that_is_nearly_one_is_a_set() -> None:
     """Each could stand for each; what can be told apart is in none."""
     equations = equations_of(problem_of(table()), (Drag(), LikeDrag(), Power()))
-    sets = collinear_sets(equations, equations.fit(()), THRESHOLD)
+    sets = collinear_sets(equations, equations.fit(()), experimenter_of(equations, THRESHOLD))
     assert [one.effects for one in sets if "drag" in one.effects] == [("drag", "like-drag")]
     assert "drive both ways" in sets[0].experiment.lower()
     terms = representatives(equations)
@@ -81,7 +83,7 @@ def test_a_named_effect_has_those_rivals_that_fit_as_well() -> None:
     """A twin is one, a power of the speed is none; the rivals' shapes are optimised in new equations."""
     equations = equations_of(problem_of(table(drag=0.3)), (Drag(), LikeDrag(), Power()))
     named = equations.fit([term_of(equations, "drag")])
-    extended, (found,) = rivals(equations, named, THRESHOLD)
+    extended, (found,) = rivals(equations, named, experimenter_of(equations, THRESHOLD))
     assert found.effects[:2] == ("drag", "like-drag")
     assert "power" not in found.effects
     assert extended.design.size >= equations.design.size
@@ -92,7 +94,9 @@ def test_a_named_effect_has_those_rivals_that_fit_as_well() -> None:
 def test_a_clear_effect_has_no_rivals() -> None:
     """Speeds of many sizes tell the drag from all others."""
     equations = equations_of(problem_of(table(drag=0.3)), (Drag(), Power()))
-    assert rivals(equations, equations.fit([term_of(equations, "drag")]), THRESHOLD)[1] == ()
+    assert (
+        rivals(equations, equations.fit([term_of(equations, "drag")]), experimenter_of(equations, THRESHOLD))[1] == ()
+    )
 
 
 class HalfTheTime(Drag):
@@ -111,7 +115,9 @@ def test_what_explains_a_part_of_an_effect_is_no_rival_of_it() -> None:
     equations = equations_of(problem_of(table(drag=0.3)), (Drag(), HalfTheTime()))
     part = equations.fit([term_of(equations, "half-the-time")])
     assert acceptable(equations, part)
-    assert rivals(equations, equations.fit([term_of(equations, "drag")]), THRESHOLD)[1] == ()
+    assert (
+        rivals(equations, equations.fit([term_of(equations, "drag")]), experimenter_of(equations, THRESHOLD))[1] == ()
+    )
 
 
 @pytest.mark.parametrize(("lead", "apart", "rate"), [(0.0, 10.8241, 0.05), (0.0, 1e-6, 0.5), (8.0, 4.0, 0.00135)])
@@ -166,16 +172,54 @@ class Patient(Drag):
     run_unloaded: ClassVar = True
 
 
+def unpredicted(equations: NormalEquations) -> Experimenter:
+    """Return an experimenter that cannot predict a drive."""
+    return replace(experimenter_of(equations, THRESHOLD), drives=None, unpredictable="it has a state")
+
+
 def test_an_experiment_names_each_drive_once_and_its_length() -> None:
     """Capitalised, joined, in the machine's words; the same as data."""
     equations = equations_of(problem_of(table()), (Drag(), Power(), Patient()))
     members = [term_of(equations, name) for name in ("drag", "patient", "power")]
-    found = with_experiment(("drag", "patient", "power"), equations, (), members, THRESHOLD)
+    found = with_experiment(("drag", "patient", "power"), unpredicted(equations), (), members)
     assert found.experiment.startswith("Drive both ways; then wait for time; then drive fast and slowly; ")
     assert found.vary == ("direction", "time", "wheel_speed")
     assert not found.lift, "the machine does not say how it runs without load"
-    alone = with_experiment(("drag",), equations, (), members[:1], THRESHOLD)
-    assert alone.experiment == f"Drive both ways; {rounded_up(alone.duration_s)[1]} in all."
+    alone = with_experiment(("drag",), unpredicted(equations), (), members[:1])
+    assert alone.experiment == (
+        f"Drive both ways; {rounded_up(alone.duration_s)[1]} in all. "
+        "How well that tells them apart is not predicted: it has a state."
+    )
+
+
+def test_a_predicted_experiment_says_ranges_margin_and_the_closest_pair() -> None:
+    """What follows from no drive is told by its own experiment behind it."""
+    equations = equations_of(problem_of(one_speed()), (Constant(), Power(), Patient()))
+    members = [term_of(equations, name) for name in ("offset", "patient", "power")]
+    experimenter = experimenter_of(equations, THRESHOLD)
+    found = with_experiment(("offset", "power"), experimenter, (), members[::2])
+    assert "(speed 0.4 to 1.2 rad/s)" in found.experiment
+    assert "Expected Δχ² between offset and power, the closest two: " in found.experiment
+    assert "tells them apart nine times in ten)" in found.experiment
+    assert "wheel_speed" in found.vary
+    faulty = replace(members[1], group=replace(members[1].group, shape={"onset_s": 1.0}))
+    both = with_experiment(("offset", "patient", "power"), experimenter, (), [members[0], faulty, members[2]])
+    assert "; then wait for time; " in both.experiment
+    assert both.vary == (*found.vary, "time")
+
+
+def test_other_likely_answers_are_told_apart_as_well() -> None:
+    """One that is far behind is not, nor one that the set has."""
+    equations = equations_of(problem_of(one_speed()), (Constant(), Drag(), Power()))
+    offset, drag, power = (term_of(equations, name) for name in ("offset", "drag", "power"))
+    experimenter = experimenter_of(equations, THRESHOLD)
+    near, far = Alternative(("power",), 1.0, (power,)), Alternative(("power",), 30.0, (power,))
+    first = Alternative(("drag",), 0.0, (drag,))
+    alone = with_experiment(("offset", "drag"), experimenter, (), [offset, drag], (first, far))
+    told = with_experiment(("offset", "drag"), experimenter, (), [offset, drag], (first, near))
+    assert "power" not in alone.experiment
+    assert "power" in told.experiment
+    assert told.effects == ("offset", "drag")
 
 
 def test_more_noise_needs_a_longer_experiment_within_what_the_recording_allows() -> None:
@@ -202,7 +246,7 @@ def test_a_duration_is_told_in_its_own_unit(seconds: float, rounded: float, word
 
 def instruction(equations: NormalEquations, name: str) -> str:
     """Return the text of the experiment for one effect alone."""
-    return with_experiment((name,), equations, (), [term_of(equations, name)], THRESHOLD).experiment
+    return with_experiment((name,), unpredicted(equations), (), [term_of(equations, name)]).experiment
 
 
 def test_where_free_parameters_hide_a_member_the_load_is_taken_off(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ import pytest
 from linear_machine import CANDIDATES, equations_of, problem_of, table
 
 from regolithd.calibration.mismatch.inference.alternatives import Alternative, alternatives
-from regolithd.calibration.mismatch.inference.probability import other_answers, probability, probability_of
+from regolithd.calibration.mismatch.inference.probability import other_answers, probability
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection.decision import Decision, decide
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
@@ -48,8 +48,9 @@ def test_a_strong_drag_is_surer_than_a_weak_one() -> None:
     """The margin to nothing shrinks with the effect, and with it the probability."""
     strong, weak = (decided(drag=drag) for drag in (0.3, 0.035))
     assert {term.name for term in strong.named.terms} == {"drag"}
-    assert probability_of(strong)[0] > 0.9
-    assert probability_of(strong)[0] > probability_of(weak)[0]
+    sure, unsure = (probability(alternatives(each), THRESHOLDS) for each in (strong, weak))
+    assert sure > 0.9
+    assert sure > unsure
 
 
 def test_the_alternatives_are_one_name_away() -> None:

@@ -1,0 +1,167 @@
+"""The choice of an experiment: what can be set, drives as predicted, margins, and the drive that is chosen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+from linear_machine import AXES, NOISE, STEP_S, Drag, Level, Power, equations_of, problem_of, table, term_of
+
+from regolithd.calibration.mismatch import from_columns
+from regolithd.calibration.mismatch.experiments.choice import experimenter_of
+from regolithd.calibration.mismatch.experiments.drives import DIRECTION, SPEED, UNLOADED, Drives
+from regolithd.calibration.mismatch.experiments.margins import expected_of, of_effect, of_parameter, predictable
+from regolithd.calibration.mismatch.experiments.settings import predicts_row_by_row, settings_of
+from regolithd.calibration.mismatch.problem.build import build_problem
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+Array = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+THRESHOLD = 8.0
+
+
+class Warm(Level):
+    """The machine with a gear between the recorded speed and the wheel's, and a temperature that never varies."""
+
+    inputs = ("speed_rad_s", "motor_degC")
+    experiment_spans: ClassVar = {"temperature": 10.0}
+    unloaded_experiment = "take the load off"
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the wheel's speed, the temperature, and a heat that two columns make."""
+        speed = (inputs["speed_rad_s"] - 0.1) / 4
+        heat = inputs["motor_degC"] * inputs["speed_rad_s"] ** 2
+        return {"wheel_speed": speed, "temperature": inputs["motor_degC"], "heat": heat, "time": inputs["t_s"]}
+
+
+class Lagging(Level):
+    """A machine with a state: the level follows the speed's running sum."""
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the level and a hundredth of the way."""
+        return values["level"] + 0.01 * np.cumsum(inputs["speed_rad_s"], axis=0)
+
+
+def one_way(drag: float = 0.3) -> dict[str, Array]:
+    """Return a recording at one speed in one direction."""
+    columns = table(drag=drag)
+    noise = columns["reading_V"] - 2.0 - drag * np.sign(columns["speed_rad_s"])
+    return {
+        **columns,
+        "speed_rad_s": np.full(len(noise), 2.1),
+        "motor_degC": np.full(len(noise), 20.0),
+        "reading_V": 2.0 + drag + noise,
+    }
+
+
+def warm(drag: float = 0.3) -> NormalEquations:
+    """Return the equations of such a recording."""
+    return equations_of(build_problem(from_columns(one_way(drag), unit="axis"), Warm()), (Drag(), Power()))
+
+
+def test_a_column_sets_a_covariate_that_is_linear_in_it() -> None:
+    """The speed through the gear, from half to one and a half times the usual; the temperature as far as is stated."""
+    found = settings_of(warm().problem, ["wheel_speed", "temperature", "heat", "time", "slip"])
+    assert list(found) == ["wheel_speed", "temperature"]
+    speed, temperature = found["wheel_speed"], found["temperature"]
+    assert (speed.channel, speed.low, speed.high) == ("speed_rad_s", pytest.approx(0.25), pytest.approx(0.75))
+    assert speed.channel_at(np.array([[0.5]])) == pytest.approx(np.full((1, AXES), 2.1))
+    assert (temperature.low, temperature.high) == (10.0, 30.0)
+
+
+def test_a_covariate_that_nothing_says_how_to_vary_is_not_set() -> None:
+    """A constant one without a span."""
+
+    class Cold(Warm):
+        experiment_spans: ClassVar = {}
+
+    problem = build_problem(from_columns(one_way(), unit="axis"), Cold())
+    assert list(settings_of(problem, ["wheel_speed", "temperature"])) == ["wheel_speed"]
+
+
+def test_a_simulation_with_a_state_is_not_predicted() -> None:
+    """Rows that are put together otherwise would be another history."""
+    assert predicts_row_by_row(problem_of(table()))
+    problem = build_problem(from_columns(table(), unit="axis"), Lagging())
+    assert not predicts_row_by_row(problem)
+    experimenter = experimenter_of(equations_of(problem, (Drag(),)), THRESHOLD)
+    assert experimenter.drives is None
+    assert experimenter.unpredictable == "the simulation depends on what was before"
+
+
+def test_a_drive_varies_what_is_asked_for_and_nothing_else() -> None:
+    """Speed and temperature step through their ranges, the direction changes, and the last third is without load."""
+    drives = Drives(warm().problem, ["wheel_speed", "temperature"])
+    assert drives.elements == ("wheel_speed", "temperature", "direction", "wheel_acceleration", "unloaded")
+    speeds = drives(frozenset({SPEED})).problem.covariates
+    levels = np.unique(np.abs(speeds["wheel_speed"]).round(6)).tolist()
+    assert levels == pytest.approx([0.25, 0.416667, 0.583333, 0.75])
+    assert speeds["wheel_speed"].min() < 0, "what is varied of the motion is varied both ways"
+    assert np.unique(speeds["temperature"]).tolist() == [20.0]
+    assert not speeds["wheel_acceleration"].any()
+    both = drives(frozenset({DIRECTION})).problem.covariates
+    assert np.unique(both["wheel_speed"].round(6)).tolist() == [-0.5, 0.5]
+    lifted = drives(frozenset({UNLOADED}))
+    assert lifted.loaded.mean() == pytest.approx(2 / 3)
+    assert not lifted.problem.prediction[lifted.loaded[:, 0] == 0].any()
+    assert not lifted.tangents[:, lifted.loaded[:, 0] == 0].any()
+    assert drives(frozenset({SPEED})) is drives(frozenset({SPEED}))
+
+
+def test_the_margin_is_the_energy_that_the_other_law_leaves() -> None:
+    """Of a drag that reverses beside a level: all of it, in proportion to the readings and one over the variance."""
+    equations = equations_of(problem_of(table(drag=0.3)), (Drag(), Power()))
+    experimenter = experimenter_of(equations, THRESHOLD)
+    assert experimenter.drives is not None
+    drag, power = (of_effect(equations, (), term_of(equations, name)) for name in ("drag", "power"))
+    assert drag.coefficients[0] == pytest.approx(0.3, rel=0.1)
+    expected = expected_of(
+        experimenter.drives(frozenset({DIRECTION})),
+        (drag, power),
+        (),
+        precision=np.array([0.0]),
+        information_per_s=experimenter.information_per_s,
+    )
+    # At one speed the power of it is the level: nothing is left of it, and half the pair's margin is the drag's.
+    whole = AXES * 100.0 / STEP_S * drag.coefficients[0] ** 2 / NOISE**2
+    assert expected.margins(100.0)["drag", "power"] == pytest.approx(whole / 2, rel=0.05)
+    assert expected.margins(200.0)["drag", "power"] == pytest.approx(whole, rel=0.05)
+
+
+def test_the_sizes_are_the_recordings_or_the_smallest_worth_an_experiment() -> None:
+    """Of an effect that is not there, and of a parameter that has its stated value."""
+    equations = equations_of(problem_of(table(drag=0.0)), (Drag(), Power()))
+    least = 0.05 * equations.problem.mean_size
+    assert abs(of_effect(equations, (), term_of(equations, "drag")).coefficients[0]) == pytest.approx(least, rel=0.05)
+    level = of_parameter(equations, (), "level-error")
+    assert level is not None
+    assert abs(level.shift) == pytest.approx(least, rel=0.05)
+    assert of_parameter(equations, (), "drag") is None
+
+
+def test_what_depends_on_time_follows_from_no_drive() -> None:
+    """A change point, or another channel's fault."""
+    term = term_of(warm(), "drag")
+    assert predictable(term)
+    assert not predictable(replace(term, group=replace(term.group, shape={"onset_s": 3.0})))
+    assert not predictable(replace(term, group=replace(term.group, candidate=None)))
+
+
+def test_the_chosen_drive_is_the_least_that_tells_the_closest_two_apart() -> None:
+    """A drag and a power of the speed at one speed: other speeds do, both ways adds little, the temperature nothing."""
+    equations = warm()
+    experimenter = experimenter_of(equations, THRESHOLD)
+    hypotheses = [of_effect(equations, (), term_of(equations, name)) for name in ("drag", "power")]
+    choice = experimenter.choose(hypotheses, ())
+    assert choice is not None
+    assert "temperature" not in choice.varied
+    assert set(choice.pair) == {"drag", "power"}
+    assert choice.margin >= choice.needed
+    assert experimenter.choose(hypotheses[:1], ()) is None
+    quiet = replace(experimenter, information_per_s=experimenter.information_per_s * 1e-9)
+    assert quiet.choose(hypotheses, ()) is None, "no drive tells them apart"
