@@ -103,7 +103,7 @@ mutants: $(DEV) ## mutation testing on a random sample (SEED=… COUNT=… ONLY=
 	$(BIN)/python tests/mutation/sample.py --seed $(or $(SEED),1) --count $(or $(COUNT),200) $(if $(ONLY),--only $(ONLY)) \
 	    $(if $(RETRY),--retry)
 
-bench: $(DEV) ## CPU, memory and delays of the daemon, beside python-can with canopen and mosquitto; build/figures/bench.json (SECONDS=20)
+bench: $(DEV) ## CPU, memory and delays of the daemon, beside python-can with canopen, candump and mosquitto; build/figures/bench.json (SECONDS=20)
 	PYTHONPATH=src:tests/bench $(BIN)/python tests/bench/speed.py --seconds $(or $(SECONDS),20)
 
 lock: $(DEV) ## systemd/requirements.lock anew: the newest packages that pyproject.toml allows, with their hashes

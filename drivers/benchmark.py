@@ -1,4 +1,4 @@
-"""Benchmark: time per received frame, ours against python-can's asyncio Notifier with canopen's `.raw`, in one run.
+"""Benchmark: CPU time per received frame, ours against python-can's asyncio Notifier with canopen's `.raw`, in one run.
 
     make frames                                  on vcan, in User Mode Linux where this kernel has none
     python -m regolithd.drivers.benchmark [vcan0]          without such a link: the decoders alone
@@ -9,7 +9,7 @@ Both get the same motor TPDOs and end at the same three SI values, which is chec
     burst     200 frames wait in the socket, as after a SYNC on a busy bus: read and decode them all
     single    one frame at a time, each alone on a quiet bus (`PAUSE_S`), wake-up included
 
-Both run in the same process, in turns; the best of the rounds counts, as other load on the machine only adds time. In
+Both run in the same process, in turns; the best of the rounds counts, as other load on the machine adds time. In
 User Mode Linux a system call (locks among them) takes some 200 times as long as natively, which raises the ratios.
 """
 
@@ -140,16 +140,16 @@ async def reading_time(
         async with way(channel) as decoded:
             for frame in frames:
                 sender.send(frame)
-            start = time.perf_counter()
+            start = time.process_time()
             await decoded.more(FRAMES)
-            burst_s = time.perf_counter() - start
+            burst_s = time.process_time() - start
             singly_s = 0.0
             for frame in frames:
                 time.sleep(PAUSE_S)  # noqa: ASYNC251  # nothing else is to run
                 sender.send(frame)
-                start = time.perf_counter()
+                start = time.process_time()
                 await decoded.more(1)
-                singly_s += time.perf_counter() - start
+                singly_s += time.process_time() - start
             check(decoded.last)
     return burst_s / FRAMES * 1e6, singly_s / FRAMES * 1e6
 
@@ -158,13 +158,13 @@ def decoding_time() -> tuple[float, float]:
     """Return the time that our decoder and canopen's take per frame [µs]."""
     mine, peers = our_decoder(), DecodedValues()
     network = their_network(peers.take)
-    start = time.perf_counter()
+    start = time.process_time()
     for data in DATA:
         last = mine(Frame(0, COB_ID, data))
-    between = time.perf_counter()
+    between = time.process_time()
     for data in DATA:
         network.notify(COB_ID, bytearray(data), 0.0)
-    end = time.perf_counter()
+    end = time.process_time()
     check(last)
     check(peers.last)
     return (between - start) / FRAMES * 1e6, (end - between) / FRAMES * 1e6

@@ -1,22 +1,23 @@
-"""The measurements of `speed` that have another program as their peer: python-can with canopen, and mosquitto."""
+"""The measurements of `speed` without the daemon: beside python-can with canopen, candump, mosquitto's persistence."""
 
 from __future__ import annotations
 
-import asyncio
-import os
+import json
+import shutil
 import statistics
+import subprocess
+import sys
 import tempfile
-import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 from unittest.mock import patch
 
-import aiomqtt
-from broker import Mosquitto
+import speed_queue
 from can_pair import pair
+from speed_queue import EVERY_CHANGE, MESSAGES, REMEDY
+from speed_table import Row
 
-from regolithd.daemon.publish.spool import Spool
 from regolithd.drivers import benchmark
 from regolithd.drivers.can import socketcan
 from regolithd.drivers.can.recvmmsg import CAN_FRAME
@@ -25,13 +26,12 @@ if TYPE_CHECKING:
     import socket
     from collections.abc import Iterator
 
+    from speed_queue import Stored
+
 ROUNDS = 9
-MESSAGES = 400
-PAYLOAD = b"x" * 2000
-"""As large as a snapshot message."""
-PERSISTENT = "persistence true\npersistence_location {folder}/\nmax_queued_messages 0\nallow_anonymous true\n"
-EVERY_CHANGE = "autosave_on_changes true\nautosave_interval 1\n"
-Figures = dict[str, float | int | str | bool | None]
+BENCH = Path(__file__).resolve().parent
+VCAN_HERE = Path("/sys/module/vcan")
+"""There once `with-vcan` has made links on this kernel."""
 
 
 def frames_on_bus() -> list[bytes]:
@@ -83,8 +83,8 @@ def on_pair() -> Iterator[None]:
         sender.close()
 
 
-async def frame_times() -> Figures:
-    """Return the time for a frame, ours and theirs: decoded alone, in bursts, one at a time."""
+async def frame_times() -> list[Row]:
+    """Return the processor time for a frame, ours and theirs: decoded alone, in bursts, one at a time."""
     rounds: dict[str, list[tuple[float, float]]] = {"decode": [], "burst": [], "one at a time": []}
     for _ in range(ROUNDS):
         rounds["decode"].append(benchmark.decoding_time())
@@ -94,75 +94,52 @@ async def frame_times() -> Figures:
                 both.append(await benchmark.reading_time(way, "pair"))
         rounds["burst"].append((both[0][0], both[1][0]))
         rounds["one at a time"].append((both[0][1], both[1][1]))
-    found: Figures = {}
+    rows = []
     for name, pairs in rounds.items():
         mine, theirs = (statistics.median(each[k] for each in pairs) for k in (0, 1))
-        found |= {
-            f"a frame, {name} / regolithd, µs": mine,
-            f"a frame, {name} / python-can and canopen, µs": theirs,
-            f"a frame, {name} / times": theirs / mine,
-        }
-    return found
+        goal = "no more than the peer" if name == "one at a time" else ""
+        rows.append(Row(f"a frame, {name}: CPU, µs", mine, goal, theirs, "python-can and canopen"))
+    return rows
 
 
-def store_cost() -> Figures:
-    """Return the processor time for storing a message in our store, and how many a killed process has lost."""
-    with tempfile.TemporaryDirectory() as name:
-        child = os.fork()
-        if child == 0:
-            spool = Spool(Path(name), 100_000_000)
-            began = time.process_time()
-            for _ in range(MESSAGES):
-                spool.append("snapshot", PAYLOAD)
-            Path(name, "cpu").write_text(str((time.process_time() - began) / MESSAGES * 1e6))
-            os.kill(os.getpid(), 9)
-        os.waitpid(child, 0)
-        kept = Spool(Path(name), 100_000_000).queued
-        return {
-            "a stored message, 2 kB / regolithd's store: CPU, µs": float(Path(name, "cpu").read_text()),
-            "a stored message, 2 kB / lost by SIGKILL, of 400": MESSAGES - kept,
-        }
+def queue_rows(ours: Stored, theirs: Stored, peer: str) -> list[Row]:
+    """Return what it costs to store and to deliver, and what SIGKILL lost, beside one setting of mosquitto."""
+    of = f"stored message of 2 kB, beside {peer}"
+    return [
+        Row(f"{of}: CPU, µs", ours.cpu_us, "", theirs.cpu_us, peer),
+        Row(f"{of}: stored per s", ours.stored_per_s, "", theirs.stored_per_s, peer),
+        Row(f"{of}: delivered per s", ours.delivered_per_s, "", theirs.delivered_per_s, peer),
+        Row(f"{of}: lost by SIGKILL, of {MESSAGES}", ours.lost, "0", theirs.lost, peer),
+    ]
 
 
-async def mosquitto_persistence() -> Figures:
-    """Return the same of mosquitto, which stores for a client that is away: saved each minute, and at each change."""
-    found: Figures = {}
-    for name, settings in (("saved every 30 min (default)", ""), ("saved at each change", EVERY_CHANGE)):
-        cpu_us, lost = await _mosquitto_store(settings)
-        found |= {
-            f"the same by mosquitto, {name} / regolithd's store: CPU, µs": None,
-            f"the same by mosquitto, {name} / lost by SIGKILL, of 400": lost,
-            f"the same by mosquitto, {name} / mosquitto: CPU, µs": cpu_us,
-        }
-    return found
+async def queues() -> list[Row]:
+    """Return our store beside mosquitto's, as it is by default and as it stores most safely."""
+    if not speed_queue.available():
+        return [Row("stored message of 2 kB: CPU, µs", speed_queue.store_cost().cpu_us, peer=f"skipped: {REMEDY}")]
+    mine = await speed_queue.ours()
+    rows = []
+    for peer, settings in (("mosquitto, saved every 30 min", ""), ("mosquitto, saved at each change", EVERY_CHANGE)):
+        rows += queue_rows(mine, await speed_queue.mosquittos(settings), peer)
+    return rows
 
 
-async def _mosquitto_store(settings: str) -> tuple[float, int]:
-    with tempfile.TemporaryDirectory() as name:
-        broker = Mosquitto(Path(name), settings=PERSISTENT.format(folder=name) + settings)
-        broker.start()
-        away = {"identifier": "away", "clean_session": False}
-        async with aiomqtt.Client("127.0.0.1", broker.port, **away) as taker:
-            await taker.subscribe("a", qos=1)
-        assert broker.process is not None
-        before = _cpu_s(broker.process.pid)
-        async with aiomqtt.Client("127.0.0.1", broker.port) as sender:
-            for _ in range(MESSAGES):
-                await sender.publish("a", PAYLOAD, qos=1)
-        cpu_us = (_cpu_s(broker.process.pid) - before) / MESSAGES * 1e6
-        broker.kill()
-        broker.start()
-        kept = 0
-        async with aiomqtt.Client("127.0.0.1", broker.port, **away) as taker:
-            with suppress(TimeoutError):
-                while True:
-                    async with asyncio.timeout(2):
-                        await anext(taker.messages)
-                        kept += 1
-        broker.stop()
-        return cpu_us, MESSAGES - kept
-
-
-def _cpu_s(pid: int) -> float:
-    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+def candump(seconds: float) -> list[Row]:
+    """Return our reader beside candump, on vcan: of this kernel where it has it, otherwise of the guest."""
+    name = "logging of a saturated bus"
+    if shutil.which("candump") is None:
+        return [Row(f"{name}: CPU per frame, µs", None, peer="skipped: candump is not here: apt-get install can-utils")]
+    with tempfile.TemporaryDirectory() as folder:
+        found = Path(folder) / "candump.json"
+        script = [sys.executable, str(BENCH / "speed_candump.py"), f"{seconds:g}", str(found)]
+        done = subprocess.run([str(BENCH / "with-vcan"), *script], check=False, capture_output=True, text=True)
+        if not found.exists():
+            why = (done.stderr.strip().splitlines() or ["no message"])[-1]
+            return [Row(f"{name}: CPU per frame, µs", None, peer=f"skipped: candump needs vcan: {why}")]
+        each = json.loads(found.read_text())
+    where = "candump -l, on this kernel" if VCAN_HERE.exists() else "candump -l, in User Mode Linux"
+    return [
+        Row(f"{name}: frames sent per s", each["sent_per_s"], "9009"),
+        Row(f"{name}: CPU per frame, µs", each["our_us"], "", each["their_us"], where),
+        Row(f"{name}: frames lost, of {each['sent']}", each["we_lost"], "0", each["they_lost"], where),
+    ]
