@@ -12,7 +12,7 @@ RECORDINGS ?= ../shared/recordings
 .PHONY: interop first-day week
 .PHONY: figures chaos fuzz holds bench audit wheelhouse lock
 .PHONY: sizing reproduce evaluate loop prove prove-machines reliability real scaling thresholds mutations mutants frames pictures picture screenshots
-.PHONY: fleet online unnamed regions
+.PHONY: fleet online unnamed regions experiments
 
 help:
 	@awk -F ':.*## ' '/^## / { print "\n" substr($$0, 4) } /^[a-z-]+:.*## / { printf "  make %-14s %s\n", $$1, $$2 }' Makefile
@@ -80,6 +80,9 @@ reliability: $(DEV) ## how often answers are right at their stated probability (
 
 regions: $(DEV) ## laws that fail in regions: localisation and bias of the parameters, beside LISDD; 4 minutes (SEEDS=8)
 	$(BIN)/python -m regolithd.calibration.validation.region_study build/figures/regions.json docs/regions.svg $(if $(SEEDS),--seeds $(SEEDS))
+
+experiments: $(DEV) ## the proposed experiment beside a covariate-wise and a random one, on a simulated rover; continues an interrupted run (SEED=… COUNT=20)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.experiment_study build/figures/experiments.json docs/experiments.svg --seed $(or $(SEED),1) --count $(or $(COUNT),20)
 
 real: $(DEV) ## worked examples on recordings that are not part of this project (RECORDINGS=… ONLY="…")
 	$(BIN)/python docs/examples/run.py $(RECORDINGS) build/figures/real.json build/real $(ONLY)
