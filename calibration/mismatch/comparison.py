@@ -18,7 +18,7 @@ from regolithd.calibration.mismatch.empirical.stated import beyond_the_range
 from regolithd.calibration.mismatch.inference.evidence import empirical_fits, evidence_of
 from regolithd.calibration.mismatch.inference.findings import answer_of
 from regolithd.calibration.mismatch.inference.held_out import earned
-from regolithd.calibration.mismatch.inference.several_channels import merged_answers
+from regolithd.calibration.mismatch.inference.several_channels import merged_answers, priors_from_others
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.equations import equations_of
 from regolithd.calibration.mismatch.report.notebook import notebook_html
@@ -105,20 +105,18 @@ def compare(
     recorded = as_recording(recording, unit=simulation.wheel_column)
     effects = simulation.corrected_effects if effects is None else effects
     if simulation.channels:
-        found = [
-            _labelled(
-                compare(
-                    recorded,
-                    OneChannel(simulation, channel),
-                    effects=[e for e in effects if e.channel == channel],
-                    thresholds=thresholds,
-                    progress=progress,
-                ),
-                channel,
-            )
-            for channel in simulation.channels
-        ]
-        return merged(found, simulation)
+
+        def of_channel(channel: str, known: Mapping[str, tuple[float, float]]) -> Comparison:
+            own = [effect for effect in effects if effect.channel == channel]
+            one = OneChannel(simulation, channel, known)
+            return _labelled(compare(recorded, one, effects=own, thresholds=thresholds, progress=progress), channel)
+
+        found = {channel: of_channel(channel, {}) for channel in simulation.channels}
+        for channel, one in found.items():
+            others = [other.answer for name, other in found.items() if name != channel]
+            if known := priors_from_others(one.answer, others):
+                found[channel] = of_channel(channel, known)
+        return merged(list(found.values()), simulation)
     search = searched(recorded, simulation, effects=effects, thresholds=thresholds, progress=progress)
     if search.decision.unnamed:
         progress("fitting a curve to what stays unexplained")

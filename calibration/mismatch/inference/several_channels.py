@@ -81,26 +81,59 @@ def told_names(answer: Answer) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*(each.name for each in answer.effects), *(each.name for each in answer.changes)]))
 
 
-def combined(*found: CalibratedParameter) -> CalibratedParameter:
-    """Return a parameter's posterior from independent channels: precisions add, the prior's counted once.
+def priors_from_others(answer: Answer, others: Sequence[Answer]) -> dict[str, tuple[float, float]]:
+    """Return mean and standard deviation of the parameters that another channel knows better than this one.
 
-    Where a channel shows that the prior is wrong, it was left, and the value is that channel's own.
+    A simulation has one value of each parameter in all of its channels. Where one channel pulls a parameter out of its
+    prior, what others know of the parameters decides whether they were stated wrongly or stand for missing physics.
+    Empty where none is pulled; a channel that leaves something unexplained is not asked.
     """
-    prior_std = found[0].prior_std
-    left = [each for each in found if abs(each.value - each.prior) > THRESHOLDS.furthest_prior_stds * prior_std > 0]
+    if not any(map(_left, answer.parameters)):
+        return {}
+    found = {}
+    for parameter in answer.parameters:
+        known = [
+            each
+            for other in others
+            for each in other.parameters
+            if other.verdict != "unexplained" and each.name == parameter.name and _std(each) < _std(parameter)
+        ]
+        if known:
+            best = min(known, key=_std)
+            found[parameter.name] = best.value, _std(best)
+    return found
+
+
+def combined(*found: CalibratedParameter) -> CalibratedParameter:
+    """Return a parameter's posterior from independent channels: precisions add, the stated prior's counted once.
+
+    Each channel's prior is the stated one, or a narrower one from another channel. Where a channel shows that its prior
+    is wrong, it was left, and the value is that channel's own.
+    """
+    stated = max(found, key=lambda each: each.prior_std)
+    left = list(filter(_left, found))
     if left:
-        return min(left, key=lambda each: each.high - each.low)
-    stds = [(each.high - each.low) / (2 * NINETY_PERCENT_STDS) for each in found]
-    if prior_std == 0 or min(stds) == 0:
-        return found[0]
-    prior = 1 / prior_std**2
-    data = [max(1 / std**2 - prior, 0.0) for std in stds]
-    # Each channel's posterior is the prior's and its own data's mean, weighted by precision.
+        best = min(left, key=_std)
+        return replace(best, prior=stated.prior, prior_std=stated.prior_std)
+    if stated.prior_std == 0 or min(map(_std, found)) == 0:
+        return stated
+    # Each channel's posterior is its prior's and its own data's mean, weighted by precision.
+    data = [max(1 / _std(each) ** 2 - 1 / each.prior_std**2, 0.0) for each in found]
     means = [
-        each.value + (each.value - each.prior) * prior / weight if weight > 0 else each.prior
+        each.value + (each.value - each.prior) / each.prior_std**2 / weight if weight > 0 else each.prior
         for each, weight in zip(found, data, strict=True)
     ]
+    prior = 1 / stated.prior_std**2
     total = prior + sum(data)
-    value = (prior * found[0].prior + sum(w * mean for w, mean in zip(data, means, strict=True))) / total
+    value = (prior * stated.prior + sum(w * mean for w, mean in zip(data, means, strict=True))) / total
     reach = NINETY_PERCENT_STDS / total**0.5
-    return replace(found[0], value=value, low=value - reach, high=value + reach)
+    return replace(stated, value=value, low=value - reach, high=value + reach)
+
+
+def _left(parameter: CalibratedParameter) -> bool:
+    """Return whether a parameter left its prior."""
+    return abs(parameter.value - parameter.prior) > THRESHOLDS.furthest_prior_stds * parameter.prior_std > 0
+
+
+def _std(parameter: CalibratedParameter) -> float:
+    return (parameter.high - parameter.low) / (2 * NINETY_PERCENT_STDS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,9 +22,14 @@ Array = NDArray[np.float64]
 
 
 class OneChannel(Simulation):
-    """A view of a simulation that predicts one of its channels; all else is the simulation's own."""
+    """A view of a simulation that predicts one of its channels; all else is the simulation's own.
 
-    def __init__(self, simulation: Simulation, channel: str) -> None:
+    `known` has the mean and the standard deviation of parameters that are known better than was stated.
+    """
+
+    def __init__(
+        self, simulation: Simulation, channel: str, known: Mapping[str, tuple[float, float]] | None = None
+    ) -> None:
         self._whole = simulation
         self.channel, self.unit = channel, simulation.channels[channel]  # type: ignore[misc]
         for name in (
@@ -42,6 +48,8 @@ class OneChannel(Simulation):
             "sensors",
         ):
             setattr(self, name, getattr(simulation, name))
+        for name, (value, std) in (known or {}).items():
+            self.parameters = {**self.parameters, name: replace(self.parameters[name], value=value, std=std)}
         self.empirical_curves = [each for each in simulation.empirical_curves if each.channel == channel]
 
     def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:

@@ -13,7 +13,7 @@ from regolithd.calibration.mismatch import Prior, Simulation, compare
 from regolithd.calibration.mismatch.answer import CalibratedParameter
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.inference.several_channels import combined, notes_of
+from regolithd.calibration.mismatch.inference.several_channels import combined, notes_of, priors_from_others
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -74,12 +74,53 @@ def test_a_prediction_without_one_of_its_channels_is_refused() -> None:
         compare(spun(), Half())
 
 
+class OneGain(Propeller):
+    """Thrust and torque with one coefficient."""
+
+    parameters: ClassVar = {"gain": Prior(1.2e-5, 5e-7)}
+
+    def predict(self, inputs: Mapping[str, Any], values: Mapping[str, float]) -> Any:
+        """Return both, in proportion to each other."""
+        thrust = values["gain"] * inputs["speed_rad_s"] * np.abs(inputs["speed_rad_s"])
+        return {"thrust_N": thrust, "torque_Nm": thrust / 69.5}
+
+
+def test_a_parameter_that_another_channel_knows_does_not_explain_what_is_missing() -> None:
+    """The torque is 15 % larger than predicted; alone it would move the coefficient by four standard deviations."""
+    found = compare(spun(), OneGain()).answer
+    (gain,) = found.parameters
+    assert (gain.prior, gain.prior_std) == (1.2e-5, 5e-7)
+    assert gain.value == pytest.approx(1.22e-5, rel=0.01)
+    assert {each.channel for each in (*found.effects, *found.unexplained)} == {"torque_Nm"}
+
+
+def posterior(value: float, std: float, prior: float = 2.0, prior_std: float = 0.5) -> CalibratedParameter:
+    """Return what a channel says of a mass."""
+    return CalibratedParameter("mass_kg", "kg", prior, prior_std, value, value - 1.645 * std, value + 1.645 * std)
+
+
+def test_another_channel_is_asked_where_a_parameter_left_its_prior() -> None:
+    """The one that knows it best, if it knows it better and explains its own readings."""
+    left, inside = (replace(ANSWER, verdict="consistent", parameters=(posterior(m, 0.1),)) for m in (4.0, 2.1))
+    sharp = replace(inside, parameters=(posterior(2.3, 0.05),))
+    assert priors_from_others(left, [inside, sharp])["mass_kg"] == pytest.approx((2.3, 0.05), rel=1e-3)
+    assert not priors_from_others(inside, [sharp])
+    assert not priors_from_others(left, [replace(sharp, verdict="unexplained")])
+    assert not priors_from_others(left, [replace(sharp, parameters=(posterior(2.3, 0.2),))])
+
+
+def test_a_channel_with_a_narrower_prior_adds_what_its_own_readings_say() -> None:
+    """The prior that it had from another channel is not counted again."""
+    sharp = posterior(2.3, 0.05)
+    told = posterior(2.3 + 0.1 * 0.05**2 / (0.05**2 + 0.3**2), (1 / 0.05**2 + 1 / 0.3**2) ** -0.5, 2.3, 0.05)
+    both = combined(sharp, told)
+    assert (both.prior, both.prior_std) == (2.0, 0.5)
+    assert (both.high - both.low) / 2 == pytest.approx(1.645 * (1 / 0.05**2 + 1 / 0.3**2) ** -0.5, rel=1e-3)
+    assert both.value == pytest.approx(told.value, rel=1e-3)
+
+
 def test_two_channels_that_say_the_same_of_a_parameter_say_it_more_surely() -> None:
     """Precisions add, and the prior's is counted once."""
-
-    def posterior(value: float, std: float) -> CalibratedParameter:
-        return CalibratedParameter("mass_kg", "kg", 2.0, 0.5, value, value - 1.645 * std, value + 1.645 * std)
-
     once = posterior(2.2, 0.3)
     both = combined(once, once)
     data = 1 / 0.3**2 - 1 / 0.5**2
