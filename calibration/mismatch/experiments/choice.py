@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.errors import MismatchError
 from regolithd.calibration.mismatch.experiments.drives import DIRECTION, MOTION, UNLOADED, Drives
 from regolithd.calibration.mismatch.experiments.margins import (
     Expected,
@@ -99,8 +100,14 @@ class Experimenter:
         """
         if self.drives is None or len(hypotheses) < 2:
             return None
+        try:
+            return self._best(self.drives, hypotheses, given)
+        except MismatchError:
+            return None  # a user's simulation or candidate that refuses a drive
+
+    def _best(self, drives: Drives, hypotheses: Sequence[Hypothesis], given: Sequence[Term]) -> Choice | None:
         length_s = self.equations.problem.length_s
-        varied = frozenset(self.drives.elements)
+        varied = frozenset(drives.elements)
         everything = self._expected(varied, hypotheses, given)
         longest_s = self.equations.thresholds.longest_experiment * length_s
         apart = [pair for pair, margin in everything.margins(longest_s).items() if margin > TOLD_APART]
@@ -156,9 +163,12 @@ def _drives_of(equations: NormalEquations) -> tuple[Drives | None, str]:
     problem = equations.problem
     if problem.stated:
         return None, "the simulation was corrected by effects"
-    if not predicts_row_by_row(problem):
-        return None, "the simulation depends on what was before"
     candidates = dict.fromkeys(group.candidate for group in equations.design.groups)
     covariates = [name for each in candidates if each is not None for name in each.varied(problem)]
-    drives = Drives(problem, covariates)
+    try:
+        if not predicts_row_by_row(problem):
+            return None, "the simulation depends on what was before"
+        drives = Drives(problem, covariates)
+    except MismatchError:
+        return None, "the simulation accepts no other inputs than those recorded"
     return (drives, "") if drives.settings else (None, "no column sets a covariate alone")

@@ -212,7 +212,8 @@ def _shapes(drive: Drive, term: Term) -> list[Shape]:
 def _columns(drive: Drive, term: Term, shape: Shape) -> Array:
     """Return a law's columns on a drive, 0 on other wheels and where the law has no part without load."""
     candidate = _candidate(term)
-    found = np.nan_to_num(np.asarray(candidate.columns(drive.problem, shape), np.float64))
+    with np.errstate(all="ignore"):  # a law may be undefined where there is no load
+        found = np.nan_to_num(np.asarray(candidate.columns(drive.problem, shape), np.float64))
     on = np.zeros(drive.problem.mask.shape[1])
     on[list(term.wheels)] = 1.0
     return found * on * (1.0 if candidate.acts_unloaded else drive.loaded)

@@ -17,8 +17,14 @@ if TYPE_CHECKING:
 
 Choice = Literal["proposed", "covariate-wise", "random"]
 CHOICES: tuple[Choice, ...] = get_args(Choice)
-CONCEALED = ("coulomb-friction", "viscous-friction", "load-dependent-efficiency", "stribeck-friction")
-"""Effects in rotation: at one speed each may pass for the others."""
+CONCEALED = (
+    "coulomb-friction",
+    "viscous-friction",
+    "load-dependent-efficiency",
+    "stribeck-friction",
+    "cold-lubricant-friction",
+)
+"""Effects in rotation: at one speed and temperature each may pass for the others."""
 COVARIATE_OF = {
     "coulomb-friction": "direction",
     "viscous-friction": "wheel_speed",

@@ -7,14 +7,25 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
+import rover_drives
 from linear_machine import AXES, NOISE, STEP_S, Drag, Level, Power, equations_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch import from_columns
+from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.experiments.choice import experimenter_of
 from regolithd.calibration.mismatch.experiments.drives import DIRECTION, SPEED, UNLOADED, Drives
-from regolithd.calibration.mismatch.experiments.margins import expected_of, of_effect, of_parameter, predictable
+from regolithd.calibration.mismatch.experiments.margins import (
+    expected_of,
+    of_effect,
+    of_parameter,
+    precisions,
+    predictable,
+)
 from regolithd.calibration.mismatch.experiments.settings import predicts_row_by_row, settings_of
 from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.regression.equations import equations_of as candidates_and_equations
+from regolithd.calibration.mismatch.regression.group import Term
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -45,6 +56,25 @@ class Lagging(Level):
     def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
         """Return the level and a hundredth of the way."""
         return values["level"] + 0.01 * np.cumsum(inputs["speed_rad_s"], axis=0)
+
+
+class Careful(Level):
+    """A machine whose user refuses speeds that were not recorded."""
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the level at the recorded speed alone."""
+        if np.any(np.abs(inputs["speed_rad_s"]) != 2.1):
+            raise SimulationError("2.1 rad/s alone")
+        return super().predict(inputs, values)
+
+
+class Choosy(Level):
+    """A machine whose covariates are those of the recorded speed alone."""
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the speed, if it is the recorded one."""
+        Careful().predict(inputs, {"level": 0.0})
+        return super().covariates(inputs)
 
 
 def one_way(drag: float = 0.3) -> dict[str, Array]:
@@ -92,6 +122,40 @@ def test_a_simulation_with_a_state_is_not_predicted() -> None:
     experimenter = experimenter_of(equations_of(problem, (Drag(),)), THRESHOLD)
     assert experimenter.drives is None
     assert experimenter.unpredictable == "the simulation depends on what was before"
+
+
+def test_a_simulation_that_refuses_a_drive_has_no_predicted_experiment() -> None:
+    """Whether its prediction does or its covariates do; the comparison goes on."""
+    recording = from_columns(one_way(), unit="axis")
+    refused = equations_of(build_problem(recording, Careful()), (Drag(), Power()))
+    hypotheses = [of_effect(refused, (), term_of(refused, name)) for name in ("drag", "power")]
+    assert experimenter_of(refused, THRESHOLD).choose(hypotheses, ()) is None
+    choosy = equations_of(build_problem(recording, Choosy()), (Drag(), Power()))
+    told = "the simulation accepts no other inputs than those recorded"
+    assert experimenter_of(choosy, THRESHOLD).unpredictable == told
+
+
+def test_every_law_of_the_library_that_follows_from_a_drive_is_predicted() -> None:
+    """On a drive of the rover that varies everything it is finite, and other than zero."""
+    problem = build_problem(from_columns(rover_drives.columns(3, length_s=60.0)), rover_drives.simulation())
+    equations, _ = candidates_and_equations(problem, library())
+    experimenter = experimenter_of(equations, THRESHOLD)
+    assert experimenter.drives is not None
+    assert {"wheel_speed", "temperature", "pitch", "slip", "torque"} <= set(experimenter.drives.settings)
+    terms = {group.name: Term(group, tuple(range(6))) for group in equations.design.groups if group.named}
+    hypotheses = [of_effect(equations, (), term) for term in terms.values() if predictable(term)]
+    names = {one.name for one in hypotheses}
+    assert {"coulomb-friction", "load-dependent-efficiency", "slip-sinkage", "grade-resistance"} <= names
+    assert not {"bearing-drag", "soil-transition", "load-cell-drift", "sensor-delay", "multi-pass-compaction"} & names
+    expected = expected_of(
+        experimenter.drives(frozenset(experimenter.drives.elements)),
+        hypotheses,
+        (),
+        precision=precisions(equations),
+        information_per_s=experimenter.information_per_s,
+    )
+    assert np.isfinite(expected.gram).all()
+    assert (np.diag(expected.gram)[list(expected.predicted)] > 0).all()
 
 
 def test_a_drive_varies_what_is_asked_for_and_nothing_else() -> None:
