@@ -16,7 +16,14 @@ sent. So the answers of each PDO are counted: each SYNC makes one more outstandi
 | otherwise | the answer to the newest SYNC | accepted |
 
 An answer that was lost would keep its PDO ambiguous. It is forgotten once each window of the last `AMBIGUITY_NS`
-brought exactly one answer.
+brought exactly one answer. A node that paused, for however long, and then answers what it has missed is told apart all
+the same: windows without an answer, or with several, do not count as such.
+
+One case cannot be told apart by the frames: a node that answers each SYNC exactly once, but for `AMBIGUITY_NS`, or from
+its first answer on, always by whole periods too late, is on the bus the same as one that answers in time after it has
+lost as many answers. Its values are then taken for those of the newest SYNC. A TPDO waits in its node for a free bus
+alone, so this needs a bus on which it always waits for longer than a period (`regolithd check` gives the bus load), or
+an adapter that holds frames back. A node with a synchronous window (0x1007) discards what is late by itself.
 
 Two cases in which nobody can say whose values these are, or of which instant, are noticed, and the values are dropped:
 
@@ -50,7 +57,7 @@ AWAITED_WINDOWS = 3
 """Number of windows for which a PDO that stopped coming is still waited for."""
 
 AMBIGUITY_NS = 500_000_000
-"""Longer than a node, or the computer that runs a virtual one, is delayed; at least `AWAITED_WINDOWS` windows."""
+"""One answer in each window for so long: the outstanding ones were lost. At least `AWAITED_WINDOWS` windows."""
 
 DOUBT_WINDOWS = 4
 DUPLICATES = 2

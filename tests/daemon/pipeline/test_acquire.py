@@ -116,6 +116,57 @@ def test_a_single_answer_after_a_missing_one_is_ambiguous_for_three_windows() ->
     assert known == {2: False, 3: False, 4: False, 5: False, 6: True, 7: True}
 
 
+@given(st.lists(st.sampled_from((0, 0, 1, 1, 1, 2, 3)), max_size=80))
+def test_no_answer_of_a_delayed_node_is_ever_taken_for_one_to_another_sync(released: list[int]) -> None:
+    """Whatever it is delayed by, and however it catches up, short of five windows in a row with one old answer each."""
+    period_ns, waiting, steady = 100 * MS, list[int](), 0
+    taken = Acquisition(MOTORS, PDOS, period_ns)
+    for k, count in enumerate([1, 1, 1, *released]):
+        waiting.append(k)
+        answers = [
+            reading(6, k * period_ns + (8 + each) * MS, current=waiting.pop(0))
+            for each in range(min(count, len(waiting)))
+        ]
+        steady = steady + 1 if len(answers) == 1 and waiting else 0
+        if steady == 5:
+            break
+        for item in (
+            Sync(k * period_ns),
+            *(reading(node, k * period_ns + node * MS) for node in range(1, 6)),
+            *answers,
+        ):
+            snapshot = taken.accept(item)
+            if snapshot is not None:
+                assert snapshot.motor_current_A[5] == snapshot.sequence or np.isnan(snapshot.motor_current_A[5])
+
+
+def test_steady_answers_of_the_period_before_are_dropped_for_half_a_second() -> None:
+    """At 100 Hz for fifty windows; then they count as answers in time after one that was lost."""
+    period_ns = 10 * MS
+    taken = Acquisition(MOTORS[:1], PDOS[:1], period_ns)
+    for k in range(54):
+        taken.accept(Sync(k * period_ns))
+        if k != 1:
+            taken.accept(reading(1, k * period_ns + MS))
+        assert taken.counters.accepted == max(1, k - 50), k
+
+
+def test_a_node_that_answers_after_five_seconds_of_silence_is_taken_at_its_newest_answer() -> None:
+    """The five hundred old ones, in a burst, are dropped."""
+    period_ns = 10 * MS
+    taken = Acquisition(MOTORS[:1], PDOS[:1], period_ns)
+    taken.accept(Sync(0))
+    taken.accept(reading(1, MS))
+    for k in range(1, 501):
+        taken.accept(Sync(k * period_ns))
+    for k in range(1, 501):
+        taken.accept(reading(1, 500 * period_ns + k * 1000, current=float(k)))
+    last = taken.accept(Sync(501 * period_ns))
+    assert last is not None
+    assert last.motor_current_A[0] == 500.0
+    assert (taken.counters.accepted, taken.counters.late) == (2, 499)
+
+
 def test_an_answer_outside_the_synchronous_window_is_late() -> None:
     """An answer in the last tenth of the period is late."""
     taken = acquisition()
