@@ -23,7 +23,7 @@ class Severity(StrEnum):
 class SoilChangeEvidence(BaseModel):
     """The evidence of a soil-change alarm, as numbers."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     onset: Time
     """Estimated time of the change."""

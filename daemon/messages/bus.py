@@ -21,7 +21,7 @@ else:
 class IdentityReport(BaseModel):
     """The identity that a node reports: objects 0x1000 (device type) and 0x1018 (identity object)."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     device_type: int
     vendor: int

@@ -57,7 +57,9 @@ def time_fields(time_ns: int) -> dict[str, str | int]:
 class Header(BaseModel):
     """The fields that every message begins with."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_serialization_defaults_required=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", json_schema_serialization_defaults_required=True, defer_build=True
+    )
 
     schema_version: Literal[2] = 2
     """Rises when a field or topic is removed or changes its meaning."""

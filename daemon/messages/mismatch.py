@@ -12,7 +12,7 @@ from regolithd.daemon.messages.header import Header
 class EffectReport(BaseModel):
     """An effect that the simulation leaves out, or a corrected one that has changed."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     name: str
     where: str
@@ -29,7 +29,7 @@ class EffectReport(BaseModel):
 class ComparisonResult(BaseModel):
     """The result of a comparison."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     verdict: Literal["consistent", "missing-physics", "unexplained"]
     text: str

@@ -12,7 +12,7 @@ from regolithd.daemon.messages.header import Header
 class IntervalReport(BaseModel):
     """The posterior of one quantity: mean, median, and the bounds of the 50 % and 90 % credible intervals."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     mean: float
     low_90: float

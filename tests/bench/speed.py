@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING
 import aiomqtt
 from broker import Mosquitto
 from can_pair import pair
+from process_cpu import cpu_s
 from speed_candump import FASTEST_BUS
 from speed_peers import candump, frame_times, frames_on_bus, queues
 from speed_table import Figures, Row, flat
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).resolve().parents[2]
 FIGURES = ROOT / "build/figures/bench.json"
-TICKS = os.sysconf("SC_CLK_TCK")
 ROVER = """
 [sync]
 rate_Hz = {rate}
@@ -61,7 +61,9 @@ port = {port}
 spool_directory = "spool"
 """
 IMPORTS = {
-    "regolithd": "import regolithd.daemon.cli, regolithd.daemon.setup, regolithd.daemon.service, "
+    # As `regolithd run` does it: without looking for garbage once the command line is there.
+    "regolithd": "import regolithd.daemon.cli, gc; gc.disable(); "
+    "import regolithd.daemon.setup, regolithd.daemon.service, "
     "regolithd.daemon.wiring, regolithd.drivers.can.socketcan",
     "python-can, canopen, paho": "import asyncio, can, canopen, paho.mqtt.client",
     "numpy": "import numpy",
@@ -81,8 +83,7 @@ class Rig:
 
     def cpu_s(self) -> float:
         """Return the processor time that the daemon has used."""
-        fields = Path(f"/proc/{self.process.pid}/stat").read_text().rsplit(")", 1)[1].split()
-        return (int(fields[11]) + int(fields[12])) / TICKS
+        return cpu_s(self.process.pid)
 
     def memory_MB(self) -> float:
         """Return its resident memory."""
@@ -165,14 +166,14 @@ async def measure(rate: float, seconds: float, frames_per_s: int = 0) -> tuple[C
             await asyncio.sleep(0.2)
         running.delays_ms.clear()
         syncs, skipped = running.produced[-1], running.skipped[-1]
-        cpu_s, began = running.cpu_s(), time.monotonic()
+        before_s, began = running.cpu_s(), time.monotonic()
         sent = await send_frames(running.link, frames_per_s, seconds)
         elapsed_s = time.monotonic() - began
-        cpu_s = running.cpu_s() - cpu_s
+        used_s = running.cpu_s() - before_s
         memory_MB = running.memory_MB()
         await end(receiving)
     done, left_out = running.produced[-1] - syncs, running.skipped[-1] - skipped
-    return Cost(elapsed_s, cpu_s, done, left_out, memory_MB, sent), running
+    return Cost(elapsed_s, used_s, done, left_out, memory_MB, sent), running
 
 
 async def end(task: asyncio.Task[None]) -> None:

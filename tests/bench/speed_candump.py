@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 import socket
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
+
+from process_cpu import cpu_s
 
 from regolithd.daemon.recording.candump import frame_line
 from regolithd.drivers.can.open_bus import open_bus
@@ -51,12 +52,6 @@ def send_frames(seconds: float) -> int:
         return sent
 
 
-def cpu_s(process: subprocess.Popen[bytes]) -> float:
-    """Return the processor time that a process has used."""
-    fields = Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
 def compare(seconds: float, folder: Path) -> dict[str, float | int]:
     """Return what was sent, and the processor time and the frames lost of both."""
     ours = [sys.executable, __file__, "log", str(folder / "ours.log")]
@@ -64,12 +59,12 @@ def compare(seconds: float, folder: Path) -> dict[str, float | int]:
     readers = [subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL) for command in (ours, theirs)]
     try:
         time.sleep(START_S)
-        used_s = [-cpu_s(reader) for reader in readers]
+        used_s = [-cpu_s(reader.pid) for reader in readers]
         began = time.monotonic()
         sent = send_frames(seconds)
         rate = sent / (time.monotonic() - began)
         time.sleep(REST_S)
-        used_s = [before + cpu_s(reader) for before, reader in zip(used_s, readers, strict=True)]
+        used_s = [before + cpu_s(reader.pid) for before, reader in zip(used_s, readers, strict=True)]
     finally:
         for reader in readers:
             reader.terminate()

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import aiomqtt
 from broker import Mosquitto, mosquitto_program
+from process_cpu import cpu_s
 
 from regolithd.daemon.config.configuration import Configuration, Mqtt
 from regolithd.daemon.publish.publisher import Publisher
@@ -111,13 +112,13 @@ async def mosquittos(settings: str) -> Stored:
         async with aiomqtt.Client(broker.host, broker.port, **away) as client:
             await client.subscribe("a", qos=1)
         assert broker.process is not None
-        began, used_s = time.perf_counter(), _cpu_s(broker.process.pid)
+        began, used_s = time.perf_counter(), cpu_s(broker.process.pid)
         async with aiomqtt.Client(broker.host, broker.port, max_inflight_messages=AT_ONCE) as sender:
             sender.pending_calls_threshold = AT_ONCE
             for _ in range(MESSAGES // AT_ONCE):
                 await asyncio.gather(*(sender.publish("a", PAYLOAD, qos=1) for _ in range(AT_ONCE)))
         per_s = MESSAGES / (time.perf_counter() - began)
-        cpu_us = (_cpu_s(broker.process.pid) - used_s) / MESSAGES * 1e6
+        cpu_us = (cpu_s(broker.process.pid) - used_s) / MESSAGES * 1e6
         broker.kill()
         broker.start()
         async with aiomqtt.Client(broker.host, broker.port, **away) as client:
@@ -140,8 +141,3 @@ async def arrivals(client: aiomqtt.Client) -> list[float]:
 def rate(times: list[float]) -> float | None:
     """Return messages per second; None for fewer than two."""
     return (len(times) - 1) / (times[-1] - times[0]) if len(times) > 1 else None
-
-
-def _cpu_s(pid: int) -> float:
-    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
