@@ -1,6 +1,6 @@
 """The study from the command line: a table, figures as JSON, and a picture.
 
-python -m regolithd.calibration.validation.experiment_study build/figures/experiments.json docs/experiments.svg
+python -m regolithd.calibration.validation.experiment_study build/figures docs --machine rover
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from rich.table import Table
 from regolithd.calibration.validation.experiment_study.choices import CHOICES, plans
 from regolithd.calibration.validation.experiment_study.picture import picture
 from regolithd.calibration.validation.experiment_study.score import figures_of
+from regolithd.calibration.validation.experiment_study.subjects import SUBJECTS
 from regolithd.calibration.validation.experiment_study.trials import run_trial
 
 
@@ -45,23 +46,27 @@ def table(figures: dict[str, float]) -> Table:
 def main() -> None:
     """Run the trials, print the table, and write figures and picture."""
     parser = argparse.ArgumentParser(prog="regolithd.calibration.validation.experiment_study")
-    parser.add_argument("figures", type=Path)
-    parser.add_argument("picture", type=Path)
+    parser.add_argument("figures", type=Path, help="folder for experiments-MACHINE.json")
+    parser.add_argument("pictures", type=Path, help="folder for experiments-MACHINE.svg")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=20, help="recordings at one speed (20)")
-    parser.add_argument("--folder", type=Path, default=None, help="of finished trials (build/experiments/SEED)")
+    parser.add_argument("--machine", choices=SUBJECTS, default="rover")
+    parser.add_argument("--folder", type=Path, default=None, help="of finished trials (build/experiments/MACHINE/SEED)")
     asked = parser.parse_args()
-    folder = asked.folder or Path("build/experiments") / str(asked.seed)
-    trials = [run_trial(plan, folder) for plan in track(plans(asked.seed, asked.count), "driving")]
+    folder = asked.folder or Path("build/experiments") / asked.machine / str(asked.seed)
+    trials = [
+        run_trial(plan, SUBJECTS[asked.machine], folder) for plan in track(plans(asked.seed, asked.count), "driving")
+    ]
     figures = figures_of(trials)
     console = Console()
     if figures["driven"]:
         console.print(table(figures))
     for name, value in figures.items():
         console.print(f"{name}: {value:.4g}")
-    asked.figures.parent.mkdir(parents=True, exist_ok=True)
-    asked.figures.write_text(json.dumps(figures, indent=1) + "\n")
-    asked.picture.write_text(picture(trials))
+    for folder in (asked.figures, asked.pictures):
+        folder.mkdir(parents=True, exist_ok=True)
+    (asked.figures / f"experiments-{asked.machine}.json").write_text(json.dumps(figures, indent=1) + "\n")
+    (asked.pictures / f"experiments-{asked.machine}.svg").write_text(picture(trials))
 
 
 if __name__ == "__main__":
