@@ -21,7 +21,7 @@ from regolithd.calibration.mismatch.inference.evidence import calibrated_values,
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
 from regolithd.calibration.mismatch.inference.intervals import parameters_of
 from regolithd.calibration.mismatch.inference.located import share_of_residual, spell_of
-from regolithd.calibration.mismatch.inference.probability import other_answers, probability
+from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
 from regolithd.calibration.mismatch.inference.ranges import range_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
 from regolithd.calibration.mismatch.inference.statements import statement
@@ -48,7 +48,8 @@ def answer_of(
     effects, changes = named_effects(decision, held_out)
     parameters = calibrated_parameters(decision)
     moved = beyond_prior(parameters, equations.thresholds)
-    rest = alternatives(decision)
+    known = decided_by_evidence(decision)
+    rest = alternatives(decision) if known else ()
     extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold, rest)
     channel, floor = problem.simulation.channel, noise_floor(decision)
     return Answer(
@@ -61,7 +62,7 @@ def answer_of(
         parameters=parameters,
         changes=changes,
         left_out=problem.left_out,
-        probability=probability(rest, equations.thresholds),
+        probability=probability(rest, equations.thresholds) if known else None,
         alternatives=other_answers(rest, equations.thresholds),
         notes=(
             *map(_beyond_prior_in_words, moved),
