@@ -22,25 +22,29 @@ from regolithd.calibration.validation.experiment_study.trials import run_trial
 
 def table(figures: dict[str, float]) -> Table:
     """Return what each choice led to, and how the proposed one compares."""
-    shown = Table("choice", "right name", "median Δχ²", "mean Δχ²", "proposed is ahead", "ratio of means")
+    shown = Table("choice", "right name", "median Δχ²", "quartiles", "proposed has the larger", "by, median")
     for choice in CHOICES:
         key = choice.replace("-", "_")
-        ahead = ratio = "–"
-        if f"ratio_to_{key}" in figures:
-            share, low, high = (100 * figures[f"win_share_against_{key}{end}"] for end in ("", "_low", "_high"))
-            ahead = f"{share:.0f} % ({low:.0f} to {high:.0f})"
-            ratio, low, high = (figures[f"ratio_to_{key}{end}"] for end in ("", "_low", "_high"))  # type: ignore[assignment]
-            ratio = f"{ratio:.2f} ({low:.2f} to {high:.2f})"
         right = f"{figures[f'{key}_right']:.0f} of {figures['driven']:.0f}"
+        quartiles = " to ".join(f"{figures[f'{key}_margin_{which}_quartile']:.1f}" for which in ("lower", "upper"))
+        share = _with_interval(figures, f"win_share_against_{key}", 100, "{:.0f}")
         shown.add_row(
             choice,
             right,
             f"{figures[f'{key}_margin_median']:.1f}",
-            f"{figures[f'{key}_margin_mean']:.1f}",
-            ahead,
-            ratio,
+            quartiles,
+            share and f"{share} %",
+            _with_interval(figures, f"ahead_of_{key}", 1, "{:.1f}"),
         )
     return shown
+
+
+def _with_interval(figures: dict[str, float], key: str, factor: float, form: str) -> str:
+    """Return a figure with its 90 % interval; nothing where there is none."""
+    if key not in figures:
+        return ""
+    value, low, high = (form.format(factor * figures[key + end]) for end in ("", "_low", "_high"))
+    return f"{value} ({low} to {high})"
 
 
 def main() -> None:

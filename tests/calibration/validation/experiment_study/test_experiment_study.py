@@ -162,8 +162,8 @@ def trial(number: int, proposed: float, one: float, random: float) -> Trial:
     return Trial(number, "coulomb-friction", undecided=True, results=results)
 
 
-def test_figures_count_wins_and_compare_means() -> None:
-    """Intervals contain the share and the ratio; the same drive is no win."""
+def test_figures_count_wins_and_compare_margins() -> None:
+    """Intervals contain the share and the median difference; equal margins are no win."""
     trials = [trial(k, 40.0 + k, 10.0, 20.0 if k else 40.0) for k in range(10)]
     figures = figures_of([*trials, Trial(10, "coulomb-friction", undecided=False, results={})])
     assert (figures["trials"], figures["driven"]) == (11, 10)
@@ -172,8 +172,9 @@ def test_figures_count_wins_and_compare_means() -> None:
     assert (figures["wins_against_random"], figures["ties_with_random"]) == (9, 1)
     assert figures["win_share_against_random"] == 1.0
     assert figures["win_share_against_random_low"] == pytest.approx(0.05 ** (1 / 9), rel=1e-6)
-    assert figures["ratio_to_covariate_wise"] == pytest.approx(4.45)
-    assert figures["ratio_to_covariate_wise_low"] < 4.45 < figures["ratio_to_covariate_wise_high"]
+    assert figures["proposed_margin_median"] == pytest.approx(44.5)
+    assert figures["ahead_of_covariate_wise"] == pytest.approx(34.5)
+    assert figures["ahead_of_covariate_wise_low"] < 34.5 < figures["ahead_of_covariate_wise_high"]
     assert table(figures).row_count == 3
     assert figures_of([]) == {"trials": 0, "driven": 0}
 
