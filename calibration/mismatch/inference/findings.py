@@ -125,11 +125,7 @@ def calibrated_parameters(decision: Decision) -> tuple[CalibratedParameter, ...]
 
 def beyond_prior(parameters: Iterable[CalibratedParameter], thresholds: Thresholds) -> tuple[CalibratedParameter, ...]:
     """Return the parameters that had to leave their priors: a finding, whatever else was found."""
-    return tuple(
-        each
-        for each in parameters
-        if each.prior_std > 0 and abs(each.value - each.prior) > thresholds.furthest_prior_stds * each.prior_std
-    )
+    return tuple(each for each in parameters if each.prior_stds_away > thresholds.furthest_prior_stds)
 
 
 def _effect(problem: Problem, term: Term, parameters: Mapping[str, Parameter], errors: tuple[float, float]) -> Effect:
@@ -184,11 +180,10 @@ def _about_the_mask(problem: Problem) -> list[str]:
 
 
 def _beyond_prior_in_words(parameter: CalibratedParameter) -> str:
-    away = abs(parameter.value - parameter.prior) / parameter.prior_std
     return (
         f"{parameter.name} had to leave its prior: {parameter.value:.4g} {parameter.unit}, "
-        f"{away:.1f} standard deviations from {parameter.prior:.4g}. Check the stated value and its standard "
-        "deviation, or look for physics that acts as this parameter does."
+        f"{parameter.prior_stds_away:.1f} standard deviations from {parameter.prior:.4g}. Check the stated value and "
+        "its standard deviation, or look for physics that acts as this parameter does."
     )
 
 
