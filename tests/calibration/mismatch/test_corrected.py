@@ -161,6 +161,7 @@ def test_beside_something_unexplained_the_file_has_the_answers_parameters(tmp_pa
     told = prior.value + prior.std
     posterior = CalibratedParameter(name, prior.unit, prior.value, prior.std, told, told, told)
     answer = SimpleNamespace(unexplained=(None,), effects=(), parameters=(posterior,))
-    evidence = SimpleNamespace(values={name: prior.value - 5 * prior.std}, contributions=())
+    values = {each: of.value - 5 * of.std for each, of in found.parameters.items()}
+    evidence = SimpleNamespace(values=values, contributions=())
     write_corrected(tmp_path / "NEW.toml", answer, evidence, found)  # type: ignore[arg-type]
     assert load_simulation(tmp_path / "NEW.toml").parameters[name].value == pytest.approx(told)
