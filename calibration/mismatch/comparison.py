@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.group import Group
     from regolithd.calibration.mismatch.selection.decision import Decision
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
@@ -157,26 +158,58 @@ def searched(
 
     problem = linearised_where_it_fits(pose)
     candidates = with_changes(problem, candidates, stated)
-    for _ in range(SEARCHES):
-        progress("computing the columns of all candidates")
-        equations, applicable = equations_of(problem, candidates)
-        progress("searching")
-        decision = decide(equations, applicable)
-        values = moved_values(decision.equations, decision.whole)
-        if not bent(problem, values):
-            break
-        problem = pose(values)
+    search = _search(problem, candidates, pose, progress)
     progress("measuring on held-out blocks and comparing with rivals")
-    decision, held_out = earned(decision, equations.design.groups)
+    decision, held_out = earned(search.decision, search.grid)
     decision = in_regions(decision)
-    answer = answer_of(decision, held_out, candidates, applicable)
+    answer = answer_of(decision, held_out, candidates, search.applicable)
     evidence = replace(
         evidence_of(decision),
         candidates=tuple(candidates),
-        covariate_labels=problem.labels,
+        covariate_labels=decision.equations.problem.labels,
         wheel_column=simulation.wheel_column,
     )
     return Searched(Comparison(answer, evidence, simulation), decision, tuple(candidates))
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """A decision, the groups before any data optimised their shapes, and the applicable candidates."""
+
+    decision: Decision
+    grid: tuple[Group, ...]
+    applicable: tuple[Candidate, ...]
+
+
+def _search(
+    problem: Problem,
+    candidates: Sequence[Candidate],
+    pose: Callable[[Mapping[str, float] | None], Problem],
+    progress: Callable[[str], None],
+) -> _Search:
+    """Search, and once more where the effects that were found move the parameters far."""
+    for _ in range(SEARCHES - 1):
+        found = _found_or_moved(problem, candidates, progress)
+        if isinstance(found, _Search):
+            return found
+        problem = pose(found)
+    return _search_at(problem, candidates, progress)
+
+
+def _found_or_moved(
+    problem: Problem, candidates: Sequence[Candidate], progress: Callable[[str], None]
+) -> _Search | Mapping[str, float]:
+    """Return what a search finds, or the parameters' values to search at: this search is then in memory no longer."""
+    found = _search_at(problem, candidates, progress)
+    values = moved_values(found.decision.equations, found.decision.whole)
+    return values if bent(problem, values) else found
+
+
+def _search_at(problem: Problem, candidates: Sequence[Candidate], progress: Callable[[str], None]) -> _Search:
+    progress("computing the columns of all candidates")
+    equations, applicable = equations_of(problem, candidates)
+    progress("searching")
+    return _Search(decide(equations, applicable), equations.design.groups, applicable)
 
 
 def _labelled(comparison: Comparison, channel: str) -> Comparison:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import dataclass
-from datetime import UTC, datetime
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
 from functools import partial
-from hashlib import sha256
+from hashlib import file_digest, sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from regolithd.calibration.mismatch.data.columns import rovers_in
+from regolithd.calibration.mismatch.data.stretches import LONGEST_AT_ONCE, Stretch, rows_in, stretches_of
 from regolithd.calibration.mismatch.errors import MismatchError, RecordingError
 from regolithd.calibration.mismatch.fleet.comparison import Member, compare_fleet
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER, date_in
@@ -119,19 +120,40 @@ def members_of(files: Sequence[RoverFile], unit: str) -> list[Member]:
     """Return the recordings of a fleet; their names are the files', with folders where two have the same."""
     paths = [file.path for file in files]
     short = len({path.name for path in paths}) == len(set(paths))
-    found = []
+    found: list[Member] = []
     for file in files:
         path, name = file.path.resolve(), file.path.name if short else str(file.path)
-        found.append(
-            Member(
-                name=f"{name} ({file.rover})" if paths.count(file.path) > 1 else name,
-                rover=file.rover or ONLY_ROVER,
-                begins=begins_at(path),
-                read=partial(read_one, path, unit, file.rover if file.of_column else None),
-                digest=sha256(path.read_bytes() + file.rover.encode()).hexdigest(),
-            )
+        with path.open("rb") as content:
+            digest = file_digest(content, "sha256").hexdigest() + file.rover
+        whole = Member(
+            name=f"{name} ({file.rover})" if paths.count(file.path) > 1 else name,
+            rover=file.rover or ONLY_ROVER,
+            begins=begins_at(path),
+            read=partial(read_one, path, unit, file.rover if file.of_column else None),
+            digest=sha256(digest.encode()).hexdigest(),
         )
+        long = not file.of_column and rows_in(path) > LONGEST_AT_ONCE
+        found += [_of_stretch(whole, path, unit, each) for each in stretches_of(path)] if long else [whole]
     return found
+
+
+def _of_stretch(whole: Member, path: Path, unit: str, stretch: Stretch) -> Member:
+    """Return a stretch of a long recording as one of its own."""
+    rows = stretch.first, stretch.last
+    return replace(
+        whole,
+        name=f"{whole.name}, {stretch.words}",
+        begins=whole.begins and whole.begins + timedelta(seconds=stretch.from_s),
+        read=partial(read_one, path, unit, rows=rows),
+        digest=sha256(f"{whole.digest} {rows}".encode()).hexdigest(),
+    )
+
+
+def too_long_at_once(files: Sequence[RoverFile]) -> bool:
+    """Return whether the recordings are so long that they are compared stretch by stretch."""
+    return sum(rows_in(file.path) for file in files) > LONGEST_AT_ONCE and all(
+        file.path.suffix == ".parquet" and stretches_of(file.path) for file in files
+    )
 
 
 def run_fleet(files: Sequence[RoverFile], simulation: Path, outputs: Outputs, options: FleetOptions) -> Answer:
@@ -144,7 +166,10 @@ def run_fleet(files: Sequence[RoverFile], simulation: Path, outputs: Outputs, op
     """
     outputs.check()
     if outputs.report or outputs.corrected:
-        raise MismatchError("--report and --corrected are of one rover; a fleet has --json and --catalogue")
+        raise MismatchError(
+            "--report and --corrected are of one rover, and of a recording that is compared at once; a fleet, and a "
+            f"recording of more than {LONGEST_AT_ONCE} rows, has --json and --catalogue"
+        )
     simulated = load_simulation(simulation, announce=partial(typer.echo, err=True))
     workers: Workers = DaskCluster(options.scheduler) if options.scheduler else AllCores()
     store = Store(_kept_beside(options.catalogue)) if options.catalogue else None

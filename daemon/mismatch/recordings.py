@@ -28,15 +28,15 @@ def read_recordings(paths: Sequence[Path], unit: str) -> Recording:
     return joined([read_one(path, unit) for path in paths], [path.name for path in paths])
 
 
-def read_one(path: Path, unit: str, rover: str | None = None) -> Recording:
-    """Read a file of any kind; of one that holds several rovers, the rows of one.
+def read_one(path: Path, unit: str, rover: str | None = None, rows: tuple[int, int] | None = None) -> Recording:
+    """Read a file of any kind; of one that holds several rovers, the rows of one; `rows` of a Parquet file alone.
 
     Raises
     ------
     RecordingError
         When it is damaged, or no recording.
     """
-    return _read_mcap(path) if path.suffix == ".mcap" else read_recording(path, unit=unit, rover=rover)
+    return _read_mcap(path) if path.suffix == ".mcap" else read_recording(path, unit=unit, rover=rover, rows=rows)
 
 
 def _read_mcap(path: Path) -> Recording:

@@ -12,7 +12,7 @@ from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.simulation.load import load_simulation
 from regolithd.daemon.mismatch.files import Outputs, write_json, write_page
-from regolithd.daemon.mismatch.fleet import FleetOptions, files_of_rovers, run_fleet
+from regolithd.daemon.mismatch.fleet import FleetOptions, files_of_rovers, run_fleet, too_long_at_once
 from regolithd.daemon.mismatch.recordings import read_recordings
 from regolithd.daemon.mismatch.terminal import print_answer
 
@@ -30,7 +30,7 @@ NO_FLEET = FleetOptions()
 def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs, options: FleetOptions = NO_FLEET) -> Answer:
     """Compare, write the outputs, print the answer and return it.
 
-    Recordings of one rover are runs of one recording, unless an option of `FleetOptions` is given.
+    Recordings of one rover are runs of one recording, unless an option of `FleetOptions` is given, or they are long.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs, options:
     """
     outputs.check()
     files = files_of_rovers(recordings, options.rover_from)
-    if options.asked_for or len({file.rover for file in files}) > 1:
+    if options.asked_for or len({file.rover for file in files}) > 1 or too_long_at_once(files):
         return run_fleet(files, simulation, outputs, options)
     simulated = load_simulation(simulation, announce=partial(typer.echo, err=True))
     with Console(stderr=True).status("reading") as status:

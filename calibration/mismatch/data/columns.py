@@ -11,6 +11,7 @@ import re
 import zlib
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.errors import RecordingError, listed
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
 Column = NDArray[Any]
@@ -30,6 +31,8 @@ NUMBERS_NEEDED = frozenset({"t_s", "t_ms", "t_us", "t_ns", "t_min", "t_h", "run"
 """Columns in which text is an error, however much of it there is."""
 ROVER = "rover"
 """The column that tells rovers apart, where a file has several."""
+ROWS_AT_ONCE = 65_536
+"""Rows that are read at once where only a part of a file is wanted (a choice)."""
 PARQUET = b"PAR1"
 MCAP = b"\x89MCAP"
 _FOREIGN = {
@@ -68,8 +71,10 @@ class _Source:
         return f"{self.counted} {row + (2 if self.counted == 'line' else 1)}"
 
 
-def file_columns(path: Path, unit: str, rover: str | None = None) -> Columns:
+def file_columns(path: Path, unit: str, rover: str | None = None, rows: tuple[int, int] | None = None) -> Columns:
     """Read CSV (also .gz) or Parquet; of a file with several rovers, the rows of one.
+
+    `rows` of a Parquet file are read alone, from the first to before the last.
 
     Raises
     ------
@@ -78,7 +83,7 @@ def file_columns(path: Path, unit: str, rover: str | None = None) -> Columns:
     """
     if not path.is_file():
         raise RecordingError(f"{path} is not there" if not path.exists() else f"{path} is not a file")
-    table = _table(path)
+    table = _table(path) if rows is None else _parquet_rows(path, *rows)
     if rover is not None:
         table = table.filter(_text(table, ROVER) == rover).drop_columns([ROVER])
     return _columns(table, unit, _Source(f"{path}: ", "row" if path.suffix == ".parquet" else "line"))
@@ -142,14 +147,43 @@ def frame_columns(frame: object, unit: str) -> Columns:
     return _columns(table, unit, _Source())
 
 
+@contextmanager
+def parquet_errors(path: Path) -> Iterator[None]:
+    """Tell what goes wrong with a Parquet file as one error that names it."""
+    import pyarrow as pa  # noqa: PLC0415
+
+    try:
+        yield
+    except (pa.ArrowException, OSError, ValueError, KeyError, MemoryError, OverflowError) as error:
+        raise RecordingError(f"{path} is not a whole Parquet file: {_first_line(error)}") from error
+
+
 def _parquet_table(path: Path) -> Any:  # noqa: ANN401  # pyarrow has no types
     import pyarrow.parquet  # noqa: PLC0415
 
-    try:
+    with parquet_errors(path):
         # One file: no dataset, whose folder names would become columns.
         return pyarrow.parquet.ParquetFile(path).read()
-    except (pyarrow.ArrowException, OSError, ValueError, KeyError, MemoryError, OverflowError) as error:
-        raise RecordingError(f"{path} is not a whole Parquet file: {_first_line(error)}") from error
+
+
+def _parquet_rows(path: Path, first: int, last: int) -> Any:  # noqa: ANN401  # pyarrow has no types
+    """Return some rows of a Parquet file, with no more than a batch of others in memory."""
+    import pyarrow as pa  # noqa: PLC0415
+    import pyarrow.parquet  # noqa: PLC0415
+
+    with parquet_errors(path):
+        file, found, row = pyarrow.parquet.ParquetFile(path), [], 0
+        for group in range(file.num_row_groups):
+            if row >= last:
+                break
+            if row + (size := file.metadata.row_group(group).num_rows) <= first:
+                row += size
+                continue
+            for batch in file.iter_batches(ROWS_AT_ONCE, row_groups=[group]):
+                begins, ends = max(first - row, 0), min(last - row, batch.num_rows)
+                found.append(batch.slice(begins, max(ends - begins, 0)))
+                row += batch.num_rows
+        return pa.Table.from_batches(found)
 
 
 def _csv_table(path: Path) -> Any:  # noqa: ANN401

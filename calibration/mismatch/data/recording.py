@@ -95,8 +95,12 @@ class Recording:
         return replace(self, channels={**self.channels, **channels})
 
 
-def read_recording(path: Path, *, unit: str = UNIT, rover: str | None = None) -> Recording:
+def read_recording(
+    path: Path, *, unit: str = UNIT, rover: str | None = None, rows: tuple[int, int] | None = None
+) -> Recording:
     """Read CSV (also .gz) or Parquet; of a file whose column `rover` names several rovers, the rows of one.
+
+    `rows` of a Parquet file are read alone, from the first to before the last.
 
     Raises
     ------
@@ -104,7 +108,7 @@ def read_recording(path: Path, *, unit: str = UNIT, rover: str | None = None) ->
         When the file is none of these, has no time, or a cell is no number; the message names line and column.
     """
     try:
-        return _arrange(file_columns(path, unit, rover), unit)
+        return _arrange(file_columns(path, unit, rover, rows), unit)
     except RecordingError as error:
         raise error if str(path) in str(error) else RecordingError(f"{path}: {error}") from error
 

@@ -19,7 +19,7 @@ from regolithd.calibration.mismatch.fleet.choice.search import places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
 from regolithd.calibration.mismatch.fleet.told.findings import Chosen, Names, answer_of_fleet
-from regolithd.calibration.mismatch.fleet.work.found import Found, found_in, one_channel
+from regolithd.calibration.mismatch.fleet.work.found import Found, found_in, one_channel, without_columns
 from regolithd.calibration.mismatch.fleet.work.grid import GridGroup, grid_of
 from regolithd.calibration.mismatch.fleet.work.sums import Laws, Sums, forms_of, sums_of
 from regolithd.calibration.mismatch.fleet.work.workers import ThisProcess, Workers
@@ -242,7 +242,7 @@ def _of_channel(
     """Compare each recording, sum their products in a common grid, and choose the effects of the fleet."""
     found = work.done("comparing", members, lambda n: partial(_find, members[n].read, load, channel), channel)
     kept = sorted(found)
-    members, results = [members[n] for n in kept], [found[n] for n in kept]
+    members, results = [members[n] for n in kept], [found.pop(n) for n in kept]
     grid = grid_of(forms_of(simulation), results, 0)
     laws: Laws = tuple((group.candidate.name, group.shape) for group in grid)
     sums = work.done(
@@ -252,6 +252,8 @@ def _of_channel(
         json.dumps((channel, laws), sort_keys=True),
     )
     kept = sorted(sums)
+    # The columns of all recordings would be in memory together; their sums are all that is needed of them.
+    results = [without_columns(each) for each in results]
     names = _names([members[n] for n in kept])
     equations = _equations([sums[n] for n in kept], names, [members[n] for n in kept], grid, level)
     work.progress("searching", len(kept), len(kept))

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from regolithd.calibration.mismatch.inference.experiment import with_experiment
 from regolithd.calibration.mismatch.regression.group import Term
+from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
+from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,10 +37,8 @@ def collinear_sets(
     Coulomb friction, viscous friction and cohesion one. A set with one of the names in `taken` is left out.
     """
     terms = representatives(equations)
-    like = {
-        one: {two for two in terms if two != one and imitates(equations, given, terms[one], terms[two])}
-        for one in terms
-    }
+    beside = Beside(equations, given, [term for shapes in terms.values() for term in shapes])
+    like = {one: {two for two in terms if two != one and imitates(beside, terms[one], terms[two])} for one in terms}
     found, seen = [], set()
     for name in terms:
         members = _mutual(name, like)
@@ -70,25 +72,50 @@ def representatives(equations: NormalEquations) -> dict[str, list[Term]]:
     return found
 
 
-def energy_apart(equations: NormalEquations, given: Sequence[Term], term: Term, factor: float = 1.0) -> float:
-    """Return the Δχ² of a term outside the span of all else, at `factor` times the size worth telling apart."""
+def energy_apart(equations: NormalEquations, given: Sequence[Term], term: Term) -> float:
+    """Return the Δχ² of a term outside the span of all else, at the size worth telling apart."""
     size = equations.thresholds.effect_to_tell_apart * equations.problem.mean_size
     _, complement = equations.own_and_complement(given, term)
-    return float(factor * complement[0, 0] * size**2)
+    return float(complement[0, 0] * size**2)
 
 
-def imitates(equations: NormalEquations, given: Fit, one: list[Term], two: list[Term]) -> bool:
+class Beside:
+    """Terms on all wheels, each held against each beside a fit: one Schur complement serves all pairs."""
+
+    def __init__(self, equations: NormalEquations, given: Fit, terms: Sequence[Term]) -> None:
+        """Compute what is left of the columns of all terms outside the span of the fit."""
+        self.thresholds = equations.thresholds
+        at = np.array(sorted({column for term in terms for column in term.group.columns}), np.int64)
+        self._place = {int(column): place for place, column in enumerate(at)}
+        products, fit = equations.products(at, at).sum(axis=0), equations.fit(given.terms)
+        self._energy = np.diag(products)
+        self._left = schur_complement(products, equations.cross(fit.columns, at, equations.all_wheels), fit.covariance)
+        self._size = (equations.thresholds.effect_to_tell_apart * equations.problem.mean_size) ** 2
+
+    def apart(self, term: Term, other: Term | None = None) -> float:
+        """Return the Δχ² of a term outside the span of the fit, and of another, at the size worth telling apart."""
+        of = self._place[term.group.columns[0]]
+        left = float(self._left[of, of])
+        if other is not None:
+            at = [self._place[column] for column in other.group.columns]
+            at = [place for place in at if self._left[place, place] > SINGULAR * self._energy[place]]
+            inverse = pseudo_inverse(self._left[np.ix_(at, at)], SINGULAR)
+            left -= float(self._left[of, at] @ inverse @ self._left[at, of])
+        return left * self._size
+
+
+def imitates(beside: Beside, one: list[Term], two: list[Term]) -> bool:
     """Return whether some shape of `two` would pass for the middle shape of `one` one time in twenty.
 
     Where the free parameters hide an effect of the size worth telling apart, one that is just found is meant, unless
     that is implausibly large.
     """
-    limits, term = equations.thresholds, one[len(one) // 2]
-    alone = energy_apart(equations, given.terms, term)
+    limits, term = beside.thresholds, one[len(one) // 2]
+    alone = beside.apart(term)
     if alone < 2 * limits.told_apart / limits.largest_plausible_factor**2:
         return False
     factor = max(2 * limits.told_apart / alone, 1.0)
-    return any(energy_apart(equations, (*given.terms, other), term, factor) < limits.told_apart for other in two)
+    return any(factor * beside.apart(term, other) < limits.told_apart for other in two)
 
 
 def parameters_like(equations: NormalEquations, given: Sequence[Term], members: Sequence[Term]) -> list[str]:

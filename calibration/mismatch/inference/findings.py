@@ -21,10 +21,11 @@ from regolithd.calibration.mismatch.inference.evidence import calibrated_values,
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
 from regolithd.calibration.mismatch.inference.intervals import parameters_of
 from regolithd.calibration.mismatch.inference.located import share_of_residual, spell_of
-from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
+from regolithd.calibration.mismatch.inference.probability import other_answers, probability
 from regolithd.calibration.mismatch.inference.ranges import range_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
 from regolithd.calibration.mismatch.inference.statements import statement
+from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors
     from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.as_read import AsRead
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
     from regolithd.calibration.mismatch.thresholds import Thresholds
@@ -48,21 +50,20 @@ def answer_of(
     effects, changes = named_effects(decision, held_out)
     parameters = calibrated_parameters(decision)
     moved = beyond_prior(parameters, equations.thresholds)
-    known = decided_by_evidence(decision)
-    rest = alternatives(decision) if known else ()
+    rest = alternatives(decision)
     extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold, rest)
     channel, floor = problem.simulation.channel, noise_floor(decision)
     return Answer(
         verdict=verdict_of(decision, moved),
         effects=effects,
-        unexplained=tuple(unexplained(decision, term) for term in decision.unnamed),
+        unexplained=unexplained(decision),
         indistinguishable=sets,
         sensitivity=sensitivities(extended, decision.whole, candidates, threshold),
         fit=FitImprovement(channel, held_out.before, held_out.after if named.terms else held_out.before, floor),
         parameters=parameters,
         changes=changes,
         left_out=problem.left_out,
-        probability=probability(rest, equations.thresholds) if known else None,
+        probability=probability(rest, equations.thresholds),
         alternatives=other_answers(rest, equations.thresholds),
         notes=(
             *map(_beyond_prior_in_words, moved),
@@ -125,7 +126,11 @@ def calibrated_parameters(decision: Decision) -> tuple[CalibratedParameter, ...]
 
 def beyond_prior(parameters: Iterable[CalibratedParameter], thresholds: Thresholds) -> tuple[CalibratedParameter, ...]:
     """Return the parameters that had to leave their priors: a finding, whatever else was found."""
-    return tuple(each for each in parameters if each.prior_stds_away > thresholds.furthest_prior_stds)
+    return tuple(
+        each
+        for each in parameters
+        if each.prior_std > 0 and abs(each.value - each.prior) > thresholds.furthest_prior_stds * each.prior_std
+    )
 
 
 def _effect(problem: Problem, term: Term, parameters: Mapping[str, Parameter], errors: tuple[float, float]) -> Effect:
@@ -148,17 +153,24 @@ def _effect(problem: Problem, term: Term, parameters: Mapping[str, Parameter], e
     )
 
 
-def unexplained(decision: Decision, term: Term) -> Unexplained:
-    """Return where a smooth term acts, from when to when, and how much of the residual it is."""
+def unexplained(decision: Decision) -> tuple[Unexplained, ...]:
+    """Return where each smooth term acts, from when to when, and how much of the residual it is."""
+    if not decision.unnamed:
+        return ()
+    read = as_read(decision.equations, decision.whole)
+    return tuple(_unexplained(decision, read, term) for term in decision.unnamed)
+
+
+def _unexplained(decision: Decision, read: AsRead, term: Term) -> Unexplained:
     equations, problem = decision.equations, decision.equations.problem
-    first_s, last_s = spell_of(equations, decision.whole, term)
+    first_s, last_s = spell_of(equations, read, term)
     return Unexplained(
         channel=problem.simulation.channel,
         wheels=wheel_names(problem, term.wheels),
         covariate=term.name,
         from_s=first_s,
         to_s=last_s,
-        share_of_residual=share_of_residual(equations, decision.whole, term),
+        share_of_residual=share_of_residual(equations, read, term),
         range=range_of(decision, term),
     )
 
@@ -180,10 +192,11 @@ def _about_the_mask(problem: Problem) -> list[str]:
 
 
 def _beyond_prior_in_words(parameter: CalibratedParameter) -> str:
+    away = abs(parameter.value - parameter.prior) / parameter.prior_std
     return (
         f"{parameter.name} had to leave its prior: {parameter.value:.4g} {parameter.unit}, "
-        f"{parameter.prior_stds_away:.1f} standard deviations from {parameter.prior:.4g}. Check the stated value and "
-        "its standard deviation, or look for physics that acts as this parameter does."
+        f"{away:.1f} standard deviations from {parameter.prior:.4g}. Check the stated value and its standard "
+        "deviation, or look for physics that acts as this parameter does."
     )
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.inference.improbable import unexplained_if_improbable
-from regolithd.calibration.mismatch.inference.one_sided import unexplained_if_one_sided
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_candidate,
@@ -70,7 +69,7 @@ def held_out_errors(
     wheels = len(equations.weights)
     before, after = np.zeros(wheels), np.zeros(wheels)
     without = np.zeros((len(named.terms), wheels))
-    for fold in range(len(equations.design.gram)):
+    for fold in range(equations.design.folds):
         train = training_equations(equations, fold)
         chosen = of_names(chosen_effects(train.with_groups(groups), entry_threshold), named)
         train, chosen = with_optimised_shapes(train, chosen)
@@ -134,8 +133,8 @@ def chosen_effects(train: NormalEquations, entry_threshold: float) -> tuple[Term
 def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOutErrors]:
     """Return the decision without names that lower no held-out error, the worst dropped first; and those errors.
 
-    Without any name left, what is more probably there than not is unexplained; so is what comes and goes. `grid` are
-    the groups before any data optimised their shapes.
+    Without any name left, what is more probably there than not is unexplained. `grid` are the groups before any data
+    optimised their shapes.
     """
     equations, threshold = decision.equations, decision.entry_threshold
     problem, kept = equations.problem, set(map(id, grid))
@@ -144,11 +143,7 @@ def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOut
     while (idle := held_out.without_gain()) is not None:
         decision = without_name(replace(decision, equations=equations), idle)
         equations, held_out = held_out_errors(equations, decision.named, choice, threshold)
-    decision = unexplained_if_improbable(replace(decision, equations=equations))
-    one_sided = unexplained_if_one_sided(decision)
-    if len(one_sided.named.terms) < len(decision.named.terms):
-        equations, held_out = held_out_errors(one_sided.equations, one_sided.named, choice, threshold)
-    return replace(one_sided, equations=equations), held_out
+    return unexplained_if_improbable(replace(decision, equations=equations)), held_out
 
 
 def _only_proposed(problem: Problem, group: Group) -> bool:

@@ -7,25 +7,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import couplings_of
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.regression.group import Fit, Term
+    from regolithd.calibration.mismatch.regression.as_read import AsRead
+    from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
 
-def share_of_residual(equations: NormalEquations, whole: Fit, term: Term) -> float:
+def share_of_residual(equations: NormalEquations, read: AsRead, term: Term) -> float:
     """Return a term's share of the power, on its wheels, of what the calibrated simulation leaves.
 
     What it leaves is counted at the parameters of the fit with all terms: those of a fit without them absorb a part.
     From the term's own power that is taken which its coefficients have by chance, a long-run variance each.
     """
-    on, read = list(term.wheels), as_read(equations, whole)
-    whole = read.fit
+    on, whole = list(term.wheels), read.fit
     terms = [contribution(equations, whole, index)[:, on] for index in range(len(whole.terms))]
     left = residual_of(equations, whole)[:, on] + sum(terms)
     own = np.sum(terms[whole.terms.index(term)] ** 2)
@@ -33,14 +32,13 @@ def share_of_residual(equations: NormalEquations, whole: Fit, term: Term) -> flo
     return float(np.clip((own - by_chance) / max(float(np.sum(left**2)), 1e-300), 0.0, 1.0))
 
 
-def spell_of(equations: NormalEquations, whole: Fit, term: Term) -> tuple[float, float]:
+def spell_of(equations: NormalEquations, read: AsRead, term: Term) -> tuple[float, float]:
     """Return from when to when a term acts [s]: the stretch of time in which it explains most beyond chance.
 
     At each instant it takes something from the weighted sum of squares. Fitted coefficients do so by chance too, and
     are charged for it by Akaike's criterion, each for its part of the time.
     """
     on, limits = list(term.wheels), equations.thresholds
-    read = as_read(equations, whole)
     whole, weights = read.fit, read.weights[on]
     own = contribution(equations, whole, whole.terms.index(term))[:, on]
     left = residual_of(equations, whole)[:, on]

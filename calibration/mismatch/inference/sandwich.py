@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.regression.as_read import columns_on_wheels
 from regolithd.calibration.mismatch.regression.discrepancy_basis import discrepancy_basis
 from regolithd.calibration.mismatch.regression.residuals import whitened_residual_of
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
@@ -72,7 +73,7 @@ class Linearisation:
 
 def linearised(equations: NormalEquations, fit: Fit) -> Linearisation:
     """Return the linearisation of a fit."""
-    columns = [*_coefficient_columns(equations, fit)]
+    columns = list(equations.design.in_time(columns_on_wheels(equations, fit)))
     slopes = []
     for slope, column in _shape_slopes(equations, fit):
         slopes.append(slope)
@@ -86,16 +87,6 @@ def linearised(equations: NormalEquations, fit: Fit) -> Linearisation:
     stacked = np.stack(columns) if columns else np.zeros((0, *shape))
     ends = len(columns) + np.cumsum([0, *sizes])
     return Linearisation(np.concatenate((stacked, *discrepancies)), precision, tuple(slopes), ends)
-
-
-def _coefficient_columns(equations: NormalEquations, fit: Fit) -> Iterator[Array]:
-    """Yield each coefficient's column on its wheels, shape (time, wheel)."""
-    design = equations.design
-    for column, wheels in fit.columns:
-        values = np.zeros(design.residual.shape)
-        on = list(wheels)
-        values[on] = design.unwhitened(design.columns[column, on].astype(np.float64), on)
-        yield design.in_time(values)
 
 
 def _shape_slopes(equations: NormalEquations, fit: Fit) -> Iterator[tuple[ShapeSlope, Array]]:

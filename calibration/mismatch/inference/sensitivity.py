@@ -53,7 +53,7 @@ def smallest_detectable(equations: NormalEquations, given: Sequence[Term], term:
         return float("inf")
     on = list(term.wheels)
     known = problem.mask.T[:, design.order][on]
-    columns = design.unwhitened(design.columns[term.group.span][:, on].astype(np.float64), on)
+    columns = design.columns_as_read(term.group.columns)[:, on].astype(np.float64)
     squares = np.mean(columns**2, axis=0)[known]
     rms = float(np.sqrt(np.mean(squares)))
     least = limits.smallest_effect * problem.mean_size / active_rms(squares, limits.active_share)

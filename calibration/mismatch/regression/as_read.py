@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR, membership
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
 from regolithd.calibration.mismatch.signal.noise import estimate_noise
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
-
-SINGULAR = 1e-10
-"""Relative eigenvalue below which a direction counts as undetermined: rounding of float32."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +44,13 @@ class AsRead:
     weights: Array
 
 
+def columns_on_wheels(equations: NormalEquations, fit: Fit) -> Array:
+    """Return a fit's columns as read, 0 on wheels that they do not act on, shape (column, wheel, time by folds)."""
+    columns = equations.design.columns_as_read([column for column, _ in fit.columns])
+    on = membership(fit.columns, len(equations.weights))
+    return np.asarray(columns * on[:, :, None], np.float64)
+
+
 def long_run_weights(equations: NormalEquations, fit: Fit) -> Array:
     """Return one over the long-run variance of what a fit leaves, shape (wheel,); the weights, where not whitened."""
     if equations.design.whitening is NOT_WHITENED:
@@ -58,11 +63,8 @@ def as_read(equations: NormalEquations, fit: Fit) -> AsRead:
     """Fit the terms of a fit to the readings as they were read."""
     design, nuisance = equations.design, equations.nuisance
     weights = long_run_weights(equations, fit)
-    residual = design.unwhitened(design.residual.astype(np.float64))
-    columns = np.zeros((len(fit.columns), *residual.shape))
-    for row, (column, wheels) in zip(columns, fit.columns, strict=True):
-        on = list(wheels)
-        row[on] = design.unwhitened(design.columns[column, on].astype(np.float64), on)
+    residual = design.residual_as_read.astype(np.float64)
+    columns = columns_on_wheels(equations, fit)
     weighted = columns * weights[:, None]
     matrix = np.einsum("awt,bwt->ab", weighted, columns, optimize=True)
     moment = np.einsum("awt,wt->a", weighted, residual, optimize=True)

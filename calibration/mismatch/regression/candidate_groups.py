@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.group import Group
 
@@ -15,8 +14,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
-
-Array = NDArray[np.float64]
 
 
 def coefficient_signs(candidate: Candidate, count: int) -> tuple[int, ...]:
@@ -39,16 +36,14 @@ def with_candidate(
     `noise_reductions` is how much less noise there is at the frequencies of each shape than in the long run.
     """
     problem, groups = design.problem, []
-    columns: list[Array] = []
     selected_from_many = 2 * float(np.log(candidate.shape_count(problem)))
     for shape, reduction in zip(shapes, noise_reductions or [1.0] * len(shapes), strict=True):
         found = np.asarray(candidate.columns(problem, shape), np.float64)
-        first = design.size + len(columns)
-        columns += list(found)
+        design, places = design.extended(list(found))
         groups.append(
             Group(
                 name=candidate.name,
-                columns=tuple(range(first, first + len(found))),
+                columns=places,
                 signs=coefficient_signs(candidate, len(found)),
                 sharing=candidate.sharing,
                 selection_penalty=selected_from_many + implausibility(problem, candidate, shape),
@@ -59,8 +54,7 @@ def with_candidate(
                 acting=np.any(np.where(problem.mask, found, 0.0) != 0, axis=1) if len(found) > 1 else None,
             )
         )
-    extended, _ = design.extended(columns)
-    return extended.with_groups((*design.groups, *groups)), tuple(groups)
+    return design.with_groups((*design.groups, *groups)), tuple(groups)
 
 
 def with_candidates(

@@ -7,8 +7,9 @@ The equations are immutable: other weights, further columns or another prior mak
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 Columns = tuple[tuple[int, tuple[int, ...]], ...]
 
 SINGULAR = 1e-10
@@ -43,7 +45,7 @@ SINGULAR = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
-    """Sums of products of all columns, weighted, on some folds; made by `normal_equations`.
+    """Sums of products of columns, weighted, on some folds.
 
     Attributes
     ----------
@@ -51,16 +53,12 @@ class NormalEquations:
     nuisance: the free parameters and their priors
     weights: one over the long-run variance, shape (wheel,)
     folds: the folds whose instants are fitted
-    gram: weighted sums of products, shape (wheel, column, column)
-    moment: weighted sums of products with the residual, shape (wheel, column)
     """
 
     design: DesignMatrix
     nuisance: Nuisance
     weights: Array
     folds: tuple[int, ...]
-    gram: Array = field(repr=False)
-    moment: Array = field(repr=False)
 
     @property
     def problem(self) -> Problem:
@@ -98,15 +96,33 @@ class NormalEquations:
 
     def over(self, design: DesignMatrix) -> NormalEquations:
         """Return the equations of a design matrix that this one was extended to."""
-        old, size = len(self.gram[0]), design.size
-        gram = np.zeros((len(self.weights), size, size))
-        gram[:, :old, :old] = self.gram
+        return replace(self, design=design)
+
+    @cached_property
+    def moment(self) -> Array:
+        """Weighted sums of products of all columns with the residual, shape (wheel, column)."""
+        return self._weighted(self.design.moment)
+
+    @property
+    def gram(self) -> Array:
+        """Weighted sums of products of all columns, shape (wheel, column, column)."""
+        return self._weighted(self.design.gram)
+
+    def products(self, rows: Sequence[int] | Index, columns: Sequence[int] | Index) -> Array:
+        """Return weighted sums of products of some columns with others, shape (wheel, row, column)."""
+        return self._weighted(self.design.products(rows, columns))
+
+    def energies(self, columns: Sequence[int] | Index) -> Array:
+        """Return weighted sums of squares of some columns, shape (wheel, column)."""
+        return self._weighted(self.design.energies(columns))
+
+    def _weighted(self, of_folds: NDArray[Any]) -> Array:
+        """Return sums (fold, wheel, …) over the folds, weighted."""
+        total = np.zeros(of_folds.shape[1:])
         for fold in self.folds:
-            gram[:, old:, :] += design.gram[fold][:, old:, :]
-        gram[:, old:, :] *= self.weights[:, None, None]
-        gram[:, :old, old:] = np.swapaxes(gram[:, old:, :old], 1, 2)
-        moment = design.moment[list(self.folds)].sum(axis=0) * self.weights[:, None]
-        return replace(self, design=design, gram=gram, moment=moment)
+            total += of_folds[fold]
+        total *= self.weights.reshape(-1, *[1] * (total.ndim - 1))
+        return total
 
     def with_groups(self, groups: Sequence[Group]) -> NormalEquations:
         """Return the equations with other groups to choose from."""
@@ -138,8 +154,9 @@ class NormalEquations:
         total = fit.delta_chi2
         for index, term in enumerate(fit.terms):
             if term.group.noise_reduction > 1:
-                values, span = fit.coefficients[fit.of_term(index)], term.group.span
-                own = sum(float(values @ self.gram[w][span, span] @ values) for w in term.wheels)
+                values = fit.coefficients[fit.of_term(index)]
+                products = self.design.own_products(term.group.columns, self.folds)
+                own = sum(float(values @ (products[w] * self.weights[w]) @ values) for w in term.wheels)
                 total += (term.group.noise_reduction - 1) * own
         return total - sum(self.penalty(term) for term in fit.terms)
 
@@ -152,45 +169,52 @@ class NormalEquations:
         signs = np.zeros(len(at))
         for group in wanted:
             signs[[place[column] for column in group.columns]] = group.signs
-        energies = self.gram[:, at, at]
+        energies, moment = self.energies(at), self.moment[:, at]
+        crosses = self._crosses(fitted.columns, at)
+        shared = {kind: self._may_share(wanted, kind, place) for kind in set(self.wheel_sets.values())}
         found: list[tuple[float, Term]] = []
         for wheels, kind in self.wheel_sets.items():
             chosen = list(wheels)
-            cross = self.cross(fitted.columns, at, wheels)
-            left = self.moment[chosen][:, at].sum(axis=0) - fitted.coefficients @ cross
+            cross = _over(crosses, wheels)
+            left = moment[chosen].sum(axis=0) - fitted.coefficients @ cross
             energy = energies[chosen].sum(axis=0)
             complement = schur_diagonal(energy, cross, fitted.covariance)
-            singles = delta_chi2_of_each(left, complement, energy, signs, self.thresholds.least_tolerance)
-            for group in wanted:
-                if not (group.may_be_shared(kind) or len(self.weights) == 1):
-                    continue
-                here = [place[column] for column in group.columns]
+            singles = delta_chi2_of_each(left, complement, energy, signs, self.thresholds.least_tolerance).tolist()
+            for group, here in shared[kind]:
                 if len(here) == 1:
-                    gain = float(singles[here[0]])
+                    gain = singles[here[0]]
                 else:
                     gain = self._together(group, wheels, left[here], explained_part(cross[:, here], fitted.covariance))
-                term = Term(group, wheels)
-                if gain > 0 and visible_in_own_channel(term, self.thresholds):
+                if gain > 0 and visible_in_own_channel(term := Term(group, wheels), self.thresholds):
                     found.append((gain * group.noise_reduction, term))
         return found
 
+    def _may_share(self, groups: Sequence[Group], kind: str, place: Mapping[int, int]) -> list[tuple[Group, list[int]]]:
+        """Return the groups that wheels of this kind may share, each with its columns' places."""
+        alone = len(self.weights) == 1
+        return [
+            (group, [place[column] for column in group.columns])
+            for group in groups
+            if alone or group.may_be_shared(kind)
+        ]
+
     def _together(self, group: Group, wheels: tuple[int, ...], left: Array, explained: Array) -> float:
         """Return the Δχ² of a group of several columns."""
-        own = sum(
-            (self.gram[w][group.span, group.span] for w in wheels[1:]), self.gram[wheels[0]][group.span, group.span]
-        )
+        products = self.design.own_products(group.columns, self.folds)
+        first, *others = (products[w] * self.weights[w] for w in wheels)
+        own = sum(others, first)
         return delta_chi2_together(
             left, own - explained, float(np.max(np.diag(own))), group.signs, self.thresholds.least_tolerance
         )
 
-    def cross(self, fitted: Columns, at: NDArray[np.int64], wheels: tuple[int, ...]) -> Array:
+    def cross(self, fitted: Columns, at: Index, wheels: tuple[int, ...]) -> Array:
         """Return sums of products of fitted columns and others that act on `wheels`, shape (fitted, other)."""
-        index = np.array([column for column, _ in fitted], np.int64)
-        total = np.zeros((len(index), len(at)))
-        for wheel in wheels:
-            on = np.array([wheel in of_column for _, of_column in fitted], np.float64)
-            total += on[:, None] * self.gram[wheel][np.ix_(index, at)]
-        return total
+        return _over(self._crosses(fitted, at), wheels)
+
+    def _crosses(self, fitted: Columns, at: Index) -> Array:
+        """Return sums of products of fitted columns, where they act, and others, shape (wheel, fitted, other)."""
+        on = membership(fitted, len(self.weights)).T
+        return on[:, :, None] * self.products([column for column, _ in fitted], at)
 
     def own_and_complement(self, given: Iterable[Term], term: Term) -> tuple[Array, Array]:
         """Return a term's sums of products, and their Schur complement beside `given` and the free parameters."""
@@ -214,9 +238,10 @@ class NormalEquations:
         """Return matrix and moment of the normal equations of these columns, the priors included."""
         index = [column for column, _ in columns]
         share = membership(columns, len(self.weights))
+        products = self.products(index, index)
         matrix = np.zeros((len(columns), len(columns)))
         for w in self.all_wheels:
-            matrix += np.outer(share[:, w], share[:, w]) * self.gram[w][np.ix_(index, index)]
+            matrix += np.outer(share[:, w], share[:, w]) * products[w]
         base = len(self.nuisance.columns)
         matrix[range(base), range(base)] += self.nuisance.precision
         moment = np.einsum("cw,wc->c", share, self.moment[:, index])
@@ -227,17 +252,16 @@ class NormalEquations:
 def normal_equations(
     design: DesignMatrix, nuisance: Nuisance, weights: Array, folds: Sequence[int] | None = None
 ) -> NormalEquations:
-    """Sum the products over the folds (all of them where none are given) and weigh them."""
-    folds = tuple(range(len(design.gram)) if folds is None else folds)
-    empty = NormalEquations(
-        design=design,
-        nuisance=nuisance,
-        weights=weights,
-        folds=folds,
-        gram=np.zeros((len(weights), 0, 0)),
-        moment=np.zeros((len(weights), 0)),
-    )
-    return empty.over(design)
+    """Return the equations on some folds; on all of them where none are given."""
+    return NormalEquations(design, nuisance, weights, tuple(range(design.folds) if folds is None else folds))
+
+
+def _over(of_wheels: Array, wheels: Sequence[int]) -> Array:
+    """Return the sum over some wheels of what is given of each, shape (wheel, …)."""
+    total = np.zeros(of_wheels.shape[1:])
+    for wheel in wheels:
+        total += of_wheels[wheel]
+    return total
 
 
 def membership(columns: Columns, wheel_count: int) -> Array:

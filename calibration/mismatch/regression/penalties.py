@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import log
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,7 +23,7 @@ def full_penalty(term: Term, wheel_count: int, thresholds: Thresholds) -> float:
     count = len(group.columns) if acting is None else np.sum(acting[:, list(term.wheels)].any(axis=1))
     total = thresholds.coefficient_penalty * float(count) + group.selection_penalty
     if len(term.wheels) < wheel_count:
-        total += 2 * float(np.log(2 * wheel_count))
+        total += 2 * log(2 * wheel_count)
         # One wheel alone is the rule for some faults and the exception for what all wheels are built with.
         total += thresholds.single_wheel_penalty if "all" in group.sharing else 0.0
     return total

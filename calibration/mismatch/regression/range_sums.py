@@ -15,14 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.region import HIGHEST_POWER, Region
 from regolithd.calibration.mismatch.regression.smooth_groups import acting
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.as_read import AsRead
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
@@ -162,10 +161,10 @@ def known_values(equations: NormalEquations, covariate: str, coupling: str, whee
 
 
 def range_sums(
-    equations: NormalEquations, fit: Fit, covariate: str, coupling: str, wheels: Sequence[int], edges: Array
+    equations: NormalEquations, read: AsRead, covariate: str, coupling: str, wheels: Sequence[int], edges: Array
 ) -> RangeSums:
-    """Sum over the bins between edges, on some wheels, beside a fit, of the readings as they were read."""
-    read = as_read(equations, fit)
+    """Sum over the bins between edges, on some wheels, beside a fit to the readings as they were read."""
+    fit = read.fit
     problem, design = equations.problem, equations.design
     values, factor = (each[design.order] for each in acting(problem, covariate, coupling))
     mask = problem.mask[design.order] & np.isfinite(values)

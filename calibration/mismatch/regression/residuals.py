@@ -8,25 +8,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
+Columns = NDArray[np.float32]
 
 
 def residual_of(equations: NormalEquations, fit: Fit) -> Array:
     """Return measured less fitted, shape (time, wheel), 0 outside the mask."""
     design = equations.design
-    return np.where(design.problem.mask, design.in_time(design.unwhitened(whitened_residual_of(equations, fit))), 0.0)
+    return design.in_time(residual_as_read_of(equations, fit))
 
 
 def whitened_residual_of(equations: NormalEquations, fit: Fit) -> Array:
     """Return measured less fitted, whitened, shape (wheel, time in the order of folds)."""
     design = equations.design
-    left = design.residual.astype(np.float64)
-    for (column, wheels), value in zip(fit.columns, fit.coefficients, strict=True):
+    return _less_fitted(design.residual, design.columns, fit)
+
+
+def residual_as_read_of(equations: NormalEquations, fit: Fit) -> Array:
+    """Return measured less fitted as read, shape (wheel, time in the order of folds), 0 outside the mask."""
+    design = equations.design
+    return _less_fitted(design.residual_as_read, design.columns_as_read, fit)
+
+
+def _less_fitted(residual: NDArray[np.float32], columns_at: Callable[[Sequence[int]], Columns], fit: Fit) -> Array:
+    """Return a residual (wheel, time) less what a fit explains of it, with the columns that `columns_at` returns."""
+    left = residual.astype(np.float64)
+    columns = columns_at([column for column, _ in fit.columns])
+    for column, (_, wheels), value in zip(columns, fit.columns, fit.coefficients, strict=True):
         for w in wheels:
-            left[w] -= value * design.columns[column, w]
+            left[w] -= value * column[w]
     return left
 
 
@@ -39,10 +54,11 @@ def contribution(equations: NormalEquations, fit: Fit, index: int) -> Array:
     """Return what a term adds to the prediction, shape (time, wheel)."""
     design, term = equations.design, fit.terms[index]
     total = np.zeros(design.residual.shape)
-    for column, value in zip(term.group.columns, fit.coefficients[fit.of_term(index)], strict=True):
+    columns = design.columns_as_read(term.group.columns)
+    for column, value in zip(columns, fit.coefficients[fit.of_term(index)], strict=True):
         for w in term.wheels:
-            total[w] += value * design.columns[column, w]
-    return design.in_time(design.unwhitened(total))
+            total[w] += value * column[w]
+    return design.in_time(total)
 
 
 def where_it_acts(equations: NormalEquations, fit: Fit, index: int) -> Array:

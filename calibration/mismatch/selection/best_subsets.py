@@ -22,12 +22,12 @@ Scored = tuple[float, "Term"]
 
 def best_of_each_candidate(equations: NormalEquations, given: Sequence[Term]) -> list[Scored]:
     """Return each candidate's best shape and wheels beside `given`, with Δχ² less penalty, best first."""
-    taken = {(term.name, term.wheels) for term in given}
+    taken = [(term.name, set(term.wheels)) for term in given]
     groups = [group for group in equations.design.groups if group.named]
     scored = [
-        (gain - equations.penalty(term), term.name, term)
+        (gain - equations.penalty(term), term.group.name, term)
         for gain, term in equations.further(given, groups)
-        if (term.name, term.wheels) not in taken and not any(_same_fault(term, other) for other in given)
+        if all(term.group.name != name or wheels.isdisjoint(term.wheels) for name, wheels in taken)
     ]
     return _best_of_each(scored)
 
@@ -51,11 +51,6 @@ def _best_of_each(scored: Sequence[tuple[float, str, Term]]) -> list[Scored]:
         if family not in best or score > best[family][0]:
             best[family] = (score, term)
     return sorted(best.values(), key=lambda found: -found[0])
-
-
-def _same_fault(one: Term, other: Term) -> bool:
-    """Return whether two terms are one candidate on overlapping wheels."""
-    return one.group.named and one.name == other.name and bool(set(one.wheels) & set(other.wheels))
 
 
 def acceptable(equations: NormalEquations, fit: Fit) -> bool:

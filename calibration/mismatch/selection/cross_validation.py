@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations, normal_equations
-from regolithd.calibration.mismatch.regression.residuals import whitened_residual_of
+from regolithd.calibration.mismatch.regression.residuals import residual_as_read_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 def squares_left(equations: NormalEquations, fit: Fit, fold: int) -> Array:
     """Return the sum of squared errors of a fit on a fold, shape (wheel,)."""
     design = equations.design
-    left = design.unwhitened(whitened_residual_of(equations, fit))
+    left = residual_as_read_of(equations, fit)
     return np.asarray(np.sum(left[:, design.cuts[fold] : design.cuts[fold + 1]] ** 2, axis=1))
 
 
@@ -39,13 +39,13 @@ def squares_on_fold(design: DesignMatrix, fit: Fit, fold: int) -> Array:
             continue
         at = [c for c, _ in on]
         values = np.array([v for _, v in on])
-        total[w] += values @ design.gram[fold, w][np.ix_(at, at)] @ values - 2 * values @ design.moment[fold, w, at]
+        total[w] += values @ design.products(at, at)[fold, w] @ values - 2 * values @ design.moment[fold, w, at]
     return total
 
 
 def other_folds(design: DesignMatrix, fold: int) -> list[int]:
     """Return all folds but one; that one where there is no other."""
-    return [f for f in range(len(design.gram)) if f != fold] or [fold]
+    return [f for f in range(design.folds) if f != fold] or [fold]
 
 
 def training_equations(equations: NormalEquations, fold: int) -> NormalEquations:
@@ -57,7 +57,7 @@ def training_equations(equations: NormalEquations, fold: int) -> NormalEquations
 def gains_on_other_folds(equations: NormalEquations, terms: Sequence[Term], index: int) -> Array:
     """Return a term's Δχ² on each fold when the other folds fitted it, shape (fold,)."""
     rest = [term for i, term in enumerate(terms) if i != index]
-    gains = np.zeros(len(equations.design.gram))
+    gains = np.zeros(equations.design.folds)
     for fold in range(len(gains)):
         train = training_equations(equations, fold)
         less = squares_on_fold(train.design, train.fit(rest), fold)

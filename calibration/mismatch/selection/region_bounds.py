@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.range_sums import Ranges, known_values, range_sums
 from regolithd.calibration.mismatch.selection.region_search import FEWEST_SHARE, Found, between, edges_of, with_region
 from regolithd.calibration.mismatch.signal.density import quantiles
 
 if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.regression.as_read import AsRead
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.regression.region import Region
@@ -52,7 +54,7 @@ def bounds_of(equations: NormalEquations, fit: Fit, index: int) -> tuple[Bound |
     term = fit.terms[index]
     region = term.group.region
     assert region is not None  # noqa: S101  # only regions come here
-    rest = equations.fit(fit.without(index))
+    rest = as_read(equations, equations.fit(fit.without(index)))
     values = known_values(equations, region.covariate, region.coupling, term.wheels)
     steps = [_step(values, bound) for bound in (region.lower, region.upper)]
     for _ in range(WIDENINGS + 1):
@@ -106,7 +108,7 @@ def _grid(values: Array, bound: float, step: float) -> Array:
 
 
 def _density(
-    equations: NormalEquations, rest: Fit, region: Region, wheels: tuple[int, ...], grids: list[Array]
+    equations: NormalEquations, rest: AsRead, region: Region, wheels: tuple[int, ...], grids: list[Array]
 ) -> Array:
     """Return the posterior of both bounds, shape (lower, upper); one row or column where there is no bound."""
     edges = np.unique(np.concatenate(grids))

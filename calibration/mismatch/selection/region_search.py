@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.group import Group, Term
 from regolithd.calibration.mismatch.regression.range_sums import Ranges, known_values, range_sums
 from regolithd.calibration.mismatch.regression.region import FORMS, GROWTH, Region
@@ -18,6 +19,7 @@ from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, ac
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from regolithd.calibration.mismatch.regression.as_read import AsRead
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.regression.range_sums import RangeSums
@@ -94,7 +96,10 @@ def _one_after_another(
 def best_region(equations: NormalEquations, fit: Fit, forms: Forms) -> Found | None:
     """Return the region with the best score beside a fit, over the covariates of significant smooth terms."""
     curves = significant_curves(equations, fit)[:CURVES_TRIED]
-    found = [region for curve in curves if (region := _region_of(equations, fit, curve, forms)) is not None]
+    if not curves:
+        return None
+    read = as_read(equations, fit)
+    found = [region for curve in curves if (region := _region_of(equations, fit, read, curve, forms)) is not None]
     best = max(found, key=lambda each: each.score, default=None)
     return best if best is not None and best.score > 0 else None
 
@@ -165,17 +170,17 @@ def with_region(equations: NormalEquations, found: Found) -> tuple[NormalEquatio
     return equations.over(design), Term(group, found.wheels)
 
 
-def _region_of(equations: NormalEquations, fit: Fit, curve: Term, forms: Forms) -> Found | None:
+def _region_of(equations: NormalEquations, fit: Fit, read: AsRead, curve: Term, forms: Forms) -> Found | None:
     """Return the best region over the covariate of a smooth term beside a fit, apart from its regions."""
     covariate, coupling, wheels = curve.name, curve.group.coupling, curve.wheels
     edges = edges_of(known_values(equations, covariate, coupling, wheels))
     if not len(edges):
         return None
-    sums = range_sums(equations, fit, covariate, coupling, wheels, edges)
+    sums = range_sums(equations, read, covariate, coupling, wheels, edges)
     ranges = _allowed(sums, Ranges(*np.triu_indices(len(edges) + 2, 1)), fit)
     of_each = schwarz_penalty(equations, fit, wheels)
     coarse = sorted(_best_of_each_form(equations, sums, ranges, forms, of_each), key=_rank)
-    refined = (_refined(equations, fit, wheels, choice, edges) for choice in coarse[:REFINED])
+    refined = (_refined(equations, read, wheels, choice, edges) for choice in coarse[:REFINED])
     best = min(refined, key=_rank, default=None)
     if best is None:
         return None
@@ -229,7 +234,9 @@ def schwarz_penalty(equations: NormalEquations, fit: Fit, wheels: Sequence[int])
     return float(np.log(max(readings, math.e)))
 
 
-def _refined(equations: NormalEquations, fit: Fit, wheels: tuple[int, ...], choice: _Choice, edges: Array) -> _Choice:
+def _refined(
+    equations: NormalEquations, read: AsRead, wheels: tuple[int, ...], choice: _Choice, edges: Array
+) -> _Choice:
     """Return a choice with its bounds at their best between the edges of the search."""
     region = choice.region
     spacing = _spacing(edges, region)
@@ -239,8 +246,8 @@ def _refined(equations: NormalEquations, fit: Fit, wheels: tuple[int, ...], choi
             for bound, step in zip((region.lower, region.upper), spacing, strict=True)
         ]
         fine = np.unique(np.concatenate(places))
-        sums = range_sums(equations, fit, region.covariate, region.coupling, wheels, fine)
-        ranges = _allowed(sums, between(fine, *places), fit)
+        sums = range_sums(equations, read, region.covariate, region.coupling, wheels, fine)
+        ranges = _allowed(sums, between(fine, *places), read.fit)
         if not len(ranges.first):
             return choice
         gains = sums.delta_chi2(ranges, [region.powers])[0]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.candidate_groups import coefficient_signs, with_candidate
 from regolithd.calibration.mismatch.regression.group import Term
+from regolithd.calibration.mismatch.regression.normal_equations import membership
 from regolithd.calibration.mismatch.regression.schur import delta_chi2_together, schur_complement
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ class ShapeProfile:
         columns = np.asarray(self.candidate.columns(problem, shape), np.float64)
         kept = np.where(problem.mask, columns, 0.0)[:, :, list(self.wheels)]
         fresh = design.whitened(design.in_folds(kept).astype(np.float32), self.wheels)
-        fresh = fresh[:, :, _fitted_instants(self.equations)]
+        fresh = _fitted(self.equations, fresh)
         return (fresh * _root_weights(self.equations, self.wheels)).reshape(len(fresh), -1)
 
 
@@ -77,13 +78,10 @@ def shape_profile(
     equations: NormalEquations, others: Sequence[Term], candidate: Candidate, wheels: tuple[int, ...]
 ) -> ShapeProfile:
     """Fit the other terms and return the candidate's profile beside them."""
-    design, fitted, instants = equations.design, equations.fit(others), _fitted_instants(equations)
-    residual = design.residual[list(wheels)][:, instants].astype(np.float64)
-    columns = np.zeros((len(fitted.columns), *residual.shape), np.float32)
-    for row, (column, on) in enumerate(fitted.columns):
-        for place, wheel in enumerate(wheels):
-            if wheel in on:
-                columns[row, place] = design.columns[column, wheel, instants]
+    design, fitted, on = equations.design, equations.fit(others), list(wheels)
+    residual = _fitted(equations, design.residual[on]).astype(np.float64)
+    columns = _fitted(equations, design.columns([column for column, _ in fitted.columns])[:, on])
+    columns *= membership(fitted.columns, len(equations.weights))[:, on, None].astype(np.float32)
     weights = _root_weights(equations, wheels)
     residual -= np.einsum("r,rwt->wt", fitted.coefficients, columns, optimize=True)
     return ShapeProfile(
@@ -96,10 +94,12 @@ def shape_profile(
     )
 
 
-def _fitted_instants(equations: NormalEquations) -> NDArray[np.int64]:
-    """Return the places, in the order of folds, of the instants that the equations are summed over."""
+def _fitted(equations: NormalEquations, values: Single) -> Single:
+    """Return the instants of values (…, time in the order of folds) that the equations are summed over."""
     cuts = equations.design.cuts
-    return np.concatenate([np.arange(cuts[fold], cuts[fold + 1]) for fold in equations.folds])
+    if len(equations.folds) == equations.design.folds:
+        return values
+    return np.concatenate([values[..., cuts[fold] : cuts[fold + 1]] for fold in equations.folds], axis=-1)
 
 
 def _root_weights(equations: NormalEquations, wheels: tuple[int, ...]) -> Single:

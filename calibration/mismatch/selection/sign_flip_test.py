@@ -92,8 +92,11 @@ def block_scores(equations: NormalEquations, columns: Index, residual: Array, bl
     starts = np.flatnonzero(np.diff(in_order[by_block], prepend=-1))
     white = design.whitened(design.in_folds(residual)) * equations.weights[:, None]
     weighted = white[:, by_block].astype(np.float32)
-    sums = [np.add.reduceat(design.columns[c][:, by_block] * weighted, starts, axis=1).T for c in columns]
-    return np.stack(sums, axis=2).astype(np.float64)
+    scores = np.empty((len(starts), len(weighted), len(columns)))
+    for place, column in enumerate(columns):
+        products = design.columns([column])[0][:, by_block] * weighted
+        scores[:, :, place] = np.add.reduceat(products, starts, axis=1).T
+    return scores
 
 
 def sign_flipped(scores: Array, draws: int) -> Array:
@@ -108,7 +111,7 @@ def _scores(equations: NormalEquations, groups: Sequence[Group], wheels: tuple[i
     chosen = list(wheels)
     at = np.array([group.columns[0] for group in groups], np.int64)
     cross = equations.cross(drawn.fit.columns, at, wheels)
-    energy = equations.gram[chosen][:, at, at].sum(axis=0)
+    energy = equations.energies(at)[chosen].sum(axis=0)
     moment = drawn.moments[:, chosen][:, :, np.searchsorted(drawn.columns, at)].sum(axis=1)
     gain = delta_chi2_of_each(
         moment - drawn.coefficients @ cross,

@@ -24,6 +24,8 @@ Index = NDArray[np.int64]
 SINGLE_LAGS, LONGEST = 8, 128
 """Readings before, each with a coefficient of its own; and the furthest one. Those between share one in each octave: a
 long memory is many small correlations, of which none is significant alone (after Corsi, 2009)."""
+SHORTEST_BLOCK = 32
+"""Readings that are filtered at once, at least (a choice: shorter ones are no quicker)."""
 LEAST_READINGS_PER_LAG = 20
 """Readings for each lag of the autoregression (a choice)."""
 LEAST_WHITE = 3.0
@@ -48,30 +50,36 @@ class Whitening:
 
     def apply(self, values: NDArray[Any], runs: Sequence[slice]) -> NDArray[Any]:
         """Return readings of shape (…, reading), whitened along the last axis, each run for itself."""
-        from scipy.signal import oaconvolve  # noqa: PLC0415  # the laptop's; reading a recording must not load SciPy
-
         order, count = len(self.coefficients), values.shape[-1]
-        # With so many zeros before each run, one convolution serves all of them.
-        at, factors = np.arange(count), np.ones(count, values.dtype)
-        for run in runs:
-            at[run.start :] += order
-            factors[run][:order] = self.beginning[: run.stop - run.start]
-        apart = np.zeros((*values.shape[:-1], count + order * len(runs)), values.dtype)
-        apart[..., at] = values
-        response = np.append(1.0, -self.coefficients).astype(values.dtype)
-        white = oaconvolve(apart, response.reshape((1,) * (values.ndim - 1) + response.shape), axes=-1)
-        return np.asarray(white[..., at] * factors)
+        if not values.size:
+            return values
+        block = max(order, SHORTEST_BLOCK)
+        blocks = -(-(count + order * len(runs)) // block)
+        # With so many zeros between the runs, one convolution serves all of them.
+        places = [slice(run.start + order * k, run.stop + order * k) for k, run in enumerate(runs)]
+        apart = np.zeros((*values.shape[:-1], blocks * block), values.dtype)
+        for run, place in zip(runs, places, strict=True):
+            apart[..., place] = values[..., run]
+        convolved = self._convolved(apart.reshape(-1, blocks, block)).reshape(apart.shape)
+        white = np.empty_like(values)
+        for run, place in zip(runs, places, strict=True):
+            white[..., run] = convolved[..., place]
+            white[..., run][..., :order] *= self.beginning[: run.stop - run.start].astype(values.dtype)
+        return white
 
-    def undo(self, values: NDArray[Any], runs: Sequence[slice]) -> NDArray[Any]:
-        """Return what became these readings."""
-        from scipy.signal import lfilter  # noqa: PLC0415  # the laptop's; reading a recording must not load SciPy
+    def _convolved(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return rows of blocks (row, block, reading), filtered from block to block: two products of matrices.
 
-        found = values.copy()
-        for run in runs:
-            length = run.stop - run.start
-            found[..., run][..., : len(self.beginning)] /= self.beginning[:length].astype(values.dtype)
-            found[..., run] = lfilter([1.0], np.append(1.0, -self.coefficients), found[..., run], axis=-1)
-        return found
+        A block is at least as long as the order, so that a reading depends on its own block and the one before.
+        """
+        block = values.shape[-1]
+        response = np.zeros(2 * block, values.dtype)
+        response[: len(self.coefficients) + 1] = np.append(1.0, -self.coefficients)
+        lags = np.arange(block) - np.arange(block)[:, None]
+        within, after = np.where(lags >= 0, response[lags], 0), response[lags + block]
+        found = values @ within.astype(values.dtype)
+        found[:, 1:] += values[:, :-1] @ after
+        return np.asarray(found)
 
 
 NOT_WHITENED = Whitening(np.zeros(0), np.zeros(0))

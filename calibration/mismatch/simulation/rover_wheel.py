@@ -97,6 +97,7 @@ class RoverWheel(Simulation):
         self.tables = tables
         self.parameters = _priors(tables)
         self.sensors = _sensors(tables.sensors)
+        self._solved: tuple[Array, Array, dict[str, Array]] | None = None
 
     @classmethod
     def from_tables(cls, tables: Mapping[str, Any]) -> Self:
@@ -153,7 +154,7 @@ class RoverWheel(Simulation):
         )
         slip = inputs["slip"]
         speed = self._wheel_speed(inputs)
-        angle = contact_angle(inputs["load_N"], slip, tables.wheel, soil)
+        angle = self._contact_angle(inputs["load_N"], slip, soil)
         if sinking := values.get("slip_sinkage", 0.0):
             angle = slip_sunk(angle, slip, sinking)
         torque = np.sign(speed) * wheel_torque(angle, slip, tables.wheel, soil) / values["gain_factor"]
@@ -162,6 +163,16 @@ class RoverWheel(Simulation):
         if torque.shape[-1] != 6:
             return torque / tables.drivetrain.gain_Nm_per_A
         return motor_current(torque, inputs["motor_speed_rad_s"], tables.drivetrain)
+
+    def _contact_angle(self, load_N: Array, slip: Array, soil: Soil) -> Array:
+        """Return the contact angle; that of the call before, where only the drivetrain or the speed is another."""
+        if self._solved is None or self._solved[0] is not load_N or self._solved[1] is not slip:
+            self._solved = load_N, slip, {}
+        solved, key = self._solved[2], soil.model_dump_json()
+        if key not in solved:
+            solved.clear()
+            solved[key] = contact_angle(load_N, slip, self.tables.wheel, soil)
+        return solved[key]
 
     def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
         """Return everything measured that a missing effect may depend on."""

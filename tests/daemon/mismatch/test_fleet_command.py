@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import json
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
+from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, NoReturn
 
 import fleet_arm
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet
 import pytest
 from typer.testing import CliRunner
 
+from regolithd.calibration.mismatch.data.stretches import stretches_of
 from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.daemon.cli import app
 from regolithd.daemon.mismatch import fleet
-from regolithd.daemon.mismatch.fleet import RoverFile, begins_at, files_of_rovers, members_of
+from regolithd.daemon.mismatch.fleet import RoverFile, begins_at, files_of_rovers, members_of, too_long_at_once
 from regolithd.daemon.recording.mcap_file import DamagedRecordingError
 
 if TYPE_CHECKING:
@@ -159,3 +162,23 @@ def test_what_is_no_file_is_one_message(name: str, told: str, tmp_path: Path) ->
     (tmp_path / "folder").mkdir()
     with pytest.raises(RecordingError, match=f"{name} {told}"):
         files_of_rovers([tmp_path / name], None)
+
+
+def test_a_long_recording_is_compared_stretch_by_stretch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each stretch is a recording of its own, with the date at which it begins; a short one is read at once."""
+    path = tmp_path / "drive-2026-05-03.parquet"
+    columns = {"t_s": np.repeat(np.arange(1000.0), 2), "wheel": np.tile([1, 2], 1000), "current_A": np.arange(2000.0)}
+    pyarrow.parquet.write_table(pa.table(columns), path)
+    files = files_of_rovers([path], None)
+    assert not too_long_at_once(files)
+    (whole,) = members_of(files, "wheel")
+    monkeypatch.setattr(fleet, "LONGEST_AT_ONCE", 1500)
+    monkeypatch.setattr(fleet, "stretches_of", partial(stretches_of, rows=1000))
+    assert too_long_at_once(files)
+    first, second = members_of(files, "wheel")
+    assert first.name == f"{path.name}, 0 min 0 s to 8 min 20 s"
+    assert second.name == f"{path.name}, 8 min 20 s to 16 min 39 s"
+    assert whole.begins
+    assert second.begins == whole.begins + timedelta(seconds=500)
+    assert len({whole.digest, first.digest, second.digest}) == 3
+    np.testing.assert_array_equal(second.read().channels["current_A"].ravel(), np.arange(1000.0, 2000.0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -116,7 +116,7 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
 def _found_term(decision: Decision, term: Term) -> FoundTerm:
     equations = decision.equations
     design = equations.design
-    columns = design.in_time(design.unwhitened(design.columns[term.group.span])).astype(np.float32)
+    columns = design.in_time(design.columns_as_read(term.group.columns)).astype(np.float32)
     columns[:, :, [wheel for wheel in equations.all_wheels if wheel not in term.wheels]] = 0.0
     return FoundTerm(
         name=term.name,
@@ -126,6 +126,12 @@ def _found_term(decision: Decision, term: Term) -> FoundTerm:
         penalty=equations.penalty(term),
         columns=columns,
     )
+
+
+def without_columns(found: Found) -> Found:
+    """Return what was found without the terms' columns, which are as long as the recording."""
+    terms = tuple(replace(term, columns=np.zeros((len(term.columns), 0, 0), np.float32)) for term in found.terms)
+    return replace(found, terms=terms)
 
 
 def shapes_in(problem: Problem, candidates: Sequence[Candidate]) -> dict[str, Shapes]:

@@ -12,6 +12,7 @@ from linear_machine import AXES, CANDIDATES, INSTANTS, Constant, Drag, Power, eq
 from regolithd.calibration.mismatch.experiments.choice import Experimenter, experimenter_of
 from regolithd.calibration.mismatch.inference.alternatives import Alternative
 from regolithd.calibration.mismatch.inference.collinearity import (
+    Beside,
     collinear_sets,
     energy_apart,
     imitates,
@@ -55,8 +56,9 @@ def test_a_pair_that_is_nearly_one_is_a_set() -> None:
     assert [one.effects for one in sets if "drag" in one.effects] == [("drag", "like-drag")]
     assert "drive both ways" in sets[0].experiment.lower()
     terms = representatives(equations)
-    assert imitates(equations, equations.fit(()), terms["drag"], terms["like-drag"])
-    assert not imitates(equations, equations.fit(()), terms["drag"], terms["power"])
+    beside = Beside(equations, equations.fit(()), [term for shapes in terms.values() for term in shapes])
+    assert imitates(beside, terms["drag"], terms["like-drag"])
+    assert not imitates(beside, terms["drag"], terms["power"])
 
 
 def test_what_a_free_parameter_hides_is_in_a_set_with_it() -> None:
@@ -76,7 +78,16 @@ def test_energy_apart_is_the_gain_at_the_size_worth_telling_apart() -> None:
     size = 0.15 * equations.problem.mean_size
     expected = equations.tolerance((), drag) * size**2 * equations.weights[0] * INSTANTS * AXES
     assert energy_apart(equations, (), drag) == pytest.approx(expected)
-    assert energy_apart(equations, (), drag, 3.0) == pytest.approx(3 * expected)
+
+
+def test_one_complement_serves_all_pairs() -> None:
+    """What is left of a term beside a fit and another term is what equations with all of them leave."""
+    equations = equations_of(problem_of(table(drag=0.3)), (Drag(), LikeDrag(), Power()))
+    drag, like, power = (term_of(equations, name) for name in ("drag", "like-drag", "power"))
+    beside = Beside(equations, equations.fit([power]), [drag, like, power])
+    assert beside.apart(drag) == pytest.approx(energy_apart(equations, [power], drag), rel=1e-6)
+    assert beside.apart(drag, like) == pytest.approx(energy_apart(equations, [power, like], drag), rel=1e-3)
+    assert beside.apart(drag, power) == pytest.approx(beside.apart(drag), rel=1e-6)
 
 
 def test_a_named_effect_has_those_rivals_that_fit_as_well() -> None:

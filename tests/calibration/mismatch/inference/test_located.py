@@ -13,6 +13,7 @@ from winch import Winch
 from regolithd.calibration.mismatch import compare
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.inference.located import largest_stretch, spell_of
+from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 
@@ -72,7 +73,8 @@ def test_a_spell_that_acts_by_a_factor_is_located_between_the_knots() -> None:
     equations = equations.over(with_smooth_terms(equations.design))
     (group,) = (each for each in equations.design.groups if (each.name, each.coupling) == ("time", "gain"))
     term = Term(group, (0, 1))
-    assert spell_of(equations, equations.fit([term]), term) == pytest.approx((130.0, 275.0), abs=4 * LINEAR_STEP_S)
+    read = as_read(equations, equations.fit([term]))
+    assert spell_of(equations, read, term) == pytest.approx((130.0, 275.0), abs=4 * LINEAR_STEP_S)
 
 
 @pytest.mark.parametrize(

@@ -40,8 +40,8 @@ def test_each_wheel_may_have_a_deviation_of_its_own(monkeypatch: pytest.MonkeyPa
     assert nuisance.names == ("level", "level of 1", "level of 2")
     shift_std = 1 / np.sqrt(nuisance.precision) / design.scale[list(nuisance.columns)]
     np.testing.assert_allclose(shift_std, [0.5, 0.5 / 3, 0.5 / 3])
-    assert not design.columns[1, 1].any()
-    assert not design.columns[2, 0].any()
+    assert not design.columns([1])[0, 1].any()
+    assert not design.columns([2])[0, 0].any()
 
 
 def test_a_candidate_has_a_group_for_each_shape() -> None:
@@ -82,7 +82,7 @@ def test_the_strongest_sine_over_time_is_added() -> None:
     group = design.groups[0]
     assert group.coupling == PERIODIC
     assert group.selection_penalty == pytest.approx(2 * np.log(PROBLEM.length_s / (5 * 0.5)))
-    columns = np.stack([design.in_time(design.columns[c])[:, 0] for c in group.columns], axis=1)
+    columns = np.stack([design.in_time(design.columns([c])[0])[:, 0] for c in group.columns], axis=1)
     left = residual[:, 0] - columns @ np.linalg.lstsq(columns, residual[:, 0], rcond=None)[0]
     assert np.sum(left**2) < 0.05 * np.sum(residual**2)
 

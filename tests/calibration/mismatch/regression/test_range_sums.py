@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from linear_machine import equations_of, problem_of, table, term_of
 
+from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.group import Group, Term
 from regolithd.calibration.mismatch.regression.range_sums import Ranges, known_values, range_sums
 from regolithd.calibration.mismatch.regression.region import FORMS
@@ -23,7 +24,7 @@ def test_a_range_gains_what_the_fit_of_its_columns_gains(
     fit = equations.fit([term_of(equations, name) for name in named])
     values = known_values(equations, "wheel_speed", "offset", wheels)
     edges = np.quantile(values, np.linspace(0.05, 0.95, 11))
-    sums = range_sums(equations, fit, "wheel_speed", "offset", wheels, edges)
+    sums = range_sums(equations, as_read(equations, fit), "wheel_speed", "offset", wheels, edges)
     ranges = Ranges(np.array(bounds[:1]), np.array(bounds[1:]))
     for powers, (gain,) in zip(FORMS, sums.delta_chi2(ranges, FORMS), strict=True):
         region = sums.region(*bounds, powers)
@@ -38,7 +39,7 @@ def test_shares_are_of_the_readings() -> None:
     equations = equations_of(problem_of(table()))
     values = known_values(equations, "wheel_speed", "offset", (0, 1))
     edges = np.quantile(values, np.linspace(0.1, 0.9, 9))
-    sums = range_sums(equations, equations.fit(()), "wheel_speed", "offset", (0, 1), edges)
+    sums = range_sums(equations, as_read(equations, equations.fit(())), "wheel_speed", "offset", (0, 1), edges)
     share = sums.share(Ranges(np.array([0, 2]), np.array([10, 3])))
     assert share == pytest.approx([1.0, 0.1], abs=0.01)
 
@@ -49,7 +50,12 @@ def test_a_range_without_readings_gains_nothing() -> None:
     values = known_values(equations, "wheel_speed", "offset", (0, 1))
     top = float(values.max())
     sums = range_sums(
-        equations, equations.fit(()), "wheel_speed", "offset", (0, 1), np.array([0.0, top + 0.1, top + 0.2])
+        equations,
+        as_read(equations, equations.fit(())),
+        "wheel_speed",
+        "offset",
+        (0, 1),
+        np.array([0.0, top + 0.1, top + 0.2]),
     )
     gains = sums.delta_chi2(Ranges(np.array([2]), np.array([3])), FORMS)
     assert [float(gain[0]) for gain in gains] == [0.0] * len(FORMS)
@@ -70,6 +76,7 @@ def test_a_range_has_the_edges_as_its_bounds(
     """The last one too; its polynomial counts the distance from the middle, or from the bound where there is one."""
     equations = equations_of(problem_of(table()))
     edges = np.array([0.2, 0.6, 1.0, 1.4])
-    region = range_sums(equations, equations.fit(()), "wheel_speed", "offset", (0, 1), edges).region(*bounds, (1,))
+    read = as_read(equations, equations.fit(()))
+    region = range_sums(equations, read, "wheel_speed", "offset", (0, 1), edges).region(*bounds, (1,))
     assert (region.lower, region.upper) == (lower, upper)
     assert region.origin == pytest.approx(origin)

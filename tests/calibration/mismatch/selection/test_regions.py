@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from linear_machine import NOISE, equations_of, problem_of, table, term_of
 
+from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.range_sums import range_sums
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
@@ -41,7 +42,7 @@ def test_ranges_between_bounds_have_these_bounds() -> None:
     """Every lower one with every upper one; none stands for an open end."""
     equations = equations_of(problem_of(table()))
     edges = np.linspace(0.0, 2.0, 21)
-    sums = range_sums(equations, equations.fit(()), "wheel_speed", "offset", (0, 1), edges)
+    sums = range_sums(equations, as_read(equations, equations.fit(())), "wheel_speed", "offset", (0, 1), edges)
 
     def found(lower: Array, upper: Array) -> set[tuple[float, float]]:
         ranges = between(edges, lower, upper)

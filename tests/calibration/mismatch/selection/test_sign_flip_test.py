@@ -37,7 +37,7 @@ def test_block_scores_add_up_to_the_moments() -> None:
     assert scores.shape == (INSTANTS // 20, AXES, 2)
     np.testing.assert_allclose(scores.sum(axis=0), equations.moment[:, at], rtol=1e-3, atol=1e-2)
     design = equations.design
-    column = design.in_time(design.columns[2])
+    column = design.in_time(design.columns([2])[0])
     here = (column * noise * equations.weights)[BLOCKS == 7].sum(axis=0)
     np.testing.assert_allclose(scores[7, :, 1], here, rtol=1e-3, atol=1e-3)
 

@@ -1,0 +1,102 @@
+"""Columns in a temporary file: the memory of a comparison does not hold a number for each reading and column.
+
+A library makes about a thousand columns, so that they are a hundred times the recording. Each is written once, and read
+a few times: all of them for their sums of products, single ones where a fit needs them. They are not computed anew
+instead, since a candidate's columns may cost runs of the user's simulation. The file is read, not mapped: mapped pages
+would count as memory of the process. It has no name, and is gone with the process, whatever ends it.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import weakref
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.errors import MismatchError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+Single = NDArray[np.float32]
+
+AT_ONCE_BYTES = 16 * 2**20
+"""Bytes of columns that are in memory at once, at most (a choice: much longer pieces are no quicker)."""
+
+
+class ColumnFile:
+    """Columns of shape (wheel, time), which can be appended and read.
+
+    Attributes
+    ----------
+    shape: of one column
+    count: of columns
+    """
+
+    def __init__(self, wheels: int, instants: int) -> None:
+        self.shape, self.count = (wheels, instants), 0
+        self._file = tempfile.TemporaryFile(prefix="regolithd-", buffering=0)  # noqa: SIM115  # closed below
+        weakref.finalize(self, self._file.close)
+
+    @property
+    def at_once(self) -> int:
+        """How many columns may be in memory at once: at least one."""
+        return max(AT_ONCE_BYTES // max(self._column_bytes, 1), 1)
+
+    @property
+    def _column_bytes(self) -> int:
+        return 4 * self.shape[0] * self.shape[1]
+
+    def append(self, columns: Single) -> None:
+        """Write further columns, shape (column, wheel, time).
+
+        Raises
+        ------
+        MismatchError
+            When the folder for temporary files is full.
+        """
+        left = np.ascontiguousarray(columns, np.float32).reshape(-1).data.cast("B")
+        offset = self.count * self._column_bytes
+        try:
+            while left:
+                written = os.pwrite(self._file.fileno(), left, offset)
+                left, offset = left[written:], offset + written
+        except OSError as error:
+            raise MismatchError(
+                f"columns of a comparison do not fit into {tempfile.gettempdir()} ({error.strerror}); "
+                "set TMPDIR to a folder with more room"
+            ) from error
+        self.count += len(columns)
+
+    def read(self, at: Sequence[int] | NDArray[np.int64]) -> Single:
+        """Return some columns, shape (column, wheel, time)."""
+        found = np.empty((len(at), *self.shape), np.float32)
+        for first, last in _adjacent(at):
+            self._fill(found[first:last], int(at[first]) * self._column_bytes)
+        return found
+
+    def part(self, count: int, wheel: int, first: int, last: int) -> Single:
+        """Return the first `count` columns on a wheel from one place in time to another, shape (column, time)."""
+        found = np.empty((count, last - first), np.float32)
+        for column, row in enumerate(found):
+            self._fill(row, column * self._column_bytes + 4 * (wheel * self.shape[1] + first))
+        return found
+
+    def _fill(self, values: Single, offset: int) -> None:
+        left = values.reshape(-1).data.cast("B")
+        while left:
+            read = os.preadv(self._file.fileno(), [left], offset)
+            left, offset = left[read:], offset + read
+
+
+def _adjacent(at: Sequence[int] | NDArray[np.int64]) -> Iterator[tuple[int, int]]:
+    """Yield the stretches of places that follow each other: from where, to before where."""
+    ends = [*(np.flatnonzero(np.diff(np.asarray(at)) != 1) + 1).tolist(), len(at)]
+    first = 0
+    for last in ends:
+        if last > first:
+            yield first, last
+        first = last

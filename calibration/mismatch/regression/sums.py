@@ -1,0 +1,171 @@
+"""Sums of products of columns, for each fold and wheel, from columns that are in a file.
+
+A search asks for products of the columns of a few fits with all columns, of every column with itself, and of those in
+one group. Of columns that came many at once all products are summed together, in one walk over the file; of later ones,
+which are shapes between the points of the grid, only those that are asked for.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.regression.column_file import ColumnFile
+
+Array = NDArray[np.float64]
+Single = NDArray[np.float32]
+Index = NDArray[np.int64]
+
+MANY = 256
+"""New columns from which on the products of all columns are summed at once (a choice: the grid, and no proposals)."""
+LONGEST_PIECE = 4096
+"""Instants that are multiplied at once (a choice: about ten MiB of columns)."""
+ROOM = 64
+"""Later columns for which room is made at once."""
+
+
+class Sums:
+    """Sums of products of the columns of a file with each other and with a residual, in float32 as the columns are."""
+
+    def __init__(self, columns: ColumnFile, residual: Single, cuts: Index) -> None:
+        """Take columns and residual (wheel, time in the order of folds), and where the folds begin and end."""
+        self._columns, self._residual = columns, residual
+        self._folds = [(int(a), int(b)) for a, b in pairwise(cuts)]
+        self.forget()
+
+    def forget(self) -> None:
+        """Free the memory; what is asked for again is summed again."""
+        leading = len(self._folds), self._columns.shape[0]
+        self._square: Single = np.zeros((*leading, 0, 0), np.float32)
+        self._moment: Array = np.zeros((*leading, 0))
+        self._later: Single = np.zeros((*leading, 0, 0), np.float32)
+        self._known: NDArray[np.bool_] = np.zeros((0, 0), np.bool_)
+        self._own: dict[tuple[tuple[int, ...], tuple[int, ...]], Array] = {}
+        self._summed = 0
+
+    def products(self, rows: Index, columns: Index) -> Single:
+        """Return sums of products of columns with others, shape (fold, wheel, row, column)."""
+        self._sum_new()
+        first = self._square.shape[-1]
+        if max(rows.max(initial=0), columns.max(initial=0)) < first:
+            return self._square[:, :, rows[:, None], columns]
+        early, later = np.flatnonzero(rows < first), np.flatnonzero(rows >= first)
+        of_early, of_later = np.flatnonzero(columns < first), np.flatnonzero(columns >= first)
+        self._sum_later(rows[later], columns)
+        self._sum_later(columns[of_later], rows[early])
+        found = np.empty((*self._square.shape[:2], len(rows), len(columns)), np.float32)
+        found[:, :, later] = self._later[:, :, (rows[later] - first)[:, None], columns]
+        found[:, :, early[:, None], of_early] = self._square[:, :, rows[early][:, None], columns[of_early]]
+        mirrored = self._later[:, :, (columns[of_later] - first)[:, None], rows[early]]
+        found[:, :, early[:, None], of_later] = np.swapaxes(mirrored, 2, 3)
+        return found
+
+    def own_products(self, columns: Index, folds: tuple[int, ...]) -> Array:
+        """Return sums of products of a few columns with each other over some folds, shape (wheel, row, column).
+
+        They are asked for again and again, and kept.
+        """
+        key = tuple(columns.tolist()), folds
+        if key not in self._own:
+            of_folds = self.products(columns, columns)
+            self._own[key] = sum((of_folds[fold] for fold in folds), np.zeros(of_folds.shape[1:]))
+        return self._own[key]
+
+    def moments(self, columns: Index) -> Array:
+        """Return sums of products of columns and residual, shape (fold, wheel, column)."""
+        self._sum_new()
+        return self._moment[:, :, columns]
+
+    def energies(self, columns: Index) -> Single:
+        """Return sums of squares, shape (fold, wheel, column)."""
+        self._sum_new()
+        first = self._square.shape[-1]
+        own = np.concatenate(
+            (
+                np.diagonal(self._square, axis1=2, axis2=3),
+                np.diagonal(self._later[:, :, : self._summed - first, first:], axis1=2, axis2=3),
+            ),
+            axis=2,
+        )
+        return own[:, :, columns]
+
+    def _sum_new(self) -> None:
+        """Sum what came since the last time: with all columns, or with each other alone where it is little."""
+        before, now = self._summed, self._columns.count
+        if before == now:
+            return
+        if now - before >= MANY:
+            self.forget()
+            self._square, self._moment = self._all(now)
+        else:
+            self._make_room(now)
+            fresh = np.arange(before, now)
+            values = self._columns.read(fresh)
+            added = [
+                [values[:, w, a:b] @ self._residual[w, a:b] for w in range(values.shape[1])] for a, b in self._folds
+            ]
+            self._moment = np.concatenate((self._moment, np.array(added, np.float64)), axis=2)
+            self._keep(fresh, fresh, self._of(values, fresh))
+        self._summed = now
+
+    def _all(self, count: int) -> tuple[Single, Array]:
+        """Return the products of all columns with each other and with the residual, in one walk over the file."""
+        wheels = self._columns.shape[0]
+        square: Single = np.zeros((len(self._folds), wheels, count, count), np.float32)
+        moment: Array = np.zeros((len(self._folds), wheels, count))
+        for fold, (first, last) in enumerate(self._folds):
+            for wheel in range(wheels):
+                for a in range(first, last, LONGEST_PIECE):
+                    b = min(a + LONGEST_PIECE, last)
+                    part = self._columns.part(count, wheel, a, b)
+                    square[fold, wheel] += part @ part.T
+                    moment[fold, wheel] += part @ self._residual[wheel, a:b]
+        return square, moment
+
+    def _sum_later(self, later: Index, columns: Index) -> None:
+        """Sum the products of later columns with others that are not known yet."""
+        if not len(later) or not len(columns):
+            return
+        unknown = ~self._known[(later - self._square.shape[-1])[:, None], columns]
+        rows, others = later[unknown.any(axis=1)], np.unique(columns[unknown.any(axis=0)])
+        if len(rows):
+            self._keep(rows, others, self._of(self._columns.read(rows), others))
+
+    def _of(self, rows: Single, columns: Index) -> Single:
+        """Return sums of products of rows (row, wheel, time) with columns of the file."""
+        wheels, at_once = self._columns.shape[0], self._columns.at_once
+        found = np.empty((len(self._folds), wheels, len(rows), len(columns)), np.float32)
+        for first in range(0, len(columns), at_once):
+            part = slice(first, first + at_once)
+            values = self._columns.read(columns[part])
+            for fold, (a, b) in enumerate(self._folds):
+                for wheel in range(wheels):
+                    found[fold, wheel, :, part] = rows[:, wheel, a:b] @ values[:, wheel, a:b].T
+        return found
+
+    def _keep(self, rows: Index, columns: Index, values: Single) -> None:
+        """Keep products of later columns, in the rows of both where the others are later ones too."""
+        first = self._square.shape[-1]
+        at, later = rows - first, np.flatnonzero(columns >= first)
+        self._later[:, :, at[:, None], columns] = values
+        self._known[at[:, None], columns] = True
+        mirrored = columns[later] - first
+        self._later[:, :, mirrored[:, None], rows] = np.swapaxes(values[:, :, :, later], 2, 3)
+        self._known[mirrored[:, None], rows] = True
+
+    def _make_room(self, count: int) -> None:
+        """Make room for the products of later columns, up to so many columns in all."""
+        later = count - self._square.shape[-1]
+        if later <= len(self._known) and count <= self._known.shape[1]:
+            return
+        shape = later + ROOM, count + ROOM
+        kept = tuple(slice(0, size) for size in self._known.shape)
+        grown: Single = np.zeros((*self._square.shape[:2], *shape), np.float32)
+        grown[(slice(None), slice(None), *kept)] = self._later
+        known = np.zeros(shape, np.bool_)
+        known[kept] = self._known
+        self._later, self._known = grown, known
