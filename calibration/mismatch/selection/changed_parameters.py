@@ -37,7 +37,8 @@ def drop_what_a_changed_parameter_explains(equations: NormalEquations, named: Fi
 
     Both have one coefficient and the same course over time. A lead of `lead_margin` against a true fault is chance in
     2 % of the cases at most: where the wrong one lags by d² on average, with the variance 4 d², it leads by L with
-    the probability Φ(−(d² + L)/2d), which is Φ(−√L) at most.
+    the probability Φ(−(d² + L)/2d), which is Φ(−√L) at most. No law is exact to the last percent: of a large fault the
+    lead must be that share (`further_share`) more.
     """
     kept = [term for index, term in enumerate(named.terms) if not _is_changed_parameter(equations, named, index, term)]
     return named if len(kept) == len(named.terms) else equations.fit(kept)
@@ -55,4 +56,6 @@ def _is_changed_parameter(equations: NormalEquations, named: Fit, index: int, te
         for name, prior in equations.problem.simulation.parameters.items()
         if prior.std > 0
     )
-    return any(change(shape) > gain + equations.thresholds.lead_margin for change in changes)
+    limits = equations.thresholds
+    least = gain + limits.lead_margin + limits.further_share * gain
+    return any(change(shape) > least for change in changes)
