@@ -27,14 +27,15 @@ CHANNEL = "vcan0"
 FASTEST_BUS = 9009
 """Frames per second of a bus with 1 Mbit/s: 111 bits each (11-bit identifier, 8 bytes of data, no stuff bits)."""
 BUFFER_BYTES = 4 << 20
-START_S, REST_S = 3.0, 2.0
-"""Time for both to start, and to read what is left."""
+START_TIMEOUT_S = 60.0
+REST_S = 2.0
+"""Time for both to read what is left."""
 
 
 async def log_frames(path: Path) -> None:
     """Log all frames, as the daemon's recorder does."""
-    with path.open("w", encoding="ascii") as log:
-        async with open_bus("socketcan", CHANNEL) as bus:
+    async with open_bus("socketcan", CHANNEL) as bus:
+        with path.open("w", encoding="ascii") as log:
             async for batch in bus:
                 log.write("".join([frame_line(frame, CHANNEL) for frame in batch]))
 
@@ -52,13 +53,23 @@ def send_frames(seconds: float) -> int:
         return sent
 
 
+def wait_for_logs(folder: Path) -> None:
+    """Wait until both read the bus: each has opened its log then."""
+    deadline = time.monotonic() + START_TIMEOUT_S
+    while len(list(folder.glob("*.log"))) < 2:
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"the readers did not start within {START_TIMEOUT_S:g} s")
+        time.sleep(0.1)
+    time.sleep(0.5)  # candump opens its socket at about the same time
+
+
 def compare(seconds: float, folder: Path) -> dict[str, float | int]:
     """Return what was sent, and the processor time and the frames lost of both."""
     ours = [sys.executable, __file__, "log", str(folder / "ours.log")]
     theirs = ["candump", "-l", "-r", str(BUFFER_BYTES), CHANNEL]
     readers = [subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL) for command in (ours, theirs)]
     try:
-        time.sleep(START_S)
+        wait_for_logs(folder)
         used_s = [-cpu_s(reader.pid) for reader in readers]
         began = time.monotonic()
         sent = send_frames(seconds)
