@@ -81,8 +81,8 @@ reliability: $(DEV) ## how often answers are right at their stated probability (
 regions: $(DEV) ## laws that fail in regions: localisation and bias of the parameters, beside LISDD; 4 minutes (SEEDS=8)
 	$(BIN)/python -m regolithd.calibration.validation.region_study build/figures/regions.json docs/regions.svg $(if $(SEEDS),--seeds $(SEEDS))
 
-experiments: $(DEV) ## the proposed experiment beside a covariate-wise and a random one, on a simulated rover; continues an interrupted run (SEED=… COUNT=20)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.experiment_study build/figures/experiments.json docs/experiments.svg --seed $(or $(SEED),1) --count $(or $(COUNT),20)
+experiments: $(DEV) ## the proposed experiment beside a covariate-wise and a random one, in simulation; continues an interrupted run (SEED=… COUNT=20 MACHINE=rover)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.experiment_study build/figures docs --machine $(or $(MACHINE),rover) --seed $(or $(SEED),1) --count $(or $(COUNT),20)
 
 real: $(DEV) ## worked examples on recordings that are not part of this project (RECORDINGS=… ONLY="…")
 	$(BIN)/python docs/examples/run.py $(RECORDINGS) build/figures/real.json build/real $(ONLY)

@@ -166,6 +166,11 @@ class CalibratedParameter:
     low: float
     high: float
 
+    @property
+    def prior_stds_away(self) -> float:
+        """How far it is from its prior, in the prior's standard deviations; 0 where the prior is exact."""
+        return abs(self.value - self.prior) / self.prior_std if self.prior_std > 0 else 0.0
+
 
 @dataclass(frozen=True)
 class Change:

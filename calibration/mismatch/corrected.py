@@ -54,7 +54,9 @@ def write_corrected(
     if source is None:
         raise SimulationError("a corrected simulation is a SIM.toml: load the simulation from one, by load_simulation")
     tables, terms = read_tables(source), evidence.contributions
-    imitating, values = bool(answer.unexplained), evidence.values
+    # Beside something unexplained the answer's parameters are those of the fit that has it: others would imitate it.
+    imitating = bool(answer.unexplained)
+    values: Mapping[str, float] = {**evidence.values, **{each.name: each.value for each in answer.parameters}}
     curves: list[StatedCurve] = []
     if empirical and answer.unexplained:
         values, terms, curves = with_curves(answer, evidence)

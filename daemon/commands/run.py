@@ -62,6 +62,7 @@ async def _run(configuration: Configuration, models: OnnxModels) -> None:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from error
     # Modules and models stay: each full collection would look through them, and delay a SYNC by tens of milliseconds.
+    gc.collect()
     gc.freeze()
     gc.enable()
     task = asyncio.create_task(service.run())

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
+from regolithd.calibration.mismatch.report.labels import beyond_prior
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -52,6 +54,11 @@ def _lines(answer: Answer) -> list[str]:
     )
     return [
         *(f"{effect.name}: {effect.statement}" for effect in answer.effects),
+        *(
+            f"parameter {each.name}: {each.value:.4g} {each.unit} instead of {each.prior:.4g}, "
+            f"{each.prior_stds_away:.1f} standard deviations of its prior away"
+            for each in filter(beyond_prior, answer.parameters)
+        ),
         *(
             f"unexplained: {100 * rest.share_of_residual:.0f} % of the residual follows {rest.covariate} on "
             f"{', '.join(map(str, rest.wheels))}, {rest.from_s:.0f} to {rest.to_s:.0f} s"

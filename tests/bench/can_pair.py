@@ -10,7 +10,7 @@ takes is that of a real link. What a real link adds is missing: arbitration, bit
 from __future__ import annotations
 
 import asyncio
-import gc
+import importlib
 import signal
 import socket
 import sys
@@ -18,10 +18,6 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from regolithd.daemon.config.reader import read_configuration
-from regolithd.daemon.pipeline.onnx_models import load_models
-from regolithd.daemon.service import Service
-from regolithd.daemon.wiring import connect_sinks
 from regolithd.drivers.can import socketcan
 from regolithd.drivers.can.recvmmsg import SO_TIMESTAMPNS
 
@@ -56,17 +52,10 @@ def use_pair(end: socket.socket) -> None:
     socketcan.SocketCanBus = PairBus  # type: ignore[misc]
 
 
-async def run_daemon(path: Path) -> None:
-    """Run the daemon until SIGTERM."""
-    configuration = read_configuration(path)
-    service = Service(configuration, load_models(configuration))
-    connect_sinks(service)
-    gc.freeze()  # as `regolithd run` does
-    task = asyncio.create_task(service.run())
-    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
-    await asyncio.wait([task])
-    if not task.cancelled():
-        task.result()
+def run_daemon(path: Path) -> None:
+    """Run the command `regolithd run` until SIGTERM."""
+    importlib.import_module("regolithd.daemon.cli")  # as the command line does, before the command itself
+    importlib.import_module("regolithd.daemon.commands.run").run(path)
 
 
 async def run_rover() -> None:
@@ -85,4 +74,7 @@ async def run_rover() -> None:
 
 if __name__ == "__main__":
     use_pair(socket.socket(fileno=int(sys.argv[2])))
-    asyncio.run(run_daemon(Path(sys.argv[3])) if sys.argv[1] == "daemon" else run_rover())
+    if sys.argv[1] == "daemon":
+        run_daemon(Path(sys.argv[3]))
+    else:
+        asyncio.run(run_rover())

@@ -55,7 +55,12 @@ SECTIONS = (
         "that send without a pause, and a replay compared with what was published.",
     ),
     Section("fuzz", "Damaged input", "Random damage to everything that the program reads from others."),
-    Section("bench", "Speed", "Each figure beside the same of another program, in one run."),
+    Section(
+        "bench",
+        "Speed",
+        "Each figure beside its goal and the same of another program, in one run. [How it is measured, and what "
+        "limits it](speed.md).",
+    ),
     Section("audit", "Dependencies", "Packages that an installation has, their licences and known vulnerabilities."),
 )
 

@@ -116,9 +116,15 @@ class Level(Simulation):
 
 
 def table(
-    *, drag: float = 0.0, factor: float = 0.0, power: float = 1.0, seed: int = 0, noise: float = NOISE, runs: int = 1
+    *,
+    drag: float | Array = 0.0,
+    factor: float = 0.0,
+    power: float = 1.0,
+    seed: int = 0,
+    noise: float = NOISE,
+    runs: int = 1,
 ) -> dict[str, Array]:
-    """Return a recording's columns, with a drag and a power of the speed added."""
+    """Return a recording's columns, with a drag, shape () or (time, axis), and a power of the speed added."""
     rng = np.random.default_rng(seed)
     t_s = np.arange(INSTANTS) * STEP_S
     speed = np.sin(t_s[:, None] / 11 + np.array([0.0, 1.3])) * (1.2 + np.sin(t_s[:, None] / 31))

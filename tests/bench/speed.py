@@ -17,9 +17,9 @@ import platform
 import statistics
 import subprocess
 import sys
-import sysconfig
 import tempfile
 import time
+import timeit
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -60,14 +60,18 @@ host = "127.0.0.1"
 port = {port}
 spool_directory = "spool"
 """
+LIBRARIES = "python-can, canopen, paho"
 IMPORTS = {
     # As `regolithd run` does it: without looking for garbage once the command line is there.
     "regolithd": "import regolithd.daemon.cli, gc; gc.disable(); "
     "import regolithd.daemon.setup, regolithd.daemon.service, "
     "regolithd.daemon.wiring, regolithd.drivers.can.socketcan",
-    "python-can, canopen, paho": "import asyncio, can, canopen, paho.mqtt.client",
+    LIBRARIES: "import asyncio, can, canopen, paho.mqtt.client",
     "numpy": "import numpy",
+    "numpy and onnxruntime": "import os; os.environ['ORT_DISABLE_TELEMETRY'] = '1'; import numpy, onnxruntime",
+    "asyncio": "import asyncio",
 }
+PARTS = ("asyncio", "numpy", "numpy and onnxruntime")
 
 
 @dataclass
@@ -226,12 +230,12 @@ async def broker_delay(messages: int) -> list[float]:
     return delays
 
 
-def import_cpu_s(statement: str) -> float:
-    """Return the processor time of importing, the interpreter's own start included; the smallest of five.
+def import_cost(statement: str) -> tuple[float, float]:
+    """Return processor time [s] and memory [MB] of importing, with those of the interpreter; the least of five.
 
     The modules are compiled before, as those of an installation are.
     """
-    code = f"{statement}\nimport time\nprint(time.process_time())"
+    code = f"{statement}\nimport time\nprint(time.process_time(), *open('/proc/self/statm'))"
     with tempfile.TemporaryDirectory() as compiled:
         environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"} | {
             "PYTHONPATH": str(ROOT / "src"),
@@ -240,7 +244,21 @@ def import_cpu_s(statement: str) -> float:
         }
         command = [sys.executable, "-c", code]
         runs = [subprocess.run(command, check=True, capture_output=True, text=True, env=environment) for _ in range(6)]
-    return min(float(run.stdout) for run in runs[1:])
+    found = [run.stdout.split() for run in runs[1:]]
+    pages = min(int(each[2]) for each in found)  # size, then resident
+    return min(float(each[0]) for each in found), pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def import_rows() -> list[Row]:
+    """Return what importing costs, and what of it the largest packages do."""
+    costs = {name: import_cost(statement) for name, statement in IMPORTS.items()}
+    (ours_s, ours_MB), (theirs_s, theirs_MB) = costs["regolithd"], costs[LIBRARIES]
+    return [
+        Row("import, s CPU", ours_s, "at most 0.4", theirs_s, LIBRARIES),
+        Row("import: memory, MB", ours_MB, "", theirs_MB, LIBRARIES),
+        *(Row(f"import of {name} alone, s CPU", costs[name][0]) for name in PARTS),
+        *(Row(f"import of {name} alone: memory, MB", costs[name][1]) for name in PARTS),
+    ]
 
 
 def percentile(values: list[float], share: float) -> float | None:
@@ -290,13 +308,12 @@ async def figures(seconds: float) -> Figures:
     head: Figures = {
         "command": f"make bench SECONDS={seconds:g}",
         "measured": f"{datetime.now(UTC):%Y-%m-%d}, {os.cpu_count()} processors, {platform.machine()}, "
-        f"Python {platform.python_version()}{optimised()}, onnxruntime {version('onnxruntime')}, "
+        f"Python {platform.python_version()}, onnxruntime {version('onnxruntime')}, "
         f"load average {os.getloadavg()[0]:.1f}",
     }
-    ours, theirs, numpy = (import_cpu_s(statement) for statement in IMPORTS.values())
     rows = [
-        Row("import, s CPU", ours, "at most 0.4", theirs, "python-can, canopen, paho"),
-        Row("import of numpy, which is part of it, s CPU", numpy),
+        Row("the interpreter: 200 000 turns of a loop, ms CPU", interpreter_ms()),
+        *import_rows(),
         *await daemon_rows(seconds),
         *await frame_times(),
         *candump(seconds),
@@ -305,10 +322,10 @@ async def figures(seconds: float) -> Figures:
     return head | flat(rows)
 
 
-def optimised() -> str:
-    """Say where the interpreter was built without profile-guided optimisation: it is a quarter slower."""
-    flags = f"{sysconfig.get_config_var('PY_CORE_CFLAGS')} {sysconfig.get_config_var('CONFIG_ARGS')}"
-    return "" if "profile-use" in flags or "--enable-optimizations" in flags else " (no optimised build)"
+def interpreter_ms() -> float:
+    """Return the processor time of a fixed piece of Python, the least of nine: compares machines and interpreters."""
+    statement = "for each in range(200_000): total += each % 7; found[each & 63] = total"
+    return 1e3 * min(timeit.repeat(statement, "total, found = 0, {}", time.process_time, repeat=9, number=1))
 
 
 def main() -> None:

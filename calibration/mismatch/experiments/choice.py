@@ -33,6 +33,8 @@ Array = NDArray[np.float64]
 WORTH_VARYING = 0.8
 """An experiment that varies less is preferred if it has this share of the largest margin (a choice: it is easier to
 drive, and takes a quarter longer at most)."""
+NOTHING_LOST = 0.999
+"""Share of the margin that is left where nothing was lost: rounding (a choice)."""
 TOLD_APART = 1.0
 """Δχ² below which the longest drive that varies everything does not tell two answers apart (a choice: odds of e^½)."""
 DURATIONS = 24
@@ -95,8 +97,8 @@ class Experimenter:
     def choose(self, hypotheses: Sequence[Hypothesis], given: Sequence[Term]) -> Choice | None:
         """Return the experiment with the largest margin of the closest pair; None where none can be predicted.
 
-        All that can be varied is left out step by step, each time what lowers that margin least. Pairs that not even
-        the drive that varies everything tells apart do not count.
+        All that can be varied is left out step by step, what adds nothing at once, then each time what lowers that
+        margin least. Pairs that not even the drive that varies everything tells apart do not count.
         """
         if self.drives is None or len(hypotheses) < 2:
             return None
@@ -121,6 +123,9 @@ class Experimenter:
                 tried[varied] = worst(expected.margins(length_s), apart)[1], expected
             return tried[varied][0]
 
+        needless = {each for each in varied if margin(varied - {each}) >= NOTHING_LOST * margin(varied)}
+        if needless < varied and margin(varied - needless) >= NOTHING_LOST * margin(varied):
+            varied -= needless
         while len(varied) > 1:
             varied = max((varied - {each} for each in sorted(varied)), key=margin)
         enough = WORTH_VARYING * max(margin(each) for each in tried)

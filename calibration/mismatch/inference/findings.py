@@ -21,7 +21,7 @@ from regolithd.calibration.mismatch.inference.evidence import calibrated_values,
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
 from regolithd.calibration.mismatch.inference.intervals import parameters_of
 from regolithd.calibration.mismatch.inference.located import share_of_residual, spell_of
-from regolithd.calibration.mismatch.inference.probability import other_answers, probability
+from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
 from regolithd.calibration.mismatch.inference.ranges import range_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
 from regolithd.calibration.mismatch.inference.statements import statement
@@ -50,7 +50,8 @@ def answer_of(
     effects, changes = named_effects(decision, held_out)
     parameters = calibrated_parameters(decision)
     moved = beyond_prior(parameters, equations.thresholds)
-    rest = alternatives(decision)
+    known = decided_by_evidence(decision)
+    rest = alternatives(decision) if known else ()
     extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold, rest)
     channel, floor = problem.simulation.channel, noise_floor(decision)
     return Answer(
@@ -63,7 +64,7 @@ def answer_of(
         parameters=parameters,
         changes=changes,
         left_out=problem.left_out,
-        probability=probability(rest, equations.thresholds),
+        probability=probability(rest, equations.thresholds) if known else None,
         alternatives=other_answers(rest, equations.thresholds),
         notes=(
             *map(_beyond_prior_in_words, moved),
@@ -126,11 +127,7 @@ def calibrated_parameters(decision: Decision) -> tuple[CalibratedParameter, ...]
 
 def beyond_prior(parameters: Iterable[CalibratedParameter], thresholds: Thresholds) -> tuple[CalibratedParameter, ...]:
     """Return the parameters that had to leave their priors: a finding, whatever else was found."""
-    return tuple(
-        each
-        for each in parameters
-        if each.prior_std > 0 and abs(each.value - each.prior) > thresholds.furthest_prior_stds * each.prior_std
-    )
+    return tuple(each for each in parameters if each.prior_stds_away > thresholds.furthest_prior_stds)
 
 
 def _effect(problem: Problem, term: Term, parameters: Mapping[str, Parameter], errors: tuple[float, float]) -> Effect:
@@ -192,11 +189,10 @@ def _about_the_mask(problem: Problem) -> list[str]:
 
 
 def _beyond_prior_in_words(parameter: CalibratedParameter) -> str:
-    away = abs(parameter.value - parameter.prior) / parameter.prior_std
     return (
         f"{parameter.name} had to leave its prior: {parameter.value:.4g} {parameter.unit}, "
-        f"{away:.1f} standard deviations from {parameter.prior:.4g}. Check the stated value and its standard "
-        "deviation, or look for physics that acts as this parameter does."
+        f"{parameter.prior_stds_away:.1f} standard deviations from {parameter.prior:.4g}. Check the stated value and "
+        "its standard deviation, or look for physics that acts as this parameter does."
     )
 
 

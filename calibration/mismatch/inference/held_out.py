@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.inference.improbable import unexplained_if_improbable
+from regolithd.calibration.mismatch.inference.one_sided import unexplained_if_one_sided
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_candidate,
@@ -133,8 +134,8 @@ def chosen_effects(train: NormalEquations, entry_threshold: float) -> tuple[Term
 def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOutErrors]:
     """Return the decision without names that lower no held-out error, the worst dropped first; and those errors.
 
-    Without any name left, what is more probably there than not is unexplained. `grid` are the groups before any data
-    optimised their shapes.
+    Without any name left, what is more probably there than not is unexplained; so is what comes and goes. `grid` are
+    the groups before any data optimised their shapes.
     """
     equations, threshold = decision.equations, decision.entry_threshold
     problem, kept = equations.problem, set(map(id, grid))
@@ -143,7 +144,11 @@ def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOut
     while (idle := held_out.without_gain()) is not None:
         decision = without_name(replace(decision, equations=equations), idle)
         equations, held_out = held_out_errors(equations, decision.named, choice, threshold)
-    return unexplained_if_improbable(replace(decision, equations=equations)), held_out
+    decision = unexplained_if_improbable(replace(decision, equations=equations))
+    one_sided = unexplained_if_one_sided(decision)
+    if len(one_sided.named.terms) < len(decision.named.terms):
+        equations, held_out = held_out_errors(one_sided.equations, one_sided.named, choice, threshold)
+    return replace(one_sided, equations=equations), held_out
 
 
 def _only_proposed(problem: Problem, group: Group) -> bool:

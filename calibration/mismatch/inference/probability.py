@@ -18,10 +18,24 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.inference.alternatives import Alternative
+    from regolithd.calibration.mismatch.selection.decision import Decision
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
 TOLD = 3
 """Other answers that are told."""
+
+
+def decided_by_evidence(decision: Decision) -> bool:
+    """Return whether each curve of what is unexplained scores as much as an effect must, to enter.
+
+    Else it stands for another finding, and the evidence says nothing of how probable the answer is.
+    """
+    equations, whole = decision.equations, decision.whole
+    least = equations.score(whole) - decision.entry_threshold
+    return all(
+        least > equations.score(equations.fit([term for term in whole.terms if term is not curve]))
+        for curve in decision.unnamed
+    )
 
 
 def probability(others: Sequence[Alternative], thresholds: Thresholds) -> float:

@@ -49,7 +49,11 @@ def joined(answers: Sequence[AnyAnswer]) -> AnyAnswer:
 def notes_of(answers: Sequence[Answer]) -> tuple[str, ...]:
     """Return the notes of all channels; one that is not of all of them is told with its channel."""
     of_all = set.intersection(*(set(answer.notes) for answer in answers))
-    notes = (note if note in of_all else f"{answer.fit.channel}: {note}" for answer in answers for note in answer.notes)
+    notes = (
+        note if note in of_all or answer.fit.channel in note else f"{answer.fit.channel}: {note}"
+        for answer in answers
+        for note in answer.notes
+    )
     return tuple(dict.fromkeys(notes))
 
 
@@ -132,7 +136,7 @@ def combined(*found: CalibratedParameter) -> CalibratedParameter:
 
 def _left(parameter: CalibratedParameter) -> bool:
     """Return whether a parameter left its prior."""
-    return abs(parameter.value - parameter.prior) > THRESHOLDS.furthest_prior_stds * parameter.prior_std > 0
+    return parameter.prior_stds_away > THRESHOLDS.furthest_prior_stds
 
 
 def _std(parameter: CalibratedParameter) -> float:

@@ -114,8 +114,7 @@ def verdict_sentence(answer: Answer, labels: Labels | None = None) -> str:
 
 def beyond_prior(parameter: CalibratedParameter) -> bool:
     """Return whether a parameter lies more than three deviations from its prior."""
-    reach = THRESHOLDS.furthest_prior_stds * parameter.prior_std
-    return parameter.prior_std > 0 and abs(parameter.value - parameter.prior) > reach
+    return parameter.prior_stds_away > THRESHOLDS.furthest_prior_stds
 
 
 def _than_corrected(change: Change) -> str:

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from regolithd.calibration.validation.blind_trials.recordings.generator import Plan
-from regolithd.calibration.validation.blind_trials.recordings.traverse import CONDITIONS_OF, ProposedExperiment
+from regolithd.calibration.validation.blind_trials.recordings.traverse import ProposedExperiment
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from regolithd.calibration.validation.experiment_study.subjects import Subject
 
 Choice = Literal["proposed", "covariate-wise", "random"]
 CHOICES: tuple[Choice, ...] = get_args(Choice)
@@ -50,7 +52,7 @@ def plans(seed: int, count: int) -> list[Plan]:
     return [Plan(number, seed, "constant", (CONCEALED[number % len(CONCEALED)],)) for number in range(count)]
 
 
-def experiments(answer: Mapping[str, Any], plan: Plan) -> dict[Choice, ProposedExperiment]:
+def experiments(answer: Mapping[str, Any], plan: Plan, subject: Subject) -> dict[Choice, ProposedExperiment]:
     """Return the experiment of each choice; none where the answer has no set of indistinguishable effects."""
     proposed = ProposedExperiment.of_answer(answer)
     if proposed is None:
@@ -58,7 +60,7 @@ def experiments(answer: Mapping[str, Any], plan: Plan) -> dict[Choice, ProposedE
     return {
         "proposed": proposed,
         "covariate-wise": ProposedExperiment(frozenset({own_covariate(answer)}), 0.0, lift=False),
-        "random": random_experiment(plan),
+        "random": random_experiment(plan, subject),
     }
 
 
@@ -69,8 +71,8 @@ def own_covariate(answer: Mapping[str, Any]) -> str:
     return next((COVARIATE_OF[name] for name in names if name in COVARIATE_OF), "wheel_speed")
 
 
-def random_experiment(plan: Plan) -> ProposedExperiment:
-    """Return one to three covariates that a drive can vary, with or without a part with the wheels lifted."""
+def random_experiment(plan: Plan, subject: Subject) -> ProposedExperiment:
+    """Return one to three covariates that a drive can vary, with or without a part without load."""
     rng = np.random.default_rng([plan.seed, 5, plan.number])
-    varied = rng.choice(sorted(CONDITIONS_OF), size=int(rng.integers(1, MOST_VARIED + 1)), replace=False)
-    return ProposedExperiment(frozenset(map(str, varied)), 0.0, lift=bool(rng.uniform() < 0.5))
+    varied = rng.choice(subject.varied, size=int(rng.integers(1, MOST_VARIED + 1)), replace=False)
+    return ProposedExperiment(frozenset(map(str, varied)), 0.0, lift=subject.can_lift and bool(rng.uniform() < 0.5))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 CONFIDENCE = 0.9
 DRAWS = 2000
-"""Bootstrap samples of the trials, for the interval of a ratio."""
+"""Bootstrap samples of the trials, for the interval of a median."""
 
 
 def figures_of(trials: Sequence[Trial]) -> dict[str, float]:
@@ -29,7 +29,9 @@ def figures_of(trials: Sequence[Trial]) -> dict[str, float]:
         key, own = choice.replace("-", "_"), margins(driven, choice)
         right = sum(trial.results[choice].right for trial in driven)
         figures |= {f"{key}_right": right, f"{key}_right_share": right / len(driven)}
-        figures |= {f"{key}_margin_median": float(np.median(own)), f"{key}_margin_mean": float(np.mean(own))}
+        low, high = np.quantile(own, (0.25, 0.75))
+        figures |= {f"{key}_margin_median": float(np.median(own))}
+        figures |= {f"{key}_margin_lower_quartile": float(low), f"{key}_margin_upper_quartile": float(high)}
     for other in CHOICES[1:]:
         figures |= against(driven, other)
     return figures
@@ -41,19 +43,17 @@ def margins(trials: Sequence[Trial], choice: Choice) -> np.ndarray[tuple[int], n
 
 
 def against(trials: Sequence[Trial], other: Choice) -> dict[str, float]:
-    """Return how often the proposed experiment has the larger margin (Clopper and Pearson), and the ratio of means.
+    """Return how often the proposed experiment has the larger margin (Clopper and Pearson), and by how much it has.
 
-    The ratio's interval is of a bootstrap over the trials. Trials in which both drives are the same are half a win.
+    That is the median of the differences, with an interval of a bootstrap over the trials: margins may be negative, so
+    that they have no ratio. Equal margins are no win for either.
     """
     ours, theirs = margins(trials, "proposed"), margins(trials, other)
     wins, ties = int(np.sum(ours > theirs)), int(np.sum(ours == theirs))
     decided = len(trials) - ties
     low, high = binomtest(wins, decided).proportion_ci(CONFIDENCE) if decided else (0.0, 1.0)
     rng = np.random.default_rng(1)
-    picked = rng.integers(len(trials), size=(DRAWS, len(trials)))
-    # A mean margin that is not positive gives no ratio: wrong answers are ahead there.
-    means = np.maximum(theirs[picked].mean(axis=1), 1e-9)
-    drawn = ours[picked].mean(axis=1) / means
+    drawn = np.median((ours - theirs)[rng.integers(len(trials), size=(DRAWS, len(trials)))], axis=1)
     key = other.replace("-", "_")
     return {
         f"wins_against_{key}": wins,
@@ -61,7 +61,7 @@ def against(trials: Sequence[Trial], other: Choice) -> dict[str, float]:
         f"win_share_against_{key}": wins / decided if decided else 0.5,
         f"win_share_against_{key}_low": float(low),
         f"win_share_against_{key}_high": float(high),
-        f"ratio_to_{key}": float(ours.mean() / max(float(theirs.mean()), 1e-9)),
-        f"ratio_to_{key}_low": float(np.quantile(drawn, (1 - CONFIDENCE) / 2)),
-        f"ratio_to_{key}_high": float(np.quantile(drawn, (1 + CONFIDENCE) / 2)),
+        f"ahead_of_{key}": float(np.median(ours - theirs)),
+        f"ahead_of_{key}_low": float(np.quantile(drawn, (1 - CONFIDENCE) / 2)),
+        f"ahead_of_{key}_high": float(np.quantile(drawn, (1 + CONFIDENCE) / 2)),
     }

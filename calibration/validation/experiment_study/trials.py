@@ -10,25 +10,28 @@ import json
 import shlex
 import sys
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from regolithd.calibration.validation.blind_trials.errors import OtherBatchError, SolverError
 from regolithd.calibration.validation.blind_trials.isolation import run_isolated
-from regolithd.calibration.validation.blind_trials.recordings.files import write_trial
-from regolithd.calibration.validation.blind_trials.recordings.generator import Plan, make_trial
 from regolithd.calibration.validation.experiment_study.choices import CHOICES, Choice, experiments
+from regolithd.calibration.validation.experiment_study.subjects import LENGTH_S
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Set as AbstractSet
 
+    from regolithd.calibration.validation.blind_trials.recordings.generator import Plan
     from regolithd.calibration.validation.blind_trials.recordings.traverse import ProposedExperiment
+    from regolithd.calibration.validation.experiment_study.subjects import Subject
 
 SOLVER = f"{shlex.quote(sys.executable)} -m regolithd.calibration.validation.experiment_study.solver"
 """A command that is given `answer` or `names` and folders, and writes answer.json into each."""
-LENGTH_S, STEP_S = 1200.0, 0.5
-"""Length of each recording and its step: a third of the usual evidence, so that an experiment matters (a choice)."""
+CONSTANT_FORMS = {"cold-lubricant-friction": ("coulomb-friction", "viscous-friction")}
+"""What a law is where its covariate, the temperature, does not vary: the solver does not look for it there."""
 TIMEOUT_S = 1800.0
 
 
@@ -60,7 +63,7 @@ class Trial:
     results: dict[Choice, Result]
 
 
-def run_trial(plan: Plan, folder: Path, solver: str = SOLVER, length_s: float = LENGTH_S) -> Trial:
+def run_trial(plan: Plan, subject: Subject, folder: Path, solver: str = SOLVER, length_s: float = LENGTH_S) -> Trial:
     """Return a trial, from its file where it is finished.
 
     Raises
@@ -72,45 +75,63 @@ def run_trial(plan: Plan, folder: Path, solver: str = SOLVER, length_s: float = 
     (name,) = plan.names
     if kept.exists():
         known = json.loads(kept.read_text())
-        if (known["seed"], known["name"]) != (plan.seed, name):
-            raise OtherBatchError(f"{folder} holds the trials of another seed")
+        if (known["seed"], known["name"], known["subject"]) != (plan.seed, name, subject.name):
+            raise OtherBatchError(f"{folder} holds the trials of another seed or machine")
         return _trial(plan, known["undecided"], known["results"])
-    (first,) = _solved(plan, [None], solver, length_s)
-    chosen = experiments(first["answer"], plan)
-    # All last equally long, whatever was proposed.
-    driven = [replace(experiment, duration_s=length_s) for experiment in chosen.values()]
-    told = _solved(plan, driven, solver, length_s) if driven else []
+
+    def solved(driven: Sequence[ProposedExperiment | None]) -> list[dict[str, Any]]:
+        # All last equally long, whatever was proposed.
+        writers = [partial(_write, subject, plan, each, length_s) for each in driven]
+        return _solved(writers, "names" if any(driven) else "answer", solver)
+
+    (first,) = solved([None])
+    chosen = experiments(first["answer"], plan, subject)
+    told = solved([*chosen.values()]) if chosen else []
     results: dict[str, Any] = {
         choice: {
             "right": [effect["name"] for effect in found["answer"]["effects"]] == [name],
-            "margin": margin_of(found["scores"], name),
+            "margin": margin_of(found["scores"], name, remaining(first["answer"])),
             "varied": sorted(experiment.vary),
             "lift": experiment.lift,
+            "scores": found["scores"],
         }
         for (choice, experiment), found in zip(chosen.items(), told, strict=True)
     }
     folder.mkdir(parents=True, exist_ok=True)
-    known = {"seed": plan.seed, "name": name, "undecided": bool(chosen), "results": results}
+    known = {"seed": plan.seed, "name": name, "subject": subject.name, "undecided": bool(chosen), "results": results}
     kept.write_text(json.dumps({**known, "proposal": first["answer"]["indistinguishable"]}, indent=1) + "\n")
     return _trial(plan, known["undecided"], results)
 
 
-def margin_of(scores: dict[str, float], name: str) -> float:
-    """Return the evidence for the concealed effect less that for the best other one."""
-    return scores.get(name, 0.0) - max((score for other, score in scores.items() if other != name), default=0.0)
+def remaining(answer: Mapping[str, Any]) -> set[str]:
+    """Return the names that may be right after the first drive: those named, and those of sets and other answers."""
+    parts = (*answer["indistinguishable"], *answer.get("alternatives", ()))
+    return {effect["name"] for effect in answer["effects"]} | {name for part in parts for name in part["effects"]}
 
 
-def _solved(
-    plan: Plan, driven: Sequence[ProposedExperiment | None], solver: str, length_s: float
-) -> list[dict[str, Any]]:
-    """Return the solver's answers to recordings of a rover: of experiments, or of the first drive where it is None."""
+def margin_of(scores: Mapping[str, float], name: str, possible: AbstractSet[str]) -> float:
+    """Return the evidence for the concealed effect less that for the best other one.
+
+    A law that an experiment did not test is there what it is at a constant covariate: it has the evidence of that form.
+    """
+    found = dict(scores)
+    for law, forms in CONSTANT_FORMS.items():
+        if law in {name, *possible} and law not in found:
+            found[law] = max(scores.get(form, 0.0) for form in forms)
+    return found.get(name, 0.0) - max((score for other, score in found.items() if other != name), default=0.0)
+
+
+def _write(subject: Subject, plan: Plan, experiment: ProposedExperiment | None, length_s: float, folder: Path) -> None:
+    subject.write(plan, experiment, folder, length_s)
+
+
+def _solved(writers: Sequence[Callable[[Path], None]], asked: str, solver: str) -> list[dict[str, Any]]:
+    """Return the solver's answers to recordings, each written into a folder of its own."""
     with tempfile.TemporaryDirectory() as folder:
-        names = [str(place) for place in range(len(driven))]
-        for name, experiment in zip(names, driven, strict=True):
-            trial = make_trial(plan, duration_s=length_s, step_s=STEP_S, experiment=experiment)
-            write_trial(trial, Path(folder) / name)
-        how = "names" if any(driven) else "answer"
-        run_isolated([*shlex.split(solver), how, *names], Path(folder), threads=1, timeout_s=TIMEOUT_S)
+        names = [str(place) for place in range(len(writers))]
+        for name, write in zip(names, writers, strict=True):
+            write(Path(folder) / name)
+        run_isolated([*shlex.split(solver), asked, *names], Path(folder), threads=1, timeout_s=TIMEOUT_S)
         try:
             return [json.loads((Path(folder) / name / "answer.json").read_text()) for name in names]
         except (OSError, json.JSONDecodeError) as error:
@@ -119,5 +140,7 @@ def _solved(
 
 def _trial(plan: Plan, undecided: bool, results: dict[str, Any]) -> Trial:  # as it is stored
     known = {choice: results[choice] for choice in CHOICES if choice in results}
-    made = {choice: Result(**{**one, "varied": tuple(one["varied"])}) for choice, one in known.items()}
+    made = {
+        choice: Result(one["right"], one["margin"], tuple(one["varied"]), one["lift"]) for choice, one in known.items()
+    }
     return Trial(plan.number, plan.names[0], undecided, made)

@@ -10,7 +10,7 @@ import pytest
 from rover_drives import TABLES, columns, simulation
 from servo import ServoAxis
 
-from regolithd.calibration.mismatch.answer import Contribution, Parameter
+from regolithd.calibration.mismatch.answer import CalibratedParameter, Contribution, Parameter
 from regolithd.calibration.mismatch.comparison import Comparison, compare
 from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects, write_corrected
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
@@ -145,8 +145,23 @@ def test_a_file_in_another_folder_leads_to_the_class(folder: str, led: str | Non
     write_templates("class", tmp_path / "sim")
     found = load_simulation(tmp_path / "sim" / "SIM.toml")
     values = {name: prior.value for name, prior in found.parameters.items()}
-    answer, evidence = SimpleNamespace(unexplained=(), effects=()), SimpleNamespace(values=values, contributions=())
+    answer = SimpleNamespace(unexplained=(), effects=(), parameters=())
+    evidence = SimpleNamespace(values=values, contributions=())
     path = tmp_path / folder / "CORRECTED.toml"
     write_corrected(path, answer, evidence, found)  # type: ignore[arg-type]
     assert tomllib.loads(path.read_text())["simulation"].get("path") == led
     assert load_simulation(path).parameters.keys() == found.parameters.keys()
+
+
+def test_beside_something_unexplained_the_file_has_the_answers_parameters(tmp_path: Path) -> None:
+    """Not those of a fit without the unknown, which move to imitate it."""
+    write_templates("class", tmp_path)
+    found = load_simulation(tmp_path / "SIM.toml")
+    name, prior = next(iter(found.parameters.items()))
+    told = prior.value + prior.std
+    posterior = CalibratedParameter(name, prior.unit, prior.value, prior.std, told, told, told)
+    answer = SimpleNamespace(unexplained=(None,), effects=(), parameters=(posterior,))
+    values = {each: of.value - 5 * of.std for each, of in found.parameters.items()}
+    evidence = SimpleNamespace(values=values, contributions=())
+    write_corrected(tmp_path / "NEW.toml", answer, evidence, found)  # type: ignore[arg-type]
+    assert load_simulation(tmp_path / "NEW.toml").parameters[name].value == pytest.approx(told)

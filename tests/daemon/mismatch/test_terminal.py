@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 from rich.console import Console
 
-from regolithd.calibration.mismatch.answer import Parameter, Suggestion, Unexplained
+from regolithd.calibration.mismatch.answer import CalibratedParameter, Parameter, Suggestion, Unexplained
 from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
 from regolithd.daemon.mismatch.terminal import print_answer
 
@@ -27,6 +27,10 @@ def test_mismatch_prints_the_answer() -> None:
         fit=SimpleNamespace(
             channel="current", held_out_rmse_before=0.00412345, held_out_rmse_after=0.001, noise_floor_rmse=0.0009
         ),
+        parameters=[
+            CalibratedParameter("loss", "W/K", 4.0, 0.16, 4.97, 4.9, 5.0),
+            CalibratedParameter("gain", "1", 1.0, 0.1, 1.2, 1.1, 1.3),
+        ],
         probability=0.914,
         next_best=SimpleNamespace(effects=("other",), unexplained=True, probability=0.05),
         notes=["short"],
@@ -36,6 +40,7 @@ def test_mismatch_prints_the_answer() -> None:
     assert console.export_text().splitlines() == [
         "effects",
         "  coulomb-friction: 37 mA",
+        "  parameter loss: 4.97 W/K instead of 4, 6.1 standard deviations of its prior away",
         "  unexplained: 12 % of the residual follows time on 1, 4, 3 to 100 s",
         "  unexplained: 40 % of the residual follows height on 1, 0 to 9 s",
         "  with an empirical curve over height, 0.1 to 0.7 m: held-out error 0.004 before, 0.002 after",

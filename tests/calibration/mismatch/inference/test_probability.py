@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from linear_machine import CANDIDATES, equations_of, problem_of, table
 
 from regolithd.calibration.mismatch.inference.alternatives import Alternative, alternatives
-from regolithd.calibration.mismatch.inference.probability import other_answers, probability
+from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
+from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.decision import Decision, decide
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -42,6 +45,15 @@ def test_probabilities_of_all_answers_add_up() -> None:
     told = other_answers(margins, THRESHOLDS)
     assert probability(margins, THRESHOLDS) + sum(other.probability for other in told) == pytest.approx(HIGHEST)
     assert len(other_answers([*margins, Alternative(("4",), 9.0)], THRESHOLDS)) == 3
+
+
+def test_the_evidence_decides_where_every_curve_pays_for_itself() -> None:
+    """Names and nothing do; a curve over time beside noise does not."""
+    decision = decided(drag=0.3)
+    assert decided_by_evidence(decision)
+    _, curve = best_of_each_smooth_term(decision.equations, decision.named.terms)[0]
+    whole = decision.equations.fit((*decision.named.terms, curve))
+    assert not decided_by_evidence(replace(decision, unnamed=(curve,), whole=whole))
 
 
 def test_a_strong_drag_is_surer_than_a_weak_one() -> None:

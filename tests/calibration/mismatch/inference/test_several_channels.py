@@ -137,3 +137,4 @@ def test_a_note_of_one_channel_is_told_with_the_channel() -> None:
     current = replace(ANSWER, notes=("a gap", "no speed"), fit=replace(ANSWER.fit, channel="current_A"))
     heat = replace(ANSWER, notes=("a gap",), fit=replace(ANSWER.fit, channel="heat_W"))
     assert notes_of([current, heat]) == ("a gap", "current_A: no speed")
+    assert notes_of([replace(current, notes=("current_A is blank",)), heat]) == ("current_A is blank", "heat_W: a gap")

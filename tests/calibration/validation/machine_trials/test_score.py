@@ -205,6 +205,13 @@ def test_intervals_and_held_out_error_are_measured() -> None:
     assert verdict(truth("single", concealed()), RIGHT).intervals == (True,)
     far = concealed(parameters={"coulomb_current": 0.4})
     assert verdict(truth("single", far), RIGHT).intervals == (False,)
+    warm = concealed(channel="oven_degC", parameters={"relative_size": 0.1})
+    told = named(
+        channel="oven_degC", parameters={"relative_size": {"value": 0.3, "low": 0.2, "high": 0.4, "unit": "1"}}
+    )
+    units = [{"channels": {"oven_degC": "oven_degC"}, "scales": {}}]
+    sealed = truth("single", warm, units=units, true_rmse={"oven_degC": 0.3})
+    assert verdict(sealed, answer(MISSING, told)).intervals == ()
     edge = named(parameters={"power": {"value": 1.4, "low": 1.0, "high": 1.4, "unit": ""}})
     assert any("on the edge" in one for one in verdict(truth("single", concealed()), answer(MISSING, edge)).problems)
     worse = answer(MISSING, named(), fit={"channel": "motor_current_A", "held_out_rmse_after": 0.31})
