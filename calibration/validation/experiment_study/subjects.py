@@ -47,12 +47,14 @@ class Subject:
     write: write recording.csv.gz and SIM.toml of a plan, of the first drive or of an experiment, of such a length [s]
     varied: the covariates that an experiment can vary
     can_lift: whether a part of it can be without load
+    steady: the covariates that stay constant where an experiment does not vary them, but for the sensors' noise
     """
 
     name: str
     write: Write
     varied: tuple[str, ...]
     can_lift: bool
+    steady: frozenset[str] = frozenset()
 
 
 def write_rover(plan: Plan, experiment: ProposedExperiment | None, folder: Path, length_s: float) -> None:
@@ -137,7 +139,7 @@ def legs(rng: Generator, t_s: np.ndarray, usual: float, vary: frozenset[str]) ->
     return np.interp(t_s, times, speeds)
 
 
-ROVER = Subject("rover", write_rover, tuple(sorted(CONDITIONS_OF)), can_lift=True)
+ROVER = Subject("rover", write_rover, tuple(sorted(CONDITIONS_OF)), can_lift=True, steady=frozenset({"temperature"}))
 VEHICLE = Subject(
     "vehicle",
     write_vehicle,

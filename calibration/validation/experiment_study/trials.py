@@ -30,8 +30,9 @@ if TYPE_CHECKING:
 
 SOLVER = f"{shlex.quote(sys.executable)} -m regolithd.calibration.validation.experiment_study.solver"
 """A command that is given `answer` or `names` and folders, and writes answer.json into each."""
+TEMPERATURE = "temperature"
 CONSTANT_FORMS = {"cold-lubricant-friction": ("coulomb-friction", "viscous-friction")}
-"""What a law is where its covariate, the temperature, does not vary: the solver does not look for it there."""
+"""What a law is where its covariate, the temperature, does not vary: nothing tells it from that form there."""
 TIMEOUT_S = 1800.0
 
 
@@ -90,7 +91,7 @@ def run_trial(plan: Plan, subject: Subject, folder: Path, solver: str = SOLVER, 
     results: dict[str, Any] = {
         choice: {
             "right": [effect["name"] for effect in found["answer"]["effects"]] == [name],
-            "margin": margin_of(found["scores"], name, remaining(first["answer"])),
+            "margin": margin_of(found["scores"], name, remaining(first["answer"]), subject.steady - experiment.vary),
             "varied": sorted(experiment.vary),
             "lift": experiment.lift,
             "scores": found["scores"],
@@ -109,14 +110,17 @@ def remaining(answer: Mapping[str, Any]) -> set[str]:
     return {effect["name"] for effect in answer["effects"]} | {name for part in parts for name in part["effects"]}
 
 
-def margin_of(scores: Mapping[str, float], name: str, possible: AbstractSet[str]) -> float:
+def margin_of(
+    scores: Mapping[str, float], name: str, possible: AbstractSet[str], constant: AbstractSet[str] = frozenset()
+) -> float:
     """Return the evidence for the concealed effect less that for the best other one.
 
-    A law that an experiment did not test is there what it is at a constant covariate: it has the evidence of that form.
+    A law that an experiment did not test, as its covariate was `constant` or the solver did not look for it, is there
+    what it is at a constant covariate: it has the evidence of that form.
     """
     found = dict(scores)
     for law, forms in CONSTANT_FORMS.items():
-        if law in {name, *possible} and law not in found:
+        if law in {name, *possible} and (law not in found or TEMPERATURE in constant):
             found[law] = max(scores.get(form, 0.0) for form in forms)
     return found.get(name, 0.0) - max((score for other, score in found.items() if other != name), default=0.0)
 

@@ -151,7 +151,9 @@ def test_what_an_experiment_did_not_test_is_not_told_apart() -> None:
     possible = remaining(first)
     assert margin_of(scores, "coulomb-friction", possible) == 0.0
     assert margin_of(scores, "cold-lubricant-friction", set()) == 0.0
-    assert margin_of({**scores, "cold-lubricant-friction": 25.0}, "coulomb-friction", possible) == 5.0
+    tested = {**scores, "cold-lubricant-friction": 25.0}
+    assert margin_of(tested, "coulomb-friction", possible) == 5.0
+    assert margin_of(tested, "coulomb-friction", possible, {"temperature"}) == 0.0
     assert margin_of({"load-dependent-efficiency": 40.0, **scores}, "load-dependent-efficiency", possible) == 10.0
 
 
