@@ -112,7 +112,8 @@ def picture(found: list[Bin]) -> str:
     diagonal = [(panel.at_x(at), panel.at_y(at)) for at in (0.0, 1.0)]
     parts = [STYLE, box(panel), axes(panel, "stated probability", "share of answers that are right"), *dots]
     parts.append(line(diagonal, "zero"))
-    parts.append(text(panel.left + 8, panel.top + 16, "dashed: stated = right; area of a dot: number of answers"))
+    parts.append(text(panel.at_x(0.4), panel.at_y(0.12), "dashed: stated = right"))
+    parts.append(text(panel.at_x(0.4), panel.at_y(0.05), "area of a dot: number of answers"))
     return svg(420, 320, parts, "Share of right answers against the stated probability")
 
 
