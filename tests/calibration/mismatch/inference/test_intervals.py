@@ -12,7 +12,7 @@ from linear_machine import NOISE, Power, equations_of, problem_of, table, term_o
 from regolithd.calibration.mismatch.inference.intervals import normal_draws, parameters_of, unit_of
 from regolithd.calibration.mismatch.inference.parameter_interval import interval
 from regolithd.calibration.mismatch.inference.sandwich import block_sums, linearised, sandwich
-from regolithd.calibration.mismatch.inference.size_interval import _over_kinds_of_shape, _rms
+from regolithd.calibration.mismatch.inference.size_interval import COMMON_DISCREPANCY_STD, _over_kinds_of_shape, _rms
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
 from regolithd.calibration.mismatch.signal.noise import NoiseModel
@@ -89,6 +89,16 @@ def test_relative_size_is_the_effect_over_the_mean_reading() -> None:
     assert size.value == pytest.approx(0.3 / float(np.mean(np.abs(equations.problem.measured))), rel=0.1)
     assert size.low < size.value < size.high
     assert (size.unit, found["drag"].unit) == ("1", "V")
+
+
+def test_no_size_is_known_better_than_the_common_discrepancy() -> None:
+    """With hardly any noise its coefficient is known to a thousandth, its size is not."""
+    equations = equations_of(problem_of(table(drag=0.3, noise=0.001)))
+    (found,) = parameters_of(
+        equations, equations.fit([term_of(equations, "drag")]), blocks_of_time(equations.problem, WHITE)
+    )
+    size = found["relative_size"]
+    assert (size.high - size.low) / (2 * 1.645 * size.value) > 0.95 * COMMON_DISCREPANCY_STD
 
 
 def test_a_shape_parameter_has_its_interval() -> None:
