@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 
 if TYPE_CHECKING:
@@ -53,15 +53,23 @@ def unexplained_if_one_sided(decision: Decision) -> Decision:
 
 
 def one_sided_wheels(decision: Decision) -> list[int]:
-    """Return the wheels on which what is left has more skewness along the motion than noise has by chance."""
-    problem = decision.equations.problem
-    left = residual_of(decision.equations, decision.whole)
+    """Return the wheels on which what is left has more skewness along the motion than noise has by chance.
+
+    What is small against the named effects there is the misfit of their laws, and has any distribution.
+    """
+    equations, problem = decision.equations, decision.equations.problem
+    left = residual_of(equations, decision.whole)
+    explained = np.zeros(left.shape)
+    for index in range(len(decision.named.terms)):
+        explained += contribution(equations, decision.named, index)
+    misfit = equations.thresholds.form_misfit * np.sum(np.where(problem.mask, explained, 0.0) ** 2, axis=0)
     along = np.nan_to_num(problem.covariates.get("direction", np.ones(left.shape)))
     found = []
     for wheel in range(left.shape[1]):
         moving = problem.mask[:, wheel] & (along[:, wheel] != 0)
         skewness, error = skewness_of(_without_single(left[moving, wheel] * along[moving, wheel]))
-        if abs(skewness) > max(LEAST_SKEWNESS, MOST_STANDARD_ERRORS * error):
+        large = np.sum(left[problem.mask[:, wheel], wheel] ** 2) > misfit[wheel]
+        if large and abs(skewness) > max(LEAST_SKEWNESS, MOST_STANDARD_ERRORS * error):
             found.append(wheel)
     return found
 

@@ -35,6 +35,13 @@ def test_a_drag_in_spells_is_unexplained_on_its_axis() -> None:
     assert not decided_by_evidence(decision)
 
 
+def test_the_misfit_of_a_large_effects_law_is_no_finding() -> None:
+    """Spells that are small against a drag which was named on both axes."""
+    decision = decided(in_spells(0.8) + 5.0)
+    assert {term.name for term in decision.named.terms} == {"drag"}
+    assert unexplained_if_one_sided(decision) is decision
+
+
 @pytest.mark.parametrize("drag", [0.0, 0.3])
 def test_noise_beside_what_was_found_is_not_one_sided(drag: float) -> None:
     """With and without a drag that has a name."""
