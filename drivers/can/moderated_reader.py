@@ -39,6 +39,11 @@ class ModeratedReader:
         self._timer: asyncio.TimerHandle | None = None
         self.start()
 
+    @property
+    def running(self) -> bool:
+        """Whether it reads, since `start` or the beginning."""
+        return self._running
+
     def start(self) -> None:
         """Begin to read; again after `stop`."""
         if not self._running:

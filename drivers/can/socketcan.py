@@ -77,9 +77,11 @@ class SocketCanBus(Bus):
                 return
 
     def close(self) -> None:
-        """Close the socket."""
+        """Close the socket, after reading the frames that wait: the last ones sent are heard, counted and recorded."""
         if self._reopening is not None:
             self._reopening.cancel()
+        elif self._reader.running:
+            self._drain()
         self._reader.stop()
         self._socket.close()
 

@@ -76,6 +76,7 @@ def _visit(process: subprocess.Popen[bytes], address: str) -> int:
         ended = process.wait(STOP_TIMEOUT_S) in {0, 130, -signal.SIGINT}
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
         ended = False
     return 0 if answers and ended else 1
 
