@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, field
 from importlib import resources
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,10 +21,16 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Verdict = Literal["consistent", "missing-physics", "unexplained"]
+Floats = TypeVar("Floats", float, Array)
 
 
 NINETY_PERCENT_STDS = 1.645
 """Half the width of a 90 % interval of a normal density, in standard deviations."""
+
+
+def std_of_interval(low: Floats, high: Floats) -> Floats:
+    """Return the standard deviation of the normal density that has this 90 % interval."""
+    return (high - low) / (2 * NINETY_PERCENT_STDS)
 
 
 @dataclass(frozen=True)
@@ -170,6 +178,10 @@ class CalibratedParameter:
     def prior_stds_away(self) -> float:
         """How far it is from its prior, in the prior's standard deviations; 0 where the prior is exact."""
         return abs(self.value - self.prior) / self.prior_std if self.prior_std > 0 else 0.0
+
+    def beyond_prior(self, thresholds: Thresholds = THRESHOLDS) -> bool:
+        """Return whether it had to leave its prior: a finding, whatever else was found."""
+        return self.prior_stds_away > thresholds.furthest_prior_stds
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS
+from regolithd.calibration.mismatch.answer import std_of_interval
 from regolithd.calibration.mismatch.empirical.written import summed, with_changed_sizes, with_curves
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.prior import own_name
@@ -137,7 +137,7 @@ def _within_three_std(simulation: Simulation, values: Mapping[str, float]) -> di
 def _relative_std(effect: Effect) -> float:
     """Return the relative standard deviation of an effect's size, from its 90 % interval."""
     size = effect.parameters.get("relative_size")
-    return 0.0 if size is None or size.value == 0 else (size.high - size.low) / (2 * NINETY_PERCENT_STDS) / size.value
+    return 0.0 if size is None or size.value == 0 else std_of_interval(size.low, size.high) / size.value
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401  # what TOML can hold

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from regolithd.calibration.mismatch.report.labels import beyond_prior
-
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -57,7 +55,8 @@ def _lines(answer: Answer) -> list[str]:
         *(
             f"parameter {each.name}: {each.value:.4g} {each.unit} instead of {each.prior:.4g}, "
             f"{each.prior_stds_away:.1f} standard deviations of its prior away"
-            for each in filter(beyond_prior, answer.parameters)
+            for each in answer.parameters
+            if each.beyond_prior()
         ),
         *(
             f"unexplained: {100 * rest.share_of_residual:.0f} % of the residual follows {rest.covariate} on "

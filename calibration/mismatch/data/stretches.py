@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from regolithd.calibration.mismatch.data.columns import parquet_errors
+from regolithd.calibration.mismatch.data.columns import ROWS_AT_ONCE, parquet_errors
 from regolithd.calibration.mismatch.data.recording import RUN, TIME_UNITS_S
 
 if TYPE_CHECKING:
@@ -24,8 +24,6 @@ LONGEST_AT_ONCE = 400_000
 """Rows up to which a recording is compared at once (a choice: it then needs less than 1 GiB)."""
 STRETCH = 100_000
 """Rows of a stretch, about (a choice: shorter ones cost more for each row, longer ones more memory)."""
-BATCH = 65_536
-"""Rows whose times are read at once (a choice)."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +101,7 @@ def _steps(path: Path) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_]]
         clock = next((name for name in TIME_UNITS_S if name in file.schema_arrow.names), None)
         names = [name for name in (clock, RUN) if name in file.schema_arrow.names]
         before: NDArray[np.float64] | None = None
-        for batch in file.iter_batches(BATCH, columns=names) if clock else ():
+        for batch in file.iter_batches(ROWS_AT_ONCE, columns=names) if clock else ():
             now = np.stack([_numbers(batch.column(name)) for name in names], axis=1)
             steps = np.diff(now, axis=0, prepend=now[:1] if before is None else before)
             before = now[-1:]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS
+from regolithd.calibration.mismatch.answer import std_of_interval
 from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.regression.smooth_groups import acting
@@ -60,7 +60,7 @@ class EmpiricalCurveLaw(Candidate):
         """Return what one standard deviation of the value at each knot adds, shape (knot, time, wheel)."""
         x, factor = self._course(problem)
         curve = self.stated.curve
-        stds = (np.array(curve.high) - np.array(curve.low)) / (2 * NINETY_PERCENT_STDS)
+        stds = std_of_interval(np.array(curve.low), np.array(curve.high))
         hats = [np.where(np.isfinite(x), np.interp(x, curve.at, row), 0.0) for row in np.diag(stds)]
         on = np.isin(np.array(problem.recording.wheels, dtype=object), list(self.stated.wheels))
         return np.where(problem.mask & on, np.stack(hats) * factor, 0.0)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.experiments.settings import NOT_SET
+from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
 from regolithd.calibration.mismatch.regression.residuals import relative_size
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
 
@@ -33,8 +34,6 @@ Pair = tuple[str, str]
 
 MOST_SHAPES = 12
 """Shapes of a law that another answer is held against (a choice: computing time)."""
-SINGULAR = 1e-10
-"""Relative eigenvalue below which a direction of the normal equations counts as undetermined."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,7 @@ from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.answer import Change, Verdict
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.as_read import AsRead
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
-    from regolithd.calibration.mismatch.thresholds import Thresholds
 
 
 def answer_of(
@@ -49,7 +48,7 @@ def answer_of(
     problem, named = equations.problem, decision.named
     effects, changes = named_effects(decision, held_out)
     parameters = calibrated_parameters(decision)
-    moved = beyond_prior(parameters, equations.thresholds)
+    moved = [each for each in parameters if each.beyond_prior(equations.thresholds)]
     known = decided_by_evidence(decision)
     rest = alternatives(decision) if known else ()
     extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold, rest)
@@ -123,11 +122,6 @@ def calibrated_parameters(decision: Decision) -> tuple[CalibratedParameter, ...]
         low, high = value - NINETY_PERCENT_STDS * std, value + NINETY_PERCENT_STDS * std
         found.append(CalibratedParameter(name, prior.unit, prior.value, prior.std, value, low, high))
     return tuple(found)
-
-
-def beyond_prior(parameters: Iterable[CalibratedParameter], thresholds: Thresholds) -> tuple[CalibratedParameter, ...]:
-    """Return the parameters that had to leave their priors: a finding, whatever else was found."""
-    return tuple(each for each in parameters if each.prior_stds_away > thresholds.furthest_prior_stds)
 
 
 def _effect(problem: Problem, term: Term, parameters: Mapping[str, Parameter], errors: tuple[float, float]) -> Effect:

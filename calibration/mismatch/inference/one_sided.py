@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
+from regolithd.calibration.mismatch.signal.noise import significant_autocorrelation
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Term
@@ -29,8 +31,6 @@ LEAST_SKEWNESS = 0.5
 """Skewness below which it is no finding: a long recording shows that a law or a sensor is not quite linear. In the
 demonstration it is −0.1 to −0.4 on the six wheels, with drag in spells 0.7 to 1.1. A drag is against the motion: what
 is skewed the other way is none."""
-SIGNIFICANT = 2.0
-"""Standard errors below which an autocorrelation ends the sum over lags, as for the noise's autocorrelation time."""
 
 
 def unexplained_if_one_sided(decision: Decision) -> Decision:
@@ -40,17 +40,13 @@ def unexplained_if_one_sided(decision: Decision) -> Decision:
     """
     equations = decision.equations
     explained = {wheel for term in decision.unnamed for wheel in term.wheels}
-    curves = {
-        term.wheels: term
-        for _, term in reversed(best_of_each_smooth_term(equations, decision.named.terms))
-        if term.name == "time"
-    }
-    wheels = [wheel for wheel in one_sided_wheels(decision) if wheel not in explained and (wheel,) in curves]
-    if not wheels:
+    wheels = [wheel for wheel in one_sided_wheels(decision) if wheel not in explained]
+    curves = _curves_over_time(decision, wheels) if wheels else ()
+    if not curves:
         return decision
-    found = tuple(curves[(wheel,)] for wheel in wheels)
-    named = equations.fit([term for term in decision.named.terms if not _constant_friction_on(term, wheels)])
-    unnamed = (*decision.unnamed, *found)
+    told = {wheel for term in curves for wheel in term.wheels}
+    named = equations.fit([term for term in decision.named.terms if not _constant_friction_on(term, told)])
+    unnamed = (*decision.unnamed, *curves)
     return replace(decision, named=named, unnamed=unnamed, whole=equations.fit((*named.terms, *unnamed)))
 
 
@@ -69,28 +65,26 @@ def one_sided_wheels(decision: Decision) -> list[int]:
     found = []
     for wheel in range(left.shape[1]):
         moving = problem.mask[:, wheel] & (along[:, wheel] != 0)
-        skewness, error = skewness_of(_without_single(left[moving, wheel] * along[moving, wheel]))
+        skewness, error = skewness_of(_without_single(left[moving, wheel] * along[moving, wheel]), equations.thresholds)
         large = np.sum(left[problem.mask[:, wheel], wheel] ** 2) > misfit[wheel]
         if large and skewness > max(LEAST_SKEWNESS, MOST_STANDARD_ERRORS * error):
             found.append(wheel)
     return found
 
 
-def skewness_of(values: Array) -> tuple[float, float]:
+def skewness_of(values: Array, thresholds: Thresholds = THRESHOLDS) -> tuple[float, float]:
     """Return the skewness of a course (time,), and its standard error where it is normal and autocorrelated.
 
-    The variance is 6/n (1 + 2 Σ ρ³) (Lomnicki, 1961); the sum ends at the first lag that is not significant.
+    The variance is 6/n (1 + 2 Σ ρ³) (Lomnicki, 1961); the sum is over the lags that are significant.
     """
     count = len(values)
     deviations = values - values.mean() if count else values
     std = float(np.std(deviations)) if count else 0.0
     if std == 0.0:
         return 0.0, float("inf")
-    correlation = np.fft.irfft(np.abs(np.fft.rfft(deviations, 2 * count)) ** 2)[: max(count // 10, 2)]
-    correlation /= correlation[0]
-    small = np.flatnonzero(correlation < SIGNIFICANT / np.sqrt(count))
-    lags = correlation[1 : small[0] if small.size else None]
-    variance = 6 / count * (1 + 2 * float(np.sum(lags**3)))
+    scaled = (deviations / std)[:, None]
+    correlation = significant_autocorrelation(scaled, np.ones(scaled.shape, bool), thresholds)
+    variance = 6 / count * (1 + 2 * float(np.sum(correlation**3)))
     return float(np.mean(deviations**3)) / std**3, variance**0.5
 
 
@@ -101,7 +95,14 @@ def _without_single(values: Array) -> Array:
     return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(values, 3), axis=-1))
 
 
-def _constant_friction_on(term: Term, wheels: list[int]) -> bool:
+def _curves_over_time(decision: Decision, wheels: list[int]) -> tuple[Term, ...]:
+    """Return the best curve over time on each of these wheels alone, where it has one."""
+    best = best_of_each_smooth_term(decision.equations, decision.named.terms)
+    curves = {term.wheels: term for _, term in reversed(best) if term.name == "time"}
+    return tuple(curves[(wheel,)] for wheel in wheels if (wheel,) in curves)
+
+
+def _constant_friction_on(term: Term, wheels: set[int]) -> bool:
     """Return whether a named effect is a drag of constant size on one of these wheels."""
     candidate = term.group.candidate
-    return candidate is not None and candidate.covariate == "direction" and bool(set(term.wheels) & set(wheels))
+    return candidate is not None and candidate.covariate == "direction" and bool(wheels.intersection(term.wheels))

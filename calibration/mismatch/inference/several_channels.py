@@ -6,9 +6,8 @@ from dataclasses import replace
 from math import prod
 from typing import TYPE_CHECKING, TypeVar
 
-from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, Answer, OtherAnswer
+from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, Answer, OtherAnswer, std_of_interval
 from regolithd.calibration.mismatch.inference.probability import TOLD
-from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -92,7 +91,7 @@ def priors_from_others(answer: Answer, others: Sequence[Answer]) -> dict[str, tu
     prior, what others know of the parameters decides whether they were stated wrongly or stand for missing physics.
     Empty where none is pulled; a channel that leaves something unexplained is not asked.
     """
-    if not any(map(_left, answer.parameters)):
+    if not any(each.beyond_prior() for each in answer.parameters):
         return {}
     found = {}
     for parameter in answer.parameters:
@@ -115,7 +114,7 @@ def combined(*found: CalibratedParameter) -> CalibratedParameter:
     is wrong, it was left, and the value is that channel's own.
     """
     stated = max(found, key=lambda each: each.prior_std)
-    left = list(filter(_left, found))
+    left = [each for each in found if each.beyond_prior()]
     if left:
         best = min(left, key=_std)
         return replace(best, prior=stated.prior, prior_std=stated.prior_std)
@@ -134,10 +133,5 @@ def combined(*found: CalibratedParameter) -> CalibratedParameter:
     return replace(stated, value=value, low=value - reach, high=value + reach)
 
 
-def _left(parameter: CalibratedParameter) -> bool:
-    """Return whether a parameter left its prior."""
-    return parameter.prior_stds_away > THRESHOLDS.furthest_prior_stds
-
-
 def _std(parameter: CalibratedParameter) -> float:
-    return (parameter.high - parameter.low) / (2 * NINETY_PERCENT_STDS)
+    return std_of_interval(parameter.low, parameter.high)

@@ -11,12 +11,11 @@ from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import direction_of
 from regolithd.calibration.mismatch.inference.statements import capital, listed, plural
 from regolithd.calibration.mismatch.problem.words import COVARIATES
-from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.answer import Answer, CalibratedParameter, Change, Evidence
+    from regolithd.calibration.mismatch.answer import Answer, Change, Evidence
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
 
 PARAMETERS = {"lag_s": "lag", "onset_s": "onset", "relative_size": "share of the mean reading"}
@@ -108,13 +107,8 @@ def verdict_sentence(answer: Answer, labels: Labels | None = None) -> str:
         return "Simulation and recording agree to within the noise."
     left_out = _left_out_sentence(answer, labels)
     changed = [f"{capital(labels.effect(change.name))} is {_than_corrected(change)}." for change in answer.changes]
-    moved = [f"The parameter {each.name} had to leave its prior." for each in answer.parameters if beyond_prior(each)]
+    moved = [f"The parameter {each.name} had to leave its prior." for each in answer.parameters if each.beyond_prior()]
     return " ".join(sentence for sentence in (left_out, *dict.fromkeys(changed), *moved) if sentence)
-
-
-def beyond_prior(parameter: CalibratedParameter) -> bool:
-    """Return whether a parameter lies more than three deviations from its prior."""
-    return parameter.prior_stds_away > THRESHOLDS.furthest_prior_stds
 
 
 def _than_corrected(change: Change) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from regolithd.calibration.mismatch.changes import direction_of
 from regolithd.calibration.mismatch.inference.statements import capital
 from regolithd.calibration.mismatch.report.axes import number
-from regolithd.calibration.mismatch.report.labels import UNITS, beyond_prior
+from regolithd.calibration.mismatch.report.labels import UNITS
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Answer
@@ -70,7 +70,7 @@ def calibrated(answer: Answer) -> tuple[CalibratedRow, ...]:
         )
         ends = (number(one.low, 4), number(one.high, 4)) if one.prior_std else ("", "")
         unit = UNITS.get(one.unit, one.unit)
-        rows.append(CalibratedRow(one.name, stated, number(one.value, 4), *ends, unit, beyond_prior(one)))
+        rows.append(CalibratedRow(one.name, stated, number(one.value, 4), *ends, unit, one.beyond_prior()))
     return tuple(rows)
 
 

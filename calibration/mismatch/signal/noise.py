@@ -39,18 +39,32 @@ class NoiseModel:
 def estimate_noise(residual: Array, mask: NDArray[np.bool_], thresholds: Thresholds = THRESHOLDS) -> NoiseModel:
     """Estimate the noise from a residual [time, wheel] that holds as little structure as possible.
 
-    The autocorrelation is pooled over wheels and summed up to the lag at which it first falls below its own standard
-    error (Geyer, 1992): further lags would add variance and no bias. A lag counts by the share of its pairs that were
-    read: of a sensor that is read in every tenth row, readings are ten rows apart.
+    The autocorrelation is pooled over wheels.
     """
     clean = np.where(mask, residual, 0.0)
     deviation = _deviation(clean, mask)
-    lags = int(thresholds.longest_lag_share * len(clean))
-    correlation, share = _autocorrelation(clean / deviation, mask, lags)
+    correlation = significant_autocorrelation(clean / deviation, mask, thresholds)
+    return NoiseModel(deviation, float(max(1.0, 1 + 2 * np.sum(correlation))))
+
+
+def significant_autocorrelation(scaled: Array, mask: NDArray[np.bool_], thresholds: Thresholds = THRESHOLDS) -> Array:
+    """Return the autocorrelation at the lags from 1 on that are significant, shape (lag,), pooled over wheels.
+
+    It ends before the lag at which it first falls below its own standard error (Geyer, 1992): further lags would add
+    variance to a sum over lags, and no bias. A lag counts by the share of its pairs that were read: of a sensor that
+    is read in every tenth row, readings are ten rows apart.
+
+    Parameters
+    ----------
+    scaled: residual over its standard deviation, shape (time, wheel); 0 where it is masked
+    mask: what was read, of the same shape
+    """
+    lags = int(thresholds.longest_lag_share * len(scaled))
+    correlation, share = _autocorrelation(scaled, mask, lags)
     standard_error = thresholds.lag_significance / np.sqrt(max(float(mask.sum()), 1.0))
     insignificant = np.flatnonzero((correlation[1:] < standard_error) & (share[1:] > LEAST_PAIRS))
     end = int(insignificant[0]) + 1 if insignificant.size else lags
-    return NoiseModel(deviation, float(max(1.0, 1 + 2 * np.sum((share * correlation)[1:end]))))
+    return np.asarray((share * correlation)[1:end])
 
 
 def _deviation(clean: Array, mask: NDArray[np.bool_]) -> Array:

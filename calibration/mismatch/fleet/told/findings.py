@@ -22,7 +22,6 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
 from regolithd.calibration.mismatch.fleet.told.intervals import onset_places, size_stds
 from regolithd.calibration.mismatch.fleet.told.recordings import shown_beside
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
-from regolithd.calibration.mismatch.inference.findings import beyond_prior
 from regolithd.calibration.mismatch.inference.statements import capital, size_and_cost, wheels_in_words
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
@@ -85,8 +84,7 @@ def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
     single = tuple(_of_recording(chosen, i, effect) for i, effect in shown.effects)
     rest = tuple(_unexplained(chosen, i, each) for i, each in shown.unexplained)
     parameters = _parameters(chosen)
-    moved = beyond_prior(parameters, THRESHOLDS)
-    named = effects or single or moved
+    named = effects or single or any(each.beyond_prior() for each in parameters)
     verdict: Verdict = "unexplained" if rest else "missing-physics" if named else "consistent"
     floor = _noise_floor(chosen)
     counts = equations.counts

@@ -44,7 +44,7 @@ def test_stretches_hold_every_row_once_and_whole_instants(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, batch: int
 ) -> None:
     """However many rows are read at once."""
-    monkeypatch.setattr(stretches, "BATCH", batch)
+    monkeypatch.setattr(stretches, "ROWS_AT_ONCE", batch)
     path = written(tmp_path, table())
     found = stretches_of(path, 251)
     assert [(each.first, each.last) for each in found] == [(0, 250), (250, 500), (500, 750), (750, 1000)]
