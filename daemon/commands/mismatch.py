@@ -44,6 +44,10 @@ def register(app: typer.Typer) -> None:
         scheduler: Annotated[
             str | None, typer.Option(metavar="ADDRESS", help="Compare recordings on this Dask cluster.")
         ] = None,
+        effects: Annotated[
+            bool,
+            typer.Option("--effects", help="List the effects that are looked for (by --simulation), and nothing else."),
+        ] = False,
         init: Annotated[
             tuple[str, Path] | None,
             typer.Option(
@@ -62,8 +66,13 @@ def register(app: typer.Typer) -> None:
             if init:
                 _write_templates(*init)
                 return
+            if effects:
+                _print_effects(simulation)
+                return
             if not recordings or simulation is None:
-                raise typer.BadParameter("a recording and --simulation SIM.toml are needed, or --init KIND FOLDER")
+                raise typer.BadParameter(
+                    "a recording and --simulation SIM.toml are needed, or --effects, or --init KIND FOLDER"
+                )
             from regolithd.daemon.mismatch.files import Outputs
             from regolithd.daemon.mismatch.fleet import FleetOptions
             from regolithd.daemon.mismatch.run import run
@@ -80,3 +89,10 @@ def _write_templates(kind: str, folder: Path) -> None:
 
     for path in write_templates(kind, folder):
         typer.echo(f"wrote {path}")
+
+
+def _print_effects(simulation: Path | None) -> None:
+    from regolithd.calibration.mismatch.reference.effects import effects_as_text, effects_of
+    from regolithd.calibration.mismatch.simulation.load import load_simulation
+
+    typer.echo(effects_as_text(*effects_of(load_simulation(simulation) if simulation else None)))

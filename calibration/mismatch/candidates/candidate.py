@@ -96,6 +96,8 @@ class Candidate:
     """Labels for the report's table of parameters; by default a parameter's name with spaces."""
     requires: ClassVar[tuple[str, ...]] = ()
     """Covariates that must have been recorded and vary; without them the candidate is not looked for."""
+    needs: ClassVar[str] = ""
+    """What `applies` asks for beside `requires`, as a noun phrase: "a predicted current"."""
     sharing: ClassVar[tuple[Sharing, ...]] = ("all", "one")
     """Wheels that may have the effect: `all` with the same coefficients, or `one` alone."""
     channel: ClassVar[str | None] = None

@@ -24,6 +24,7 @@ class CurrentSensorBias(Candidate):
     signature = "one wheel's residual is constant and keeps its sign when the wheel reverses"
     experiment = "read the sensor at rest and without power, then run to and fro"
     vary: ClassVar = ("direction",)
+    needs = "a predicted current"
     source = "data sheets of shunt amplifiers: offsets of milliamperes"
     along_motion = False
     coefficients: ClassVar = (Coefficient("offset", "{unit}", 0),)

@@ -34,6 +34,7 @@ class SoilTransition(Candidate):
     run_unloaded = True
     source = "Table 1 of the paper: strengths differ by a factor of five between soils"
     acts_unloaded = False
+    needs = "the parameters cohesion_Pa and friction_angle_deg"
     coefficients: ClassVar = (Coefficient("relative_strength_change", "1", 0),)
     sharing: ClassVar = ("all",)
     free: ClassVar = {"onset_s": (0.0, float("inf"))}

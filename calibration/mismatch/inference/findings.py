@@ -195,8 +195,10 @@ def _not_looked_for(problem: Problem, candidates: Sequence[Candidate], applicabl
     lacking: dict[str, list[str]] = {}
     for candidate in candidates:
         if candidate.name not in applicable:
-            needs = ", ".join(name for name in candidate.requires if name not in problem.covariates)
-            lacking.setdefault(needs or "another kind of machine", []).append(candidate.name)
+            missing = [name for name in candidate.requires if name not in problem.covariates]
+            told = [f"{name} that varies" if name in problem.constants else name for name in missing]
+            needs = ", ".join(told) or candidate.needs or "another kind of machine"
+            lacking.setdefault(needs, []).append(candidate.name)
     if not lacking:
         return []
     return [

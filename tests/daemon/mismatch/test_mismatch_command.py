@@ -12,6 +12,7 @@ import pyarrow.csv
 import pytest
 from typer.testing import CliRunner
 
+from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.simulation.load import load_simulation
 from regolithd.daemon.cli import app
 
@@ -80,6 +81,22 @@ def test_a_call_without_recording_or_simulation_is_told_what_is_missing() -> Non
     done = call("drive.csv")
     assert done.exit_code == 2
     assert "--simulation" in done.stderr
+
+
+def test_effects_are_listed_with_law_needs_and_parameters() -> None:
+    """Every effect of the library is there, and no recording is needed."""
+    done = call("--effects")
+    assert done.exit_code == 0
+    assert "viscous-friction: drag that grows with speed\n  law         ΔI = b sign(ω) |ω|^p\n" in done.output
+    assert "  needs       a predicted current\n" in done.output
+    assert [each.name for each in library() if f"{each.name}: " not in done.output] == []
+
+
+def test_the_effects_of_a_simulation_have_its_units(start: Path) -> None:
+    """A coefficient is in the predicted column's unit, and its own effects are listed beside the library's."""
+    done = call("--effects", "--simulation", start / "SIM.toml")
+    assert done.exit_code == 0
+    assert "  parameters  quadratic_coefficient [N·m s²/rad²]\n" in done.output
 
 
 def test_recordings_are_compared_together(start: Path, tmp_path: Path) -> None:

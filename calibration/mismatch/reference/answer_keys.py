@@ -1,4 +1,4 @@
-"""MkDocs hook: puts the keys of the mismatch tool's answer where a page says `<!-- answer -->`, from its schema."""
+"""The keys of the answer as Markdown, from its JSON Schema."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ from regolithd.calibration.mismatch.answer import answer_schema
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-MARK = "<!-- answer -->"
 TITLES = {"calibrated_parameter": "An entry of `parameters`", "parameter": "A value of an effect's `parameters`"}
 """Headings of parts whose name is not that of their key."""
 
 
-def on_page_markdown(markdown: str, **_: object) -> str:
-    """Replace the mark by a table for the whole answer and for each of its parts."""
-    return markdown.replace(MARK, "\n".join(_sections(answer_schema()))) if MARK in markdown else markdown
+def answer_tables() -> str:
+    """Return a table for the whole answer and for each of its parts."""
+    return "\n".join(_sections(answer_schema()))
 
 
 def _sections(schema: Mapping[str, Any]) -> Iterator[str]:

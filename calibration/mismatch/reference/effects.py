@@ -1,0 +1,98 @@
+"""The library of effects as Markdown, and as text for the terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.problem.words import in_units, in_words
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Sharing
+    from regolithd.calibration.mismatch.simulation.simulation import Simulation
+
+WHEELS: dict[Sharing, str] = {"all": "all alike", "one": "one alone"}
+IN_TEXT = ("law", "depends on", "needs", "parameters")
+"""Rows that the terminal shows."""
+CHANNEL_UNIT = "channel's unit"
+
+
+def effect_sections(candidates: Sequence[Candidate] | None = None) -> str:
+    """Return a table of all effects and a section for each, as Markdown; by default of the library."""
+    of = library() if candidates is None else candidates
+    return "\n".join([*_overview(of), *(line for candidate in of for line in _section(candidate))])
+
+
+def effects_as_text(candidates: Sequence[Candidate], labels: Mapping[str, str], unit: str = CHANNEL_UNIT) -> str:
+    """Return what a terminal shows of candidates: name, words, and the rows `IN_TEXT`.
+
+    Parameters
+    ----------
+    labels: of covariates, as the machine calls them
+    unit: of the predicted channel
+    """
+    width = max(map(len, IN_TEXT))
+    blocks = []
+    for candidate in candidates:
+        rows = dict(_rows(candidate, labels, unit))
+        lines = [f"  {name.ljust(width)}  {rows[name].replace('`', '')}" for name in IN_TEXT]
+        blocks.append("\n".join([f"{candidate.name}: {in_words(candidate.words, labels)}", *lines]))
+    return "\n".join(blocks)
+
+
+def effects_of(simulation: Simulation | None) -> tuple[Sequence[Candidate], Mapping[str, str], str]:
+    """Return the candidates of a simulation in its forms, its labels of covariates, and its channel's unit."""
+    if simulation is None:
+        return library(), {}, CHANNEL_UNIT
+    if simulation.channels:
+        return simulation.candidates(library()), simulation.covariate_labels, CHANNEL_UNIT
+    found = [each.form_for(simulation) for each in simulation.candidates(library())]
+    return found, simulation.covariate_labels, simulation.unit
+
+
+def _overview(candidates: Sequence[Candidate]) -> Iterator[str]:
+    yield "| effect | what it is | depends on | needs |\n|---|---|---|---|"
+    for candidate in candidates:
+        rows = dict(_rows(candidate, {}, CHANNEL_UNIT))
+        link = f"[`{candidate.name}`](#{candidate.label.lower().replace(' ', '-')})"
+        cells = (link, in_words(candidate.words, {}), rows["depends on"], rows["needs"])
+        yield f"| {' | '.join(map(_cell, cells))} |"
+    yield ""
+
+
+def _section(candidate: Candidate) -> Iterator[str]:
+    yield f"## {candidate.label[:1].upper()}{candidate.label[1:]}\n"
+    yield f"`{candidate.name}`: {in_words(candidate.words, {})}.\n\n| | |\n|---|---|"
+    yield from (f"| {name} | {_cell(text)} |" for name, text in _rows(candidate, {}, CHANNEL_UNIT))
+    yield ""
+
+
+def _rows(candidate: Candidate, labels: Mapping[str, str], unit: str) -> Iterator[tuple[str, str]]:
+    yield "law", candidate.equation
+    yield "depends on", f"`{candidate.covariate}`" if candidate.covariate != "none" else "nothing"
+    yield "needs", _needs(candidate)
+    yield "wheels", " or ".join(WHEELS[each] for each in candidate.sharing)
+    yield "parameters", ", ".join(_parameters(candidate, labels, unit))
+    yield "in a residual", candidate.signature
+    yield "experiment", in_words(candidate.experiment, labels)
+    yield "source", candidate.source
+
+
+def _needs(candidate: Candidate) -> str:
+    """Return the covariates that are needed, and what else the machine must have."""
+    needed = [f"`{name}`" for name in candidate.requires]
+    return ", ".join([*needed, *filter(None, [candidate.needs])]) or "nothing more"
+
+
+def _parameters(candidate: Candidate, labels: Mapping[str, str], unit: str) -> Iterator[str]:
+    for coefficient in candidate.coefficients:
+        found = in_units(coefficient.unit, unit, labels)
+        yield f"`{coefficient.name}`" + (f" [{found}]" if found != "1" else "")
+    yield from (f"`{name}`" for name in candidate.free)
+
+
+def _cell(text: str) -> str:
+    escaped = text.replace("|", "\\|")
+    return escaped if "`" in text else escaped.replace("_", "\\_")
