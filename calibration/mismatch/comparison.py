@@ -189,20 +189,13 @@ def _search(
 ) -> _Search:
     """Search, and once more where the effects that were found move the parameters far."""
     for _ in range(SEARCHES - 1):
-        found = _found_or_moved(problem, candidates, progress)
-        if isinstance(found, _Search):
+        found = _search_at(problem, candidates, progress)
+        values = moved_values(found.decision.equations, found.decision.whole)
+        if not bent(problem, values):
             return found
-        problem = pose(found)
+        del found  # memory holds the matrix of one search at a time
+        problem = pose(values)
     return _search_at(problem, candidates, progress)
-
-
-def _found_or_moved(
-    problem: Problem, candidates: Sequence[Candidate], progress: Callable[[str], None]
-) -> _Search | Mapping[str, float]:
-    """Return what a search finds, or the parameters' values to search at: this search is then in memory no longer."""
-    found = _search_at(problem, candidates, progress)
-    values = moved_values(found.decision.equations, found.decision.whole)
-    return values if bent(problem, values) else found
 
 
 def _search_at(problem: Problem, candidates: Sequence[Candidate], progress: Callable[[str], None]) -> _Search:

@@ -78,10 +78,10 @@ class SocketCanBus(Bus):
 
     def close(self) -> None:
         """Close the socket, after reading the frames that wait: the last ones sent are heard, counted and recorded."""
+        if self._reader.running:
+            self._drain()
         if self._reopening is not None:
             self._reopening.cancel()
-        elif self._reader.running:
-            self._drain()
         self._reader.stop()
         self._socket.close()
 

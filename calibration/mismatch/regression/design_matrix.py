@@ -104,11 +104,6 @@ class DesignMatrix:
         return self._sums.energies(self._places[np.asarray(columns, np.int64)])
 
     @property
-    def gram(self) -> Single:
-        """Sums of products of all columns, shape (fold, wheel, column, column)."""
-        return self.products(range(self.size), range(self.size))
-
-    @property
     def moment(self) -> Array:
         """Sums of products of columns and residual, shape (fold, wheel, column)."""
         self._whiten_new()

@@ -103,11 +103,6 @@ class NormalEquations:
         """Weighted sums of products of all columns with the residual, shape (wheel, column)."""
         return self._weighted(self.design.moment)
 
-    @property
-    def gram(self) -> Array:
-        """Weighted sums of products of all columns, shape (wheel, column, column)."""
-        return self._weighted(self.design.gram)
-
     def products(self, rows: Sequence[int] | Index, columns: Sequence[int] | Index) -> Array:
         """Return weighted sums of products of some columns with others, shape (wheel, row, column)."""
         return self._weighted(self.design.products(rows, columns))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,15 @@ class RoverWheelTables(Table):
     sensors: Sensors = Sensors()
 
 
+class _Solved(NamedTuple):
+    """A contact angle, and what it was solved for."""
+
+    load_N: Array
+    slip: Array
+    soil: Soil
+    contact_angle_rad: Array
+
+
 class RoverWheel(Simulation):
     """Motor currents of a six-wheel rover; odd wheels left, even right, 1 and 2 in front."""
 
@@ -97,7 +106,7 @@ class RoverWheel(Simulation):
         self.tables = tables
         self.parameters = _priors(tables)
         self.sensors = _sensors(tables.sensors)
-        self._solved: tuple[Array, Array, dict[str, Array]] | None = None
+        self._solved: _Solved | None = None
 
     @classmethod
     def from_tables(cls, tables: Mapping[str, Any]) -> Self:
@@ -166,13 +175,11 @@ class RoverWheel(Simulation):
 
     def _contact_angle(self, load_N: Array, slip: Array, soil: Soil) -> Array:
         """Return the contact angle; that of the call before, where only the drivetrain or the speed is another."""
-        if self._solved is None or self._solved[0] is not load_N or self._solved[1] is not slip:
-            self._solved = load_N, slip, {}
-        solved, key = self._solved[2], soil.model_dump_json()
-        if key not in solved:
-            solved.clear()
-            solved[key] = contact_angle(load_N, slip, self.tables.wheel, soil)
-        return solved[key]
+        solved = self._solved
+        if solved is None or solved.load_N is not load_N or solved.slip is not slip or solved.soil != soil:
+            solved = _Solved(load_N, slip, soil, contact_angle(load_N, slip, self.tables.wheel, soil))
+            self._solved = solved
+        return solved.contact_angle_rad
 
     def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
         """Return everything measured that a missing effect may depend on."""

@@ -215,6 +215,20 @@ async def test_a_closed_bus_opens_nothing_any_more(kernel: Kernel) -> None:
     assert kernel.ours[0].fileno() == -1
 
 
+async def test_an_adapter_that_is_lost_while_the_bus_is_closed_is_not_opened_again(kernel: Kernel) -> None:
+    """The read before closing may be the first to be told that it is gone."""
+
+    def gone(*_: object) -> list[Frame]:
+        raise OSError(errno.ENODEV, "gone")
+
+    async with open_bus("socketcan", "can7") as bus:
+        assert isinstance(bus, SocketCanBus)
+        bus._batch.receive = gone  # type: ignore[method-assign]
+    await asyncio.sleep(0.05)
+    assert bus.state is BusState.DOWN
+    assert len(kernel.ours) == 1
+
+
 async def test_a_controller_that_is_off_is_on_again_when_others_are_heard(kernel: Kernel) -> None:
     """An echo of our own says nothing then, of a link that was down it does; error frames are counted by class."""
     bus_off, own = Frame(0, 0x40, bytes(8), error=True), Frame(0, 0x80, b"", sent=True)
