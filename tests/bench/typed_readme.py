@@ -24,7 +24,7 @@ from typing import IO
 ROOT = Path(__file__).parents[2]
 PAGE = re.compile(r"https?://[^\s/]+:\d+/")
 PAGE_TIMEOUT_S = 30
-STOP_TIMEOUT_S = 20
+STOP_TIMEOUT_S = 60
 
 
 def commands(readme: str) -> list[str]:
@@ -35,10 +35,13 @@ def commands(readme: str) -> list[str]:
 
 
 def type_command(command: str, folder: Path) -> int:
-    """Run a command and return its status; 0 for a page that answers and ends by Ctrl-C, 1 for one that does not."""
+    """Run a command and return its status; 0 for a page that answers and ends by Ctrl-C, 1 for one that does not.
+
+    A job that a shell started in the background ignores Ctrl-C, and what it starts inherits that: `env` undoes it.
+    """
     home = os.environ | {"HOME": str(folder.resolve() / "build/home")}  # what the ground stores stays in the folder
     process = subprocess.Popen(
-        ["bash", "-c", command],
+        ["env", "--default-signal=INT", "bash", "-c", command],
         cwd=folder,
         env=home,
         stdout=subprocess.PIPE,

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 import typed_readme
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 ROOT = Path(__file__).parents[2]
 SERVER = "python3 -u -m http.server --bind 127.0.0.1 0"
@@ -35,11 +40,20 @@ def test_the_commands_of_this_readme_lead_to_demo_page_and_comparison() -> None:
     assert not [line for line in found if line.startswith("sudo")]
 
 
+@pytest.fixture
+def ignored_interrupt() -> Iterator[None]:
+    """Ctrl-C is ignored, as in a job that a shell started in the background."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.timeout(120)
+@pytest.mark.usefixtures("ignored_interrupt")
 def test_commands_are_typed_in_a_clone_and_a_page_is_visited_and_closed(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """A command sees what the one before it made; a server is ended once its page answers."""
+    """A command sees what the one before it made; a server is ended once its page answers, also in a background job."""
     ours = project(
         tmp_path / "ours",
         "echo regolithd > index.html",

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.timeout(180)
 PATIENCE_MS = 20_000
+PAGE_LOAD_MS = 60_000
+"""How long a page may take to load: the first one also waits for Chromium to start, on a busy machine too."""
 OUTAGE_S = 30
 EVIDENCE = {
     "onset": "2026-11-22T04:00:00.000000000Z",
@@ -64,6 +66,7 @@ def page(browser: Browser, rig: GroundRig) -> Iterator[Page]:
     page.on("pageerror", lambda error: problems.append(str(error)))
     page.on("console", lambda line: problems.append(line.text) if line.type == "error" else None)
     page.set_default_timeout(PATIENCE_MS)
+    page.set_default_navigation_timeout(PAGE_LOAD_MS)
     page.goto(f"{rig.url}/#kapvik")
     yield page
     page.close()

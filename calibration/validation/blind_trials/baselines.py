@@ -16,6 +16,7 @@ import time
 import tomllib
 import warnings
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,8 +53,9 @@ class Regression:
     tangents: Array
     covariates: dict[str, Array]
 
+    @cached_property
     def projected(self) -> Regression:
-        """Return it with the tangents projected out of residual and columns, which have unit rms again."""
+        """The same with the tangents projected out of residual and columns, which have unit rms again."""
         basis = np.linalg.qr(self.tangents)[0]
         columns = self.columns - basis @ (basis.T @ self.columns)
         residual = self.residual - basis @ (basis.T @ self.residual)
@@ -176,7 +178,7 @@ def pysindy_aic(regression: Regression) -> set[str]:
     """Return the names that sequentially thresholded least squares keeps, with the threshold of the lowest AIC."""
     from pysindy import STLSQ  # noqa: PLC0415  # loaded only when this baseline runs
 
-    regression = regression.projected()
+    regression = regression.projected
     rows = len(regression.residual)
     scale = float(np.sqrt(np.mean(regression.residual**2)))
     best, chosen = np.inf, np.zeros(len(regression.names), bool)
@@ -197,7 +199,7 @@ def pysindy_aic(regression: Regression) -> set[str]:
 
 def stepwise_bic(regression: Regression) -> set[str]:
     """Return the names that forward selection adds while the Bayesian information criterion decreases."""
-    regression = regression.projected()
+    regression = regression.projected
     rows = len(regression.residual)
     gram, towards = regression.columns.T @ regression.columns, regression.columns.T @ regression.residual
     total = float(regression.residual @ regression.residual)
@@ -221,7 +223,7 @@ def lasso_stability(regression: Regression, *, draws: int = 60, first: int = 6, 
     """Return the names among the first columns of the lasso path in at least `often` of random halves of the blocks."""
     from sklearn.linear_model import lars_path_gram  # noqa: PLC0415  # loaded only when this baseline runs
 
-    regression = regression.projected()
+    regression = regression.projected
     blocks = np.unique(regression.block)
     parts = [regression.block == block for block in blocks]
     grams = np.array([regression.columns[part].T @ regression.columns[part] for part in parts])
