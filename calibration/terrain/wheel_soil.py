@@ -62,7 +62,12 @@ def sinkage_at_peak_stress(contact_angle_rad: Array, wheel: Wheel) -> Array:
     Array
         Sinkage of the rim at θ_m [m].
     """
-    return wheel.radius_m * (np.cos(contact_angle_rad / 2) - np.cos(contact_angle_rad))
+    return _sinkage(np.sin(contact_angle_rad / 4), wheel)
+
+
+def _sinkage(sine: Array, wheel: Wheel) -> Array:
+    """Return the same from s = sin(θ_C/4): 2 r s² (3 − 4 s²), without a difference of cosines."""
+    return 2 * wheel.radius_m * sine**2 * (3 - 4 * sine**2)
 
 
 def peak_normal_stress(contact_angle_rad: Array, wheel: Wheel, soil: AnySoil) -> Array:
@@ -82,8 +87,13 @@ def peak_normal_stress(contact_angle_rad: Array, wheel: Wheel, soil: AnySoil) ->
     Array
         Peak normal stress σ_m [Pa].
     """
+    return _normal_stress(np.sin(contact_angle_rad / 4), wheel, soil)
+
+
+def _normal_stress(sine: Array, wheel: Wheel, soil: AnySoil) -> Array:
+    """Return the same from sin(θ_C/4)."""
     stiffness = 1000 * (soil.k_c_kN / wheel.width_m + soil.k_phi_kN)
-    return stiffness * sinkage_at_peak_stress(contact_angle_rad, wheel) ** soil.sinkage_exponent
+    return stiffness * _sinkage(sine, wheel) ** soil.sinkage_exponent
 
 
 def shear_displacement(contact_angle_rad: Array, slip: Array, wheel: Wheel) -> Array:
@@ -105,8 +115,18 @@ def shear_displacement(contact_angle_rad: Array, slip: Array, wheel: Wheel) -> A
     Array
         Shear displacement j_m [m]; negative for a wheel that is dragged.
     """
-    at = contact_angle_rad / 2
-    return wheel.radius_m * (contact_angle_rad - at - (1 - slip) * (np.sin(contact_angle_rad) - np.sin(at)))
+    return _displacement(contact_angle_rad, np.sin(contact_angle_rad / 4), slip, wheel)
+
+
+def _displacement(contact_angle_rad: Array, sine: Array, slip: Array, wheel: Wheel) -> Array:
+    """Return the same from θ_C and s = sin(θ_C/4): sin θ_C − sin θ_m = sin θ_m (1 − 4 s²)."""
+    risen = _sine_at_peak(sine) * (1 - 4 * sine**2)
+    return wheel.radius_m * (contact_angle_rad / 2 - (1 - slip) * risen)
+
+
+def _sine_at_peak(sine: Array) -> Array:
+    """Return sin θ_m from s = sin(θ_C/4): 2 s √(1 − s²)."""
+    return 2 * sine * np.sqrt(1 - sine**2)
 
 
 def mobilised_share(displacement_m: Array, soil: AnySoil) -> Array:
@@ -162,8 +182,13 @@ def peak_stresses(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: Any
     tuple of Array
         σ_m [Pa] and τ_m [Pa].
     """
-    normal = peak_normal_stress(contact_angle_rad, wheel, soil)
-    mobilised = mobilised_share(shear_displacement(contact_angle_rad, slip, wheel), soil)
+    return _stresses(contact_angle_rad, np.sin(contact_angle_rad / 4), slip, wheel, soil)
+
+
+def _stresses(contact_angle_rad: Array, sine: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> tuple[Array, Array]:
+    """Return the same from θ_C and sin(θ_C/4): sines take most of the time of a comparison's predictions."""
+    normal = _normal_stress(sine, wheel, soil)
+    mobilised = mobilised_share(_displacement(contact_angle_rad, sine, slip, wheel), soil)
     return normal, shear_strength(normal, soil) * mobilised
 
 
@@ -186,14 +211,12 @@ def carried_load(contact_angle_rad: Array, slip: Array, wheel: Wheel, soil: AnyS
     Array
         Load W normal to the ground [N].
     """
-    theta, half = contact_angle_rad, contact_angle_rad / 2
-    normal, shear = peak_stresses(theta, slip, wheel, soil)
-    # 1 + cos θ − 2 cos(θ/2) is written as −4 cos(θ/2) sin²(θ/4): no cancellation of digits at small angles.
-    bracket = (
-        soil.cohesion_Pa * (theta - 2 * np.sin(half))
-        + 8 * normal * np.cos(half) * np.sin(theta / 4) ** 2
-        - 2 * shear * (np.sin(theta) - 2 * np.sin(half))
-    )
+    theta, sine = contact_angle_rad, np.sin(contact_angle_rad / 4)
+    normal, shear = _stresses(theta, sine, slip, wheel, soil)
+    square, at_peak = sine**2, _sine_at_peak(sine)
+    # With s = sin(θ/4): cos θ/2 = 1 − 2 s², 1 + cos θ − 2 cos(θ/2) = −4 s² cos θ/2, sin θ − 2 sin θ/2 = −4 s² sin θ/2.
+    # No digits cancel at small angles, and one sine serves all of them.
+    bracket = soil.cohesion_Pa * (theta - 2 * at_peak) + 8 * square * (normal * (1 - 2 * square) + shear * at_peak)
     return wheel.radius_m * wheel.width_m / theta * bracket
 
 
@@ -242,9 +265,7 @@ def contact_angle(load_N: Array, slip: Array, wheel: Wheel, soil: AnySoil) -> Ar
     """
     load = np.asarray(load_N, np.float64)
     slip = np.asarray(slip, np.float64)
-    most = carried_load(
-        np.full(np.broadcast_shapes(load.shape, slip.shape), LARGEST_CONTACT_ANGLE_RAD), slip, wheel, soil
-    )
+    most = carried_load(np.asarray(LARGEST_CONTACT_ANGLE_RAD), slip, wheel, soil)
     with np.errstate(invalid="ignore"):
         solvable = (load > 0) & (load <= most) & np.isfinite(slip)
     # Elements without a solution are solved for 1 N at no slip, and set to NaN afterwards.
@@ -269,7 +290,7 @@ def _solve_log_angle(log_load: Array, slip: Array, wheel: Wheel, soil: AnySoil) 
         step = np.divide(-excess_now * moved, rise, out=np.zeros_like(moved), where=np.abs(rise) > 1e-15)
         before, excess_before = now, excess_now
         now = np.minimum(now + np.clip(step, -1, 1), np.log(LARGEST_CONTACT_ANGLE_RAD))
-        excess_now = excess(now)
         if not step.size or np.max(np.abs(step)) < _TOLERANCE:
             break
+        excess_now = excess(now)
     return now
