@@ -60,6 +60,11 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f"it has {listed(names)}"
 
 
+def counted(number: int, noun: str) -> str:
+    """Return '1 gap' or '2 gaps'."""
+    return f"{number} {noun}" + ("" if number == 1 else "s")
+
+
 def listed(names: Iterable[str]) -> str:
     """Return names separated by commas, at most twenty of them, each printable and short."""
     shown = [text if text.isprintable() and len(text) <= 60 else repr(text[:60]) for text in map(str, names)]

@@ -22,6 +22,8 @@ from regolithd.calibration.mismatch.fleet.comparison import Member, compare_flee
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER, date_in
 from regolithd.calibration.mismatch.fleet.work.store import Store
 from regolithd.calibration.mismatch.fleet.work.workers import AllCores, DaskCluster, Workers
+from regolithd.calibration.mismatch.inference.statements import noun_of
+from regolithd.calibration.mismatch.report.labels import Labels
 from regolithd.calibration.mismatch.simulation.load import load_simulation, model_folder, read_tables
 from regolithd.daemon.mismatch.files import write_json
 from regolithd.daemon.mismatch.recordings import read_one
@@ -188,7 +190,7 @@ def run_fleet(files: Sequence[RoverFile], simulation: Path, outputs: Outputs, op
         write_json(outputs.json, found.answer)
     if options.catalogue:
         found.write_catalogue(options.catalogue)
-    print_answer(Console(), found.answer)
+    print_answer(Console(), found.answer, Labels(noun_of(simulated.wheel_column), simulated.covariate_labels))
     return found.answer
 
 

@@ -10,6 +10,7 @@ from rich.console import Console
 
 from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.errors import RecordingError
+from regolithd.calibration.mismatch.report.labels import Labels
 from regolithd.calibration.mismatch.simulation.load import load_simulation
 from regolithd.daemon.mismatch.files import Outputs, write_json, write_page
 from regolithd.daemon.mismatch.fleet import FleetOptions, files_of_rovers, run_fleet, too_long_at_once
@@ -54,5 +55,5 @@ def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs, options:
         found.write_corrected(outputs.corrected, empirical=outputs.empirical)
     if outputs.report:
         write_page(outputs.report, found, recordings, simulation)
-    print_answer(Console(), found.answer)
+    print_answer(Console(), found.answer, Labels.of(found.evidence), found.evidence.wheels)
     return found.answer

@@ -2,74 +2,140 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
+from regolithd.calibration.mismatch.inference.statements import on_wheels
+
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
     from rich.console import Console
 
-    from regolithd.calibration.mismatch.answer import Answer, Unexplained
+    from regolithd.calibration.mismatch.answer import (
+        Answer,
+        CalibratedParameter,
+        FitImprovement,
+        Parameter,
+        Unexplained,
+    )
+    from regolithd.calibration.mismatch.report.labels import Labels
+
+NO_BREAK = "\u00a0"
+"""A space at which a line is not broken."""
 
 
-def print_answer(console: Console, answer: Answer) -> None:
-    """Print verdict, effects, what is unexplained or indistinguishable, the held-out error and the notes."""
+def print_answer(console: Console, answer: Answer, labels: Labels, wheels: Sequence[int | str] = ()) -> None:
+    """Print verdict, effects, what is unexplained or indistinguishable, the held-out error and the notes.
+
+    `wheels` are all that the recording has; empty: not known. On a terminal, lines that continue are indented; a file
+    or a pipe gets each on one line.
+    """
     console.print(f"[bold]{answer.verdict}[/bold]")
-    for line in _lines(answer):
-        console.print(f"  {escape(line)}")
+    for line in _lines(answer, labels, wheels):
+        console.print(escape(_wrapped(line, console.width if console.is_terminal else 0)), soft_wrap=True)
 
 
 def sure_of(answer: Answer) -> str:
-    """Return how probable the set of names is, and which other is next."""
+    """Return how probable the answer is, and which other is next."""
     if answer.probability is None:
-        return "probability of this set of names: not known"
-    text = f"probability of this set of names: {answer.probability:.2f}"
+        return "probability of this answer: not known"
+    text = f"probability of this answer: {answer.probability:.2f}"
     if (other := answer.next_best) is None:
         return text
     names = (*other.effects, *(("something unexplained",) if other.unexplained else ()))
     return f"{text}; next: {' + '.join(names) or 'nothing'} ({other.probability:.2f})"
 
 
-def _curve_lines(rest: Unexplained) -> list[str]:
-    """Return what an empirical curve brings, and the closed forms that may describe it."""
-    if rest.curve is None:
-        return []
-    curve = rest.curve
-    reach = f"{curve.at[0]:.4g} to {curve.at[-1]:.4g} {curve.covariate_unit}".strip()
-    error = f"held-out error {curve.held_out_rmse_before:.5g} before, {curve.held_out_rmse_after:.5g} after"
-    lines = [f"with an empirical curve over {rest.covariate}, {reach}: {error}"]
-    for place, each in enumerate(rest.suggestions, 1):
-        numbers = ", ".join(f"{name} = {one.value:.4g} {one.unit}" for name, one in each.parameters.items())
-        lines.append(f"suggestion {place}: {each.equation}; {numbers}; held-out error {each.held_out_rmse:.5g}")
-    return lines
+def _wrapped(line: str, width: int) -> str:
+    """Return a line indented, and with its continuation indented further; a width of 0 does not break it."""
+    indent = "  " + " " * (len(line) - len(line.lstrip()))
+    if not width:
+        return f"  {line}"
+    kept = line.strip().replace(" %", NO_BREAK + "%")
+    return textwrap.fill(
+        kept, width, initial_indent=indent, subsequent_indent=indent + "  ", break_on_hyphens=False
+    ).replace(NO_BREAK, " ")
 
 
-def _lines(answer: Answer) -> list[str]:
-    fit = answer.fit
-    error = (
-        f"held-out error of {fit.channel}: {fit.held_out_rmse_before:.5g} before, "
-        f"{fit.held_out_rmse_after:.5g} after, noise floor {fit.noise_floor_rmse:.5g}"
-    )
+def _lines(answer: Answer, labels: Labels, wheels: Sequence[int | str]) -> list[str]:
+    several = len(answer.fits) > 1
+    moved = [each for each in answer.parameters if each.beyond_prior()]
     return [
-        *(f"{effect.name}: {effect.statement}" for effect in answer.effects),
         *(
-            f"parameter {each.name}: {each.value:.4g} {each.unit} instead of {each.prior:.4g}, "
-            f"{each.prior_stds_away:.1f} standard deviations of its prior away"
-            for each in answer.parameters
-            if each.beyond_prior()
+            f"{effect.name}{f' in {effect.channel}' if several else ''}: {effect.statement}"
+            for effect in answer.effects
         ),
-        *(
-            f"unexplained: {100 * rest.share_of_residual:.0f} % of the residual follows {rest.covariate} on "
-            f"{', '.join(map(str, rest.wheels))}, {rest.from_s:.0f} to {rest.to_s:.0f} s"
-            f"{f'; only {rest.range.statement}' if rest.range else ''}"
-            for rest in answer.unexplained
-        ),
-        *(line for rest in answer.unexplained for line in _curve_lines(rest)),
+        *map(_moved, moved),
+        *(line for rest in answer.unexplained for line in _unexplained(rest, labels, len(wheels), several=several)),
         *(
             f"{' or '.join(pair.effects)}: this recording does not distinguish them. {pair.experiment}"
             for pair in answer.indistinguishable
         ),
         sure_of(answer),
-        error,
-        *(f"note: {note}" for note in answer.notes),
+        *map(_error, answer.fits or (answer.fit,)),
+        *(f"note: {note}" for note in _other_notes(answer.notes, moved)),
     ]
+
+
+def _moved(parameter: CalibratedParameter) -> str:
+    return (
+        f"parameter {parameter.name} had to leave its prior: {parameter.value:.4g}{_unit(parameter.unit)} instead of "
+        f"{parameter.prior:.4g} ± {parameter.prior_std:.2g}, {parameter.prior_stds_away:.1f} standard deviations away. "
+        "Check the stated value and its standard deviation, or look for physics that acts as this parameter does."
+    )
+
+
+def _other_notes(notes: Sequence[str], moved: Sequence[CalibratedParameter]) -> Iterator[str]:
+    """Return the notes without those about parameters that are told under the verdict."""
+    told = [f"{each.name} had to leave its prior" for each in moved]
+    return (note for note in notes if not any(each in note for each in told))
+
+
+def _unexplained(rest: Unexplained, labels: Labels, of: int, *, several: bool) -> list[str]:
+    """Return the line about what is unexplained, and those about its curve, indented."""
+    line = (
+        f"unexplained{f' in {rest.channel}' if several else ''}: {100 * rest.share_of_residual:.0f} % of the residual "
+        f"follows {_the(rest.covariate, labels)}{on_wheels(rest.wheels, of, labels.wheel)}, "
+        f"{rest.from_s:.0f} to {rest.to_s:.0f} s{f'; only {rest.range.statement}' if rest.range else ''}"
+    )
+    return [line, *(f"  {each}" for each in _curve_lines(rest, labels))]
+
+
+def _the(covariate: str, labels: Labels) -> str:
+    """Return a covariate with its article: "the belt speed", "time"."""
+    return "time" if covariate == "time" else f"the {labels.covariate(covariate)}"
+
+
+def _curve_lines(rest: Unexplained, labels: Labels) -> list[str]:
+    """Return what an empirical curve brings, and the closed forms that may describe it."""
+    if rest.curve is None:
+        return []
+    curve = rest.curve
+    reach = f"{curve.at[0]:.4g} to {curve.at[-1]:.4g}{_unit(curve.covariate_unit)}"
+    error = f"held-out error {curve.held_out_rmse_before:.5g} without it, {curve.held_out_rmse_after:.5g} with it"
+    lines = [f"empirical curve over {_the(rest.covariate, labels)}, {reach}: {error}"]
+    for place, each in enumerate(rest.suggestions, 1):
+        numbers = ", ".join(_value(name, one) for name, one in each.parameters.items())
+        lines.append(f"suggestion {place}: {each.equation}; {numbers}; held-out error {each.held_out_rmse:.5g}")
+    return lines
+
+
+def _value(name: str, parameter: Parameter) -> str:
+    return f"{name} = {parameter.value:.4g}{_unit(parameter.unit)}"
+
+
+def _unit(unit: str) -> str:
+    """Return a unit after its number; nothing for a pure number."""
+    return f" {unit}" if unit not in {"", "1"} else ""
+
+
+def _error(fit: FitImprovement) -> str:
+    """Return the errors of one predicted column, in its unit."""
+    before, after, floor = (
+        f"{each:.5g}" for each in (fit.held_out_rmse_before, fit.held_out_rmse_after, fit.noise_floor_rmse)
+    )
+    errors = before if before == after else f"{before} before, {after} after"
+    return f"held-out error of {fit.channel}: {errors}, noise floor {floor}"

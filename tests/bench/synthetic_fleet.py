@@ -45,7 +45,7 @@ class Drag(Candidate):
 class Wear(Candidate):
     """A change by its nature, of one wheel."""
 
-    name, covariate, equation, words = "wear", "time", "ΔI = I_b g(t)", "drag that was not there before"
+    name, covariate, equation, words = "wear", "time", "ΔI = I_b g(t)", "drag that was not there at first"
     experiment = "repeat the beginning"
     run_unloaded = True
     coefficients: ClassVar = (Coefficient("worn"),)

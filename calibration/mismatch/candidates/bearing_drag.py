@@ -33,7 +33,7 @@ class BearingDrag(Candidate):
     name = "bearing-drag"
     covariate = "time"
     equation = "ΔI = I_b g(t − t_0) sign(ω)"
-    words = "drag that was not there before"
+    words = "drag that was not there at first"
     signature = "one wheel's residual along sign(ω), none before its onset, growing after"
     experiment = "repeat the beginning of this recording as it was"
     run_unloaded = True

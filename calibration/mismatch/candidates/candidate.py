@@ -70,13 +70,16 @@ class Candidate:
     equation: ClassVar[str]
     """The law, as text, for the answer and the report."""
     words: ClassVar[str]
-    """A noun phrase in lower case that begins the answer's sentence: "drag that grows with speed"."""
+    """A noun phrase in lower case that begins the answer's sentence: "drag that grows with speed". A covariate in
+    braces is replaced as in `experiment`."""
     signature: ClassVar[str]
     """What the effect looks like in a residual, for the documentation."""
     experiment: ClassVar[str]
     """An instruction in the imperative, lower case, without a full stop: how to vary what `vary` names, and nothing
     else. The answer gives it where this effect cannot be told from another. A covariate in braces, `{wheel_speed}`, is
     replaced by what the user's machine calls it."""
+    experiment_one_way: ClassVar[str] = ""
+    """The same for a machine that runs one way only; by default `experiment`."""
     vary: ClassVar[tuple[str, ...]] = ()
     """The covariates that the experiment varies, for programs; by default `covariate`."""
     run_unloaded: ClassVar[bool] = False
@@ -128,6 +131,14 @@ class Candidate:
     def form_for(self, simulation: Predictor) -> Candidate:  # noqa: ARG002  # subclasses look
         """Return the candidate in the form that it has for a simulation; by default it has only one."""
         return self
+
+    def words_for(self, shape: Shape) -> str:  # noqa: ARG002  # subclasses look
+        """Return the words for one shape, where that says more (which channel is late); by default `words`."""
+        return self.words
+
+    def instruction(self, simulation: Predictor) -> str:
+        """Return the experiment for a simulation's machine: that of a machine that runs one way, where it does."""
+        return (simulation.one_way and self.experiment_one_way) or self.experiment
 
     def varied(self, problem: Problem) -> tuple[str, ...]:  # noqa: ARG002  # subclasses look
         """Return the covariates that the experiment varies on this machine; by default `vary`."""

@@ -49,7 +49,7 @@ class ColdLubricantFriction(Candidate):
     name = "cold-lubricant-friction"
     covariate = "temperature"
     equation = "ΔI = I_cold g(T) sign(ω) |ω|^p,  g falling with T"
-    words = "drag that grows as the gearbox gets colder"
+    words = "drag that grows as the {temperature} falls"
     signature = "a residual along sign(ω) that shrinks as the motor warms"
     experiment = "start cold, warm up, cool down and repeat, so that the {temperature} does not follow the time"
     source = "Vogel–Fulcher viscosity of low-temperature greases: a factor e in 10 to 40 K; linear in a small range"

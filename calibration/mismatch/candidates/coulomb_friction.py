@@ -22,6 +22,7 @@ class CoulombFriction(Candidate):
     words = "constant drag against the motion (Coulomb friction, no-load current)"
     signature = "a residual of constant size that changes sign with the direction of rotation"
     experiment = "run to and fro at one and the same {wheel_speed}"
+    experiment_one_way = "hold at least four values of the {wheel_speed}, from the slowest to the highest"
     source = "Maxon RE 25: no-load current about 37 mA; harmonic drives add their starting torque"
     requires = ("direction",)
     label = "Coulomb friction"

@@ -23,6 +23,7 @@ class CurrentSensorBias(Candidate):
     words = "an offset of one reading, whatever the direction"
     signature = "one wheel's residual is constant and keeps its sign when the wheel reverses"
     experiment = "read the sensor at rest and without power, then run to and fro"
+    experiment_one_way = "read the sensor at rest and without power, then run at several values of the {wheel_speed}"
     vary: ClassVar = ("direction",)
     needs = "a predicted current"
     source = "data sheets of shunt amplifiers: offsets of milliamperes"

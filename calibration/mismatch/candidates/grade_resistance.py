@@ -23,6 +23,7 @@ class GradeResistance(Candidate):
     words = "the weight's part along the slope"
     signature = "a residual along sin(pitch) that does not change sign with the direction of travel"
     experiment = "drive one slope up and down, forwards and backwards"
+    experiment_one_way = "drive one slope up and down"
     vary: ClassVar = ("pitch", "direction")
     source = "statics: at most weight × radius / gain"
     requires = ("pitch",)

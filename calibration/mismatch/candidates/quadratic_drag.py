@@ -21,6 +21,7 @@ class QuadraticDrag(Candidate):
     words = "drag that grows with the square of speed"
     signature = "a residual along sign(ω) that rises with ω² and is flat near standstill"
     experiment = "hold at least four values of the {wheel_speed}, from the slowest to the highest, both ways"
+    experiment_one_way = "hold at least four values of the {wheel_speed}, from the slowest to the highest"
     vary: ClassVar = ("wheel_speed", "direction")
     source = "Newton's drag law F = ½ ρ c A v²; centrifugal fans and pumps have torque proportional to speed squared"
     requires = ("wheel_speed",)

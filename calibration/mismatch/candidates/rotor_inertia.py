@@ -29,9 +29,10 @@ class RotorInertia(Candidate):
     name = "rotor-inertia"
     covariate = "wheel_acceleration"
     equation = "ΔI(t) = (J/k) dω/dt (t − lag)"
-    words = "current that goes into accelerating rotor and wheel"
+    words = "inertia of the parts that move"
     signature = "short residuals at each change of speed, with the acceleration's sign"
     experiment = "start, stop and reverse sharply, twenty times"
+    experiment_one_way = "start and stop sharply, twenty times"
     vary: ClassVar = ("wheel_acceleration", "direction")
     source = "RE 25 rotor 10 g cm²; through 1400:1 about 2 kg m² at the wheel"
     requires = ("wheel_acceleration",)

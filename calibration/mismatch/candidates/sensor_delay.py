@@ -37,14 +37,18 @@ class SensorDelay(Candidate):
     name = "sensor-delay"
     covariate = "time"
     equation = "y(t) = y_true(t − τ)"
-    words = "a channel that is late"
+    words = "a delay of one column"
     signature = "a residual proportional to the rate of change of one channel"
-    experiment = "change speed and load in steps, both ways, twenty times"
+    experiment = "change the inputs (speed, load) in steps, up and down, twenty times"
     source = "filters, buses and polling: a first-order filter delays slow changes by its time constant"
     along_motion = False
     imitated_over = "none"
     coefficients: ClassVar = (Coefficient("delay_s", "s", 1),)
     free: ClassVar = {"secant_s": (0.0, float("inf"))}
+
+    def words_for(self, shape: Shape) -> str:
+        """Return which column is late."""
+        return f"a delay of {shape['late']}" if "late" in shape else self.words
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the predicted channel and each input, late by two readings up to a tenth of the recording."""

@@ -38,6 +38,7 @@ class StribeckFriction(Candidate):
     words = "extra drag near standstill that decays with speed"
     signature = "a residual along sign(ω) that is largest at the slowest speeds"
     experiment = "hold at least four values of the {wheel_speed}, from the slowest to the highest, both ways"
+    experiment_one_way = "hold at least four values of the {wheel_speed}, from the slowest to the highest"
     vary: ClassVar = ("wheel_speed", "direction")
     source = "Armstrong-Hélouvry, Dupont and Canudas de Wit (1994): δ from 1 to 2; Hess and Soom (1990): the quotient"
     requires = ("wheel_speed",)

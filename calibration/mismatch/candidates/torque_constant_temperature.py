@@ -33,7 +33,7 @@ class TorqueConstantTemperature(Candidate):
     name = "torque-constant-temperature"
     covariate = "temperature"
     equation = "ΔI = I_sim (1/(1 − α (T − T_0)) − 1)"
-    words = "a torque constant that falls as the motor warms"
+    words = "a torque constant that falls as the {temperature} rises"
     signature = "a residual along the predicted current that grows with temperature, through zero at T_0"
     experiment = "start cold, warm up, cool down and repeat, so that the {temperature} does not follow the time"
     source = "magnet data sheets: NdFeB −0.1 %/K, ferrite −0.2 %/K, T_0 20 to 25 °C"

@@ -23,6 +23,7 @@ class ViscousFriction(Candidate):
     words = "drag that grows with speed"
     signature = "a residual along sign(ω) that rises with |ω| and vanishes towards standstill"
     experiment = "hold at least four values of the {wheel_speed}, from the slowest to the highest, both ways"
+    experiment_one_way = "hold at least four values of the {wheel_speed}, from the slowest to the highest"
     vary: ClassVar = ("wheel_speed", "direction")
     source = "grease viscosity; power 0.7 (shear-thinning) to 1.4 (churning)"
     requires = ("wheel_speed",)

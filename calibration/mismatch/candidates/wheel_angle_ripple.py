@@ -41,7 +41,7 @@ class WheelAngleRipple(Candidate):
     name = "wheel-angle-ripple"
     covariate = "wheel_angle"
     equation = "ΔI = Σ a_k cos(order θ) + b_k sin(order θ), wheel by wheel"
-    words = "a ripple that is periodic in the wheel's angle"
+    words = "a ripple that is periodic in the {wheel_angle}"
     signature = "a line in the residual's spectrum over wheel angle that stays put when the speed changes"
     experiment = "hold three values of the {wheel_speed}, sampled at four times the ripple's frequency"
     vary: ClassVar = ("wheel_speed",)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.data.columns import Column, Columns, file_columns, frame_columns
-from regolithd.calibration.mismatch.errors import RecordingError, listed
+from regolithd.calibration.mismatch.errors import RecordingError, counted, listed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -151,7 +151,7 @@ def from_columns(columns: Mapping[str, Column], *, unit: str = UNIT) -> Recordin
     channels = {
         name: _arranged(values, row, column, shape) for name, values in table.items() if name not in {TIME, unit, RUN}
     }
-    _note_duplicates(row, column, shape, notes)
+    _note_duplicates(row, column, shape, unit, notes)
     run, time_s = keys[:, 0].astype(np.int64), keys[:, 1]
     for number in np.unique(run):
         time_s[run == number] -= time_s[run == number][0]
@@ -186,7 +186,7 @@ def _table(
     if not known.any():
         raise RecordingError(f"no row has both {TIME} and {unit}" if rows else "the recording has no rows")
     if not known.all():
-        notes.append(f"{np.sum(~known)} rows have no time or no {unit}; they are left out.")
+        notes.append(f"{counted(int(np.sum(~known)), 'row')} without {TIME} or {unit}: left out.")
         table = {name: values[known] for name, values in table.items()}
     for name in table.keys() - {TIME, RUN, unit}:
         table[name] = _without_codes(name, table[name], notes)
@@ -250,7 +250,9 @@ def _without_codes(name: str, values: Array, notes: list[str]) -> Array:
     code = np.abs(values) > GREATEST_READING
     if not code.any():
         return values
-    notes.append(f"{int(code.sum())} readings of {name} are infinite or beyond {GREATEST_READING:g}: not measured.")
+    notes.append(
+        f"{counted(int(code.sum()), 'reading')} of {name} infinite or beyond {GREATEST_READING:g}: not measured."
+    )
     return np.where(code, np.nan, values)
 
 
@@ -310,16 +312,18 @@ def _split_where_the_clock_jumps_back(table: Mapping[str, Array], unit: str, not
     if jumps > MOST_CLOCK_JUMPS:
         notes.append("Rows are not in the order of time; they are sorted.")
         return run
-    notes.append(f"The clock jumps back {jumps} time(s), first at {at:.1f} s; what follows is taken as another run.")
+    notes.append(
+        f"The clock jumps back {counted(jumps, 'time')}, first at {at:.1f} s; what follows is taken as another run."
+    )
     return run * (MOST_CLOCK_JUMPS + 1) + shift
 
 
-def _note_duplicates(row: Index, column: Index, shape: tuple[int, int], notes: list[str]) -> None:
+def _note_duplicates(row: Index, column: Index, shape: tuple[int, int], unit: str, notes: list[str]) -> None:
     taken = np.bincount(row * shape[1] + column, minlength=shape[0] * shape[1])
     if (extra := int(np.sum(taken[taken > 1] - 1))) > 0:
-        notes.append(f"{extra} rows repeat an instant and wheel; their mean is taken.")
+        notes.append(f"{counted(extra, 'row')} with the same {TIME} and {unit} as another: the mean is taken.")
     if (absent := int(np.sum(taken == 0))) > 0:
-        notes.append(f"{absent} of {taken.size} instants of single wheels are absent.")
+        notes.append(f"Instants without a row, counted for each {unit}: {absent} of {taken.size}.")
 
 
 def _note_gaps(time_s: Array, run: Index, notes: list[str]) -> None:
@@ -328,7 +332,9 @@ def _note_gaps(time_s: Array, run: Index, notes: list[str]) -> None:
     gaps = np.flatnonzero(steps > GAP_STEPS * usual)
     if gaps.size:
         lost = float(np.sum(steps[gaps]))
-        notes.append(f"{gaps.size} gaps, {lost:.1f} s in all; nothing is assumed about what happened in them.")
+        notes.append(
+            f"{counted(gaps.size, 'gap')}, {lost:.1f} s in all; nothing is assumed about what happened in between."
+        )
 
 
 def _note_channels(channels: Mapping[str, Array], wheels: tuple[int | str, ...], unit: str, notes: list[str]) -> None:

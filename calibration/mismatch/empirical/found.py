@@ -20,7 +20,7 @@ from regolithd.calibration.mismatch.empirical.suggestions import (
 )
 from regolithd.calibration.mismatch.empirical.sums import points_beside, profile, squares_on_fold, sums_of
 from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
-from regolithd.calibration.mismatch.problem.words import unit_in_label
+from regolithd.calibration.mismatch.problem.words import divided, product, unit_in_label, word_for
 from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
 
 if TYPE_CHECKING:
@@ -36,6 +36,10 @@ EACH_WAY, ALONG = "each way", "drag, "
 """Coupling of a function of the signed speed, and the beginning of those that act oppositely on two parts."""
 X = re.compile(r"(?<![a-z])x(?![a-z])")
 """The covariate in the text of a form."""
+TIMES = re.compile(r"\b([cd]) (?=[a-z√|(])(?!where)")
+"""A coefficient and what it is multiplied by."""
+POWERS = {0.0: "", 1.0: "", 2.0: "²", 3.0: "³", -1.0: "", -2.0: "²"}
+"""Exponents of a unit, without their sign; others stand as numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +134,7 @@ def _suggestion(
     names = (*form.coefficients, *(("b",) if found.constant else ()), *form.names)
     values = (*found.coefficients, *found.shape)
     stds = standard_deviations(profile(sums), sums.at, found)
-    units = _units(found, curve.unit, curve.covariate_unit or term.name)
+    units = _units(found, curve.unit, curve.covariate_unit)
     parameters = {
         name: Parameter(
             float(value), float(value - NINETY_PERCENT_STDS * std), float(value + NINETY_PERCENT_STDS * std), unit
@@ -147,18 +151,31 @@ def _suggestion(
 
 
 def _units(found: FittedForm, unit: str, of_x: str) -> tuple[str, ...]:
-    """Return the units of the coefficients, of the constant, and of the shape parameters."""
-    exponent = "p" if "p" in found.form.names else f"{found.form.exponent:g}"
-    per = {"0": unit, "1": f"{unit}/({of_x})"}.get(exponent, f"{unit}/({of_x})^{exponent}")
+    """Return the units of the coefficients, of the constant, and of the shape parameters; `of_x` the covariate's."""
     shapes = tuple("1" if name == "p" else of_x for name in found.form.names)
-    return (*[per] * len(found.form.coefficients), *([unit] if found.constant else []), *shapes)
+    per = [_per(unit, of_x, "^p" if "p" in found.form.names else found.form.exponent)]
+    return (*per * len(found.form.coefficients), *([unit] if found.constant else []), *shapes)
+
+
+def _per(unit: str, of_x: str, power: float | str) -> str:
+    """Return a unit over a power of the covariate's."""
+    if isinstance(power, str) or power not in POWERS:
+        return divided(unit, of_x, power if isinstance(power, str) else f"^{power:g}")
+    if power == 0:
+        return unit
+    if power > 0:
+        return divided(unit, of_x, POWERS[power])
+    return product(unit, of_x + POWERS[power]) if of_x else unit
 
 
 def _equation(problem: Problem, curve: EmpiricalCurve, term: Term, found: FittedForm) -> str:
-    """Return the form as text with the names of channel, covariate and factor."""
-    x = f"|{term.name}|" if curve.magnitude else term.name
-    text = X.sub(x, found.form.text.replace("|x|", x) if curve.magnitude else found.form.text)
-    text += " + b" if found.constant else ""
+    """Return the form as text with the channel's name, and the covariate and the factor in the machine's words."""
+    word = word_for(term.name, problem.labels)
+    x = f"|{word}|" if curve.magnitude else word
+    form = TIMES.sub(r"\1 · ", found.form.text.replace("|x|", "x") if curve.magnitude else found.form.text)
+    if found.constant:
+        form = f"({form}) + b" if "where" in form else f"{form} + b"
+    text = X.sub(lambda _: x, form)
     factor = factor_in_words(curve.coupling, problem.simulation.channel)
     return f"Δ{problem.simulation.channel} = " + (f"({text}) · {factor}" if factor else text)
 

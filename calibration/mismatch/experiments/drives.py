@@ -70,8 +70,8 @@ class Drives:
     def elements(self) -> tuple[str, ...]:
         """What a drive may vary: covariates, the direction, the acceleration; and whether a part is without load."""
         unloaded = (UNLOADED,) if self.problem.simulation.unloaded_experiment else ()
-        moving = (DIRECTION, ACCELERATION) if SPEED in self.settings else ()
-        return (*self.settings, *moving, *unloaded)
+        moving = (ACCELERATION,) if self.problem.simulation.one_way else (DIRECTION, ACCELERATION)
+        return (*self.settings, *(moving if SPEED in self.settings else ()), *unloaded)
 
     def __call__(self, varied: frozenset[str]) -> Drive:
         """Return the drive that varies these elements and nothing else."""
@@ -109,7 +109,7 @@ class Drives:
         size = np.full(known.shape[1], np.nanmedian(np.abs(known)))
         ways = np.sign(np.nanmedian(known)) or 1.0
         steps = np.broadcast_to(_steps(setting.low, setting.high, place), (len(unloaded), len(size)))
-        to_and_fro = _steps(-1.0, 1.0, len(self.settings), 2)
+        to_and_fro = ways if self.problem.simulation.one_way else _steps(-1.0, 1.0, len(self.settings), 2)
         speeds = np.where(unloaded | (SPEED in varied), steps, size)
         return np.asarray(speeds * np.where(unloaded | bool(MOTION & varied), to_and_fro, ways))
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import Indistinguishable
+from regolithd.calibration.mismatch.experiments.drives import DIRECTION, SPEED
 from regolithd.calibration.mismatch.experiments.margins import of_effect, of_parameter, predictable
 from regolithd.calibration.mismatch.inference.statements import capital, listed
 from regolithd.calibration.mismatch.problem.words import in_words, label_of_column, unit_in_label, word_for
@@ -58,7 +59,7 @@ def with_experiment(
     apart = [candidate for candidate in left if candidate is not None]
     drives = [
         *_instructions(problem, choice.varied, [*members, *_terms(others)]),
-        *(in_words(candidate.experiment, problem.labels) for candidate in apart),
+        *(_instruction(candidate, problem) for candidate in apart),
     ]
     lift = bool(unloaded) and (choice.lift or any(candidate.run_unloaded for candidate in apart))
     duration_s, in_all = rounded_up(choice.duration_s)
@@ -67,7 +68,7 @@ def with_experiment(
     return Indistinguishable(
         effects=names,
         experiment=f"{capital(sentence)}; {in_all} in all{ranges and f' ({ranges})'}. {_expectation(choice)}",
-        vary=tuple(dict.fromkeys((*choice.varied, *(name for each in apart for name in each.varied(problem))))),
+        vary=tuple(dict.fromkeys((*choice.varied, *(name for each in apart for name in varied_by(each, problem))))),
         duration_s=duration_s,
         lift=lift,
     )
@@ -104,15 +105,31 @@ def _instructions(problem: Problem, varied: Iterable[str], first: Sequence[Term]
         if best is None or not _covered(best, problem, wanted, left):
             words = [word_for(name, problem.labels) for name in sorted(left)]
             return [*found, f"hold at least four values of the {listed(words)}"]
-        left -= set(best.varied(problem))
-        found.append(in_words(best.experiment, problem.labels))
+        left -= set(varied_by(best, problem))
+        found.append(_instruction(best, problem))
     return found
 
 
 def _covered(candidate: Candidate, problem: Problem, wanted: set[str], left: set[str]) -> int:
     """Return how many covariates that are left an experiment varies; 0 where it varies others than are wanted."""
-    varied = set(candidate.varied(problem))
+    varied = set(varied_by(candidate, problem))
     return len(varied & left) if varied <= wanted else 0
+
+
+def _instruction(candidate: Candidate, problem: Problem) -> str:
+    """Return a candidate's experiment in the machine's words."""
+    return in_words(candidate.instruction(problem.simulation), problem.labels)
+
+
+def varied_by(candidate: Candidate, problem: Problem) -> tuple[str, ...]:
+    """Return the covariates that a candidate's experiment varies on this machine.
+
+    What a reversal shows, several speeds show on a machine that runs one way only.
+    """
+    varied = candidate.varied(problem)
+    if problem.simulation.one_way and DIRECTION in varied:
+        return tuple(name for name in varied if name != DIRECTION) or (SPEED,)
+    return varied
 
 
 def _range(problem: Problem, setting: Setting) -> str:
@@ -141,17 +158,17 @@ def _own_experiments(
     equations = experimenter.equations
     problem = equations.problem
     candidates = [member.group.candidate for member in members if member.group.candidate is not None]
-    drives = [in_words(candidate.experiment, problem.labels) for candidate in candidates]
+    drives = [_instruction(candidate, problem) for candidate in candidates]
     unloaded = problem.simulation.unloaded_experiment
     hidden = any(_imitated(equations, given, member) for member in members)
     lift = bool(unloaded) and (hidden or any(candidate.run_unloaded for candidate in candidates))
     sentence = "; then ".join(dict.fromkeys([*drives, unloaded] if lift else drives))
     duration_s, in_all = rounded_up(seconds_needed(equations, experimenter.entry_threshold))
-    why = experimenter.unpredictable or "no drive that can be predicted does it"
+    why = experimenter.unpredictable or "no experiment that can be predicted does it"
     return Indistinguishable(
         effects=names,
         experiment=f"{capital(sentence)}; {in_all} in all. How well that tells them apart is not predicted: {why}.",
-        vary=tuple(dict.fromkeys(name for candidate in candidates for name in candidate.varied(problem))),
+        vary=tuple(dict.fromkeys(name for candidate in candidates for name in varied_by(candidate, problem))),
         duration_s=duration_s,
         lift=lift,
     )

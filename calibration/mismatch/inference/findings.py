@@ -25,6 +25,7 @@ from regolithd.calibration.mismatch.inference.probability import decided_by_evid
 from regolithd.calibration.mismatch.inference.ranges import range_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
 from regolithd.calibration.mismatch.inference.statements import statement
+from regolithd.calibration.mismatch.problem.words import in_words
 from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 
@@ -129,6 +130,7 @@ def _effect(problem: Problem, term: Term, parameters: Mapping[str, Parameter], e
     assert candidate is not None  # noqa: S101  # named terms are candidates
     wheels = wheel_names(problem, term.wheels)
     onset = parameters.get(candidate.change_point)
+    words = in_words(candidate.words_for(term.group.shape), problem.labels)
     all_wheels = len(problem.recording.wheels)
     return Effect(
         name=term.name,
@@ -137,7 +139,7 @@ def _effect(problem: Problem, term: Term, parameters: Mapping[str, Parameter], e
         covariate=candidate.covariate,
         onset_s=None if onset is None else onset.value,
         equation=candidate.equation,
-        statement=statement(candidate, wheels, all_wheels, parameters, errors, simulation.wheel_column),
+        statement=statement(words, wheels, all_wheels, parameters, errors, simulation.wheel_column),
         parameters=parameters,
         rmse_before=errors[0],
         rmse_after=errors[1],

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from math import floor, isfinite, log10
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.answer import Parameter
-    from regolithd.calibration.mismatch.candidates.candidate import Candidate
 
 
 def listed(items: Sequence[str]) -> str:
@@ -22,23 +23,40 @@ def capital(sentence: str) -> str:
 
 
 def plural(noun: str) -> str:
-    """Return the plural: wheels, axes, bodies."""
+    """Return the plural: wheels, axes, bodies, boxes."""
     if noun.endswith("is"):
         return noun[:-2] + "es"
-    if noun.endswith("y"):
+    if re.search(r"[^aeiou]y$", noun):
         return noun[:-1] + "ies"
-    return noun + "s"
+    return noun + ("es" if re.search(r"(s|x|z|ch|sh)$", noun) else "s")
+
+
+def noun_of(column: str) -> str:
+    """Return what the column that tells axes apart calls one of them: `zone_id` a zone."""
+    return re.sub(r"_(id|no|nr|name|number|index)$", "", column).replace("_", " ")
 
 
 def wheels_in_words(wheels: Sequence[int | str], of: int, kind: str = "wheel") -> str:
-    """Return 'all 6 wheels', 'wheel 4', 'wheels 1, 3 and 5'; `kind` is the singular."""
+    """Return 'all 6 wheels', 'both axes', 'wheel 4', 'wheels 1, 3 and 5'; empty where there is one alone.
+
+    `kind` is the column that tells them apart.
+    """
+    if of == 1:
+        return ""
+    noun = noun_of(kind)
     if len(wheels) == of:
-        return f"all {of} {plural(kind)}"
-    return f"{plural(kind) if len(wheels) > 1 else kind} {listed([str(wheel) for wheel in wheels])}"
+        return f"{'both' if of == 2 else f'all {of}'} {plural(noun)}"
+    return f"{plural(noun) if len(wheels) > 1 else noun} {listed([str(wheel) for wheel in wheels])}"
+
+
+def on_wheels(wheels: Sequence[int | str], of: int, kind: str = "wheel") -> str:
+    """Return ', on ' and `wheels_in_words`; empty where there is one alone."""
+    words = wheels_in_words(wheels, of, kind)
+    return f", on {words}" if words else ""
 
 
 def statement(
-    candidate: Candidate,
+    words: str,
     wheels: Sequence[int | str],
     of: int,
     parameters: Mapping[str, Parameter],
@@ -49,20 +67,32 @@ def statement(
 
     Parameters
     ----------
-    wheels: names of those that have it, of `of`; a column of the recording is a `kind` (wheel, axis, side)
+    words: what it is, as a noun phrase
+    wheels: names of those that have it, of `of`; `kind` is the recording's column that tells them apart
     parameters: with `relative_size`, and `onset_s` where it has an onset
     errors: held-out root mean squares on these wheels without and with the effect
     """
-    where = f", on {wheels_in_words(wheels, of, kind)}" if of > 1 else ""
     onset = parameters.get("onset_s")
-    begins = f" from {onset.value:.0f} s on (90 % sure: {onset.low:.0f} to {onset.high:.0f} s)" if onset else ""
-    return f"{capital(candidate.words)}{where}{begins}: {size_and_cost(parameters['relative_size'], errors)}."
+    begins = ""
+    if onset:
+        value, low, high = told(onset.value, onset.low, onset.high)
+        begins = f", from {value} s on (90 % sure: {low} to {high} s)"
+    size = size_and_cost(parameters["relative_size"], errors)
+    return f"{capital(words)}{on_wheels(wheels, of, kind)}{begins}: {size}."
+
+
+def told(value: float, low: float, high: float) -> tuple[str, str, str]:
+    """Return a value and its interval with as many decimals as the first digit of the interval's width."""
+    width = high - low
+    places = max(-floor(log10(width)), 0) if isfinite(width) and width > 0 else 0
+    return f"{value:.{places}f}", f"{low:.{places}f}", f"{high:.{places}f}"
 
 
 def size_and_cost(size: Parameter, errors: tuple[float, float]) -> str:
     """Return how large an effect is over the mean reading, and what leaving it out costs."""
     costs = 100 * (errors[0] / errors[1] - 1) if errors[1] > 0 else 0.0
+    value, low, high = told(100 * size.value, 100 * size.low, 100 * size.high)
     return (
-        f"{100 * size.value:.0f} % of the mean reading (90 % sure: {100 * size.low:.0f} to {100 * size.high:.0f} %); "
+        f"{value} % of the mean reading (90 % sure: {low} to {high} %); "
         f"left out, it makes the held-out error there {abs(costs):.1f} % {'larger' if costs >= 0 else 'smaller'}"
     )

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS
-from regolithd.calibration.mismatch.inference.statements import wheels_in_words
+from regolithd.calibration.mismatch.inference.statements import on_wheels
+from regolithd.calibration.mismatch.problem.words import in_words
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -113,11 +114,12 @@ def change_of(found: Linearised, place: Place, beside: Scores, at_s: float, inte
         rivals=_rivals(found, place, beside, statistic),
         statement="",
     )
-    return replace(change, statement=_statement(change, found, law.candidate.words))
+    words = in_words(law.candidate.words, found.simulation.covariate_labels)
+    return replace(change, statement=_statement(change, found, words))
 
 
 def _statement(change: Change, found: Linearised, words: str) -> str:
-    where = wheels_in_words(change.wheels, len(found.wheels), found.simulation.wheel_column)
+    where = on_wheels(change.wheels, len(found.wheels), found.simulation.wheel_column)
     since = (
         f"since {change.onset_s:.0f} s (90 % sure: {change.onset_low_s:.0f} to {change.onset_high_s:.0f} s)"
         if change.onset_s is not None
@@ -125,7 +127,7 @@ def _statement(change: Change, found: Linearised, words: str) -> str:
     )
     names = ", ".join(dict.fromkeys(rival.name for rival in change.rivals if rival.name != change.name))
     return (
-        f"{words[:1].upper()}{words[1:]}, on {where}, {since}: {change.size:.3g} {change.unit} "
+        f"{words[:1].upper()}{words[1:]}{where}, {since}: {change.size:.3g} {change.unit} "
         f"(90 % sure: {change.low:.3g} to {change.high:.3g})"
         f"{f'; or {names}, which explains it nearly as well' if names else ''}. {WHOLE_DECIDES}."
     )

@@ -53,6 +53,8 @@ def build_problem(
             f"only {mask.sum()} values of {simulation.channel} can be compared; "
             f"at least {thresholds.fewest_readings} are needed"
         )
+    predicted = {simulation.channel: np.abs(prediction)}
+    labels = labels_of(simulation.covariate_labels, {**constants, **covariates}, recording.channels, predicted)
     return Problem(
         recording=prepared,
         simulation=simulation,
@@ -62,9 +64,9 @@ def build_problem(
         mask=mask,
         covariates=covariates,
         constants=constants,
-        labels=labels_of(simulation.covariate_labels, {**constants, **covariates}, recording.channels),
+        labels=labels,
         side=simulation.side(recording.wheels),
         row=simulation.row(recording.wheels),
-        left_out=left_out(simulation.channel, measured, run, outliers, blanks),
+        left_out=left_out(simulation.channel, measured, run, outliers, blanks, labels),
         thresholds=thresholds,
     )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.problem.problem import LeftOut
+from regolithd.calibration.mismatch.problem.words import word_for
 from regolithd.calibration.mismatch.signal.robust import robust_std
 
 if TYPE_CHECKING:
@@ -66,7 +67,12 @@ def blanks_of(
 
 
 def left_out(
-    channel: str, measured: Array, run: Simulated, outliers: Mask, blanks: Mapping[str, Mask]
+    channel: str,
+    measured: Array,
+    run: Simulated,
+    outliers: Mask,
+    blanks: Mapping[str, Mask],
+    labels: Mapping[str, str],
 ) -> tuple[LeftOut, ...]:
     """Return what was measured and is not compared, each with its reason; `blanks` are those of covariates."""
     silent, known = ~np.isfinite(run.prediction), np.isfinite(measured)
@@ -75,6 +81,6 @@ def left_out(
         *((known & ~silent & blank, f"{name} was not measured there") for name, blank in run.blanks.items()),
         (known & run.carried, f"the prediction depends on {', '.join(run.blanks)}, which was not measured before"),
         (outliers, "single, isolated readings far outside all others"),
-        *((blank, f"{name} was not measured there") for name, blank in blanks.items()),
+        *((blank, f"{word_for(name, labels)} was not measured there") for name, blank in blanks.items()),
     ]
     return tuple(LeftOut(channel, int(where.sum()), reason) for where, reason in reasons if where.any())

@@ -77,6 +77,10 @@ class Predictor(Protocol):
         """How to run the machine without its load, as an instruction; empty where that cannot be done."""
 
     @property
+    def one_way(self) -> bool:
+        """Whether the machine runs one way only."""
+
+    @property
     def experiment_spans(self) -> Mapping[str, float]:
         """How far from its usual value, each way, an experiment can move a covariate."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,19 +34,29 @@ DIVISORS = frozenset({"s", "s2", "min", "h"})
 """Unit words that divide what stands before them: `m_s` is m/s."""
 ANGULAR_SPEED = "rad/s"
 """The unit of `wheel_speed` where nothing says another: the contract's."""
+UNIT_OF_ONE_WORD = re.compile(r"[^\W\d]+|°[CF]|[%°]")
+"""A unit that is divided by without brackets."""
+SUPERSCRIPT = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹]")
 UNIT_IN_LABEL = re.compile(r"\(([^(),]+)[^()]*\)$")
 WORD_IN_BRACES = re.compile(r"\{(\w+)\}")
 
 
 def labels_of(
-    stated: Mapping[str, str], covariates: Mapping[str, Array], channels: Mapping[str, Array]
+    stated: Mapping[str, str],
+    covariates: Mapping[str, Array],
+    channels: Mapping[str, Array],
+    predicted: Mapping[str, Array] = MappingProxyType({}),
 ) -> dict[str, str]:
-    """Return a label with its unit for each covariate: as stated, or as the column is called that it is."""
+    """Return a label with its unit for each covariate: as stated, or as the column is called that it is.
+
+    `predicted` has the sizes of the predictions, by the name of the column.
+    """
     found = {}
     for name, values in covariates.items():
-        column = column_of(values, channels)
-        if column is not None and quantity(column) != column:
+        if (column := column_of(values, channels)) is not None and quantity(column) != column:
             found[name] = label_of_column(column)
+        elif (column := column_of(values, predicted)) is not None:
+            found[name] = f"predicted {label_of_column(column)}"
     return {**found, **stated}
 
 
@@ -71,11 +82,16 @@ def label_of_column(column: str) -> str:
 
 
 def unit_in_label(covariate: str, labels: Mapping[str, str]) -> str:
-    """Return a covariate's unit: what its label has in brackets, up to a comma; empty where nothing says it."""
+    """Return a covariate's unit: what its label has in brackets, up to a comma.
+
+    Empty where nothing says it, and for a pure number (1). A speed is in rad/s where nothing says it.
+    """
     if covariate == "time":
         return "s"
+    if covariate == "wheel_speed":
+        return speed_unit(labels)
     found = UNIT_IN_LABEL.search(labels.get(covariate, ""))
-    return found[1] if found else ""
+    return found[1] if found and found[1] != "1" else ""
 
 
 def word_for(covariate: str, labels: Mapping[str, str]) -> str:
@@ -100,11 +116,38 @@ def in_units(unit: str, of_channel: str, labels: Mapping[str, str]) -> str:
     {per_speed} and {per_speed2} are one over the unit of speed and its square, {per_acceleration} over that a second.
     """
     speed = speed_unit(labels)
+    per = {"per_speed": divided("1", speed), "per_speed2": divided("1", speed, "²")}
     above, _, below = speed.partition("/")
-    below = below or "1"
-    if below == "s":
-        per = {"per_speed": f"s/{above}", "per_speed2": f"s²/{above}²", "per_acceleration": f"s²/{above}"}
-    else:
-        per = {"per_speed": f"{below}/{above}", "per_speed2": f"({below}/{above})²"}
-        per["per_acceleration"] = f"{below} s/{above}"
-    return unit.format(unit=of_channel, speed=speed, **per)
+    per["per_acceleration"] = f"s²/{above}" if below == "s" else product(f"{below or '1'} s", divided("1", above))
+    text = unit.format(unit=of_channel, speed=speed, **per)
+    text = re.sub(r"\(1/([^()\s/]+)\)\^", r"1/\1^", text)  # (1/rpm)^p
+    text = re.sub(r"\(1\)\^\w+", "1", text)
+    return product(*text.split(" "))
+
+
+def divided(unit: str, by: str, power: str = "") -> str:
+    """Return one unit over another: N/m, N s²/m² (over the square of m/s), 1/K, A/V^p.
+
+    `power` is of `by`: ², ^p, or nothing.
+    """
+    if by in {"", "1"}:
+        return unit
+    above, slash, below = by.partition("/")
+    words = (above, below) if slash else (above,)
+    if not all(map(UNIT_OF_ONE_WORD.fullmatch, words)) or (power and any(map(SUPERSCRIPT.search, words))):
+        return product(unit, f"1/({by}){power}")
+    if not slash:
+        return product(unit, f"1/{by}{power}")
+    flipped = f"({below}/{above}){power}" if power.startswith("^") else f"{below}{power}/{above}{power}"
+    return product(unit, flipped)
+
+
+def product(*units: str) -> str:
+    """Return units beside each other: A and 1/rpm are A/rpm; a 1 is left out."""
+    found = ""
+    for unit in units:
+        if found and unit.startswith("1/"):
+            found += unit[1:]
+        elif unit != "1":
+            found += f" {unit}" if found else unit
+    return found or "1"

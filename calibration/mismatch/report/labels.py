@@ -9,7 +9,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import direction_of
-from regolithd.calibration.mismatch.inference.statements import capital, listed, plural
+from regolithd.calibration.mismatch.inference.statements import capital, listed, noun_of, plural, wheels_in_words
 from regolithd.calibration.mismatch.problem.words import COVARIATES
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Labels:
         in_minutes = float(evidence.time_s[-1] - evidence.time_s[0]) > LONGEST_IN_SECONDS
         candidates = {candidate.name: candidate for candidate in evidence.candidates or library()}
         in_milli = evidence.unit in WITH_MILLI and float(np.nanmean(np.abs(evidence.measured))) < 1
-        return cls(evidence.wheel_column, evidence.covariate_labels, candidates, in_minutes, in_milli)
+        return cls(noun_of(evidence.wheel_column), evidence.covariate_labels, candidates, in_minutes, in_milli)
 
     @property
     def time_unit(self) -> str:
@@ -81,7 +81,7 @@ class Labels:
         if covariate == "time":
             return f"time ({self.time_unit})"
         named = COVARIATES.get(covariate, covariate.replace("_", " "))
-        return self.covariates.get(covariate, named)
+        return self.covariates.get(covariate, named).removesuffix(" (1)")
 
     def covariate(self, name: str) -> str:
         """Return a covariate's name in a sentence, without its unit."""
@@ -94,9 +94,9 @@ class Labels:
         return own or PARAMETERS.get(name) or self.effect(name)
 
     def wheels(self, wheels: Sequence[int | str], everything: Sequence[int | str]) -> str:
-        """Return 'all 6 wheels', 'wheel 4' or 'wheels 1, 3'; nothing where the machine has one alone."""
+        """Return 'all 6 wheels', 'both axes', 'wheel 4' or 'wheels 1, 3'; nothing where the machine has one alone."""
         if len(wheels) == len(everything):
-            return f"all {len(wheels)} {plural(self.wheel)}" if len(wheels) > 1 else ""
+            return wheels_in_words(wheels, len(everything), self.wheel)
         return f"{plural(self.wheel) if len(wheels) > 1 else self.wheel} {', '.join(map(str, wheels))}"
 
 

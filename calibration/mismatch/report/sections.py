@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from regolithd.calibration.mismatch.inference.statements import capital, listed
+from regolithd.calibration.mismatch.inference.statements import capital, listed, plural
 from regolithd.calibration.mismatch.report.axes import number
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.empirical import EmpiricalSection, empirical_section
@@ -116,8 +116,8 @@ def certainty(answer: Answer, labels: Labels) -> Certainty:
 def summary(evidence: Evidence, labels: Labels) -> tuple[tuple[str, str], ...]:
     """Return what was compared, as pairs of a number and its noun."""
     length = float(evidence.time_s[-1] - evidence.time_s[0]) * labels.time_factor
-    everything = labels.wheels(evidence.wheels, evidence.wheels).removeprefix("all ")
-    count = [tuple(everything.split(" ", 1))] if everything else []
+    several = len(evidence.wheels) > 1
+    count = [(str(len(evidence.wheels)), plural(labels.wheel))] if several else []
     values = [
         (f"{int(np.isfinite(each.before).sum()):,}", f"values of {each.channel} compared")
         for each in (evidence, *evidence.others)
@@ -169,7 +169,7 @@ def _curve(curve: Curve, answer: Answer, evidence: Evidence, labels: Labels) -> 
 
 def effect(found: Effect, evidence: Evidence, labels: Labels) -> EffectSection:
     """Return one named effect: sentence, equation, facts and table."""
-    factor, unit = labels.scaled(_unit_of(found))
+    factor, unit = labels.scaled(_unit_of(found, evidence))
     before, after = factor * found.rmse_before, factor * found.rmse_after
     change = f"{100 * (after / before - 1) if before else 0.0:+.1f}".replace("-", "−")
     facts = (
@@ -200,8 +200,10 @@ def _parameter_rows(found: Effect, labels: Labels) -> tuple[ParameterRow, ...]:
     return tuple(rows)
 
 
-def _unit_of(found: Effect) -> str:
-    """Return the unit that the channel's name ends in."""
+def _unit_of(found: Effect, evidence: Evidence) -> str:
+    """Return the predicted channel's unit; of another column that its name ends in."""
+    if found.channel == evidence.channel:
+        return evidence.unit
     return found.channel.rsplit("_", 1)[-1] if "_" in found.channel else ""
 
 

@@ -62,6 +62,7 @@ class FmuSimulation(Simulation):
         self.channels = units if len(units) > 1 else {}  # type: ignore[misc]
         self.inputs = tuple(self._inputs)  # type: ignore[misc]
         self.wheel_column = str(tables.get("simulation", {}).get("wheel_column", "wheel"))  # type: ignore[misc]
+        self.one_way = _stated_flag(tables.get("simulation", {}), "one_way")
         self._covariates = _covariates(tables.get("covariates", {}))
         self.parameters = _parameters(tables.get("parameters", {}), known, path)
         self._unpacked = Path(tempfile.mkdtemp(prefix="fmu-"))
@@ -185,6 +186,13 @@ def _mapped(tables: Mapping[str, Any], known: Mapping[str, Any], path: Path) -> 
             told = f"[variables] {name}: the name of a recorded column is needed, not {column!r}"
             raise SimulationError(told, ("variables", name))
     return dict(stated)
+
+
+def _stated_flag(table: Mapping[str, Any], name: str) -> bool:
+    value = table.get(name, False)
+    if not isinstance(value, bool):
+        raise SimulationError(f"[simulation] {name} must be true or false, not {value!r}", ("simulation", name))
+    return value
 
 
 def _covariates(table: object) -> dict[str, str]:

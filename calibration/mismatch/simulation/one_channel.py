@@ -41,6 +41,7 @@ class OneChannel(Simulation):
             "unlikely_effects",
             "covariate_labels",
             "unloaded_experiment",
+            "one_way",
             "experiment_spans",
             "between_readings",
             "undefined_at_times",

@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from regolithd.calibration.mismatch.errors import counted
 from regolithd.calibration.mismatch.online.channels import monitors_of
 from regolithd.calibration.mismatch.online.pieces import Cutter
 from regolithd.calibration.mismatch.online.thresholds import ONLINE_THRESHOLDS, OnlineThresholds
@@ -103,7 +104,9 @@ def _notes(cutter: Cutter) -> tuple[str, ...]:
     if cutter.late_rows:
         notes.append(f"{cutter.late_rows} rows came after their interval was decided on; they are left out.")
     if cutter.clock_set_back:
-        notes.append(f"The clock was set back {cutter.clock_set_back} time(s); time goes on from the next interval.")
+        notes.append(
+            f"The clock was set back {counted(cutter.clock_set_back, 'time')}; time goes on from the next interval."
+        )
     return tuple(notes)
 
 

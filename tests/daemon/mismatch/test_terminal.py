@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from io import StringIO
 from types import SimpleNamespace
 
 from rich.console import Console
 
 from regolithd.calibration.mismatch.answer import CalibratedParameter, Parameter, Suggestion, Unexplained
 from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
+from regolithd.calibration.mismatch.report.labels import Labels
 from regolithd.daemon.mismatch.terminal import print_answer
 
 CURVE = EmpiricalCurve("offset", False, "A", "m", (0.1, 0.7), (0.0, 1.5), (-0.1, 1.4), (0.1, 1.6), 0.004, 0.002)
 SUGGESTIONS = (Suggestion("power", "Δcurrent = c height", {"c": Parameter(2.5, 2.0, 3.0, "A/m")}, 0.0021, 0.0),)
+
+LEFT = (
+    "4.97 W/K instead of 4 ± 0.16, 6.1 standard deviations away. Check the stated value and its standard "
+    "deviation, or look for physics that acts as this parameter does."
+)
 
 
 def test_mismatch_prints_the_answer() -> None:
@@ -33,20 +40,73 @@ def test_mismatch_prints_the_answer() -> None:
         ],
         probability=0.914,
         next_best=SimpleNamespace(effects=("other",), unexplained=True, probability=0.05),
-        notes=["short"],
+        fits=(),
+        notes=["short", "in b: loss had to leave its prior: 4.97 W/K."],
     )
     console = Console(record=True, width=200, quiet=False)
-    print_answer(console, answer)
+    print_answer(console, answer, Labels("zone", {"height": "height of the bale (m)"}), (1, 2, 3, 4))
     assert console.export_text().splitlines() == [
         "effects",
         "  coulomb-friction: 37 mA",
-        "  parameter loss: 4.97 W/K instead of 4, 6.1 standard deviations of its prior away",
-        "  unexplained: 12 % of the residual follows time on 1, 4, 3 to 100 s",
-        "  unexplained: 40 % of the residual follows height on 1, 0 to 9 s",
-        "  with an empirical curve over height, 0.1 to 0.7 m: held-out error 0.004 before, 0.002 after",
-        "  suggestion 1: Δcurrent = c height; c = 2.5 A/m; held-out error 0.0021",
+        f"  parameter loss had to leave its prior: {LEFT}",
+        "  unexplained: 12 % of the residual follows time, on zones 1 and 4, 3 to 100 s",
+        "  unexplained: 40 % of the residual follows the height of the bale, on zone 1, 0 to 9 s",
+        "    empirical curve over the height of the bale, 0.1 to 0.7 m: held-out error 0.004 without it, 0.002 with it",
+        "    suggestion 1: Δcurrent = c height; c = 2.5 A/m; held-out error 0.0021",
         "  one or other: this recording does not distinguish them. Drive backwards.",
-        "  probability of this set of names: 0.91; next: other + something unexplained (0.05)",
+        "  probability of this answer: 0.91; next: other + something unexplained (0.05)",
         "  held-out error of current: 0.0041234 before, 0.001 after, noise floor 0.0009",
         "  note: short",
+    ]
+
+
+def test_of_several_channels_each_finding_and_each_error_names_its_own() -> None:
+    """An error that no effect changed is told once."""
+    fits = [
+        SimpleNamespace(channel=name, held_out_rmse_before=1.5, held_out_rmse_after=after, noise_floor_rmse=1.0)
+        for name, after in (("pressure", 1.5), ("current", 1.25))
+    ]
+    answer = SimpleNamespace(
+        verdict="unexplained",
+        effects=[SimpleNamespace(name="sensor-delay", channel="current", statement="A delay of pressure.")],
+        unexplained=[Unexplained("pressure", (1,), "flow", 0.0, 9.0, 0.4)],
+        indistinguishable=[],
+        fit=fits[1],
+        fits=fits,
+        parameters=[],
+        probability=None,
+        next_best=None,
+        notes=[],
+    )
+    console = Console(record=True, width=200, quiet=False)
+    print_answer(console, answer, Labels(), (1,))
+    assert console.export_text().splitlines() == [
+        "unexplained",
+        "  sensor-delay in current: A delay of pressure.",
+        "  unexplained in pressure: 40 % of the residual follows the flow, 0 to 9 s",
+        "  probability of this answer: not known",
+        "  held-out error of pressure: 1.5, noise floor 1",
+        "  held-out error of current: 1.5 before, 1.25 after, noise floor 1",
+    ]
+
+
+def test_a_terminal_gets_continued_lines_indented() -> None:
+    """A line is broken at its width, never between a number and its percent sign, and goes on under its beginning."""
+    answer = SimpleNamespace(
+        verdict="missing-physics",
+        effects=[SimpleNamespace(name="viscous-friction", statement="Drag that grows with speed: 37 % of the mean.")],
+        unexplained=[],
+        indistinguishable=[],
+        fit=SimpleNamespace(channel="a", held_out_rmse_before=1.0, held_out_rmse_after=1.0, noise_floor_rmse=1.0),
+        fits=(),
+        parameters=[],
+        probability=None,
+        next_best=None,
+        notes=[],
+    )
+    console = Console(record=True, width=51, force_terminal=True, file=StringIO())
+    print_answer(console, answer, Labels(), (1,))
+    assert console.export_text().splitlines()[1:3] == [
+        "  viscous-friction: Drag that grows with speed:",
+        "    37 % of the mean.",
     ]

@@ -22,8 +22,9 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
 from regolithd.calibration.mismatch.fleet.told.intervals import onset_places, size_stds
 from regolithd.calibration.mismatch.fleet.told.recordings import shown_beside
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
-from regolithd.calibration.mismatch.inference.statements import capital, size_and_cost, wheels_in_words
+from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost
 from regolithd.calibration.mismatch.problem.problem import LeftOut
+from regolithd.calibration.mismatch.problem.words import in_units, in_words
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -151,9 +152,7 @@ def _effect(chosen: Chosen, index: int, held_out: tuple[Array, Array, list[Array
         covariate=candidate.covariate,
         onset_s=None,
         equation=candidate.equation,
-        statement=_statement(
-            chosen, term, wheels_in_words(wheels, all_wheels, kind), parameters["relative_size"], errors
-        ),
+        statement=_statement(chosen, term, on_wheels(wheels, all_wheels, kind), parameters["relative_size"], errors),
         parameters=parameters,
         rmse_before=errors[0],
         rmse_after=errors[1],
@@ -180,7 +179,7 @@ def _sizes(chosen: Chosen, index: int) -> dict[str, Parameter]:
     unit = chosen.simulation.unit
     for coefficient, value, spread in zip(term.group.candidate.coefficients, mean, std, strict=False):
         reach = NINETY_PERCENT_STDS * spread
-        told = coefficient.unit.replace("{unit}", unit)
+        told = in_units(coefficient.unit, unit, chosen.simulation.covariate_labels)
         found[coefficient.name] = Parameter(float(value), float(value - reach), float(value + reach), told)
     for name, value in term.group.shape.items():
         if name in term.group.candidate.free and name != term.group.candidate.change_point:
@@ -206,7 +205,8 @@ def _statement(chosen: Chosen, term: FleetTerm, wheels: str, size: Parameter, er
         "until": f" until {at}",
         "growing": f" since {at}, growing",
     }[course.kind]
-    return f"{capital(term.group.candidate.words)}, on {wheels}{of}{when}: {size_and_cost(size, errors)}."
+    words = in_words(term.group.candidate.words_for(term.group.shape), chosen.simulation.covariate_labels)
+    return f"{capital(words)}{wheels}{of}{when}: {size_and_cost(size, errors)}."
 
 
 def _of_recording(chosen: Chosen, recording: int, effect: Effect) -> FleetEffect:

@@ -10,6 +10,7 @@ import pytest
 from rover_drives import columns, recording, simulation
 
 from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
 
@@ -169,3 +170,9 @@ def test_inertia_may_come_late(problem: Problem) -> None:
     assert np.allclose(one[1:], at_once[:-1])
     assert np.allclose(two[2:], at_once[:-2])
     assert np.allclose(between, 0.5 * (one + two))
+
+
+def test_a_delay_names_the_column_that_is_late() -> None:
+    """The predicted one, or an input."""
+    assert SensorDelay().words_for({"late": "valve_pct", "input_secant_s": 2.0}) == "a delay of valve_pct"
+    assert SensorDelay().words_for({}) == SensorDelay.words

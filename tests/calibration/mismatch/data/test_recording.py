@@ -39,7 +39,7 @@ def test_repeated_rows_are_averaged_and_said() -> None:
     twice["load_N"][:6] += 2.0
     found = from_columns(twice)
     np.testing.assert_allclose(found.channels["load_N"][0], TABLE["load_N"][:6] + 1.0)
-    assert any("6 rows repeat" in note for note in found.notes)
+    assert any("6 rows with the same t_s and wheel" in note for note in found.notes)
 
 
 def test_a_clock_that_jumps_back_begins_another_run() -> None:
@@ -62,7 +62,7 @@ def test_gaps_silence_and_constants_are_said() -> None:
     table["load_N"][table["wheel"] == 3] = np.nan
     told = " ".join(from_columns(table).notes)
     for part in (
-        "1 gaps",
+        "1 gap,",
         "bus_voltage_V is constant",
         "yaw_rate_rad_s was never",
         "load_N was never measured at wheel 3",

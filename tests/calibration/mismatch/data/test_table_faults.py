@@ -56,8 +56,8 @@ def test_rows_without_time_or_wheel_are_left_out() -> None:
     broken = table([0.0, 1.0, 2.0])
     broken["t_s"][0] = broken["wheel"][3] = np.nan
     found = from_columns(broken)
-    assert found.notes[0] == "2 rows have no time or no wheel; they are left out."
-    assert "2 of 6 instants of single wheels are absent." in found.notes
+    assert found.notes[0] == "2 rows without t_s or wheel: left out."
+    assert "Instants without a row, counted for each wheel: 2 of 6." in found.notes
     assert np.isnan(found.channels["value"][0, 0])
 
 
@@ -68,7 +68,7 @@ def test_repeated_rows_are_counted_and_averaged() -> None:
     extra["value"][:3] = (4.0, 7.0, np.nan)
     found = from_columns(extra)
     assert found.channels["value"][0, 0] == pytest.approx((1 + 4 + 7) / 3)
-    assert "3 rows repeat an instant and wheel; their mean is taken." in found.notes
+    assert "3 rows with the same t_s and wheel as another: the mean is taken." in found.notes
 
 
 def test_times_that_agree_to_a_nanosecond_are_one_instant() -> None:
@@ -89,7 +89,7 @@ def test_a_clock_that_jumps_back_up_to_three_times_begins_new_runs(jumps: int, r
     if runs == 1:
         assert "Rows are not in the order of time; they are sorted." in found.notes
     else:
-        first = f"The clock jumps back {jumps} time(s), first at {100 * jumps + 2:.1f} s; "
+        first = f"The clock jumps back {jumps} time{'s' if jumps > 1 else ''}, first at {100 * jumps + 2:.1f} s; "
         assert first + "what follows is taken as another run." in found.notes
         np.testing.assert_array_equal(found.time_s, [0.0, 1.0, 2.0] * runs)
 
@@ -109,7 +109,7 @@ def test_a_gap_is_longer_than_five_usual_steps(gap_s: float, noted: bool) -> Non
     """All gaps are counted, with their length."""
     times = np.cumsum([0.0, 1, 1, 1, gap_s, 1, 1, gap_s, 1, 1, 1]).tolist()
     notes = from_columns(table(times)).notes
-    expected = "2 gaps, 10.2 s in all; nothing is assumed about what happened in them."
+    expected = "2 gaps, 10.2 s in all; nothing is assumed about what happened in between."
     assert (expected in notes) == noted
     assert len(notes) == int(noted)
 

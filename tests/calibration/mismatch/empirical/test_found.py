@@ -73,7 +73,7 @@ def test_a_bump_is_suggested_and_no_name_given(found: Comparison) -> None:
     """Among the first three, with its place and width; the verdict stays `unexplained`."""
     assert (found.answer.verdict, found.answer.effects) == ("unexplained", ())
     bump = next(each for each in found.answer.unexplained[0].suggestions if each.form == "bump")
-    assert bump.equation.startswith("Δcurrent_A = (c exp(−((|wheel_speed| − a)/k)²/2)")
+    assert bump.equation.startswith("Δcurrent_A = (c · exp(−((|speed| − a)/k)²/2)")
     assert bump.parameters["a"].value == pytest.approx(0.8, abs=0.05)
     assert bump.parameters["a"].low < 0.8 < bump.parameters["a"].high
 

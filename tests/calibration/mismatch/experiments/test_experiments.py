@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -23,6 +24,7 @@ from regolithd.calibration.mismatch.experiments.margins import (
     predictable,
 )
 from regolithd.calibration.mismatch.experiments.settings import predicts_row_by_row, settings_of
+from regolithd.calibration.mismatch.inference.experiment import with_experiment
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.equations import equations_of as candidates_and_equations
 from regolithd.calibration.mismatch.regression.group import Term
@@ -121,7 +123,7 @@ def test_a_simulation_with_a_state_is_not_predicted() -> None:
     assert not predicts_row_by_row(problem)
     experimenter = experimenter_of(equations_of(problem, (Drag(),)), THRESHOLD)
     assert experimenter.drives is None
-    assert experimenter.unpredictable == "the simulation depends on what was before"
+    assert experimenter.unpredictable == "the simulation has a state, which depends on what was before"
 
 
 def test_a_simulation_that_refuses_a_drive_has_no_predicted_experiment() -> None:
@@ -229,3 +231,25 @@ def test_the_chosen_drive_is_the_least_that_tells_the_closest_two_apart() -> Non
     assert experimenter.choose(hypotheses[:1], ()) is None
     quiet = replace(experimenter, information_per_s=experimenter.information_per_s * 1e-9)
     assert quiet.choose(hypotheses, ()) is None, "no drive tells them apart"
+
+
+def test_a_machine_that_runs_one_way_is_never_asked_to_reverse() -> None:
+    """Its drives keep the direction, instructions ask for speeds in its place, and programs are told the same."""
+
+    class Pump(Warm):
+        one_way, unloaded_experiment = True, ""
+        covariate_labels: ClassVar = {"wheel_speed": "pump speed (rad/s)"}
+
+    problem = build_problem(from_columns(one_way(), unit="axis"), Pump())
+    drives = Drives(problem, ["wheel_speed", "temperature"])
+    assert drives.elements == ("wheel_speed", "temperature", "wheel_acceleration")
+    assert drives(frozenset(drives.elements)).problem.covariates["wheel_speed"].min() > 0
+    equations, applicable = candidates_and_equations(problem, library())
+    names = ("coulomb-friction", "bearing-drag", "rotor-inertia")
+    terms = [term_of(equations, name) for name in names]
+    found = with_experiment(names, experimenter_of(equations, THRESHOLD), (), terms)
+    assert "pump speed" in found.experiment
+    assert {"wheel_speed"} <= set(found.vary)
+    assert DIRECTION not in found.vary
+    told = [found.experiment, *(each.instruction(problem.simulation) for each in applicable)]
+    assert [text for text in told if re.search(r"both ways|to and fro|reverse|backwards", text)] == []

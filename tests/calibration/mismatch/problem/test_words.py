@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from regolithd.calibration.mismatch.problem.words import in_units, in_words, label_of_column, labels_of, unit_in_label
+from regolithd.calibration.mismatch.problem.words import (
+    divided,
+    in_units,
+    in_words,
+    label_of_column,
+    labels_of,
+    unit_in_label,
+)
 
 
 @pytest.mark.parametrize(
@@ -45,8 +52,8 @@ def test_an_instruction_has_the_machine_s_words() -> None:
     [
         ("speed", "N s/rad", "N s²/rad²", "N s²/rad"),
         ("belt speed (m/s)", "N s/m", "N s²/m²", "N s²/m"),
-        ("shaft speed (rpm)", "N 1/rpm", "N (1/rpm)²", "N 1 s/rpm"),
-        ("feed (mm/min)", "N min/mm", "N (min/mm)²", "N min s/mm"),
+        ("shaft speed (rpm)", "N/rpm", "N/rpm²", "N s/rpm"),
+        ("feed (mm/min)", "N min/mm", "N min²/mm²", "N min s/mm"),
     ],
 )
 def test_a_coefficient_s_unit_follows_the_speed_s(label: str, viscous: str, quadratic: str, inertia: str) -> None:
@@ -61,3 +68,29 @@ def test_a_unit_is_what_the_label_has_in_brackets_up_to_a_comma() -> None:
     labels = {"pitch": "pitch (rad, nose up)", "load": "wheel load (N)", "slip": "slip"}
     units = {name: unit_in_label(name, labels) for name in ("pitch", "load", "slip", "yaw", "time")}
     assert units == {"pitch": "rad", "load": "N", "slip": "", "yaw": "", "time": "s"}
+
+
+@pytest.mark.parametrize(
+    ("speed", "unit"), [("rad/s", "A (s/rad)^p"), ("rpm", "A/rpm^p"), ("m³/h", "A (h/m³)^p"), ("1", "A")]
+)
+def test_a_free_power_of_the_speed_stays_a_power(speed: str, unit: str) -> None:
+    """The coefficient of a power law has the unit of the channel over that power of the speed."""
+    assert in_units("{unit} ({per_speed})^p", "A", {"wheel_speed": f"speed ({speed})"}) == unit
+
+
+@pytest.mark.parametrize(
+    ("unit", "by", "power", "expected"),
+    [
+        ("V", "A", "", "V/A"),
+        ("1", "°F", "", "1/°F"),
+        ("A", "m", "³", "A/m³"),
+        ("1", "A", "^p", "1/A^p"),
+        ("bar", "m³/h", "²", "bar/(m³/h)²"),
+        ("V", "1", "", "V"),
+        ("1", "", "", "1"),
+        ("N", "bar s h", "", "N/(bar s h)"),
+    ],
+)
+def test_a_unit_over_another_is_written_as_people_write_it(unit: str, by: str, power: str, expected: str) -> None:
+    """No brackets around one word, none of a pure number, and no 1 before another unit."""
+    assert divided(unit, by, power) == expected

@@ -227,7 +227,7 @@ def test_another_machine_has_its_own_words(evidence: Evidence) -> None:
             candidates=(Axle(),),
         )
     )
-    assert labels.wheels((1, 2), (1, 2)) == "all 2 axes"
+    assert labels.wheels((1, 2), (1, 2)) == "both axes"
     assert labels.wheels((2,), (1, 2, 3)) == "axis 2"
     assert labels.wheels((1, 3), (1, 2, 3)) == "axes 1, 3"
     assert labels.wheels((1,), (1,)) == ""
@@ -263,13 +263,13 @@ def test_plurals_are_english(noun: str, expected: str) -> None:
 def test_a_sentence_names_the_wheels_only_where_there_are_several() -> None:
     """One axis needs no name."""
     parameters = {"relative_size": Parameter(0.2, 0.1, 0.3, "1"), "onset_s": Parameter(60.0, 50.0, 70.0, "s")}
-    told = statement(CoulombFriction(), (1,), 1, parameters, (2.0, 1.0), "axis")
+    told = statement(CoulombFriction.words, (1,), 1, parameters, (2.0, 1.0), "axis")
     assert "axis" not in told
     assert "from 60 s on (90 % sure: 50 to 70 s): 20 % of the mean reading (90 % sure: 10 to 30 %)" in told
     assert "100.0 % larger" in told
-    assert "50.0 % smaller" in statement(CoulombFriction(), (1,), 1, parameters, (1.0, 2.0), "axis")
-    several = statement(CoulombFriction(), (1, 3, 4), 6, parameters, (2.0, 1.0), "axis")
-    assert "on axes 1, 3 and 4 from 60 s on" in several
+    assert "50.0 % smaller" in statement(CoulombFriction.words, (1,), 1, parameters, (1.0, 2.0), "axis")
+    several = statement(CoulombFriction.words, (1, 3, 4), 6, parameters, (2.0, 1.0), "axis")
+    assert "on axes 1, 3 and 4, from 60 s on" in several
 
 
 def test_currents_of_amperes_are_in_amperes(evidence: Evidence) -> None:

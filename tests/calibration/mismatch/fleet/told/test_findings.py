@@ -188,7 +188,7 @@ def test_recordings_without_dates_are_told_by_their_names() -> None:
     answer = answer_of_fleet(chosen(equations, (term(DRAG, Course("since", 2)),), [found()] * 4, dated=False))
     (effect,) = answer.effects
     assert (effect.since, effect.since_low, effect.since_high) == (None, None, None)
-    assert "on all 2 wheels since drive 2: 30 % of the mean reading" in effect.statement
+    assert "on both wheels since drive 2: 30 % of the mean reading" in effect.statement
     assert (answer.rovers[0].first, answer.rovers[0].last) == (None, None)
 
 

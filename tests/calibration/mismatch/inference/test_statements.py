@@ -1,0 +1,62 @@
+"""Sentences about effects: nouns of the user's machine, and numbers with as many digits as are known."""
+
+from __future__ import annotations
+
+import pytest
+
+from regolithd.calibration.mismatch.answer import Parameter
+from regolithd.calibration.mismatch.inference.statements import noun_of, on_wheels, plural, statement, told
+
+
+@pytest.mark.parametrize(
+    ("noun", "expected"),
+    [
+        ("wheel", "wheels"),
+        ("axis", "axes"),
+        ("body", "bodies"),
+        ("bay", "bays"),
+        ("box", "boxes"),
+        ("branch", "branches"),
+    ],
+)
+def test_a_plural_is_that_of_the_noun(noun: str, expected: str) -> None:
+    """English endings of what machines are made of."""
+    assert plural(noun) == expected
+
+
+@pytest.mark.parametrize(
+    ("column", "noun"), [("zone", "zone"), ("zone_id", "zone"), ("motor_no", "motor"), ("drum_side", "drum side")]
+)
+def test_a_column_s_name_is_a_noun(column: str, noun: str) -> None:
+    """What says that it is a number or a name is left out."""
+    assert noun_of(column) == noun
+
+
+def test_the_axes_are_named_only_where_there_are_several() -> None:
+    """One alone needs no name; a pair is both."""
+    assert on_wheels((1,), 1, "pump") == ""
+    assert on_wheels(("left", "right"), 2, "track_id") == ", on both tracks"
+    assert on_wheels((1, 3), 4, "zone") == ", on zones 1 and 3"
+
+
+@pytest.mark.parametrize(
+    ("interval", "expected"),
+    [
+        ((14.04, 13.98, 14.31), ("14.0", "14.0", "14.3")),
+        ((436.0, 251.0, 560.0), ("436", "251", "560")),
+        ((4.0, float("nan"), float("nan")), ("4", "nan", "nan")),
+        ((7.0, 7.0, 7.0), ("7", "7", "7")),
+    ],
+)
+def test_a_value_has_the_decimals_of_its_interval(
+    interval: tuple[float, float, float], expected: tuple[str, str, str]
+) -> None:
+    """Both ends of a narrow interval differ as they are told."""
+    assert told(*interval) == expected
+
+
+def test_a_small_effect_has_a_decimal() -> None:
+    """Else its interval would be told as a point."""
+    parameters = {"relative_size": Parameter(0.039, 0.037, 0.041, "1")}
+    sentence = statement("inertia of the parts that move", (1,), 1, parameters, (1.1, 1.0), "drum")
+    assert sentence.startswith("Inertia of the parts that move: 3.9 % of the mean reading (90 % sure: 3.7 to 4.1 %); ")
