@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from regolithd.calibration.mismatch.signal.noise import estimate_noise
 
@@ -73,6 +72,8 @@ def _best_transition(problem: Problem) -> float:
 
 def _refined(problem: Problem, width: float) -> tuple[float, float]:
     """Return the best transition between half and twice this one, and the sum of squares that it leaves."""
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415  # most recordings need no transition, and no SciPy for it
+
     found = minimize_scalar(
         lambda log: _squares_left(problem, float(np.exp(log))),
         bounds=(np.log(width / 2), np.log(2 * width)),

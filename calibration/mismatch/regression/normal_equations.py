@@ -14,16 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.regression.batch import Batch, Left
 from regolithd.calibration.mismatch.regression.group import Fit, Term
 from regolithd.calibration.mismatch.regression.penalties import penalty, visible_in_own_channel
-from regolithd.calibration.mismatch.regression.schur import (
-    delta_chi2_of_each,
-    delta_chi2_together,
-    explained_part,
-    pseudo_inverse,
-    schur_complement,
-    schur_diagonal,
-)
+from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -39,6 +33,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Columns = tuple[tuple[int, tuple[int, ...]], ...]
 
+KINDS = ("all", "some", "one")
+"""Of sets of wheels that may share an effect."""
 SINGULAR = 1e-10
 """Relative eigenvalue below which a direction of the normal equations counts as undetermined: rounding of float32."""
 
@@ -157,50 +153,45 @@ class NormalEquations:
 
     def further(self, given: Iterable[Term], groups: Sequence[Group] | None = None) -> list[tuple[float, Term]]:
         """Return the further Δχ² of every group beside `given`, on each set of wheels that may share it."""
-        wanted = self.design.groups if groups is None else groups
+        wanted = tuple(self.design.groups if groups is None else groups)
         fitted = self.fit(given)
         at = np.array(sorted({column for group in wanted for column in group.columns}), np.int64)
-        place = {int(column): k for k, column in enumerate(at)}
-        signs = np.zeros(len(at))
-        for group in wanted:
-            signs[[place[column] for column in group.columns]] = group.signs
         energies, moment = self.energies(at), self.moment[:, at]
-        crosses = self._crosses(fitted.columns, at)
-        shared = {kind: self._may_share(wanted, kind, place) for kind in set(self.wheel_sets.values())}
+        crosses, batches = self._crosses(fitted.columns, at), self._batches(wanted, at)
+        alone, least = len(self.weights) == 1, self.thresholds.least_tolerance
+        may_share = {kind: np.array([alone or group.may_be_shared(kind) for group in wanted]) for kind in KINDS}
         found: list[tuple[float, Term]] = []
         for wheels, kind in self.wheel_sets.items():
             chosen = list(wheels)
             cross = _over(crosses, wheels)
-            left = moment[chosen].sum(axis=0) - fitted.coefficients @ cross
+            solved = fitted.covariance @ cross
+            left = Left(moment[chosen].sum(axis=0) - fitted.coefficients @ cross, cross, solved)
             energy = energies[chosen].sum(axis=0)
-            complement = schur_diagonal(energy, cross, fitted.covariance)
-            singles = delta_chi2_of_each(left, complement, energy, signs, self.thresholds.least_tolerance).tolist()
-            for group, here in shared[kind]:
-                if len(here) == 1:
-                    gain = singles[here[0]]
-                else:
-                    gain = self._together(group, wheels, left[here], explained_part(cross[:, here], fitted.covariance))
-                if gain > 0 and visible_in_own_channel(term := Term(group, wheels), self.thresholds):
-                    found.append((gain * group.noise_reduction, term))
+            gains = np.zeros(len(wanted))
+            for batch in batches:
+                asked = batch.of(may_share[kind])
+                gains[asked.which] = asked.gains(left, energy, chosen, least)
+            gaining = [(float(gains[place]), Term(wanted[place], wheels)) for place in np.flatnonzero(gains > 0)]
+            found += [
+                (gain * term.group.noise_reduction, term)
+                for gain, term in gaining
+                if visible_in_own_channel(term, self.thresholds)
+            ]
         return found
 
-    def _may_share(self, groups: Sequence[Group], kind: str, place: Mapping[int, int]) -> list[tuple[Group, list[int]]]:
-        """Return the groups that wheels of this kind may share, each with its columns' places."""
-        alone = len(self.weights) == 1
-        return [
-            (group, [place[column] for column in group.columns])
-            for group in groups
-            if alone or group.may_be_shared(kind)
-        ]
-
-    def _together(self, group: Group, wheels: tuple[int, ...], left: Array, explained: Array) -> float:
-        """Return the Δχ² of a group of several columns."""
-        products = self.design.own_products(group.columns, self.folds)
-        first, *others = (products[w] * self.weights[w] for w in wheels)
-        own = sum(others, first)
-        return delta_chi2_together(
-            left, own - explained, float(np.max(np.diag(own))), group.signs, self.thresholds.least_tolerance
-        )
+    def _batches(self, groups: Sequence[Group], at: Index) -> list[Batch]:
+        """Return the groups in batches of equally many columns, which are among those at `at`."""
+        found = []
+        for size in sorted({len(group.columns) for group in groups}):
+            which = [place for place, group in enumerate(groups) if len(group.columns) == size]
+            columns = np.array([groups[place].columns for place in which])
+            own = np.zeros((len(self.weights), 0, size, size))
+            if size > 1:
+                products = [self.design.own_products(groups[place].columns, self.folds) for place in which]
+                own = np.stack(products, axis=1) * self.weights[:, None, None, None]
+            signs = np.array([groups[place].signs for place in which], np.float64)
+            found.append(Batch(np.array(which), np.searchsorted(at, columns), signs, own))
+        return found
 
     def cross(self, fitted: Columns, at: Index, wheels: tuple[int, ...]) -> Array:
         """Return sums of products of fitted columns and others that act on `wheels`, shape (fitted, other)."""

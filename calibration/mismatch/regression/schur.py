@@ -42,7 +42,7 @@ def schur_complement(own: Array, cross: Array, inverse: Array) -> Array:
 
 def schur_diagonal(own_diagonal: Array, cross: Array, inverse: Array) -> Array:
     """Return the diagonal of the Schur complement alone, shape (new,): for many columns, each by itself."""
-    return own_diagonal - np.einsum("sp,st,tp->p", cross, inverse, cross)
+    return own_diagonal - np.einsum("sp,sp->p", cross, inverse @ cross)
 
 
 def delta_chi2_of_each(
@@ -64,10 +64,20 @@ def delta_chi2_together(
 
     Directions with less than `least_tolerance` of the largest column's energy are left out.
     """
+    energy, of_signs = np.array([largest_energy]), np.array([signs], np.float64)
+    return float(delta_chi2_of_groups(moment[None], complement[None], energy, of_signs, least_tolerance)[0])
+
+
+def delta_chi2_of_groups(
+    moment: Array, complement: Array, largest_energy: Array, signs: Array, least_tolerance: float
+) -> Array:
+    """Return the same of groups of equally many columns, shape (group,).
+
+    Moments and signs have the shape (group, column), complements (group, column, column), energies (group,).
+    """
     values, vectors = np.linalg.eigh(complement)
-    kept = values > least_tolerance * largest_energy
-    along = vectors[:, kept].T @ moment
-    coefficients = vectors[:, kept] @ (along / values[kept])
-    if any(sign * value < 0 for sign, value in zip(signs, coefficients, strict=True)):
-        return 0.0
-    return float(np.sum(along**2 / values[kept]))
+    kept = values > least_tolerance * largest_energy[:, None]
+    along = np.einsum("gji,gj->gi", vectors, moment)
+    scaled = np.where(kept, along / np.where(kept, values, 1.0), 0.0)
+    coefficients = np.einsum("gij,gj->gi", vectors, scaled)
+    return np.where(np.any(signs * coefficients < 0, axis=1), 0.0, np.einsum("gi,gi->g", along, scaled))
