@@ -96,10 +96,13 @@ def _other_notes(notes: Sequence[str], moved: Sequence[CalibratedParameter]) -> 
 
 def _unexplained(rest: Unexplained, labels: Labels, of: int, *, several: bool) -> list[str]:
     """Return the line about what is unexplained, and those about its curve, indented."""
+    # Of one recording, what has no curve is periodic in time; of several, nothing has a curve.
+    periodic = of > 0 and rest.covariate == "time" and rest.curve is None
+    follows = f"{_the(rest.covariate, labels)}{' periodically' if periodic else ''}"
     line = (
         f"unexplained{f' in {rest.channel}' if several else ''}: {100 * rest.share_of_residual:.0f} % of the residual "
-        f"follows {_the(rest.covariate, labels)}{on_wheels(rest.wheels, of, labels.wheel)}, "
-        f"{rest.from_s:.0f} to {rest.to_s:.0f} s{f'; only {rest.range.statement}' if rest.range else ''}"
+        f"follows {follows}{on_wheels(rest.wheels, of, labels.wheel)}, {rest.from_s:.0f} to {rest.to_s:.0f} s"
+        f"{f'; only {rest.range.statement}' if rest.range else ''}"
     )
     return [line, *(f"  {each}" for each in _curve_lines(rest, labels))]
 
@@ -115,12 +118,19 @@ def _curve_lines(rest: Unexplained, labels: Labels) -> list[str]:
         return []
     curve = rest.curve
     reach = f"{curve.at[0]:.4g} to {curve.at[-1]:.4g}{_unit(curve.covariate_unit)}"
-    error = f"held-out error {curve.held_out_rmse_before:.5g} without it, {curve.held_out_rmse_after:.5g} with it"
-    lines = [f"empirical curve over {_the(rest.covariate, labels)}, {reach}: {error}"]
+    before = curve.held_out_rmse_before
+    error = _compared(curve.held_out_rmse_after, before)
+    lines = [f"empirical curve over {_the(rest.covariate, labels)}, {reach}: held-out error {error} with it"]
     for place, each in enumerate(rest.suggestions, 1):
         numbers = ", ".join(_value(name, one) for name, one in each.parameters.items())
-        lines.append(f"suggestion {place}: {each.equation}; {numbers}; held-out error {each.held_out_rmse:.5g}")
+        lines.append(f"suggestion {place}: {each.equation}; {numbers}; {_compared(each.held_out_rmse, before)}")
     return lines
+
+
+def _compared(error: float, without: float) -> str:
+    """Return how much smaller an error is than that without it."""
+    change = 100 * (1 - error / without) if without > 0 else 0.0
+    return f"{abs(change):.1f} % {'smaller' if change >= 0 else 'larger'}"
 
 
 def _value(name: str, parameter: Parameter) -> str:

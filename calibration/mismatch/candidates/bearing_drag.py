@@ -28,7 +28,11 @@ wear slows down, spalling accelerates)."""
 
 
 class BearingDrag(Candidate):
-    """Coulomb drag on one wheel, absent before its onset, constant or growing after it."""
+    """Coulomb drag on one wheel, absent before its onset, constant or growing after it.
+
+    g is 0 before the onset. After it, it is a step to 1, an exponential approach to 1, or a power of the time since the
+    onset that is 1 at the end of the recording: `drag_current` is the drag at the end.
+    """
 
     name = "bearing-drag"
     covariate = "time"

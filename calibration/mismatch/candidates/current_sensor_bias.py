@@ -20,12 +20,12 @@ class CurrentSensorBias(Candidate):
     name = "current-sensor-bias"
     covariate = "none"
     equation = "ΔI = I_0"
-    words = "an offset of one reading, whatever the direction"
+    words = "an offset of the current sensor, whatever the direction"
     signature = "one wheel's residual is constant and keeps its sign when the wheel reverses"
     experiment = "read the sensor at rest and without power, then run to and fro"
     experiment_one_way = "read the sensor at rest and without power, then run at several values of the {wheel_speed}"
     vary: ClassVar = ("direction",)
-    needs = "a predicted current"
+    needs = "a predicted column in A, mA, µA or kA"
     source = "data sheets of shunt amplifiers: offsets of milliamperes"
     along_motion = False
     coefficients: ClassVar = (Coefficient("offset", "{unit}", 0),)

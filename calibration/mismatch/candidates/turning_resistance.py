@@ -25,7 +25,10 @@ CREEP_SHARE = 0.1
 
 
 class TurningResistance(Candidate):
-    """Drag against each wheel's own rotation, and a moment: the outer side drives more, the inner one less."""
+    """Drag against each wheel's own rotation, and a moment: the outer side drives more, the inner one less.
+
+    g grows with the yaw rate, or with the slip angle (the yaw rate over the speed), in proportion or up to a limit.
+    """
 
     name = "turning-resistance"
     covariate = "yaw_rate"

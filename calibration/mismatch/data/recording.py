@@ -86,6 +86,15 @@ class Recording:
         found = self.channels.get(name)
         return np.full(self.shape, np.nan) if found is None else found
 
+    def rate_of_change(self, values: Array) -> Array:
+        """Return the change per second of values (time, wheel): central differences within each run."""
+        found = np.full(self.shape, np.nan)
+        for run in np.unique(self.run):
+            rows = self.run == run
+            if rows.sum() > 1:
+                found[rows] = np.gradient(values[rows], self.time_s[rows], axis=0)
+        return found
+
     def with_notes(self, *notes: str) -> Recording:
         """Return the recording with further notes."""
         return replace(self, notes=(*self.notes, *notes))

@@ -46,6 +46,7 @@ class Setting:
     channel: of the recording as the simulation gets it
     slope, intercept: shape (wheel,)
     low, high: the values that an experiment may have; of a covariate that changes sign with the direction, magnitudes
+    relative: whether the values are shares of the channel's usual reading
     """
 
     covariate: str
@@ -54,6 +55,7 @@ class Setting:
     intercept: Array
     low: float
     high: float
+    relative: bool = False
 
     def channel_at(self, values: Array) -> Array:
         """Return the channel, shape (time, wheel), where the covariate has these values, shape (time, 1)."""
@@ -158,7 +160,7 @@ def _load_like(problem: Problem, medians: Mapping[str, Array], speed: str | None
         return None
     one = np.ones(problem.mask.shape[1])
     # The torque as a share of the usual one: what the channel reads over its median.
-    return Setting("torque", channel, one / medians[channel], 0 * one, SMALLEST, LARGEST)
+    return Setting("torque", channel, one / medians[channel], 0 * one, SMALLEST, LARGEST, relative=True)
 
 
 def _ends(problem: Problem, name: str, values: Array) -> tuple[float, float] | None:

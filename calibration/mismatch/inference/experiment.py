@@ -135,7 +135,7 @@ def varied_by(candidate: Candidate, problem: Problem) -> tuple[str, ...]:
 def _range(problem: Problem, setting: Setting) -> str:
     """Return between which values a covariate is varied."""
     ends = f"{setting.low:.2g} to {setting.high:.2g}"
-    if setting.covariate == "torque":
+    if setting.relative:
         return f"{label_of_column(setting.channel).split(' (')[0]} {ends} times the usual"
     unit = unit_in_label(setting.covariate, problem.labels)
     return f"{word_for(setting.covariate, problem.labels)} {ends} {unit}".strip()

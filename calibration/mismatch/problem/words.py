@@ -49,14 +49,14 @@ def labels_of(
 ) -> dict[str, str]:
     """Return a label with its unit for each covariate: as stated, or as the column is called that it is.
 
-    `predicted` has the sizes of the predictions, by the name of the column.
+    `predicted` has the size of the prediction, by the name of its column; its label is that stated of `torque`, if any.
     """
     found = {}
     for name, values in covariates.items():
         if (column := column_of(values, channels)) is not None and quantity(column) != column:
             found[name] = label_of_column(column)
         elif (column := column_of(values, predicted)) is not None:
-            found[name] = f"predicted {label_of_column(column)}"
+            found[name] = stated.get("torque", f"predicted {label_of_column(column)}")
     return {**found, **stated}
 
 
@@ -132,6 +132,8 @@ def divided(unit: str, by: str, power: str = "") -> str:
     """
     if by in {"", "1"}:
         return unit
+    if by == unit and not power:
+        return "1"
     above, slash, below = by.partition("/")
     words = (above, below) if slash else (above,)
     if not all(map(UNIT_OF_ONE_WORD.fullmatch, words)) or (power and any(map(SUPERSCRIPT.search, words))):

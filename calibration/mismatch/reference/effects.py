@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from inspect import cleandoc
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.candidates.library import library
@@ -64,7 +65,8 @@ def _overview(candidates: Sequence[Candidate]) -> Iterator[str]:
 
 def _section(candidate: Candidate) -> Iterator[str]:
     yield f"## {candidate.label[:1].upper()}{candidate.label[1:]}\n"
-    yield f"`{candidate.name}`: {in_words(candidate.words, {})}.\n\n| | |\n|---|---|"
+    yield f"`{candidate.name}`: {in_words(candidate.words, {})}.\n\n{cleandoc(type(candidate).__doc__ or '')}\n"
+    yield "| | |\n|---|---|"
     yield from (f"| {name} | {_cell(text)} |" for name, text in _rows(candidate, {}, CHANNEL_UNIT))
     yield ""
 
@@ -77,6 +79,8 @@ def _rows(candidate: Candidate, labels: Mapping[str, str], unit: str) -> Iterato
     yield "parameters", ", ".join(_parameters(candidate, labels, unit))
     yield "in a residual", candidate.signature
     yield "experiment", in_words(candidate.experiment, labels)
+    if candidate.experiment_one_way:
+        yield "… one way only", in_words(candidate.experiment_one_way, labels)
     yield "source", candidate.source
 
 

@@ -75,7 +75,9 @@ def _part(answer: Answer, evidence: Evidence, *, alone: bool) -> ChannelPart:
         corrected=bool(answer.effects or answer.changes),
         map=sections.residual_map(answer, evidence, labels),
         curves=sections.curves(answer, evidence, labels),
-        effects=[sections.effect(effect, evidence, labels) for effect in answer.effects],
+        effects=[
+            sections.effect(effect, evidence, labels, several=len(answer.effects) > 1) for effect in answer.effects
+        ],
         unexplained=[sections.unexplained(place, evidence, labels) for place in answer.unexplained],
         fit=sections.fit(answer, evidence, labels),
         sensitivity=sections.sensitivity(answer, evidence, labels),

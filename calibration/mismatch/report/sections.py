@@ -167,16 +167,19 @@ def _curve(curve: Curve, answer: Answer, evidence: Evidence, labels: Labels) -> 
     return Figure(svg, labels.covariate(curve.covariate), labels.wheels(curve.wheels, evidence.wheels))
 
 
-def effect(found: Effect, evidence: Evidence, labels: Labels) -> EffectSection:
-    """Return one named effect: sentence, equation, facts and table."""
+def effect(found: Effect, evidence: Evidence, labels: Labels, *, several: bool = False) -> EffectSection:
+    """Return one named effect: sentence, equation, facts and table; `several`: there are others beside it."""
     factor, unit = labels.scaled(_unit_of(found, evidence))
     before, after = factor * found.rmse_before, factor * found.rmse_after
     change = f"{100 * (after / before - 1) if before else 0.0:+.1f}".replace("-", "−")
+    # It is of these wheels, and the other effects are added without this one too.
+    there = f" on {labels.wheels(found.wheels, evidence.wheels)}" if len(found.wheels) < len(evidence.wheels) else ""
+    beside = f"{there}{' beside the other effects' if several else ''}"
     facts = (
         labels.wheels(found.wheels, evidence.wheels),
         "constant" if found.covariate == "none" else f"depends on {labels.covariate(found.covariate)}",
         "" if found.onset_s is None else f"from {number(found.onset_s * labels.time_factor)} {labels.time_unit} on",
-        f"held-out error {number(before)} → {number(after)} {unit} ({change} %)",
+        f"held-out error{beside}: {number(before)} → {number(after)} {unit} ({change} %)",
     )
     return EffectSection(
         capital(labels.effect(found.name)),
@@ -218,7 +221,12 @@ def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> Unexp
         f"{100 * place.share_of_residual:.1f} % of the residual’s power",
     )
     curve = empirical_section(place, evidence, labels) if place.curve else None
-    return UnexplainedSection(labels.covariate(place.covariate), tuple(fact for fact in facts if fact), curve)
+    name = labels.covariate(place.covariate)
+    # Of one recording, what has no curve is periodic in time.
+    periodic = place.covariate == "time" and curve is None
+    return UnexplainedSection(
+        f"{name}, periodically" if periodic else name, tuple(fact for fact in facts if fact), curve
+    )
 
 
 def fit(answer: Answer, evidence: Evidence, labels: Labels) -> FitSection:

@@ -60,7 +60,8 @@ class Simulation:
     own_to_each_wheel: ClassVar[frozenset[str]] = frozenset()
     """Parameters of which each wheel has a deviation of its own (`Thresholds.own_share`) beside the common one."""
     parameter_effects: ClassVar[Mapping[str, str]] = {}
-    """Names of parameters as effects, for sets of effects that cannot be told apart."""
+    """For sets of effects that cannot be told apart: by parameter, the name of the effect that it is like, of the
+    library or a word of your own: {"friction_Nm": "coulomb-friction", "gain": "drive-gain"}."""
     unlikely_effects: ClassVar[frozenset[str]] = frozenset()
     """Names of candidates that this machine hardly has: each must gain `Thresholds.unlikely_penalty` more than others.
     Physics that it cannot have at all is left out of `candidates`."""

@@ -36,6 +36,8 @@ def _mistakes(simulation: Simulation) -> Iterator[str]:
     for name in ("unit", "wheel_column", "unloaded_experiment"):
         if not isinstance(getattr(simulation, name), str):
             yield f"{name} must be text, not {getattr(simulation, name)!r}"
+    if not isinstance(simulation.one_way, bool):
+        yield f"one_way must be True or False, not {simulation.one_way!r}"
     for name in ("inputs", "own_tables"):
         found = getattr(simulation, name)
         if not isinstance(found, tuple | list) or not all(isinstance(each, str) for each in found):
@@ -60,6 +62,17 @@ def _wrong_priors(simulation: Simulation) -> Iterator[str]:
     for name in simulation.own_to_each_wheel:
         if name not in simulation.parameters:
             yield f"own_to_each_wheel names {name}, which is no parameter; {did_you_mean(name, simulation.parameters)}"
+    yield from _wrong_parameter_effects(simulation)
+
+
+def _wrong_parameter_effects(simulation: Simulation) -> Iterator[str]:
+    found = simulation.parameter_effects
+    if not isinstance(found, Mapping) or not all(isinstance(name, str) for name in (*found, *found.values())):
+        yield f'parameter_effects must be a dict of names, {{"friction_Nm": "coulomb-friction"}}, not {found!r}'
+        return
+    for name in found:
+        if name not in simulation.parameters:
+            yield f"parameter_effects names {name}, which is no parameter; {did_you_mean(name, simulation.parameters)}"
 
 
 def _wrong_columns(simulation: Simulation) -> Iterator[str]:

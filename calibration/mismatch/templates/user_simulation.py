@@ -16,7 +16,12 @@ if TYPE_CHECKING:
 
 
 class Joint(Simulation):
-    """Inertia and viscous friction of one joint."""
+    """Inertia and viscous friction of one joint.
+
+    What else a class may state (several channels, errors and slower sensors of inputs, states, machines that run one
+    way, effects of its own): docs/how-to/simulation.md, or python -m pydoc regolithd.calibration.mismatch.Simulation.
+    What is looked for with it: regolithd mismatch --effects --simulation SIM.toml.
+    """
 
     channel, unit = "torque_Nm", "N·m"  # the recorded column that is predicted
     wheel_column = "axis"  # the column that tells several axes apart; a recording without it has one
@@ -35,4 +40,4 @@ class Joint(Simulation):
 
     def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
         """Return what left-out physics may depend on; `wheel_speed` is the speed that friction opposes."""
-        return {"time": inputs["t_s"], "wheel_speed": inputs["speed_rad_s"]}
+        return {"wheel_speed": inputs["speed_rad_s"]}

@@ -86,3 +86,15 @@ def test_what_is_no_recording_is_refused_with_a_reason(tmp_path: Path, text: str
     path.write_text(text)
     with pytest.raises(RecordingError, match=r"."):
         read_recording(path)
+
+
+def test_a_rate_of_change_does_not_reach_across_runs() -> None:
+    """Each run is differentiated by itself; one instant alone has no rate."""
+    table = {
+        "t_s": np.array([0.0, 1.0, 2.0, 0.0, 2.0, 4.0, 0.0]),
+        "run": np.array([1, 1, 1, 2, 2, 2, 3]),
+        "speed_rpm": np.array([0.0, 3.0, 6.0, 100.0, 90.0, 80.0, 7.0]),
+    }
+    found = from_columns(table)
+    rate = found.rate_of_change(found.channel("speed_rpm"))
+    np.testing.assert_allclose(rate[:, 0], [3.0, 3.0, 3.0, -5.0, -5.0, -5.0, np.nan])

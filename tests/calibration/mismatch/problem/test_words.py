@@ -41,6 +41,14 @@ def test_a_covariate_is_called_as_the_simulation_says_or_as_the_column_that_it_i
     assert found == {"wheel_speed": "belt speed (m/s)", "load": "pull of the rope (kN)"}
 
 
+def test_the_prediction_as_a_covariate_is_called_so_or_as_the_simulation_calls_the_torque() -> None:
+    """It is no column of its own."""
+    size = np.full((3, 1), 48.0)
+    covariates, predicted = {"pack": size.copy()}, {"pack_V": size}
+    assert labels_of({}, covariates, {}, predicted)["pack"] == "predicted pack (V)"
+    assert labels_of({"torque": "predicted voltage (V)"}, covariates, {}, predicted)["pack"] == "predicted voltage (V)"
+
+
 def test_an_instruction_has_the_machine_s_words() -> None:
     """A covariate in braces is replaced by its label without the unit, or by what it is called anywhere."""
     text = "hold the {wheel_speed}, then the {oil_pressure}"
@@ -83,6 +91,7 @@ def test_a_free_power_of_the_speed_stays_a_power(speed: str, unit: str) -> None:
     [
         ("V", "A", "", "V/A"),
         ("1", "°F", "", "1/°F"),
+        ("V", "V", "", "1"),
         ("A", "m", "³", "A/m³"),
         ("1", "A", "^p", "1/A^p"),
         ("bar", "m³/h", "²", "bar/(m³/h)²"),

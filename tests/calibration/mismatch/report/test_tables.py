@@ -68,5 +68,5 @@ def test_each_of_several_channels_has_its_own_drawings_and_findings() -> None:
     first, second = page.split("<h2>Where they differ")[1:]
     assert "Bearing drag" in first
     assert "Quadratic drag" not in first.split("<h2>Parameters")[0].split("<h2>Effects that this")[0]
-    assert "held-out error 3.2 → 2.1 N" in second
+    assert "held-out error: 3.2 → 2.1 N" in second
     assert "thrust_N</td>" in page

@@ -26,6 +26,7 @@ class Tank(Simulation):
     own_tables = ("tank",)
     parameters: ClassVar = {"area_m2": Prior(0.5, 0.01), "drain": Prior(1, 0)}
     own_to_each_wheel = frozenset({"drain"})
+    parameter_effects: ClassVar = {"drain": "leak"}
     sensors: ClassVar = {"pump_V": SensorError(relative=0.1)}
     between_readings: ClassVar = {"valve": "hold", "pump_V": "linear", "other": "blank"}
 
@@ -50,6 +51,14 @@ def test_what_is_stated_rightly_is_accepted() -> None:
         ("unit", 3, "unit must be text, not 3"),
         ("wheel_column", None, "wheel_column must be text, not None"),
         ("unloaded_experiment", 1.0, "unloaded_experiment must be text, not 1.0"),
+        ("one_way", "no", "one_way must be True or False, not 'no'"),
+        ("parameter_effects", ["drain"], "parameter_effects must be a dict of names"),
+        ("parameter_effects", {"drain": 3}, "parameter_effects must be a dict of names"),
+        (
+            "parameter_effects",
+            {"drian": "leak"},
+            "parameter_effects names drian, which is no parameter; did you mean drain?",
+        ),
         ("inputs", "pump_V", "inputs must be a tuple of names"),
         ("inputs", ("pump_V", 3), "inputs must be a tuple of names"),
         ("own_tables", {"tank"}, "own_tables must be a tuple of names"),
