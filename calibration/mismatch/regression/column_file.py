@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
 Single = NDArray[np.float32]
+Index = NDArray[np.int64]
 
 AT_ONCE_BYTES = 16 * 2**20
 """Bytes of columns that are in memory at once, at most (a choice: much longer pieces are no quicker)."""
@@ -34,10 +35,12 @@ class ColumnFile:
     ----------
     shape: of one column
     count: of columns
+    begins: each column's first instant that is not 0 on every wheel, shape (column,)
     """
 
     def __init__(self, wheels: int, instants: int) -> None:
         self.shape, self.count = (wheels, instants), 0
+        self.begins: Index = np.zeros(0, np.int64)
         self._file = tempfile.TemporaryFile(prefix="regolithd-", buffering=0)  # noqa: SIM115  # closed below
         weakref.finalize(self, self._file.close)
 
@@ -50,8 +53,8 @@ class ColumnFile:
     def _column_bytes(self) -> int:
         return 4 * self.shape[0] * self.shape[1]
 
-    def append(self, columns: Single) -> None:
-        """Write further columns, shape (column, wheel, time).
+    def append(self, columns: Single, begins: Index) -> None:
+        """Write further columns, shape (column, wheel, time), with the first instants at which they are not 0.
 
         Raises
         ------
@@ -70,20 +73,19 @@ class ColumnFile:
                 "set TMPDIR to a folder with more room"
             ) from error
         self.count += len(columns)
+        self.begins = np.concatenate((self.begins, begins))
 
-    def read(self, at: Sequence[int] | NDArray[np.int64]) -> Single:
+    def read(self, at: Sequence[int] | Index) -> Single:
         """Return some columns, shape (column, wheel, time)."""
         found = np.empty((len(at), *self.shape), np.float32)
         for first, last in _adjacent(at):
             self._fill(found[first:last], int(at[first]) * self._column_bytes)
         return found
 
-    def part(self, count: int, wheel: int, first: int, last: int) -> Single:
-        """Return the first `count` columns on a wheel from one place in time to another, shape (column, time)."""
-        found = np.empty((count, last - first), np.float32)
-        for column, row in enumerate(found):
-            self._fill(row, column * self._column_bytes + 4 * (wheel * self.shape[1] + first))
-        return found
+    def read_part(self, found: Single, at: Sequence[int] | Index, wheel: int, first: int) -> None:
+        """Fill an array (column, time) with some columns on a wheel, from a place in time on."""
+        for row, column in zip(found, at, strict=True):
+            self._fill(row, int(column) * self._column_bytes + 4 * (wheel * self.shape[1] + first))
 
     def _fill(self, values: Single, offset: int) -> None:
         left = values.reshape(-1).data.cast("B")
@@ -92,7 +94,7 @@ class ColumnFile:
             left, offset = left[read:], offset + read
 
 
-def _adjacent(at: Sequence[int] | NDArray[np.int64]) -> Iterator[tuple[int, int]]:
+def _adjacent(at: Sequence[int] | Index) -> Iterator[tuple[int, int]]:
     """Yield the stretches of places that follow each other: from where, to before where."""
     ends = [*(np.flatnonzero(np.diff(np.asarray(at)) != 1) + 1).tolist(), len(at)]
     first = 0

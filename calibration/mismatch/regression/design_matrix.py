@@ -139,7 +139,7 @@ class DesignMatrix:
         file = self._as_read if whitening is NOT_WHITENED else ColumnFile(*self._as_read.shape)
         other = replace(self, whitening=whitening, _whitened=file)
         residual = other.whitened(self.residual_as_read)
-        sums = Sums(file, residual, self.cuts)
+        sums = Sums(file, residual, self.order, self.cuts)
         return replace(other, residual=residual, energy=_energy(residual, self.cuts), _sums=sums)
 
     def with_groups(self, groups: Sequence[Group]) -> DesignMatrix:
@@ -156,7 +156,7 @@ class DesignMatrix:
         scale = np.where(scale > 0, scale, 1.0)
         fresh /= scale[:, None, None].astype(np.float32)
         places = np.arange(self._as_read.count, self._as_read.count + len(fresh))
-        self._as_read.append(fresh)
+        self._as_read.append(fresh, _begins(fresh, self.order))
         grown = replace(self, scale=np.concatenate((self.scale, scale)), _places=np.concatenate((self._places, places)))
         return grown, tuple(range(self.size, grown.size))
 
@@ -166,7 +166,7 @@ class DesignMatrix:
         while whitened.count < as_read.count:
             first = whitened.count
             part = np.arange(first, min(first + as_read.at_once, as_read.count))
-            whitened.append(self.whitened(as_read.read(part)))
+            whitened.append(self.whitened(as_read.read(part)), as_read.begins[part])
 
 
 def empty_design(problem: Problem, folds: Index) -> DesignMatrix:
@@ -191,7 +191,7 @@ def empty_design(problem: Problem, folds: Index) -> DesignMatrix:
         _places=np.zeros(0, np.int64),
         _as_read=columns,
         _whitened=columns,
-        _sums=Sums(columns, residual, cuts),
+        _sums=Sums(columns, residual, order, cuts),
     )
 
 
@@ -219,6 +219,15 @@ def _arranged(problem: Problem, order: Index, columns: Sequence[Array]) -> Singl
     for row, column in zip(found, columns, strict=True):
         row[:] = np.where(problem.mask, column, 0.0).astype(np.float32)[order].T
     return found
+
+
+def _begins(columns: Single, order: Index) -> Index:
+    """Return the first instant at which a column (wheel, time in the order of folds) is not 0, shape (column,).
+
+    What is whitened later is 0 until then as well.
+    """
+    acting = columns.any(axis=1)
+    return np.asarray(np.min(np.where(acting, order, len(order)), axis=1), np.int64)
 
 
 def _folds_of(values: NDArray[Any], cuts: Index) -> list[NDArray[Any]]:

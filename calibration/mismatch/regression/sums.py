@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from regolithd.calibration.mismatch.regression.column_file import ColumnFile
 
 Array = NDArray[np.float64]
@@ -22,8 +24,10 @@ Index = NDArray[np.int64]
 
 MANY = 256
 """New columns from which on the products of all columns are summed at once (a choice: the grid, and no proposals)."""
-LONGEST_PIECE = 4096
-"""Instants that are multiplied at once (a choice: about ten MiB of columns)."""
+LONGEST_PART = 8192
+"""Instants of all columns that are in memory at once (a choice: about 25 MiB)."""
+LONGEST_PIECE = 512
+"""Instants that are multiplied at once (a choice: of shorter pieces a product of matrices takes longer for each)."""
 ROOM = 64
 """Later columns for which room is made at once."""
 
@@ -31,9 +35,9 @@ ROOM = 64
 class Sums:
     """Sums of products of the columns of a file with each other and with a residual, in float32 as the columns are."""
 
-    def __init__(self, columns: ColumnFile, residual: Single, cuts: Index) -> None:
-        """Take columns and residual (wheel, time in the order of folds), and where the folds begin and end."""
-        self._columns, self._residual = columns, residual
+    def __init__(self, columns: ColumnFile, residual: Single, order: Index, cuts: Index) -> None:
+        """Take columns and residual (wheel, time in the order of folds), that order, and where the folds begin."""
+        self._columns, self._residual, self._order = columns, residual, order
         self._folds = [(int(a), int(b)) for a, b in pairwise(cuts)]
         self.forget()
 
@@ -41,6 +45,8 @@ class Sums:
         """Free the memory; what is asked for again is summed again."""
         leading = len(self._folds), self._columns.shape[0]
         self._square: Single = np.zeros((*leading, 0, 0), np.float32)
+        self._rank: Index = np.zeros(0, np.int64)
+        """Of each column that `_square` has, its row there."""
         self._moment: Array = np.zeros((*leading, 0))
         self._later: Single = np.zeros((*leading, 0, 0), np.float32)
         self._known: NDArray[np.bool_] = np.zeros((0, 0), np.bool_)
@@ -52,14 +58,16 @@ class Sums:
         self._sum_new()
         first = self._square.shape[-1]
         if max(rows.max(initial=0), columns.max(initial=0)) < first:
-            return self._square[:, :, rows[:, None], columns]
+            return self._square[:, :, self._rank[rows][:, None], self._rank[columns]]
         early, later = np.flatnonzero(rows < first), np.flatnonzero(rows >= first)
         of_early, of_later = np.flatnonzero(columns < first), np.flatnonzero(columns >= first)
         self._sum_later(rows[later], columns)
         self._sum_later(columns[of_later], rows[early])
         found = np.empty((*self._square.shape[:2], len(rows), len(columns)), np.float32)
         found[:, :, later] = self._later[:, :, (rows[later] - first)[:, None], columns]
-        found[:, :, early[:, None], of_early] = self._square[:, :, rows[early][:, None], columns[of_early]]
+        found[:, :, early[:, None], of_early] = self._square[
+            :, :, self._rank[rows[early]][:, None], self._rank[columns[of_early]]
+        ]
         mirrored = self._later[:, :, (columns[of_later] - first)[:, None], rows[early]]
         found[:, :, early[:, None], of_later] = np.swapaxes(mirrored, 2, 3)
         return found
@@ -86,7 +94,7 @@ class Sums:
         first = self._square.shape[-1]
         own = np.concatenate(
             (
-                np.diagonal(self._square, axis1=2, axis2=3),
+                np.diagonal(self._square, axis1=2, axis2=3)[:, :, self._rank],
                 np.diagonal(self._later[:, :, : self._summed - first, first:], axis1=2, axis2=3),
             ),
             axis=2,
@@ -100,7 +108,7 @@ class Sums:
             return
         if now - before >= MANY:
             self.forget()
-            self._square, self._moment = self._all(now)
+            self._sum_all(now)
         else:
             self._make_room(now)
             fresh = np.arange(before, now)
@@ -112,19 +120,36 @@ class Sums:
             self._keep(fresh, fresh, self._of(values, fresh))
         self._summed = now
 
-    def _all(self, count: int) -> tuple[Single, Array]:
-        """Return the products of all columns with each other and with the residual, in one walk over the file."""
-        wheels = self._columns.shape[0]
-        square: Single = np.zeros((len(self._folds), wheels, count, count), np.float32)
+    def _sum_all(self, count: int) -> None:
+        """Sum the products of all columns with each other and with the residual, in one walk over the file.
+
+        What changes at some time is 0 before. Columns are sorted by that, so that those which are not 0 in a piece of
+        time are the first ones: only they are multiplied.
+        """
+        by_begin = np.argsort(self._columns.begins[:count], kind="stable")
+        begins, self._rank = self._columns.begins[by_begin], np.argsort(by_begin)
+        wheels, instants = self._columns.shape
+        self._square = np.zeros((len(self._folds), wheels, count, count), np.float32)
         moment: Array = np.zeros((len(self._folds), wheels, count))
-        for fold, (first, last) in enumerate(self._folds):
-            for wheel in range(wheels):
-                for a in range(first, last, LONGEST_PIECE):
-                    b = min(a + LONGEST_PIECE, last)
-                    part = self._columns.part(count, wheel, a, b)
-                    square[fold, wheel] += part @ part.T
-                    moment[fold, wheel] += part @ self._residual[wheel, a:b]
-        return square, moment
+        room: Single = np.empty((count, min(LONGEST_PART, instants)), np.float32)
+        for wheel in range(wheels):
+            for first in range(0, instants, LONGEST_PART):
+                last = min(first + LONGEST_PART, instants)
+                part = room[:, : last - first]
+                self._columns.read_part(part, by_begin, wheel, first)
+                for fold, a, b in self._pieces(first, last):
+                    begun = int(np.searchsorted(begins, self._order[b - 1], side="right"))
+                    piece = part[:begun, a - first : b - first]
+                    self._square[fold, wheel, :begun, :begun] += piece @ piece.T
+                    moment[fold, wheel, :begun] += piece @ self._residual[wheel, a:b]
+        self._moment = moment[:, :, self._rank]
+
+    def _pieces(self, first: int, last: int) -> Iterator[tuple[int, int, int]]:
+        """Yield pieces between two places in time, each in one fold: its fold, and where it begins and ends."""
+        for fold, (begin, end) in enumerate(self._folds):
+            low, high = max(begin, first), min(end, last)
+            cuts = np.linspace(low, high, -(-(high - low) // LONGEST_PIECE) + 1) if low < high else ()
+            yield from ((fold, int(a), int(b)) for a, b in pairwise(cuts))
 
     def _sum_later(self, later: Index, columns: Index) -> None:
         """Sum the products of later columns with others that are not known yet."""

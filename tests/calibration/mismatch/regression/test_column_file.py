@@ -14,13 +14,14 @@ from regolithd.calibration.mismatch.errors import MismatchError
 from regolithd.calibration.mismatch.regression.column_file import AT_ONCE_BYTES, ColumnFile
 
 COLUMNS = np.random.default_rng(0).normal(size=(7, 2, 50)).astype(np.float32)
+BEGINS = np.arange(7)
 
 
 def written() -> ColumnFile:
     """Return a file with all columns, written in two parts."""
     file = ColumnFile(2, 50)
-    file.append(COLUMNS[:3])
-    file.append(COLUMNS[3:])
+    file.append(COLUMNS[:3], BEGINS[:3])
+    file.append(COLUMNS[3:], BEGINS[3:])
     return file
 
 
@@ -33,8 +34,10 @@ def test_columns_come_back_in_any_order() -> None:
 
 
 def test_a_part_of_time_comes_back_for_one_wheel() -> None:
-    """Of as many columns as are asked for."""
-    np.testing.assert_array_equal(written().part(6, 1, 10, 35), COLUMNS[:6, 1, 10:35])
+    """Of the columns that are asked for."""
+    found = np.empty((3, 25), np.float32)
+    written().read_part(found, [4, 0, 5], 1, 10)
+    np.testing.assert_array_equal(found, COLUMNS[[4, 0, 5], 1, 10:35])
 
 
 def test_long_columns_are_few_at_once() -> None:
@@ -52,7 +55,7 @@ def test_a_full_disk_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None
     file = written()
     monkeypatch.setattr(os, "pwrite", full)
     with pytest.raises(MismatchError, match=r"do not fit into .* \(No space left on device\); set TMPDIR"):
-        file.append(COLUMNS)
+        file.append(COLUMNS, BEGINS)
 
 
 def test_the_file_is_gone_with_its_object() -> None:

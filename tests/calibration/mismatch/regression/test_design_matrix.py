@@ -101,6 +101,21 @@ def test_products_of_later_columns_are_those_of_all_at_once(
     np.testing.assert_allclose(design.own_products([2, 7], [0, 3]), at_once.own_products([2, 7], [0, 3]), atol=1e-3)
 
 
+def test_columns_that_begin_later_have_the_same_products(empty: DesignMatrix, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In short pieces too, and after they were whitened: they are left out only where they are 0."""
+    for name, value in {"MANY": 1, "LONGEST_PIECE": 7, "LONGEST_PART": 60}.items():
+        monkeypatch.setattr(sums, name, value)
+    later = np.arange(INSTANTS)[:, None] >= INSTANTS // 2
+    design, _ = empty.extended([np.where(later, COLUMNS[0], 0.0), COLUMNS[1], np.where(later, COLUMNS[2], 0.0)])
+    for each in (design, design.whitened_by(Whitening(np.array([0.5]), np.array([1.1])))):
+        columns = each.columns(range(3)).astype(np.float64)
+        for fold, (a, b) in enumerate(zip(each.cuts[:-1], each.cuts[1:], strict=True)):
+            explicit = np.einsum("cwt,dwt->wcd", columns[..., a:b], columns[..., a:b])
+            np.testing.assert_allclose(gram_of(each)[fold], explicit, rtol=1e-4, atol=1e-3)
+            moment = np.einsum("cwt,wt->wc", columns[..., a:b], each.residual[:, a:b])
+            np.testing.assert_allclose(each.moment[fold], moment, rtol=1e-4, atol=1e-3)
+
+
 def test_sums_that_were_forgotten_are_summed_again(empty: DesignMatrix) -> None:
     """Under another whitening the first sums need no memory, and are there when they are asked for."""
     design, _ = empty.extended(COLUMNS)
