@@ -9,6 +9,7 @@ recording, so that a signal that jumps is hardly smoothed. With a stated error o
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,11 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.prior import SensorError
 
 Array = NDArray[np.float64]
+
+SETTLED = 1e-15
+"""Relative change of a variance from one instant to the next, up to which it is settled: a few roundings."""
+NEGLIGIBLE = 1e-20
+"""Factor of what was added so many instants before, below which it no longer counts: less than rounding."""
 
 
 def expected_inputs(recording: Recording, sensors: Mapping[str, SensorError]) -> Recording:
@@ -58,13 +64,15 @@ def conditional_expectation(values: Array, error_variance: Array, starts: NDArra
     mean = np.array([np.mean(c[k]) if k.any() else 0.0 for c, k in zip(values.T, known.T, strict=True)])
     centred = np.where(known, values - mean, 0.0)
     persistence, variance = _autoregression(centred, known, error_variance)
-    estimate, spread, predicted = _filtered(centred, known, persistence, variance, error_variance, set(starts.tolist()))
-    smooth = estimate.copy()
-    for t in range(len(values) - 2, -1, -1):
-        if t + 1 in starts:
-            continue
-        gain = spread[t] * persistence / predicted[t + 1]
-        smooth[t] += gain * (smooth[t + 1] - persistence * estimate[t])
+    predicted, spread = _variances(known, persistence, variance, error_variance, starts)
+    gain = np.where(known, predicted / (predicted + error_variance + 1e-300), 0.0)
+    kept = (1 - gain) * persistence
+    kept[starts] = 0.0
+    estimate = _recursion(kept, gain * centred)
+    back = np.zeros_like(spread)
+    back[:-1] = spread[:-1] * persistence / predicted[1:]
+    back[starts[starts > 0] - 1] = 0.0
+    smooth = _recursion(back[::-1], ((1 - back * persistence) * estimate)[::-1])[::-1]
     return np.where(known, smooth + mean, np.nan)
 
 
@@ -87,21 +95,41 @@ def _autoregression(centred: Array, known: NDArray[np.bool_], error_variance: Ar
     return np.where(np.isnan(moved), 1 - 1e-3, moved), variance
 
 
-def _filtered(
-    centred: Array, known: NDArray[np.bool_], persistence: Array, variance: Array, error: Array, starts: set[int]
-) -> tuple[Array, Array, Array]:
-    """Return the filter's estimates, their variances, and the variances before each reading."""
-    estimate, spread, predicted = (np.empty_like(centred) for _ in range(3))
-    innovation = (1 - persistence**2) * variance
-    state, doubt = np.zeros_like(variance), variance.copy()
-    for t in range(len(centred)):
-        if t in starts:
-            state, doubt = np.zeros_like(variance), variance
-        elif t:
-            state, doubt = persistence * state, persistence**2 * doubt + innovation
-        predicted[t] = doubt
-        gain = np.where(known[t], doubt / (doubt + error + 1e-300), 0.0)
-        state = state + gain * (centred[t] - state)
-        doubt = (1 - gain) * doubt
-        estimate[t], spread[t] = state, doubt
-    return estimate, spread, predicted
+def _variances(
+    known: NDArray[np.bool_], persistence: Array, variance: Array, error: Array, starts: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """Return the variance of the filter's estimate before and after each reading, shape (time, column).
+
+    They depend on what is known, not on the readings. Where that does not change they settle, and then stay.
+    """
+    predicted, spread = np.empty(known.shape), np.empty(known.shape)
+    innovation, begins = (1 - persistence**2) * variance, set(starts.tolist())
+    changes = np.flatnonzero(np.any(known[1:] != known[:-1], axis=1)) + 1
+    cuts = np.unique(np.concatenate(([0], changes, starts, [len(known)])))
+    doubt = variance
+    for first, last in pairwise(cuts.tolist()):
+        before = np.full(variance.shape, np.inf)
+        for t in range(first, last):
+            doubt = variance if t in begins else doubt
+            after = np.where(known[t], (1 - doubt / (doubt + error + 1e-300)) * doubt, doubt)
+            predicted[t], spread[t] = doubt, after
+            settled = np.all(np.abs(after - before) <= SETTLED * after)
+            before, doubt = after, persistence**2 * after + innovation
+            if settled:
+                predicted[t:last], spread[t:last] = doubt, after
+                break
+    return predicted, spread
+
+
+def _recursion(factor: Array, added: Array) -> Array:
+    """Return y(t) = factor(t) y(t − 1) + added(t), shape (time, column), from 0 before the first instant.
+
+    By doubling: after k passes, each y has what was added in the last 2^k instants.
+    """
+    factor, total, reach = factor.copy(), added.copy(), 1
+    while reach < len(total) and np.any(np.abs(factor) > NEGLIGIBLE):
+        total[reach:] += factor[reach:] * total[:-reach]
+        factor[reach:] *= factor[:-reach].copy()
+        factor[:reach] = 0.0
+        reach *= 2
+    return total
