@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         Answer,
         CalibratedParameter,
         FitImprovement,
+        Indistinguishable,
         Parameter,
         Unexplained,
     )
@@ -70,14 +71,19 @@ def _lines(answer: Answer, labels: Labels, wheels: Sequence[int | str]) -> list[
         ),
         *map(_moved, moved),
         *(line for rest in answer.unexplained for line in _unexplained(rest, labels, len(wheels), several=several)),
-        *(
-            f"{' or '.join(pair.effects)}: this recording does not distinguish them. {pair.experiment}"
-            for pair in answer.indistinguishable
-        ),
+        *(_not_distinguished(each, {effect.name for effect in answer.effects}) for each in answer.indistinguishable),
         sure_of(answer),
         *map(_error, answer.fits or (answer.fit,)),
         *(f"note: {note}" for note in _other_notes(answer.notes, moved)),
     ]
+
+
+def _not_distinguished(found: Indistinguishable, named: set[str]) -> str:
+    """Return a set of effects with its experiment; one that has no named effect says what would be, were one there."""
+    names = " or ".join(found.effects)
+    if named.intersection(found.effects):
+        return f"{names}: this recording does not distinguish them. {found.experiment}"
+    return f"{names}, were one of them there: this recording would not distinguish them. {found.experiment}"
 
 
 def _moved(parameter: CalibratedParameter) -> str:
@@ -98,18 +104,13 @@ def _unexplained(rest: Unexplained, labels: Labels, of: int, *, several: bool) -
     """Return the line about what is unexplained, and those about its curve, indented."""
     # Of one recording, what has no curve is periodic in time; of several, nothing has a curve.
     periodic = of > 0 and rest.covariate == "time" and rest.curve is None
-    follows = f"{_the(rest.covariate, labels)}{' periodically' if periodic else ''}"
+    follows = f"{labels.the(rest.covariate)}{' periodically' if periodic else ''}"
     line = (
         f"unexplained{f' in {rest.channel}' if several else ''}: {100 * rest.share_of_residual:.0f} % of the residual "
         f"follows {follows}{on_wheels(rest.wheels, of, labels.wheel)}, {rest.from_s:.0f} to {rest.to_s:.0f} s"
         f"{f'; only {rest.range.statement}' if rest.range else ''}"
     )
     return [line, *(f"  {each}" for each in _curve_lines(rest, labels))]
-
-
-def _the(covariate: str, labels: Labels) -> str:
-    """Return a covariate with its article: "the belt speed", "time"."""
-    return "time" if covariate == "time" else f"the {labels.covariate(covariate)}"
 
 
 def _curve_lines(rest: Unexplained, labels: Labels) -> list[str]:
@@ -120,7 +121,7 @@ def _curve_lines(rest: Unexplained, labels: Labels) -> list[str]:
     reach = f"{curve.at[0]:.4g} to {curve.at[-1]:.4g}{_unit(curve.covariate_unit)}"
     before = curve.held_out_rmse_before
     error = _compared(curve.held_out_rmse_after, before)
-    lines = [f"empirical curve over {_the(rest.covariate, labels)}, {reach}: held-out error {error} with it"]
+    lines = [f"empirical curve over {labels.the(rest.covariate)}, {reach}: held-out error {error} with it"]
     for place, each in enumerate(rest.suggestions, 1):
         numbers = ", ".join(_value(name, one) for name, one in each.parameters.items())
         lines.append(f"suggestion {place}: {each.equation}; {numbers}; {_compared(each.held_out_rmse, before)}")

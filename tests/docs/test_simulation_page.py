@@ -101,5 +101,5 @@ def test_the_whole_example_names_what_its_recording_conceals(fans: dict[str, Any
     assert loss.unit == "Pa s⁵/m⁶"
     assert friction.parameters["viscous_coefficient"].unit == "A/rpm^p"
     told = [*answer.notes, *(one.experiment for one in answer.indistinguishable)]
-    assert any("filter-clogging (needs the channel rise_Pa)" in note for note in told)
+    assert any("without the channel rise_Pa: filter-clogging" in note for note in told)
     assert not any("to and fro" in text or "both ways" in text for text in told)

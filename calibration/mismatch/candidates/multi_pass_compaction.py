@@ -40,7 +40,7 @@ class MultiPassCompaction(Candidate):
     experiment = "drive one virgin lane, then twice more in the same ruts"
     source = "multi-pass tests on sand: most of the compaction in the first pass"
     requires = ("torque",)
-    needs = "wheels one behind the other: row of the simulation"
+    needs = "wheels one behind the other (row of the simulation)"
     acts_unloaded = False
     coefficients: ClassVar = (
         Coefficient("relative_change_per_pass", "1", 0),

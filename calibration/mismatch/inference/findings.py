@@ -16,6 +16,7 @@ from regolithd.calibration.mismatch.answer import (
     Unexplained,
 )
 from regolithd.calibration.mismatch.changes import ChangedSize, change_in_words, changes_of
+from regolithd.calibration.mismatch.experiments.drives import DIRECTION
 from regolithd.calibration.mismatch.inference.alternatives import alternatives
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values, wheel_names
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
@@ -24,7 +25,7 @@ from regolithd.calibration.mismatch.inference.located import share_of_residual, 
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
 from regolithd.calibration.mismatch.inference.ranges import range_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
-from regolithd.calibration.mismatch.inference.statements import statement
+from regolithd.calibration.mismatch.inference.statements import listed, statement
 from regolithd.calibration.mismatch.problem.words import in_words
 from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
@@ -32,7 +33,7 @@ from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.answer import Change, Verdict
+    from regolithd.calibration.mismatch.answer import Change, Indistinguishable, Verdict
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors
     from regolithd.calibration.mismatch.problem.problem import Problem
@@ -71,6 +72,7 @@ def answer_of(
             *map(change_in_words, changes),
             *problem.recording.notes,
             *_about_the_mask(problem),
+            *one_way_only(problem, sets),
             *_not_looked_for(problem, candidates, [candidate.name for candidate in applicable]),
         ),
     )
@@ -193,16 +195,33 @@ def _beyond_prior_in_words(parameter: CalibratedParameter) -> str:
 
 
 def _not_looked_for(problem: Problem, candidates: Sequence[Candidate], applicable: Sequence[str]) -> list[str]:
-    """Return a note of the candidates that this recording or simulation does not allow, by what they lack."""
-    lacking: dict[str, list[str]] = {}
+    """Return notes of the candidates that this recording or simulation does not allow, by what they lack.
+
+    Missing covariates are in one note; what else the machine lacks is in one each, as channels differ in it.
+    """
+    covariates: dict[str, list[str]] = {}
+    others: dict[str, list[str]] = {}
     for candidate in candidates:
         if candidate.name not in applicable:
             missing = [name for name in candidate.requires if name not in problem.covariates]
             told = [f"{name} that varies" if name in problem.constants else name for name in missing]
-            needs = ", ".join(told) or candidate.needs or "another kind of machine"
-            lacking.setdefault(needs, []).append(candidate.name)
-    if not lacking:
-        return []
+            lacking = covariates.setdefault(listed(told), []) if told else others.setdefault(candidate.needs, [])
+            lacking.append(candidate.name)
+    parts = [f"without {needs}: {', '.join(names)}" for needs, names in covariates.items()]
     return [
-        "Not looked for: " + "; ".join(f"{', '.join(names)} (needs {needs})" for needs, names in lacking.items()) + "."
+        *([f"Not looked for {'; '.join(parts)}."] if parts else []),
+        *(
+            f"Not looked for without {needs or 'another kind of machine'}: {', '.join(names)}."
+            for needs, names in others.items()
+        ),
     ]
+
+
+def one_way_only(problem: Problem, sets: Sequence[Indistinguishable]) -> list[str]:
+    """Return a note where an experiment asks for a reversal, and the recording has none."""
+    if problem.simulation.one_way is not None or not any(DIRECTION in one.vary for one in sets):
+        return []
+    ways = np.unique(problem.covariates[DIRECTION][problem.mask])
+    if {-1.0, 1.0} <= set(ways.tolist()):
+        return []
+    return ["The motion is one way only: state in one_way whether the machine can reverse, as an experiment asks for."]

@@ -77,8 +77,8 @@ class Predictor(Protocol):
         """How to run the machine without its load, as an instruction; empty where that cannot be done."""
 
     @property
-    def one_way(self) -> bool:
-        """Whether the machine runs one way only."""
+    def one_way(self) -> bool | None:
+        """Whether the machine runs one way only; None: not said."""
 
     @property
     def experiment_spans(self) -> Mapping[str, float]:

@@ -21,7 +21,7 @@ COVARIATES = {
     "direction": "direction of motion",
     "torque": "predicted value",
     "wheel_acceleration": "acceleration",
-    "wheel_angle": "angle",
+    "wheel_angle": "angle of rotation",
     "voltage": "bus voltage",
     "wheel_row": "row",
     "none": "nothing (a constant)",

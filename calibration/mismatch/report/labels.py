@@ -87,6 +87,10 @@ class Labels:
         """Return a covariate's name in a sentence, without its unit."""
         return self.axis(name).split(" (")[0] if name != "none" else COVARIATES[name]
 
+    def the(self, name: str) -> str:
+        """Return a covariate's name with its article, if it has one: "the belt speed", "time"."""
+        return self.covariate(name) if name in {"time", "none"} else f"the {self.covariate(name)}"
+
     def parameter(self, effect: str, name: str) -> str:
         """Return the label of an effect's parameter."""
         candidate = self.candidates.get(effect)
@@ -121,7 +125,7 @@ def _left_out_sentence(answer: Answer, labels: Labels) -> str:
     names = list(dict.fromkeys(labels.effect(effect.name) for effect in answer.effects))
     if answer.verdict == "missing-physics":
         return f"The simulation leaves out {listed(names)}." if names else ""
-    covariates = list(dict.fromkeys(labels.covariate(place.covariate) for place in answer.unexplained))
+    covariates = list(dict.fromkeys(labels.the(place.covariate) for place in answer.unexplained))
     place = f" that depends on {listed(covariates)}" if covariates else ""
     if names:
         return f"The simulation leaves out {listed(names)} – and something{place} that no known effect explains."

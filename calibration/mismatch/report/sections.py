@@ -177,7 +177,7 @@ def effect(found: Effect, evidence: Evidence, labels: Labels, *, several: bool =
     beside = f"{there}{' beside the other effects' if several else ''}"
     facts = (
         labels.wheels(found.wheels, evidence.wheels),
-        "constant" if found.covariate == "none" else f"depends on {labels.covariate(found.covariate)}",
+        "constant" if found.covariate == "none" else f"depends on {labels.the(found.covariate)}",
         "" if found.onset_s is None else f"from {number(found.onset_s * labels.time_factor)} {labels.time_unit} on",
         f"held-out error{beside}: {number(before)} → {number(after)} {unit} ({change} %)",
     )
@@ -211,17 +211,16 @@ def _unit_of(found: Effect, evidence: Evidence) -> str:
 
 
 def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> UnexplainedSection:
-    """Return one structure that no candidate explains: channel, wheels, time, and share of the residual's power."""
+    """Return one structure that no candidate explains: range, wheels, time, and share of the residual's power."""
     first, last = (number(each * labels.time_factor) for each in (place.from_s, place.to_s))
     facts = (
         f"only {place.range.statement}".replace(" %", NO_BREAK + "%") if place.range else "",
-        place.channel,
         labels.wheels(place.wheels, evidence.wheels),
         f"{first} to {last} {labels.time_unit}",
         f"{100 * place.share_of_residual:.1f} % of the residual’s power",
     )
     curve = empirical_section(place, evidence, labels) if place.curve else None
-    name = labels.covariate(place.covariate)
+    name = labels.the(place.covariate)
     # Of one recording, what has no curve is periodic in time.
     periodic = place.covariate == "time" and curve is None
     return UnexplainedSection(

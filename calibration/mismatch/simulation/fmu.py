@@ -188,9 +188,9 @@ def _mapped(tables: Mapping[str, Any], known: Mapping[str, Any], path: Path) -> 
     return dict(stated)
 
 
-def _stated_flag(table: Mapping[str, Any], name: str) -> bool:
-    value = table.get(name, False)
-    if not isinstance(value, bool):
+def _stated_flag(table: Mapping[str, Any], name: str) -> bool | None:
+    value = table.get(name)
+    if not isinstance(value, bool | None):
         raise SimulationError(f"[simulation] {name} must be true or false, not {value!r}", ("simulation", name))
     return value
 

@@ -82,6 +82,7 @@ class RoverWheel(Simulation):
 
     undefined_at_times: ClassVar = frozenset({"slip", "load", "place"})  # a wheel that stands, or hangs in the air
     unlikely_effects = frozenset({"quadratic-drag"})  # air at 0.1 m/s: some 10 µN
+    one_way = False
     unloaded_experiment = "lift the wheels and spin all six at several speeds, both ways"
     # Slopes of 6° and 4°, arcs of 1 m and more at a few cm/s, half a day's warming, a sledge.
     experiment_spans: ClassVar = {"pitch": 0.1, "roll": 0.07, "yaw_rate": 0.03, "temperature": 15.0, "slip": 0.04}

@@ -69,8 +69,8 @@ class Simulation:
     """Axis labels with units for the report, by covariate: {"wheel_speed": "carriage speed (m/s)"}."""
     unloaded_experiment: ClassVar[str] = ""
     """How to run the machine without its load, as an instruction: what free parameters of the load hide shows there."""
-    one_way: bool = False
-    """Whether the machine runs one way only (a pump, a fan): then no experiment asks for a reversal."""
+    one_way: bool | None = None
+    """Whether the machine runs one way only (a pump, a fan): then no experiment asks for a reversal. None: not said."""
     experiment_spans: ClassVar[Mapping[str, float]] = {}
     """How far from its usual value, each way, an experiment can move a covariate: {"temperature": 15.0, "pitch": 0.1}.
     Where nothing is said, a speed, load, torque or slip is varied from half to one and a half times the usual one, and

@@ -36,7 +36,7 @@ def _mistakes(simulation: Simulation) -> Iterator[str]:
     for name in ("unit", "wheel_column", "unloaded_experiment"):
         if not isinstance(getattr(simulation, name), str):
             yield f"{name} must be text, not {getattr(simulation, name)!r}"
-    if not isinstance(simulation.one_way, bool):
+    if not isinstance(simulation.one_way, bool | None):
         yield f"one_way must be True or False, not {simulation.one_way!r}"
     for name in ("inputs", "own_tables"):
         found = getattr(simulation, name)

@@ -30,7 +30,10 @@ def test_mismatch_prints_the_answer() -> None:
             Unexplained("current", (1, 4), "time", 3.4, 99.6, 0.123),
             Unexplained("current", (1,), "height", 0.0, 9.0, 0.4, curve=CURVE, suggestions=SUGGESTIONS),
         ],
-        indistinguishable=[SimpleNamespace(effects=("one", "other"), experiment="Drive backwards.")],
+        indistinguishable=[
+            SimpleNamespace(effects=("coulomb-friction", "other"), experiment="Drive backwards."),
+            SimpleNamespace(effects=("one", "other"), experiment="Drive fast."),
+        ],
         fit=SimpleNamespace(
             channel="current", held_out_rmse_before=0.00412345, held_out_rmse_after=0.001, noise_floor_rmse=0.0009
         ),
@@ -53,7 +56,8 @@ def test_mismatch_prints_the_answer() -> None:
         "  unexplained: 40 % of the residual follows the height of the bale, on zone 1, 0 to 9 s",
         "    empirical curve over the height of the bale, 0.1 to 0.7 m: held-out error 50.0 % smaller with it",
         "    suggestion 1: Δcurrent = c height; c = 2.5 A/m; 47.5 % smaller",
-        "  one or other: this recording does not distinguish them. Drive backwards.",
+        "  coulomb-friction or other: this recording does not distinguish them. Drive backwards.",
+        "  one or other, were one of them there: this recording would not distinguish them. Drive fast.",
         "  probability of this answer: 0.91; next: other + something unexplained (0.05)",
         "  held-out error of current: 0.0041234 before, 0.001 after, noise floor 0.0009",
         "  note: short",

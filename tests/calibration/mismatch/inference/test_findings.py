@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from linear_machine import AXES, INSTANTS, NOISE, Level, table
+from linear_machine import AXES, INSTANTS, NOISE, Level, problem_of, table
 
 from regolithd.calibration.mismatch import compare, from_columns
+from regolithd.calibration.mismatch.answer import Indistinguishable
+from regolithd.calibration.mismatch.inference.findings import one_way_only
+from regolithd.calibration.mismatch.problem.build import build_problem
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.comparison import Comparison
@@ -97,7 +101,8 @@ def test_notes_say_what_could_not_be_compared_or_looked_for() -> None:
     notes = compare(from_columns(columns, unit="axis"), WithLibrary()).answer.notes
     assert any("nothing to compare at axis 2" in note for note in notes)
     assert any(note.startswith("Readings of reading_V that are not compared: 1 (single") for note in notes)
-    assert any("cold-lubricant-friction" in note and "(needs temperature" in note for note in notes)
+    assert any("without temperature: cold-lubricant-friction" in note for note in notes)
+    assert "Not looked for without a predicted column in A, mA, µA or kA: current-sensor-bias." in notes
 
 
 class WithLibrary(Level):
@@ -106,3 +111,20 @@ class WithLibrary(Level):
     def candidates(self, library: object) -> object:  # type: ignore[override]
         """Return the library."""
         return library
+
+
+def test_whether_a_machine_can_reverse_is_asked_for_where_an_experiment_needs_it() -> None:
+    """Where the recording has one direction, an experiment varies it, and the simulation does not say."""
+    columns = {**table(), "speed_rad_s": np.abs(table()["speed_rad_s"]) + 0.1}
+    problem = problem_of(columns)
+    reverse = Indistinguishable(("drag", "power"), "drive both ways", ("direction",), 60.0, lift=False)
+    (note,) = one_way_only(problem, [reverse])
+    assert "state in one_way whether the machine can reverse" in note
+    assert one_way_only(problem, [replace(reverse, vary=("wheel_speed",))]) == []
+    assert one_way_only(problem_of(table()), [reverse]) == []
+
+    class Stated(Level):
+        one_way = False
+
+    stated = build_problem(from_columns(columns, unit="axis"), Stated())
+    assert one_way_only(stated, [reverse]) == []

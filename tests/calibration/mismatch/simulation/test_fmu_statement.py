@@ -100,7 +100,7 @@ def test_the_fmu_says_which_variables_are_inputs_and_outputs(tmp_path: Path) -> 
     found = loaded(tmp_path)
     assert (found.channel, found.unit, found.channels, found.inputs) == ("level_m", "m", {}, ("pump_V",))
     assert found.parameters == {"area": Prior(0.5, 0.01, "m2")}
-    assert (found.wheel_column, found.one_way) == ("wheel", False)
+    assert (found.wheel_column, found.one_way) == ("wheel", None)
     pump = {"model": "tank.fmu", "one_way": True}
     assert loaded(tmp_path, simulation=pump).one_way
     with pytest.raises(SimulationError, match=r"\[simulation\] one_way must be true or false, not 'yes'"):
