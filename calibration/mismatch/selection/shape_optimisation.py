@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.candidate_groups import coefficient_signs, with_candidate
+from regolithd.calibration.mismatch.regression.course import course_of
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.normal_equations import membership
 from regolithd.calibration.mismatch.regression.schur import delta_chi2_together, schur_complement
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.regression.course import Course
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
@@ -34,15 +36,18 @@ class ShapeProfile:
 
     Attributes
     ----------
-    equations, candidate, wheels: what is asked
+    equations, candidate: what is asked
+    course: the readings of the wheels
+    weights: roots of the readings' weights, shape (reading,)
     inverse: of the other terms' normal equations
-    fitted: the other terms' columns, weighted, shape (column, wheels × time)
-    left: what they leave of the residual, weighted, shape (wheels × time,)
+    fitted: the other terms' columns, weighted, shape (column, reading)
+    left: what they leave of the residual, weighted, shape (reading,)
     """
 
     equations: NormalEquations
     candidate: Candidate
-    wheels: tuple[int, ...]
+    course: Course
+    weights: Single
     inverse: Array
     fitted: Single
     left: Single
@@ -53,7 +58,8 @@ class ShapeProfile:
 
     def __call__(self, shape: Shape) -> float:
         """Return the further Δχ²."""
-        rows = self._weighted_rows(shape)
+        columns = np.asarray(self.candidate.columns(self.equations.problem, shape), np.float64)
+        rows = self.course.whitened(columns) * self.weights
         cross = (rows @ self.fitted.T).astype(np.float64)
         own = (rows @ rows.T).astype(np.float64)
         moment = (rows @ self.left).astype(np.float64)
@@ -65,45 +71,27 @@ class ShapeProfile:
             self.equations.thresholds.least_tolerance,
         )
 
-    def _weighted_rows(self, shape: Shape) -> Single:
-        problem, design = self.equations.problem, self.equations.design
-        columns = np.asarray(self.candidate.columns(problem, shape), np.float64)
-        kept = np.where(problem.mask, columns, 0.0)[:, :, list(self.wheels)]
-        fresh = design.whitened(design.in_folds(kept).astype(np.float32), self.wheels)
-        fresh = _fitted(self.equations, fresh)
-        return (fresh * _root_weights(self.equations, self.wheels)).reshape(len(fresh), -1)
-
 
 def shape_profile(
     equations: NormalEquations, others: Sequence[Term], candidate: Candidate, wheels: tuple[int, ...]
 ) -> ShapeProfile:
     """Fit the other terms and return the candidate's profile beside them."""
     design, fitted, on = equations.design, equations.fit(others), list(wheels)
-    residual = _fitted(equations, design.residual[on]).astype(np.float64)
-    columns = _fitted(equations, design.columns([column for column, _ in fitted.columns])[:, on])
-    columns *= membership(fitted.columns, len(equations.weights))[:, on, None].astype(np.float32)
-    weights = _root_weights(equations, wheels)
-    residual -= np.einsum("r,rwt->wt", fitted.coefficients, columns, optimize=True)
+    course = course_of(design, wheels, equations.folds)
+    weights = np.sqrt(equations.weights[on])[course.wheel].astype(np.float32)
+    columns = design.columns([column for column, _ in fitted.columns])[:, on]
+    columns = course.ordered(columns * membership(fitted.columns, len(equations.weights))[:, on, None]) * weights
+    residual = course.ordered(design.residual[on]).astype(np.float64) * weights
+    left = residual - fitted.coefficients @ columns
     return ShapeProfile(
         equations=equations,
         candidate=candidate,
-        wheels=wheels,
+        course=course,
+        weights=weights,
         inverse=fitted.covariance,
-        fitted=(columns * weights).reshape(len(columns), -1),
-        left=(residual * weights).astype(np.float32).ravel(),
+        fitted=columns.astype(np.float32),
+        left=left.astype(np.float32),
     )
-
-
-def _fitted(equations: NormalEquations, values: Single) -> Single:
-    """Return the instants of values (…, time in the order of folds) that the equations are summed over."""
-    cuts = equations.design.cuts
-    if len(equations.folds) == equations.design.folds:
-        return values
-    return np.concatenate([values[..., cuts[fold] : cuts[fold + 1]] for fold in equations.folds], axis=-1)
-
-
-def _root_weights(equations: NormalEquations, wheels: tuple[int, ...]) -> Single:
-    return np.sqrt(equations.weights[list(wheels)])[:, None].astype(np.float32)
 
 
 def optimised_shape(equations: NormalEquations, others: Sequence[Term], term: Term) -> tuple[NormalEquations, Term]:

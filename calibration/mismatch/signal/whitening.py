@@ -9,6 +9,7 @@ Andrews and Monahan, 1992).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -53,7 +54,7 @@ class Whitening:
         order, count = len(self.coefficients), values.shape[-1]
         if not values.size:
             return values
-        block = max(order, SHORTEST_BLOCK)
+        block = self._block
         blocks = -(-(count + order * len(runs)) // block)
         # With so many zeros between the runs, one convolution serves all of them.
         places = [slice(run.start + order * k, run.stop + order * k) for k, run in enumerate(runs)]
@@ -72,14 +73,24 @@ class Whitening:
 
         A block is at least as long as the order, so that a reading depends on its own block and the one before.
         """
-        block = values.shape[-1]
-        response = np.zeros(2 * block, values.dtype)
+        within, after = self._matrices
+        found = values @ within.astype(values.dtype)
+        found[:, 1:] += values[:, :-1] @ after.astype(values.dtype)
+        return np.asarray(found)
+
+    @cached_property
+    def _matrices(self) -> tuple[Array, Array]:
+        """What a block's readings add to themselves, and to those of the block after it."""
+        block = self._block
+        response = np.zeros(2 * block)
         response[: len(self.coefficients) + 1] = np.append(1.0, -self.coefficients)
         lags = np.arange(block) - np.arange(block)[:, None]
-        within, after = np.where(lags >= 0, response[lags], 0), response[lags + block]
-        found = values @ within.astype(values.dtype)
-        found[:, 1:] += values[:, :-1] @ after
-        return np.asarray(found)
+        return np.where(lags >= 0, response[lags], 0), response[lags + block]
+
+    @property
+    def _block(self) -> int:
+        """How many readings are filtered at once."""
+        return max(len(self.coefficients), SHORTEST_BLOCK)
 
 
 NOT_WHITENED = Whitening(np.zeros(0), np.zeros(0))
