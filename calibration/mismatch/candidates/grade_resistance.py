@@ -29,6 +29,7 @@ class GradeResistance(Candidate):
     requires = ("pitch",)
     along_motion = False
     acts_unloaded = False
+    parameter_labels: ClassVar = {"grade_current": "grade resistance"}
     coefficients: ClassVar = (Coefficient("grade_current", "{unit}"),)
     sharing: ClassVar = ("all",)
 

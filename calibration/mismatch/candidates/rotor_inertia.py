@@ -37,6 +37,7 @@ class RotorInertia(Candidate):
     source = "RE 25 rotor 10 g cm²; through 1400:1 about 2 kg m² at the wheel"
     requires = ("wheel_acceleration",)
     along_motion = False
+    parameter_labels: ClassVar = {"inertia_current": "inertia"}
     coefficients: ClassVar = (Coefficient("inertia_current", "{unit} {per_acceleration}"),)
     free: ClassVar = {"lag_s": (0.0, float("inf"))}
 

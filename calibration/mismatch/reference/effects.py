@@ -6,10 +6,11 @@ from inspect import cleandoc
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.inference.intervals import unit_of
 from regolithd.calibration.mismatch.problem.words import in_units, in_words
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Collection, Iterator, Mapping, Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Sharing
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
@@ -91,10 +92,17 @@ def _needs(candidate: Candidate) -> str:
 
 
 def _parameters(candidate: Candidate, labels: Mapping[str, str], unit: str) -> Iterator[str]:
-    for coefficient in candidate.coefficients:
-        found = in_units(coefficient.unit, unit, labels)
-        yield f"`{coefficient.name}`" + (f" [{found}]" if found != "1" else "")
-    yield from (f"`{name}`" for name in candidate.free)
+    units = {each.name: in_units(each.unit, unit, labels) for each in candidate.coefficients}
+    units |= {name: unit_of(name, labels) for name in candidate.free}
+    yield from (f"`{name}`" + (f" [{units[name]}]" if units[name] != "1" else "") for name in _told(candidate, units))
+
+
+def _told(candidate: Candidate, names: Collection[str]) -> Collection[str]:
+    """Return the parameters that the answer has: a candidate may keep one of its shape to itself (`parameters`)."""
+    try:
+        return candidate.parameters(dict.fromkeys(candidate.free, 1.0), [1.0] * len(candidate.coefficients))
+    except KeyError:  # it asks for more of a shape than what is free
+        return names
 
 
 def _cell(text: str) -> str:
