@@ -92,7 +92,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         ),
         *("Searched", "_Search"),
         "AsRead",
-        *("Batch", "Left", "Course"),
+        *("Batch", "Left"),
         "Whitening",
         *("Setting", "Drive", "Hypothesis", "Expected", "Choice", "Experimenter"),
         *("Piece", "Law", "Linearised", "Interval", "Segment", "Suffixes", "Search", "Scores", "_Beside"),

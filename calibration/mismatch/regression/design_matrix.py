@@ -119,6 +119,18 @@ class DesignMatrix:
             found[..., row, places] = self.whitening.apply(values[..., row, places], runs)
         return found
 
+    def whitened_readings(self, columns: Array, wheels: Sequence[int]) -> Single:
+        """Return columns (column, time, wheel), whitened, of some wheels, as (column, wheel, time in order of folds).
+
+        They are 0 where nothing is compared, whatever the columns are there.
+        """
+        found = np.zeros((len(columns), len(wheels), len(self.order)), np.float32)
+        for row, wheel in enumerate(wheels):
+            places, runs = self.readings[wheel]
+            values = columns[:, self.order[places], wheel].astype(np.float32)
+            found[:, row, places] = values if self.whitening is NOT_WHITENED else self.whitening.apply(values, runs)
+        return found
+
     def in_folds(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return (…, time, wheel) in the order of time as (…, wheel, time in the order of folds)."""
         return np.swapaxes(values, -1, -2)[..., self.order]

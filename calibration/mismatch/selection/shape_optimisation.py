@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.candidate_groups import coefficient_signs, with_candidate
-from regolithd.calibration.mismatch.regression.course import course_of
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.normal_equations import membership
 from regolithd.calibration.mismatch.regression.schur import delta_chi2_together, schur_complement
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
-    from regolithd.calibration.mismatch.regression.course import Course
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
@@ -36,18 +34,15 @@ class ShapeProfile:
 
     Attributes
     ----------
-    equations, candidate: what is asked
-    course: the readings of the wheels
-    weights: roots of the readings' weights, shape (reading,)
+    equations, candidate, wheels: what is asked
     inverse: of the other terms' normal equations
-    fitted: the other terms' columns, weighted, shape (column, reading)
-    left: what they leave of the residual, weighted, shape (reading,)
+    fitted: the other terms' columns, weighted, shape (column, wheels × time)
+    left: what they leave of the residual, weighted, shape (wheels × time,)
     """
 
     equations: NormalEquations
     candidate: Candidate
-    course: Course
-    weights: Single
+    wheels: tuple[int, ...]
     inverse: Array
     fitted: Single
     left: Single
@@ -58,8 +53,7 @@ class ShapeProfile:
 
     def __call__(self, shape: Shape) -> float:
         """Return the further Δχ²."""
-        columns = np.asarray(self.candidate.columns(self.equations.problem, shape), np.float64)
-        rows = self.course.whitened(columns) * self.weights
+        rows = self._weighted_rows(shape)
         cross = (rows @ self.fitted.T).astype(np.float64)
         own = (rows @ rows.T).astype(np.float64)
         moment = (rows @ self.left).astype(np.float64)
@@ -71,27 +65,42 @@ class ShapeProfile:
             self.equations.thresholds.least_tolerance,
         )
 
+    def _weighted_rows(self, shape: Shape) -> Single:
+        columns = np.asarray(self.candidate.columns(self.equations.problem, shape), np.float64)
+        fresh = _fitted(self.equations, self.equations.design.whitened_readings(columns, self.wheels))
+        return (fresh * _root_weights(self.equations, self.wheels)).reshape(len(fresh), -1)
+
 
 def shape_profile(
     equations: NormalEquations, others: Sequence[Term], candidate: Candidate, wheels: tuple[int, ...]
 ) -> ShapeProfile:
     """Fit the other terms and return the candidate's profile beside them."""
     design, fitted, on = equations.design, equations.fit(others), list(wheels)
-    course = course_of(design, wheels, equations.folds)
-    weights = np.sqrt(equations.weights[on])[course.wheel].astype(np.float32)
-    columns = design.columns([column for column, _ in fitted.columns])[:, on]
-    columns = course.ordered(columns * membership(fitted.columns, len(equations.weights))[:, on, None]) * weights
-    residual = course.ordered(design.residual[on]).astype(np.float64) * weights
-    left = residual - fitted.coefficients @ columns
+    residual = _fitted(equations, design.residual[on]).astype(np.float64)
+    columns = _fitted(equations, design.columns([column for column, _ in fitted.columns])[:, on])
+    columns *= membership(fitted.columns, len(equations.weights))[:, on, None].astype(np.float32)
+    weights = _root_weights(equations, wheels)
+    residual -= np.einsum("r,rwt->wt", fitted.coefficients, columns, optimize=True)
     return ShapeProfile(
         equations=equations,
         candidate=candidate,
-        course=course,
-        weights=weights,
+        wheels=wheels,
         inverse=fitted.covariance,
-        fitted=columns.astype(np.float32),
-        left=left.astype(np.float32),
+        fitted=(columns * weights).reshape(len(columns), -1),
+        left=(residual * weights).astype(np.float32).ravel(),
     )
+
+
+def _fitted(equations: NormalEquations, values: Single) -> Single:
+    """Return the instants of values (…, time in the order of folds) that the equations are summed over."""
+    cuts = equations.design.cuts
+    if len(equations.folds) == equations.design.folds:
+        return values
+    return np.concatenate([values[..., cuts[fold] : cuts[fold + 1]] for fold in equations.folds], axis=-1)
+
+
+def _root_weights(equations: NormalEquations, wheels: tuple[int, ...]) -> Single:
+    return np.sqrt(equations.weights[list(wheels)])[:, None].astype(np.float32)
 
 
 def optimised_shape(equations: NormalEquations, others: Sequence[Term], term: Term) -> tuple[NormalEquations, Term]:

@@ -124,6 +124,16 @@ def test_sums_that_were_forgotten_are_summed_again(empty: DesignMatrix) -> None:
     np.testing.assert_allclose(gram_of(design), before, atol=1e-3)
 
 
+def test_readings_are_whitened_as_columns_are(empty: DesignMatrix) -> None:
+    """Straight from where they were computed, and whatever they are where nothing is compared."""
+    unknown = np.where(empty.problem.mask, COLUMNS[0], np.nan)
+    for design in (empty, empty.whitened_by(Whitening(np.array([0.5]), np.array([1.1])))):
+        kept = np.where(empty.problem.mask, COLUMNS[0], 0.0)
+        expected = design.whitened(design.in_folds(kept).astype(np.float32))
+        for wheels in ([0, 1], [1]):
+            np.testing.assert_array_equal(design.whitened_readings(unknown[None], wheels)[0], expected[wheels])
+
+
 def test_the_order_of_time_is_restored(empty: DesignMatrix) -> None:
     """A column comes back as it was."""
     design, _ = empty.extended(COLUMNS[:1])
