@@ -45,10 +45,12 @@ def transition_of(problem: Problem) -> Shape:
 
 
 def along_motion(problem: Problem, shape: Shape) -> Array:
-    """Return sign(ω), or tanh(ω/ω_t) where the shape has a transition, shape (time, wheel)."""
-    if TRANSITION in shape:
-        return np.tanh(np.nan_to_num(problem.covariates["wheel_speed"]) / float(shape[TRANSITION]))
-    return np.asarray(np.nan_to_num(problem.covariates["direction"]))
+    """Return sign(ω), or tanh(ω/ω_t) where the shape has a transition, 0 at standstill, shape (time, wheel)."""
+    direction = np.nan_to_num(problem.covariates["direction"])
+    if TRANSITION not in shape:
+        return np.asarray(direction)
+    speed = np.nan_to_num(np.abs(problem.covariates["wheel_speed"]))
+    return np.asarray(direction * np.tanh(speed / float(shape[TRANSITION])))
 
 
 def _best_transition(problem: Problem) -> float:

@@ -43,7 +43,8 @@ def build_problem(
     compared = run.known & np.isfinite(measured)
     residual = np.where(compared, measured - prediction, np.nan)
     outliers = isolated_outliers(residual, recording.run, thresholds)
-    found, constants = covariates_of(prepared, simulation, complete_inputs(prepared), prediction)
+    as_read = None if run.as_read is prepared else complete_inputs(run.as_read)
+    found, constants = covariates_of(prepared, simulation, complete_inputs(prepared), prediction, as_read)
     covariates, blanks = blanks_of(found, simulation.undefined_at_times, compared, thresholds)
     mask = compared & ~outliers
     for blank in blanks.values():

@@ -20,14 +20,30 @@ KEPT_WHERE_CONSTANT = frozenset({"wheel_speed", "direction", "wheel_acceleration
 """Covariates that candidates need even where they are constant."""
 UNIT_WORD = re.compile(r"[munkM]?(A|V|N|Nm|W|J|m|s|g|Pa|Hz|bar|l)[23]?|K|deg[CF]?|rad[2]?|min|h|rpm|per|percent")
 """A part of a column's name that is of its unit: `A` of `current_A`, `m` and `s` of `flow_m_s`."""
+SLOW_SHARE = 0.05
+"""Share of the highest usual speed below which an axis may stand (a choice): no more of it is noise of a speed sensor
+that is of use."""
+USUAL_SPEED_QUANTILE = 0.98
+STANDSTILL_DEVIATIONS = 3.0
+"""Standard deviations of its noise within which a speed has no sign: 1 reading in 370 of an axis that stands is beyond
+(normal density)."""
+ONE_STD_QUANTILE = 0.6827
+"""Quantile of a normal magnitude at one standard deviation."""
 LONGEST_STEP = 3.0
 """Steps of time longer than so many usual ones are gaps: nothing is differentiated across them."""
 
 
 def covariates_of(
-    recording: Recording, simulation: Predictor, inputs: Mapping[str, Array], prediction: Array
+    recording: Recording,
+    simulation: Predictor,
+    inputs: Mapping[str, Array],
+    prediction: Array,
+    as_read: Mapping[str, Array] | None = None,
 ) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Return what was measured and varies, with what follows from it; and what was measured but is one number."""
+    """Return what was measured and varies, with what follows from it; and what was measured but is one number.
+
+    `as_read` are the inputs before they were smoothed, where they were: a smoothed speed is never quite zero.
+    """
     found = dict(simulation.covariates(inputs))
     found["time"] = np.broadcast_to(_elapsed(recording)[:, None], recording.shape)
     if not simulation.arbitrary_zero:
@@ -35,12 +51,39 @@ def covariates_of(
         found.setdefault("torque" if "wheel_speed" in found else quantity(simulation.channel), np.abs(prediction))
     if "wheel_speed" in found:
         speed = found["wheel_speed"]
-        found["direction"] = np.sign(speed)
+        read = speed if as_read is None else simulation.covariates(as_read)["wheel_speed"]
+        found["direction"] = direction_of(read)
         found["wheel_acceleration"] = _derivative(speed, recording)
         found["wheel_angle"] = _integral(speed, recording)
     measured = {name: values for name, values in found.items() if np.isfinite(values).any()}
     varying = {name: values for name, values in found.items() if name in KEPT_WHERE_CONSTANT or _varies(values)}
     return varying, {name: values for name, values in measured.items() if name not in varying}
+
+
+def direction_of(speed: Array) -> Array:
+    """Return the sign of a speed (time, wheel); 0 where it is within the noise that the sensor has at standstill.
+
+    An axis that stands reads a little more or less than zero. The sign of that is no direction: no friction turns round
+    with it. NaN stays NaN.
+    """
+    directions = [np.where(np.abs(column) > _noise_at_standstill(column), np.sign(column), 0.0) for column in speed.T]
+    return np.where(np.isfinite(speed), np.stack(directions, axis=1), np.nan)
+
+
+def _noise_at_standstill(speed: Array) -> float:
+    """Return the reach of a speed's noise (time,) about zero, by its second differences while it is slow.
+
+    These are free of a constant speed and of a ramp through zero. At most the share of the usual speed that is slow.
+    """
+    known = speed[np.isfinite(speed)]
+    slow_below = SLOW_SHARE * float(np.quantile(np.abs(known), USUAL_SPEED_QUANTILE)) if known.size else 0.0
+    slow = np.abs(speed) < slow_below
+    inside = slow[:-2] & slow[1:-1] & slow[2:]
+    if not inside.any():
+        return 0.0
+    second = np.abs(np.diff(speed, 2)[inside])
+    deviation = float(np.quantile(second, ONE_STD_QUANTILE)) / np.sqrt(6)  # variance 1 + 4 + 1
+    return min(STANDSTILL_DEVIATIONS * float(deviation), slow_below)
 
 
 def quantity(channel: str) -> str:

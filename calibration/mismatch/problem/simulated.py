@@ -38,12 +38,14 @@ class Simulated:
     Attributes
     ----------
     recording: with derived channels, and inputs replaced by their conditional expectation
+    as_read: the same with the inputs' readings
     prediction: shape (time, wheel), NaN where the simulation says nothing
     blanks: where each input was not measured
     carried: where the prediction depends on an input that was not measured earlier
     """
 
     recording: Recording
+    as_read: Recording
     prediction: Array
     blanks: Mapping[str, Mask]
     carried: Mask
@@ -65,11 +67,13 @@ def simulated(
     RecordingError
         When the predicted channel or an input is missing.
     """
-    prepared, blanks = _prepared(recording, simulation)
+    as_read, blanks = _prepared(recording, simulation)
+    prepared = expected_inputs(as_read, simulation.sensors)
     prediction = simulation.predict(complete_inputs(prepared), values)
     carried = np.zeros(prediction.shape, np.bool_)
     if blanks:
         other, _ = _prepared(recording, simulation, other_way=True)
+        other = expected_inputs(other, simulation.sensors)
         apart = np.abs(simulation.predict(complete_inputs(other), values) - prediction)
         blank = np.any(list(blanks.values()), axis=0)
         residual = (prepared.channel(simulation.channel) - prediction)[~blank]
@@ -78,13 +82,13 @@ def simulated(
             thresholds.carried_share * robust_std(residual), 1e-9 * float(np.max(np.abs(residual), initial=0.0))
         )
         carried = np.isfinite(prediction) & ~blank & ~(apart <= least)
-    return Simulated(prepared, prediction, blanks, carried)
+    return Simulated(prepared, as_read, prediction, blanks, carried)
 
 
 def _prepared(
     recording: Recording, simulation: Predictor, *, other_way: bool = False
 ) -> tuple[Recording, dict[str, Mask]]:
-    """Return the recording as the simulation gets it, and where inputs are bridged.
+    """Return the recording with the inputs that the simulation needs, as read, and where they are bridged.
 
     Columns are bridged before the simulation derives others from them, and derived inputs after.
     """
@@ -96,4 +100,4 @@ def _prepared(
     if missing := [name for name in needed if not np.isfinite(derived.channel(name)).any()]:
         raise RecordingError(f"the simulation needs {', '.join(missing)}, which the recording does not have")
     derived, more = bridged(derived, simulation.inputs, between, other_way=other_way)
-    return expected_inputs(derived, simulation.sensors), {**more, **recorded}
+    return derived, {**more, **recorded}
