@@ -1,15 +1,17 @@
-"""One channel is late: it reports what was some time ago."""
+"""One channel is late: it reports what was some time ago, or follows it through a filter."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from scipy.signal import lfilter
 
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.problem.covariates import LONGEST_STEP
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.problem import Problem
@@ -29,14 +31,16 @@ LONGEST_SHARE = 0.1
 class SensorDelay(Candidate):
     """The predicted channel, or one of the simulation's inputs, is late by a constant time.
 
-    The change of the prediction is exact for the shape's own delay (no Taylor series); per second of delay, so that the
-    coefficient is the delay. That of the predicted channel is optimised, since a delay shows in when the channel steps,
-    not in how far; that of an input costs a run of the simulation, and only follows the fit until both agree.
+    The predicted channel is late by a dead time (a bus, polling), or by the time constant of a first-order filter,
+    which is how late it is on a ramp. The change of the prediction is exact for the shape's own delay (no Taylor
+    series); per second of delay, so that the coefficient is the delay. That of the predicted channel is optimised,
+    since a delay shows in when the channel steps, not in how far; that of an input costs a run of the simulation, and
+    only follows the fit until both agree.
     """
 
     name = "sensor-delay"
     covariate = "time"
-    equation = "y(t) = y_true(t − τ)"
+    equation = "y(t) = y_true(t − τ), or τ dy/dt = y_true − y"
     words = "a delay of one column"
     signature = "a residual proportional to the rate of change of one channel"
     experiment = "change the inputs (speed, load) in steps, up and down, twenty times"
@@ -44,7 +48,7 @@ class SensorDelay(Candidate):
     along_motion = False
     imitated_over = "none"
     coefficients: ClassVar = (Coefficient("delay_s", "s", 1),)
-    free: ClassVar = {"secant_s": (0.0, float("inf"))}
+    free: ClassVar = {"secant_s": (0.0, float("inf")), "filter_s": (0.0, float("inf"))}
 
     def words_for(self, shape: Shape) -> str:
         """Return which column is late."""
@@ -54,7 +58,9 @@ class SensorDelay(Candidate):
         """Return the predicted channel and each input, late by two readings up to a tenth of the recording."""
         simulation = problem.simulation
         of_channel: list[Shape] = [
-            {"late": simulation.channel, "secant_s": delay} for delay in _delays(problem, RATIO_OF_CHANNEL)
+            {"late": simulation.channel, kind: delay}
+            for kind in OF_CHANNEL
+            for delay in _delays(problem, RATIO_OF_CHANNEL)
         ]
         of_inputs: list[Shape] = [
             {"late": name, "input_secant_s": delay}
@@ -65,11 +71,12 @@ class SensorDelay(Candidate):
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the prediction's change for this delay of this channel, over the delay."""
-        late = str(shape["late"])
-        if "secant_s" in shape:
-            delay = float(shape["secant_s"])
-            return ((shifted(problem.recording, problem.prediction, -delay) - problem.prediction) / delay)[None]
-        delay = float(shape["input_secant_s"])
+        for kind, delayed in OF_CHANNEL.items():
+            if kind in shape:
+                delay = float(shape[kind])
+                behind = delayed(problem.recording, _without_blanks(problem), delay)
+                return ((behind - problem.prediction) / delay)[None]
+        late, delay = str(shape["late"]), float(shape["input_secant_s"])
         key = (f"{late} late", delay)
         if key not in problem.made:
             moved = problem.with_input(late, shifted(problem.recording, problem.recording.channels[late], delay))
@@ -78,7 +85,7 @@ class SensorDelay(Candidate):
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Return delays from a fraction of a reading to the longest."""
-        return {"secant_s": (0.1 * problem.recording.step_s, LONGEST_SHARE * problem.length_s)}
+        return dict.fromkeys(OF_CHANNEL, (0.1 * problem.recording.step_s, LONGEST_SHARE * problem.length_s))
 
     def search_range(
         self, problem: Problem, shape: Shape, name: str, bounds: tuple[float, float]
@@ -98,7 +105,7 @@ class SensorDelay(Candidate):
 
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
         """Return the shape at the fitted delay."""
-        name = "secant_s" if "secant_s" in shape else "input_secant_s"
+        name = next(name for name in (*OF_CHANNEL, "input_secant_s") if name in shape)
         delay = float(np.clip(values[0], *self.bounds(problem, shape)["secant_s"]))
         before = float(shape[name])
         return shape if abs(delay - before) < SHAPE_TOLERANCE * before else {**shape, name: delay}
@@ -109,6 +116,42 @@ def _delays(problem: Problem, ratio: float) -> list[float]:
     shortest, longest = FINEST_READINGS * problem.recording.step_s, LONGEST_SHARE * problem.length_s
     count = int(np.log(max(longest / shortest, 1.0)) / np.log(ratio) + 1e-9) + 1
     return [float(delay) for delay in shortest * ratio ** np.arange(count)]
+
+
+def _without_blanks(problem: Problem) -> Array:
+    """Return the prediction; where the simulation says nothing, the median of what was recorded until it does again.
+
+    What a late channel reports just after a standstill is what it would have reported at standstill. Where nothing was
+    recorded either, a straight line bridges the gap.
+    """
+    found = np.array(problem.prediction)
+    for k in range(found.shape[1]):
+        blank = np.isnan(found[:, k])
+        edges = np.flatnonzero(np.diff(blank, prepend=False, append=False))
+        for first, end in zip(edges[::2], edges[1::2], strict=True):
+            recorded = problem.measured[first:end, k]
+            if np.isfinite(recorded).any():
+                found[first:end, k] = np.nanmedian(recorded)
+        known = np.flatnonzero(np.isfinite(found[:, k]))
+        if known.size:
+            found[:, k] = np.interp(np.arange(len(found)), known, found[known, k])
+    return found
+
+
+def filtered(recording: Recording, values: Array, time_constant_s: float) -> Array:
+    """Return values (time, wheel) behind a first-order filter, exact for straight lines between readings.
+
+    Each run begins at its first value; so does what follows a gap.
+    """
+    steps = np.diff(recording.time_s)
+    whole = (np.diff(recording.run) == 0) & (steps < LONGEST_STEP * recording.step_s)
+    found = np.array(values, np.float64)
+    decay = float(np.exp(-recording.step_s / time_constant_s))
+    slope = (1 - decay) * time_constant_s / recording.step_s
+    for part in np.split(np.arange(len(values)), np.flatnonzero(~whole) + 1):
+        start = slope * found[part[:1]]
+        found[part] = lfilter([1 - slope, slope - decay], [1, -decay], found[part], axis=0, zi=start)[0]
+    return found
 
 
 def shifted(recording: Recording, values: Array, by_s: float) -> Array:
@@ -123,3 +166,10 @@ def shifted(recording: Recording, values: Array, by_s: float) -> Array:
             if known.sum() > 1:
                 moved[here, k] = np.where(known, np.interp(at + by_s, at[known], column[known]), np.nan)
     return moved
+
+
+OF_CHANNEL: Mapping[str, Callable[[Recording, Array, float], Array]] = {
+    "secant_s": lambda recording, values, delay: shifted(recording, values, -delay),
+    "filter_s": filtered,
+}
+"""What delays the predicted channel, by the shape parameter that holds the delay: dead time, or a filter."""
