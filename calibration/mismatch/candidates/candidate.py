@@ -27,10 +27,10 @@ UNLIKELY_SHAPE_PENALTY = 9.2
 """Δχ² charged for a shape that has odds of one in a hundred before the recording: 2 ln 100."""
 ONSET_COUNT = 24
 """Onsets in the grid of a candidate (a choice: one in each 4 % of the recording, refined later)."""
-EARLIEST_ONSET, LATEST_ONSET = 0.03, 0.95
+EARLIEST_ONSET, LATEST_ONSET = 0.05, 0.95
 """Ends of that grid, as shares of the recording: what is before and after an onset must both be seen (a choice)."""
-FIRST_ONSET, LAST_ONSET = 0.01, 0.97
-"""Range of the optimised onset, as shares of the recording (a choice)."""
+FIRST_ONSET, LAST_ONSET = 0.05, 0.97
+"""Range of the optimised onset, as shares of the recording (a choice): what is there from the start is no change."""
 Shape = dict[str, float | str]
 """Values of the shape parameters by name. Numbers may be continuous (`free`), strings are kinds."""
 Sharing = Literal["all", "one"]

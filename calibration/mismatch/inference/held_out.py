@@ -72,8 +72,11 @@ def held_out_errors(
     without = np.zeros((len(named.terms), wheels))
     for fold in range(equations.design.folds):
         train = training_equations(equations, fold)
-        chosen = of_names(chosen_effects(train.with_groups(groups), entry_threshold), named)
+        chosen = chosen_effects(train.with_groups(groups), entry_threshold)
         train, chosen = with_optimised_shapes(train, chosen)
+        if {term.name for term in chosen} != {term.name for term in named.terms}:
+            train, chosen = _or_as_named(train, chosen, named, groups)
+        chosen = of_names(chosen, named)
         equations = equations.over(train.design.with_groups(equations.design.groups))
         before += squares_left(train, train.fit(()), fold)
         after += squares_left(train, train.fit(chosen), fold)
@@ -102,6 +105,26 @@ def with_optimised_shapes(train: NormalEquations, chosen: tuple[Term, ...]) -> t
     for index, term in enumerate(chosen):
         train, terms[index] = optimised_shape(train, terms[:index] + terms[index + 1 :], term)
     return train, tuple(terms)
+
+
+def _or_as_named(
+    train: NormalEquations, chosen: tuple[Term, ...], named: Fit, groups: Sequence[Group]
+) -> tuple[NormalEquations, tuple[Term, ...]]:
+    """Return the answer's effects, fitted to these folds, where they score more there than those that were chosen.
+
+    On the grid an effect may lose to another that it beats once the shapes of both are optimised.
+    """
+    terms: tuple[Term, ...] = ()
+    for one in named.terms:
+        family = [group for group in groups if group.named and group.name == one.name]
+        found = [(gain, term) for gain, term in train.further(terms, family) if term.wheels == one.wheels]
+        if not found:
+            return train, chosen
+        terms = (*terms, max(found, key=lambda pair: pair[0])[1])
+    train, terms = with_optimised_shapes(train, terms)
+    as_named = train.fit(terms)
+    better = acceptable(train, as_named) and train.score(as_named) > train.score(train.fit(chosen))
+    return train, terms if better else chosen
 
 
 def _rms(squares: Array, counts: Array) -> float:
