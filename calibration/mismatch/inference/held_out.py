@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.inference.improbable import unexplained_if_improbable
-from regolithd.calibration.mismatch.inference.one_sided import unexplained_if_one_sided
+from regolithd.calibration.mismatch.inference.intermittent import unexplained_if_intermittent
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_candidate,
@@ -75,7 +75,7 @@ def held_out_errors(
         chosen = chosen_effects(train.with_groups(groups), entry_threshold)
         train, chosen = with_optimised_shapes(train, chosen)
         if {term.name for term in chosen} != {term.name for term in named.terms}:
-            train, chosen = _or_as_named(train, chosen, named, groups)
+            train, chosen = _or_as_named(train, chosen, named, groups, entry_threshold)
         chosen = of_names(chosen, named)
         equations = equations.over(train.design.with_groups(equations.design.groups))
         before += squares_left(train, train.fit(()), fold)
@@ -108,11 +108,12 @@ def with_optimised_shapes(train: NormalEquations, chosen: tuple[Term, ...]) -> t
 
 
 def _or_as_named(
-    train: NormalEquations, chosen: tuple[Term, ...], named: Fit, groups: Sequence[Group]
+    train: NormalEquations, chosen: tuple[Term, ...], named: Fit, groups: Sequence[Group], entry_threshold: float
 ) -> tuple[NormalEquations, tuple[Term, ...]]:
     """Return the answer's effects, fitted to these folds, where they score more there than those that were chosen.
 
-    On the grid an effect may lose to another that it beats once the shapes of both are optimised.
+    On the grid an effect may lose to another that it beats once the shapes of both are optimised. More effects than
+    were chosen have to pass the test of further ones.
     """
     terms: tuple[Term, ...] = ()
     for one in named.terms:
@@ -122,9 +123,13 @@ def _or_as_named(
             return train, chosen
         terms = (*terms, max(found, key=lambda pair: pair[0])[1])
     train, terms = with_optimised_shapes(train, terms)
-    as_named = train.fit(terms)
-    better = acceptable(train, as_named) and train.score(as_named) > train.score(train.fit(chosen))
-    return train, terms if better else chosen
+    as_named, as_chosen = train.fit(terms), train.fit(chosen)
+    better = (
+        passes_entry_test(train, as_named, as_chosen, entry_threshold)
+        if len(terms) > len(chosen)
+        else train.score(as_named) > train.score(as_chosen)
+    )
+    return train, terms if better and acceptable(train, as_named) else chosen
 
 
 def _rms(squares: Array, counts: Array) -> float:
@@ -168,10 +173,10 @@ def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOut
         decision = without_name(replace(decision, equations=equations), idle)
         equations, held_out = held_out_errors(equations, decision.named, choice, threshold)
     decision = unexplained_if_improbable(replace(decision, equations=equations))
-    one_sided = unexplained_if_one_sided(decision)
-    if len(one_sided.named.terms) < len(decision.named.terms):
-        equations, held_out = held_out_errors(one_sided.equations, one_sided.named, choice, threshold)
-    return replace(one_sided, equations=equations), held_out
+    intermittent = unexplained_if_intermittent(decision)
+    if len(intermittent.named.terms) < len(decision.named.terms):
+        equations, held_out = held_out_errors(intermittent.equations, intermittent.named, choice, threshold)
+    return replace(intermittent, equations=equations), held_out
 
 
 def _only_proposed(problem: Problem, group: Group) -> bool:

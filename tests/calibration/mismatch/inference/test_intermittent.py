@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from linear_machine import AXES, CANDIDATES, INSTANTS, equations_of, problem_of, table
 
-from regolithd.calibration.mismatch.inference.one_sided import skewness_of, unexplained_if_one_sided
+from regolithd.calibration.mismatch.inference.intermittent import skewness_of, unexplained_if_intermittent
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection.decision import Decision, decide
@@ -29,7 +29,7 @@ def in_spells(size: float) -> np.ndarray:
 
 def test_a_drag_in_spells_is_unexplained_on_its_axis() -> None:
     """It is told over time, and no constant friction has its mean."""
-    decision = unexplained_if_one_sided(decided(in_spells(0.8)))
+    decision = unexplained_if_intermittent(decided(in_spells(0.8)))
     assert [(term.name, term.wheels) for term in decision.unnamed] == [("time", (1,))]
     assert not decision.named.terms
     assert not decided_by_evidence(decision)
@@ -39,14 +39,14 @@ def test_the_misfit_of_a_large_effects_law_is_no_finding() -> None:
     """Spells that are small against a drag which was named on both axes."""
     decision = decided(in_spells(0.8) + 5.0)
     assert {term.name for term in decision.named.terms} == {"drag"}
-    assert unexplained_if_one_sided(decision) is decision
+    assert unexplained_if_intermittent(decision) is decision
 
 
 @pytest.mark.parametrize("drag", [0.0, 0.3])
-def test_noise_beside_what_was_found_is_not_one_sided(drag: float) -> None:
+def test_noise_beside_what_was_found_is_not_intermittent(drag: float) -> None:
     """With and without a drag that has a name."""
     decision = decided(drag)
-    assert unexplained_if_one_sided(decision) is decision
+    assert unexplained_if_intermittent(decision) is decision
 
 
 def test_single_readings_that_are_off_are_no_finding() -> None:
@@ -54,7 +54,7 @@ def test_single_readings_that_are_off_are_no_finding() -> None:
     spikes = np.zeros((INSTANTS, AXES))
     spikes[10::40, 1] = 2.0
     decision = decided(spikes)
-    assert unexplained_if_one_sided(decision) is decision
+    assert unexplained_if_intermittent(decision) is decision
 
 
 def test_the_standard_error_is_that_of_autocorrelated_noise() -> None:
