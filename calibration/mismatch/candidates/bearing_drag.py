@@ -44,6 +44,7 @@ class BearingDrag(Candidate):
     source = "reports of seal and bearing failures: from some percent of rated current up to stalling"
     requires = ("direction",)
     parameter_labels: ClassVar = {"drag_current": "drag"}
+    loads = True
     coefficients: ClassVar = (Coefficient("drag_current", "{unit}"),)
     sharing: ClassVar = ("one",)
     free: ClassVar = {"onset_s": (0.0, float("inf"))}

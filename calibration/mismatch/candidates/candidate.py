@@ -36,6 +36,19 @@ Shape = dict[str, float | str]
 Sharing = Literal["all", "one"]
 
 
+UNITS_OF_NO_LOAD = frozenset(
+    (
+        *("°C", "degC", "K", "mK", "°F", "degF"),
+        *("m", "mm", "cm", "µm", "km", "rad", "mrad", "deg", "°"),
+        *("m/s", "mm/s", "cm/s", "m/min", "km/h", "mph", "rad/s", "deg/s", "°/s", "rpm", "1/min", "r/min", "Hz"),
+        *("m/s²", "mm/s²", "rad/s²", "deg/s²", "°/s²"),
+        *("l", "L", "m³", "m³/s", "m³/h", "l/s", "L/s", "l/min", "L/min", "l/h", "kg/s", "kg/h"),
+    )
+)
+"""Units of temperature, place, motion, acceleration, content and flow: a drive's load may change them, but is not made
+of them. Any other unit, a percentage or counts too, may be that of a load."""
+
+
 @dataclass(frozen=True)
 class Coefficient:
     """A linear factor that is fitted.
@@ -114,6 +127,9 @@ class Candidate:
     change_point: ClassVar[str] = "onset_s"
     """The shape parameter, where a candidate has it, that is the time at which the effect begins. Its Δχ² is no smooth
     function of it, so that it has an interval of its own."""
+    loads: ClassVar[bool] = False
+    """Whether the effect is a force or a torque on a drive. It is told in the predicted channel's unit, and is not
+    looked for where that is no force, torque, or what a drive takes for one (current, voltage, power, pressure)."""
     acts_unloaded: ClassVar[bool] = True
     """Whether the effect is there with the wheels lifted, where soil and load have no part in the channel."""
 
@@ -146,7 +162,7 @@ class Candidate:
 
     def applies(self, problem: Problem) -> bool:
         """Return whether this recording and simulation allow the effect at all."""
-        return problem.has(*self.requires)
+        return problem.has(*self.requires) and not (self.loads and problem.simulation.unit in UNITS_OF_NO_LOAD)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002  # subclasses use it
         """Return the grid of shapes to search; empty where shapes come from `propose_shapes` alone."""

@@ -54,6 +54,7 @@ class ColdLubricantFriction(Candidate):
     experiment = "start cold, warm up, cool down and repeat, so that the {temperature} does not follow the time"
     source = "Vogel–Fulcher viscosity of low-temperature greases: a factor e in 10 to 40 K; linear in a small range"
     requires = ("temperature", "direction")
+    loads = True
     parameter_labels: ClassVar = {"scale_K": "temperature scale"}
     coefficients: ClassVar = (Coefficient("cold_drag", "{unit} ({per_speed})^p"),)
     free: ClassVar = {"scale_K": (STEEPEST_K, 80.0), "no_drag_above_degC": (-60.0, 80.0)}

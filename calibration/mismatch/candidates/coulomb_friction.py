@@ -25,6 +25,7 @@ class CoulombFriction(Candidate):
     experiment_one_way = "hold at least four values of the {wheel_speed}, from the slowest to the highest"
     source = "Maxon RE 25: no-load current about 37 mA; harmonic drives add their starting torque"
     requires = ("direction",)
+    loads = True
     label = "Coulomb friction"
     parameter_labels: ClassVar = {"coulomb_current": "Coulomb friction"}
     coefficients: ClassVar = (Coefficient("coulomb_current", "{unit}"),)

@@ -27,6 +27,7 @@ class GradeResistance(Candidate):
     vary: ClassVar = ("pitch", "direction")
     source = "statics: at most weight × radius / gain"
     requires = ("pitch",)
+    loads = True
     along_motion = False
     acts_unloaded = False
     parameter_labels: ClassVar = {"grade_current": "grade resistance"}

@@ -51,6 +51,7 @@ class LoadDependentEfficiency(Candidate):
     experiment = "carry at least three different loads at each {wheel_speed}"
     source = "CSF-11 efficiency over load (maker's chart): 0.3 to 0.7 from a tenth of rated torque to rated"
     requires = ("torque",)
+    loads = True
     coefficients: ClassVar = (Coefficient("relative_loss", "1", 0),)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:

@@ -25,6 +25,7 @@ class QuadraticDrag(Candidate):
     vary: ClassVar = ("wheel_speed", "direction")
     source = "Newton's drag law F = ½ ρ c A v²; centrifugal fans and pumps have torque proportional to speed squared"
     requires = ("wheel_speed",)
+    loads = True
     coefficients: ClassVar = (Coefficient("quadratic_coefficient", "{unit} {per_speed2}"),)
 
     def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002

@@ -36,6 +36,7 @@ class RotorInertia(Candidate):
     vary: ClassVar = ("wheel_acceleration", "direction")
     source = "RE 25 rotor 10 g cm²; through 1400:1 about 2 kg m² at the wheel"
     requires = ("wheel_acceleration",)
+    loads = True
     along_motion = False
     parameter_labels: ClassVar = {"inertia_current": "inertia"}
     coefficients: ClassVar = (Coefficient("inertia_current", "{unit} {per_acceleration}"),)

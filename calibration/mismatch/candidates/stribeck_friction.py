@@ -42,6 +42,7 @@ class StribeckFriction(Candidate):
     vary: ClassVar = ("wheel_speed", "direction")
     source = "Armstrong-Hélouvry, Dupont and Canudas de Wit (1994): δ from 1 to 2; Hess and Soom (1990): the quotient"
     requires = ("wheel_speed",)
+    loads = True
     label = "Stribeck friction"
     parameter_labels: ClassVar = {"stribeck_current": "Stribeck friction", "stribeck_speed_rad_s": "Stribeck speed"}
     coefficients: ClassVar = (Coefficient("stribeck_current", "{unit}"),)

@@ -38,6 +38,7 @@ class TorqueConstantTemperature(Candidate):
     experiment = "start cold, warm up, cool down and repeat, so that the {temperature} does not follow the time"
     source = "magnet data sheets: NdFeB −0.1 %/K, ferrite −0.2 %/K, T_0 20 to 25 °C"
     requires = ("temperature", "torque")
+    loads = True
     coefficients: ClassVar = (Coefficient("temperature_coefficient", "1/K"),)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:

@@ -39,6 +39,7 @@ class TurningResistance(Candidate):
     vary: ClassVar = ("yaw_rate", "direction")
     source = "skid-steer terramechanics: lateral friction saturates within a few degrees of side slip"
     requires = ("yaw_rate", "direction")
+    loads = True
     acts_unloaded = False
     coefficients: ClassVar = (Coefficient("drag", "{unit}", 0), Coefficient("moment", "{unit}", 0))
     sharing: ClassVar = ("all",)

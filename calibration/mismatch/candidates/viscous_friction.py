@@ -27,6 +27,7 @@ class ViscousFriction(Candidate):
     vary: ClassVar = ("wheel_speed", "direction")
     source = "grease viscosity; power 0.7 (shear-thinning) to 1.4 (churning)"
     requires = ("wheel_speed",)
+    loads = True
     coefficients: ClassVar = (Coefficient("viscous_coefficient", "{unit} ({per_speed})^p"),)
     free: ClassVar = {"power": (0.7, 1.4)}
 

@@ -74,8 +74,8 @@ def held_out_errors(
         train = training_equations(equations, fold)
         chosen = chosen_effects(train.with_groups(groups), entry_threshold)
         train, chosen = with_optimised_shapes(train, chosen)
-        if {term.name for term in chosen} != {term.name for term in named.terms}:
-            train, chosen = _or_as_named(train, chosen, named, groups, entry_threshold)
+        if len(chosen) == len(named.terms) and {term.name for term in chosen} != {term.name for term in named.terms}:
+            train, chosen = _or_as_named(train, chosen, named, groups)
         chosen = of_names(chosen, named)
         equations = equations.over(train.design.with_groups(equations.design.groups))
         before += squares_left(train, train.fit(()), fold)
@@ -108,12 +108,11 @@ def with_optimised_shapes(train: NormalEquations, chosen: tuple[Term, ...]) -> t
 
 
 def _or_as_named(
-    train: NormalEquations, chosen: tuple[Term, ...], named: Fit, groups: Sequence[Group], entry_threshold: float
+    train: NormalEquations, chosen: tuple[Term, ...], named: Fit, groups: Sequence[Group]
 ) -> tuple[NormalEquations, tuple[Term, ...]]:
-    """Return the answer's effects, fitted to these folds, where they score more there than those that were chosen.
+    """Return the answer's effects, fitted to these folds, where they score more there than as many that were chosen.
 
-    On the grid an effect may lose to another that it beats once the shapes of both are optimised. More effects than
-    were chosen have to pass the test of further ones.
+    On the grid an effect may lose to another that it beats once the shapes of both are optimised.
     """
     terms: tuple[Term, ...] = ()
     for one in named.terms:
@@ -123,13 +122,9 @@ def _or_as_named(
             return train, chosen
         terms = (*terms, max(found, key=lambda pair: pair[0])[1])
     train, terms = with_optimised_shapes(train, terms)
-    as_named, as_chosen = train.fit(terms), train.fit(chosen)
-    better = (
-        passes_entry_test(train, as_named, as_chosen, entry_threshold)
-        if len(terms) > len(chosen)
-        else train.score(as_named) > train.score(as_chosen)
-    )
-    return train, terms if better and acceptable(train, as_named) else chosen
+    as_named = train.fit(terms)
+    better = acceptable(train, as_named) and train.score(as_named) > train.score(train.fit(chosen))
+    return train, terms if better else chosen
 
 
 def _rms(squares: Array, counts: Array) -> float:

@@ -70,7 +70,7 @@ def test_a_coefficient_has_the_unit_of_its_law(name: str, units: list[str]) -> N
 MINUTE_S = 60.0
 COLDEST = float(np.quantile(WARM, 0.005))
 BOUNDS = [
-    ("bearing-drag", {"onset_s": 30.0, "rise_s": 0.0}, "onset_s", (0.01 * MINUTE_S, 0.97 * MINUTE_S)),
+    ("bearing-drag", {"onset_s": 30.0, "rise_s": 0.0}, "onset_s", (0.05 * MINUTE_S, 0.97 * MINUTE_S)),
     ("soil-transition", {"onset_s": 30.0, "along": "time"}, "onset_s", (0.02 * MINUTE_S, 0.97 * MINUTE_S)),
     ("cold-lubricant-friction", {"scale_K": 10.0}, "scale_K", (5.0, 80.0)),
     (
@@ -82,6 +82,7 @@ BOUNDS = [
     ("load-cell-drift", {"relative_offset": 0.0}, "relative_offset", (-3.0, 0.85)),
     ("rotor-inertia", {"lag_s": 0.0}, "lag_s", (0.0, 4 * STEP_S)),
     ("sensor-delay", {"late": "current_A", "secant_s": 1.0}, "secant_s", (0.1 * STEP_S, 0.1 * MINUTE_S)),
+    ("sensor-delay", {"late": "current_A", "filter_s": 1.0}, "filter_s", (0.1 * STEP_S, 0.1 * MINUTE_S)),
     (
         "stribeck-friction",
         {"stribeck_speed_rad_s": 0.1},
@@ -98,7 +99,7 @@ def test_a_shape_is_optimised_where_the_recording_can_tell_it(
 ) -> None:
     """Shares of the recording's length, readings, quantiles of what varied, or limits of the law itself."""
     found = CANDIDATES[name].bounds(P, shape)
-    assert list(found) == [key]
+    assert [name for name in found if name in shape] == [key]
     assert found[key] == pytest.approx(bounds)
 
 

@@ -106,7 +106,8 @@ def test_what_is_left_out_is_counted_with_its_reason() -> None:
     prediction[:2] = np.nan
     none, blank = np.zeros((10, 1), np.bool_), np.zeros((10, 1), np.bool_)
     blank[5:8] = True
-    run = Simulated(from_columns({"t_s": np.arange(len(measured))}), prediction, {}, none)
+    recording = from_columns({"t_s": np.arange(len(measured))})
+    run = Simulated(recording, recording, prediction, {}, none)
     told = left_out("current_A", measured, run, none, {"yaw_rate": blank}, {"yaw_rate": "turning (rad/s)"})
     assert [(each.channel, each.readings) for each in told] == [("current_A", 2), ("current_A", 3)]
     assert "predicts nothing" in told[0].reason

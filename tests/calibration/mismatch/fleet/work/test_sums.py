@@ -53,7 +53,8 @@ def made() -> tuple[Sums, Array, Array]:
         by_joint(columns[name]) for name in ("speed_rad_s", "acceleration_rad_s2", "torque_Nm")
     )
     mask = np.isfinite(torque)
-    expected = np.stack([acceleration, np.sign(speed), np.sign(speed), *own.astype(np.float64)])
+    direction = direction_of(speed)
+    expected = np.stack([acceleration, direction, direction, *own.astype(np.float64)])
     residual = np.where(mask, torque - 0.5 * acceleration, 0.0)
     return sums_of(recording, fleet_arm.Arm(), "torque_Nm", LAWS, found), np.where(mask, expected, 0.0), residual
 
