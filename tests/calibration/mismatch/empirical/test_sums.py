@@ -58,4 +58,4 @@ def test_without_a_curve_the_held_out_squares_are_those_of_the_readings(equation
         train = training_equations(equations, fold)
         expected = squares_of_readings(train.design, train.fit(named.terms), fold)
         found = squares_on_fold(sums, fold, nothing, profile(sums, sums.other_folds(fold)).others(nothing))
-        assert found == pytest.approx(expected, rel=1e-6)
+        assert found == pytest.approx(expected, rel=1e-5)  # both are sums in single precision

@@ -13,6 +13,7 @@ from regolithd.calibration.mismatch.data.recording import as_recording
 from regolithd.calibration.mismatch.fleet.work import sums as of_recordings
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
 from regolithd.calibration.mismatch.fleet.work.sums import Sums, sums_of
+from regolithd.calibration.mismatch.problem.covariates import direction_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
