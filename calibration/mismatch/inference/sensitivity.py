@@ -30,8 +30,10 @@ def sensitivities(
         if not groups:
             found.append(Sensitivity(candidate.name, channel, float("inf"), unit))
             continue
-        # A shape in the middle of the grid stands for the family.
-        group = groups[len(groups) // 2]
+        # A shape in the middle of the grid stands for the family, whichever others the search has tried.
+        grid = candidate.shapes(equations.problem)
+        on_grid = [group for group in groups if group.shape in grid] or groups
+        group = on_grid[len(on_grid) // 2]
         wheels = equations.all_wheels
         patterns = [wheels] if "all" in candidate.sharing or len(wheels) == 1 else [(w,) for w in wheels]
         # What was found already is looked for anew, not beside itself.
