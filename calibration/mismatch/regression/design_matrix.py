@@ -151,7 +151,7 @@ class DesignMatrix:
         file = self._as_read if whitening is NOT_WHITENED else ColumnFile(*self._as_read.shape)
         other = replace(self, whitening=whitening, _whitened=file)
         residual = other.whitened(self.residual_as_read)
-        sums = Sums(file, residual, self.order, self.cuts)
+        sums = Sums(file, residual, self.order, self.cuts, searched=True)
         return replace(other, residual=residual, energy=_energy(residual, self.cuts), _sums=sums)
 
     def with_groups(self, groups: Sequence[Group]) -> DesignMatrix:
@@ -203,7 +203,7 @@ def empty_design(problem: Problem, folds: Index) -> DesignMatrix:
         _places=np.zeros(0, np.int64),
         _as_read=columns,
         _whitened=columns,
-        _sums=Sums(columns, residual, order, cuts),
+        _sums=Sums(columns, residual, order, cuts, searched=False),
     )
 
 

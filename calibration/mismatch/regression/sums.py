@@ -35,9 +35,12 @@ ROOM = 64
 class Sums:
     """Sums of products of the columns of a file with each other and with a residual, in float32 as the columns are."""
 
-    def __init__(self, columns: ColumnFile, residual: Single, order: Index, cuts: Index) -> None:
-        """Take columns and residual (wheel, time in the order of folds), that order, and where the folds begin."""
-        self._columns, self._residual, self._order = columns, residual, order
+    def __init__(self, columns: ColumnFile, residual: Single, order: Index, cuts: Index, *, searched: bool) -> None:
+        """Take columns and residual (wheel, time in the order of folds), that order, and where the folds begin.
+
+        `searched`: whether products of many columns with all others will be asked for, one column after the other.
+        """
+        self._columns, self._residual, self._order, self._searched = columns, residual, order, searched
         self._folds = [(int(a), int(b)) for a, b in pairwise(cuts)]
         self.forget()
 
@@ -48,6 +51,7 @@ class Sums:
         self._rank: Index = np.zeros(0, np.int64)
         """Of each column that `_square` has, its row there."""
         self._moment: Array = np.zeros((*leading, 0))
+        self._energy: Single = np.zeros((*leading, 0), np.float32)
         self._later: Single = np.zeros((*leading, 0, 0), np.float32)
         self._known: NDArray[np.bool_] = np.zeros((0, 0), np.bool_)
         self._own: dict[tuple[tuple[int, ...], tuple[int, ...]], Array] = {}
@@ -91,34 +95,34 @@ class Sums:
     def energies(self, columns: Index) -> Single:
         """Return sums of squares, shape (fold, wheel, column)."""
         self._sum_new()
-        first = self._square.shape[-1]
-        own = np.concatenate(
-            (
-                np.diagonal(self._square, axis1=2, axis2=3)[:, :, self._rank],
-                np.diagonal(self._later[:, :, : self._summed - first, first:], axis1=2, axis2=3),
-            ),
-            axis=2,
-        )
-        return own[:, :, columns]
+        return self._energy[:, :, columns]
 
     def _sum_new(self) -> None:
-        """Sum what came since the last time: with all columns, or with each other alone where it is little."""
+        """Sum what came since the last time: with all columns, or with the residual and itself where it is little."""
         before, now = self._summed, self._columns.count
         if before == now:
             return
-        if now - before >= MANY:
+        if self._searched and now - before >= MANY:
             self.forget()
             self._sum_all(now)
         else:
             self._make_room(now)
-            fresh = np.arange(before, now)
-            values = self._columns.read(fresh)
-            added = [
-                [values[:, w, a:b] @ self._residual[w, a:b] for w in range(values.shape[1])] for a, b in self._folds
-            ]
-            self._moment = np.concatenate((self._moment, np.array(added, np.float64)), axis=2)
-            self._keep(fresh, fresh, self._of(values, fresh))
+            at_once = self._columns.at_once
+            for first in range(before, now, at_once):
+                self._sum_with_residual(np.arange(first, min(first + at_once, now)))
         self._summed = now
+
+    def _sum_with_residual(self, fresh: Index) -> None:
+        """Sum the products of new columns with the residual, and their squares."""
+        values = self._columns.read(fresh)
+        moment, energy = np.empty((2, *self._moment.shape[:2], len(fresh)))
+        for fold, (a, b) in enumerate(self._folds):
+            for wheel in range(values.shape[1]):
+                part = values[:, wheel, a:b]
+                moment[fold, wheel] = part @ self._residual[wheel, a:b]
+                energy[fold, wheel] = np.einsum("ct,ct->c", part, part)
+        self._moment = np.concatenate((self._moment, moment), axis=2)
+        self._energy = np.concatenate((self._energy, energy.astype(np.float32)), axis=2)
 
     def _sum_all(self, count: int) -> None:
         """Sum the products of all columns with each other and with the residual, in one walk over the file.
@@ -143,6 +147,7 @@ class Sums:
                     self._square[fold, wheel, :begun, :begun] += piece @ piece.T
                     moment[fold, wheel, :begun] += piece @ self._residual[wheel, a:b]
         self._moment = moment[:, :, self._rank]
+        self._energy = np.diagonal(self._square, axis1=2, axis2=3)[:, :, self._rank]
 
     def _pieces(self, first: int, last: int) -> Iterator[tuple[int, int, int]]:
         """Yield pieces between two places in time, each in one fold: its fold, and where it begins and ends."""
