@@ -31,6 +31,8 @@ LEAST_IN_UNIT = 5.0
 """Durations are told in the largest unit of which they are so many, rounded up to as many again (a choice)."""
 LIKELY_MARGIN = 6.0
 """Margin of evidence up to which another answer is held against a set of effects: odds of one in twenty (a choice)."""
+NEXT_TO_NOTHING = 1e-3
+"""Share of the other end of a range below which an end is told as 0 (a choice: two digits are told)."""
 MOST_OTHERS = 4
 """Other answers that are held against a set (a choice: computing time)."""
 
@@ -64,7 +66,7 @@ def with_experiment(
     lift = bool(unloaded) and (choice.lift or any(candidate.run_unloaded for candidate in apart))
     duration_s, in_all = rounded_up(choice.duration_s)
     sentence = "; then ".join(dict.fromkeys([*drives, unloaded] if lift else drives))
-    ranges = listed([_range(problem, setting) for setting in choice.settings]) if choice.settings else ""
+    ranges = listed([range_in_words(problem, setting) for setting in choice.settings]) if choice.settings else ""
     return Indistinguishable(
         effects=names,
         experiment=f"{capital(sentence)}; {in_all} in all{ranges and f' ({ranges})'}. {_expectation(choice)}",
@@ -132,9 +134,10 @@ def varied_by(candidate: Candidate, problem: Problem) -> tuple[str, ...]:
     return varied
 
 
-def _range(problem: Problem, setting: Setting) -> str:
+def range_in_words(problem: Problem, setting: Setting) -> str:
     """Return between which values a covariate is varied."""
-    ends = f"{setting.low:.2g} to {setting.high:.2g}"
+    least = NEXT_TO_NOTHING * max(abs(setting.low), abs(setting.high))
+    ends = " to ".join(f"{each if abs(each) > least else 0.0:.2g}" for each in (setting.low, setting.high))
     if setting.relative:
         return f"{label_of_column(setting.channel).split(' (')[0]} {ends} times the usual"
     unit = unit_in_label(setting.covariate, problem.labels)

@@ -23,8 +23,8 @@ from regolithd.calibration.mismatch.experiments.margins import (
     precisions,
     predictable,
 )
-from regolithd.calibration.mismatch.experiments.settings import predicts_row_by_row, settings_of
-from regolithd.calibration.mismatch.inference.experiment import with_experiment
+from regolithd.calibration.mismatch.experiments.settings import Setting, predicts_row_by_row, settings_of
+from regolithd.calibration.mismatch.inference.experiment import range_in_words, with_experiment
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.equations import equations_of as candidates_and_equations
 from regolithd.calibration.mismatch.regression.group import Term
@@ -253,3 +253,13 @@ def test_a_machine_that_runs_one_way_is_never_asked_to_reverse() -> None:
     assert DIRECTION not in found.vary
     told = [found.experiment, *(each.instruction(problem.simulation) for each in applicable)]
     assert [text for text in told if re.search(r"both ways|to and fro|reverse|backwards", text)] == []
+
+
+def test_a_range_is_told_in_its_unit_or_in_shares_of_the_usual() -> None:
+    """What is next to nothing is 0."""
+    problem = replace(problem_of(table()), labels={"torque": "shaft torque (N·m)"})
+    one = np.ones(AXES)
+    recorded = Setting("torque", "torque_Nm", one, 0 * one, 9.6e-8, 7.0)
+    assert range_in_words(problem, recorded) == "shaft torque 0 to 7 N·m"
+    by_load = Setting("torque", "load_kg", one, 0 * one, 0.5, 1.5, relative=True)
+    assert range_in_words(problem, by_load) == "load 0.5 to 1.5 times the usual"
