@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from scipy.signal import lfilter
 
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Array, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.problem.covariates import LONGEST_STEP
+from regolithd.calibration.mismatch.signal.recursion import recursion
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -145,13 +145,13 @@ def filtered(recording: Recording, values: Array, time_constant_s: float) -> Arr
     """
     steps = np.diff(recording.time_s)
     whole = (np.diff(recording.run) == 0) & (steps < LONGEST_STEP * recording.step_s)
-    found = np.array(values, np.float64)
     decay = float(np.exp(-recording.step_s / time_constant_s))
     slope = (1 - decay) * time_constant_s / recording.step_s
-    for part in np.split(np.arange(len(values)), np.flatnonzero(~whole) + 1):
-        start = slope * found[part[:1]]
-        found[part] = lfilter([1 - slope, slope - decay], [1, -decay], found[part], axis=0, zi=start)[0]
-    return found
+    begins = np.concatenate(([True], ~whole))
+    added = (1 - slope) * values
+    added[1:] += (slope - decay) * values[:-1]
+    added[begins] = values[begins]
+    return recursion(np.where(begins, 0.0, decay)[:, None], added)
 
 
 def shifted(recording: Recording, values: Array, by_s: float) -> Array:

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.signal.recursion import recursion
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -25,8 +27,6 @@ Array = NDArray[np.float64]
 
 SETTLED = 1e-15
 """Relative change of a variance from one instant to the next, up to which it is settled: a few roundings."""
-NEGLIGIBLE = 1e-20
-"""Factor of what was added so many instants before, below which it no longer counts: less than rounding."""
 
 
 def expected_inputs(recording: Recording, sensors: Mapping[str, SensorError]) -> Recording:
@@ -68,11 +68,11 @@ def conditional_expectation(values: Array, error_variance: Array, starts: NDArra
     gain = np.where(known, predicted / (predicted + error_variance + 1e-300), 0.0)
     kept = (1 - gain) * persistence
     kept[starts] = 0.0
-    estimate = _recursion(kept, gain * centred)
+    estimate = recursion(kept, gain * centred)
     back = np.zeros_like(spread)
     back[:-1] = spread[:-1] * persistence / predicted[1:]
     back[starts[starts > 0] - 1] = 0.0
-    smooth = _recursion(back[::-1], ((1 - back * persistence) * estimate)[::-1])[::-1]
+    smooth = recursion(back[::-1], ((1 - back * persistence) * estimate)[::-1])[::-1]
     return np.where(known, smooth + mean, np.nan)
 
 
@@ -119,17 +119,3 @@ def _variances(
                 predicted[t:last], spread[t:last] = doubt, after
                 break
     return predicted, spread
-
-
-def _recursion(factor: Array, added: Array) -> Array:
-    """Return y(t) = factor(t) y(t − 1) + added(t), shape (time, column), from 0 before the first instant.
-
-    By doubling: after k passes, each y has what was added in the last 2^k instants.
-    """
-    factor, total, reach = factor.copy(), added.copy(), 1
-    while reach < len(total) and np.any(np.abs(factor) > NEGLIGIBLE):
-        total[reach:] += factor[reach:] * total[:-reach]
-        factor[reach:] *= factor[:-reach].copy()
-        factor[:reach] = 0.0
-        reach *= 2
-    return total

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Single = NDArray[np.float32]
 Index = NDArray[np.int64]
 
-AT_ONCE_BYTES = 16 * 2**20
+AT_ONCE_BYTES = 4 * 2**20
 """Bytes of columns that are in memory at once, at most (a choice: much longer pieces are no quicker)."""
 
 

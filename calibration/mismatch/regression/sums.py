@@ -83,7 +83,9 @@ class Sums:
         """
         key = tuple(columns.tolist()), folds
         if key not in self._own:
-            of_folds = self.products(columns, columns)
+            self._sum_new()
+            together = columns.max(initial=0) < self._square.shape[-1]
+            of_folds = self.products(columns, columns) if together else self._of(self._columns.read(columns), columns)
             self._own[key] = sum((of_folds[fold] for fold in folds), np.zeros(of_folds.shape[1:]))
         return self._own[key]
 
@@ -183,6 +185,8 @@ class Sums:
         at, later = rows - first, np.flatnonzero(columns >= first)
         self._later[:, :, at[:, None], columns] = values
         self._known[at[:, None], columns] = True
+        if not self._searched:
+            return  # Rows that were never asked for would take memory.
         mirrored = columns[later] - first
         self._later[:, :, mirrored[:, None], rows] = np.swapaxes(values[:, :, :, later], 2, 3)
         self._known[mirrored[:, None], rows] = True
