@@ -7,6 +7,7 @@ compared as the recordings of a fleet are, each by itself and all together, on a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,6 +76,13 @@ def stretches_of(path: Path, rows: int = STRETCH) -> tuple[Stretch, ...]:
     RecordingError
         When the file is damaged.
     """
+    state = path.stat()
+    return _stretches(path, rows, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=64)
+def _stretches(path: Path, rows: int, _changed_ns: int, _bytes: int) -> tuple[Stretch, ...]:
+    """Return the stretches of a file in this state: it is asked for them twice, and reading all times takes a while."""
     total = rows_in(path)
     length = total / max(round(total / rows), 1)
     cuts, row, elapsed_s = [(0, 0.0)], 0, 0.0

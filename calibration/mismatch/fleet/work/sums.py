@@ -178,7 +178,8 @@ def _products(values: Array, residual: Array) -> tuple[Array, Array, Array]:
             piece = np.ascontiguousarray(values[:, start : start + PIECE, wheel])
             gram[wheel] += piece @ piece.T
             moment[wheel] += piece @ residual[start : start + PIECE, wheel]
-            fourth[wheel] += np.sum(piece**4, axis=1)
+            squares = np.square(piece)
+            fourth[wheel] += np.einsum("ct,ct->c", squares, squares)
     return gram, moment, fourth
 
 
