@@ -12,7 +12,7 @@ from regolithd.calibration.mismatch.regression.residuals import chi2_of, relativ
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
@@ -24,35 +24,30 @@ def best_of_each_candidate(equations: NormalEquations, given: Sequence[Term]) ->
     """Return each candidate's best shape and wheels beside `given`, with Δχ² less penalty, best first."""
     taken = [(term.name, set(term.wheels)) for term in given]
     groups = [group for group in equations.design.groups if group.named]
-    found = (
-        (gain, term.group.name, term)
+    scored = [
+        (gain - equations.penalty(term), term.group.name, term)
         for gain, term in equations.further(given, groups)
         if all(term.group.name != name or wheels.isdisjoint(term.wheels) for name, wheels in taken)
-    )
-    return _best_of_each(equations, found)
+    ]
+    return _best_of_each(scored)
 
 
 def best_of_each_smooth_term(equations: NormalEquations, given: Sequence[Term]) -> list[Scored]:
     """Return the best smooth term of each covariate, coupling and number of wheels, likewise."""
     taken = {(term.name, term.wheels) for term in given}
     groups = [group for group in equations.design.groups if not group.named]
-    found = (
-        (gain, f"{term.name} {term.group.coupling} {len(term.wheels)}", term)
+    scored = [
+        (gain - equations.penalty(term), f"{term.name} {term.group.coupling} {len(term.wheels)}", term)
         for gain, term in equations.further(given, groups)
         if (term.name, term.wheels) not in taken
-    )
-    return _best_of_each(equations, found)
+    ]
+    return _best_of_each(scored)
 
 
-def _best_of_each(equations: NormalEquations, found: Iterable[tuple[float, str, Term]]) -> list[Scored]:
-    """Return the term of each family with the largest Δχ² less penalty, best first; the first of equals."""
+def _best_of_each(scored: Sequence[tuple[float, str, Term]]) -> list[Scored]:
+    """Return the best term of each family, best first; the first of equals."""
     best: dict[str, Scored] = {}
-    for gain, family, term in found:
-        credited = term.group.own_channel is not None or term.group.selection_penalty < 0
-        # Without a credit the penalty is not negative: most terms gain too little, whatever theirs is.
-        if family in best and gain <= best[family][0] and not credited:
-            continue
-        score = gain - equations.penalty(term)
+    for score, family, term in scored:
         if family not in best or score > best[family][0]:
             best[family] = (score, term)
     return sorted(best.values(), key=lambda found: -found[0])
