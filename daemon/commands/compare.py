@@ -36,6 +36,9 @@ def compare(
     written to `comparisons`, beside the recordings, with the corrected simulation. The alarm `mismatch` is raised when
     the simulation lacks physics, or when an effect of a corrected simulation has changed.
     """
+    from regolithd.daemon.one_thread import compute_with_one_thread
+
+    compute_with_one_thread()
     from regolithd.calibration.mismatch.errors import MismatchError
     from regolithd.daemon.mismatch.files import Outputs
     from regolithd.daemon.mismatch.result import comparison_result

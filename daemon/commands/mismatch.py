@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path  # noqa: TC003  # typer reads the annotations when it runs
 from typing import Annotated, Literal
 
@@ -10,8 +9,6 @@ import typer
 
 RoverFrom = Literal["column", "metadata", "folder"]
 Level = Literal["shared", "rover", "recording"]
-THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
-"""Environment variables of NumPy's linear algebra, which reads them when it is loaded."""
 EXIT_DATA = 65
 """EX_DATAERR: recording or simulation cannot be used."""
 
@@ -63,9 +60,9 @@ def register(app: typer.Typer) -> None:
 
         Prints each effect with size and interval, indistinguishable effects, and the held-out error before and after.
         """
-        for name in THREADS:
-            # Its matrices are small: with two threads a comparison takes as long, and a third more processor time.
-            os.environ.setdefault(name, "1")
+        from regolithd.daemon.one_thread import compute_with_one_thread
+
+        compute_with_one_thread()
         from regolithd.calibration.mismatch.errors import MismatchError
 
         try:

@@ -41,6 +41,9 @@ def monitor(
     "nothing has begun". One threshold bounds the rate of false reports over all of them. The first ten minutes of
     driving show how strong the noise is. When the recording has ended, `regolithd mismatch` decides what it was.
     """
+    from regolithd.daemon.one_thread import compute_with_one_thread
+
+    compute_with_one_thread()
     from regolithd.calibration.mismatch.errors import MismatchError
     from regolithd.daemon.mismatch.online.monitoring import monitored
 

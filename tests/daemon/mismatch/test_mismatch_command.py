@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 import tomllib
 from typing import TYPE_CHECKING
 
@@ -141,18 +138,3 @@ def test_a_missing_column_is_told_with_the_recording(start: Path, tmp_path: Path
         f"regolithd mismatch: {path}: the simulation needs column torque_Nm, which the recording does not have; did "
         "you mean torqe_Nm?\n"
     )
-
-
-@pytest.mark.parametrize(("stated", "expected"), [(None, "1"), ("3", "3")])
-def test_linear_algebra_has_one_thread_unless_its_user_says_otherwise(stated: str | None, expected: str) -> None:
-    """It is told before NumPy is loaded, which reads it then."""
-    asked = {**os.environ, "OPENBLAS_NUM_THREADS": stated or ""}
-    if stated is None:
-        del asked["OPENBLAS_NUM_THREADS"]
-    code = (
-        "import os, sys; from regolithd.daemon.cli import app; print('numpy' in sys.modules);"
-        "app(['mismatch', 'no.csv', '--simulation', 'no.toml'], standalone_mode=False);"
-        "print('numpy' in sys.modules, os.environ['OPENBLAS_NUM_THREADS'])"
-    )
-    done = subprocess.run([sys.executable, "-c", code], env=asked, capture_output=True, text=True, check=False)
-    assert done.stdout.split() == ["False", "True", expected], done.stderr
