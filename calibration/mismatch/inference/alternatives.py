@@ -15,9 +15,10 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     best_of_each_candidate,
     best_of_each_smooth_term,
     entry_cost,
+    passes_entry_test,
 )
 from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
-from regolithd.calibration.mismatch.selection.smooth_terms import drop_what_a_curve_explains
+from regolithd.calibration.mismatch.selection.smooth_terms import covariate_of, drop_what_a_curve_explains
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -63,15 +64,37 @@ def alternatives(decision: Decision) -> tuple[Alternative, ...]:
 
 
 def _admissible(decision: Decision, fit: Fit) -> bool:
-    """Return whether a set could have been the answer: acceptable, and no name is what a smooth term holds."""
+    """Return whether a set could have been the answer: its names and its curves pass the decision's own tests."""
     equations = decision.equations
     named = equations.fit([term for term in fit.terms if term.group.named])
     curves = [term for term in fit.terms if not term.group.named]
     return (
         acceptable(equations, fit)
+        and _enough_for_more_names(decision, fit)
+        and (not curves or not _is_a_laws_misfit(decision, fit, named, curves[-1]))
         and all(len(drop_what_a_curve_explains(equations, named, curve).terms) == len(named.terms) for curve in curves)
         and len(drop_what_a_changed_parameter_explains(equations, named).terms) == len(named.terms)
     )
+
+
+def _enough_for_more_names(decision: Decision, fit: Fit) -> bool:
+    """Return whether a set gains what a further effect must, where it has the answer's effects and more."""
+    extra = len(fit.terms) - len(decision.whole.terms)
+    more = extra > 0 and all(term.group.named for term in fit.terms)
+    return not more or passes_entry_test(decision.equations, fit, decision.whole, decision.entry_threshold)
+
+
+def _is_a_laws_misfit(decision: Decision, fit: Fit, named: Fit, curve: Term) -> bool:
+    """Return whether a curve gains no more than an inexact law leaves.
+
+    That is beside a set's own names, or in the place of the answer's, of which none has another covariate.
+    """
+    instead_of = named if named.terms or decision.unnamed else decision.named
+    if not instead_of.terms:
+        return False
+    share = (fit.delta_chi2 - instead_of.delta_chi2) / max(fit.delta_chi2, 1e-9)
+    of_its_covariate = not named.terms and all(covariate_of(term) == curve.name for term in instead_of.terms)
+    return of_its_covariate or share < decision.equations.thresholds.form_misfit
 
 
 def _evidence(decision: Decision, fit: Fit) -> float:

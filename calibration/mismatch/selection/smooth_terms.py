@@ -76,7 +76,7 @@ def _rest_of_refuted(
 
 def _imitates_a_curve(equations: NormalEquations, named: Fit, curve: Term, entry_threshold: float) -> bool:
     """Return whether one curve scores clearly more than several effects, of which some have other covariates."""
-    if len(named.terms) < 2 or all(_covariate(term) == curve.name for term in named.terms):
+    if len(named.terms) < 2 or all(covariate_of(term) == curve.name for term in named.terms):
         return False
     return equations.score(equations.fit((curve,))) > equations.score(named) + entry_threshold
 
@@ -90,7 +90,7 @@ def _explains_more(equations: NormalEquations, curve: Fit, named: Fit, entry_thr
     limits = equations.thresholds
     ahead = equations.score(curve) - equations.score(named)
     if all(term.group.named for term in named.terms):
-        of_its_covariate = all(_covariate(term) == curve.terms[-1].name for term in named.terms)
+        of_its_covariate = all(covariate_of(term) == curve.terms[-1].name for term in named.terms)
         misfit = (curve.delta_chi2 - named.delta_chi2) / max(curve.delta_chi2, 1e-9)
         return not of_its_covariate and misfit > limits.form_misfit and ahead > limits.smooth_term_entry
     further = sum(term.group.named for term in named.terms) - sum(term.group.named for term in curve.terms)
@@ -132,7 +132,7 @@ def unexplained_beside(equations: NormalEquations, named: Fit, *, tolerated: flo
     return None if named.terms and misfit < tolerated else curve
 
 
-def _covariate(term: Term) -> str:
+def covariate_of(term: Term) -> str:
     """Return the covariate over which a curve can imitate a term."""
     return term.group.candidate.imitated_over if term.group.candidate else term.name
 
@@ -159,7 +159,7 @@ def drop_what_a_curve_explains(equations: NormalEquations, named: Fit, curve: Te
 def _same_quantity(problem: Problem, term: Term, curve: Term) -> bool:
     """Return whether a term's covariate is a curve's on the same wheels: by name, or as an angle is a position."""
     wheels = sorted(set(term.wheels) & set(curve.wheels))
-    if not wheels or _covariate(term) == "none":
+    if not wheels or covariate_of(term) == "none":
         return False
     covariate = term.group.candidate.covariate if term.group.candidate else term.name
     if covariate == curve.name:
@@ -193,7 +193,7 @@ def drop_transients(equations: NormalEquations, named: Fit) -> Fit:
     kept = []
     for term in named.terms:
         # A sensor's fault, which its own channel shows, may come and go.
-        is_change = _covariate(term) == "time" and term.group.own_channel is None
+        is_change = covariate_of(term) == "time" and term.group.own_channel is None
         beside = equations.further(named.terms, curves) if is_change else []
         shares = [
             gain / (gain + named.delta_chi2)
