@@ -230,6 +230,14 @@ class Candidate:
         """
         return shape
 
+    def stated_coefficients(self, shape: Shape) -> Sequence[float] | None:  # noqa: ARG002
+        """Return the coefficients at which a shape is exact, where it states them: it is then optimised at these."""
+        return None
+
+    def shape_at(self, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002
+        """Return the shape whose columns have the stated coefficients, when it was fitted with `values`."""
+        return shape
+
     def onset_profiles(self, problem: Problem) -> Sequence[Shape]:
         """Return how the effect may develop after its onset: every distinct shape without its `onset_s`."""
         found = {tuple(sorted((k, v) for k, v in s.items() if k != "onset_s")) for s in self.shapes(problem)}

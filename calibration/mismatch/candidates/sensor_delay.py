@@ -21,6 +21,10 @@ FINEST_READINGS = 2.0
 LEAST_READINGS = 1.25
 """Shortest delay that is named, in readings: what a sampled input does between two readings is not recorded, and a
 solver that holds it, or interpolates it, is early or late by up to one (a choice: a quarter of a reading more)."""
+PASSED = "passed"
+"""The shape parameter of a delay of the predicted channel: the share of the predicted change that was recorded."""
+LEAST_PASSED = 0.5
+"""That share, or its reciprocal, below which something else than a delay is fitted (a choice)."""
 RATIO_OF_CHANNEL, RATIO_OF_INPUT = 2.0, 4.0
 """Ratio of neighbouring delays in the grid, for the predicted channel and for an input (a choice: a fitted delay is
 refined from the nearest; each delay of an input costs a run of the simulation)."""
@@ -33,9 +37,10 @@ class SensorDelay(Candidate):
 
     The predicted channel is late by a dead time (a bus, polling), or by the time constant of a first-order filter,
     which is how late it is on a ramp. The change of the prediction is exact for the shape's own delay (no Taylor
-    series); per second of delay, so that the coefficient is the delay. That of the predicted channel is optimised,
-    since a delay shows in when the channel steps, not in how far; that of an input costs a run of the simulation, and
-    only follows the fit until both agree.
+    series); per second of delay, so that the coefficient is the delay. That of the predicted channel is optimised with
+    its coefficient, since a delay shows in when the channel steps. How far it steps is predicted from inputs with
+    errors: `passed` is the share of the predicted change that was recorded. The delay of an input costs a run of the
+    simulation, and only follows the fit until both agree.
     """
 
     name = "sensor-delay"
@@ -75,7 +80,7 @@ class SensorDelay(Candidate):
             if kind in shape:
                 delay = float(shape[kind])
                 behind = delayed(problem.recording, _without_blanks(problem), delay)
-                return ((behind - problem.prediction) / delay)[None]
+                return (float(shape.get(PASSED, 1.0)) * (behind - problem.prediction) / delay)[None]
         late, delay = str(shape["late"]), float(shape["input_secant_s"])
         key = (f"{late} late", delay)
         if key not in problem.made:
@@ -99,12 +104,22 @@ class SensorDelay(Candidate):
         """Return the delay."""
         return {"delay_s": float(values[0])}
 
-    def plausible(self, problem: Problem, shape: Shape, values: Sequence[float]) -> bool:  # noqa: ARG002
-        """Return whether the delay is more than sampling itself leaves open."""
-        return values[0] >= LEAST_READINGS * problem.recording.step_s
+    def plausible(self, problem: Problem, shape: Shape, values: Sequence[float]) -> bool:
+        """Return whether the delay is more than sampling itself leaves open, and shows in steps of about their size."""
+        passed = float(shape.get(PASSED, 1.0))
+        return values[0] >= LEAST_READINGS * problem.recording.step_s and LEAST_PASSED <= passed <= 1 / LEAST_PASSED
+
+    def stated_coefficients(self, shape: Shape) -> Sequence[float] | None:
+        """Return the delay of the predicted channel."""
+        return next(([float(shape[kind])] for kind in OF_CHANNEL if kind in shape), None)
+
+    def shape_at(self, shape: Shape, values: Sequence[float]) -> Shape:
+        """Return the shape with the share of the predicted change that was recorded."""
+        (delay,) = self.stated_coefficients(shape) or values
+        return {**shape, PASSED: float(shape.get(PASSED, 1.0)) * values[0] / delay}
 
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
-        """Return the shape at the fitted delay."""
+        """Return the shape at the fitted delay, with the same share of the change."""
         name = next(name for name in (*OF_CHANNEL, "input_secant_s") if name in shape)
         delay = float(np.clip(values[0], *self.bounds(problem, shape)["secant_s"]))
         before = float(shape[name])

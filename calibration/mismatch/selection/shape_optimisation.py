@@ -53,17 +53,27 @@ class ShapeProfile:
 
     def __call__(self, shape: Shape) -> float:
         """Return the further Δχ²."""
+        moment, complement, own = self._sums(shape)
+        return delta_chi2_together(
+            moment,
+            complement,
+            float(np.max(np.diag(own))),
+            coefficient_signs(self.candidate, len(own)),
+            self.equations.thresholds.least_tolerance,
+        )
+
+    def at(self, shape: Shape, coefficients: Sequence[float]) -> float:
+        """Return the further Δχ² with these coefficients, the other terms fitted."""
+        moment, complement, _ = self._sums(shape)
+        values = np.array(coefficients, np.float64)
+        return float(2 * values @ moment - values @ complement @ values)
+
+    def _sums(self, shape: Shape) -> tuple[Array, Array, Array]:
+        """Return moments, the products beside the other terms, and all products of the shape's columns."""
         rows = self._weighted_rows(shape)
         cross = (rows @ self.fitted.T).astype(np.float64)
         own = (rows @ rows.T).astype(np.float64)
-        moment = (rows @ self.left).astype(np.float64)
-        return delta_chi2_together(
-            moment,
-            schur_complement(own, cross.T, self.inverse),
-            float(np.max(np.diag(own))),
-            coefficient_signs(self.candidate, len(rows)),
-            self.equations.thresholds.least_tolerance,
-        )
+        return (rows @ self.left).astype(np.float64), schur_complement(own, cross.T, self.inverse), own
 
     def _weighted_rows(self, shape: Shape) -> Single:
         columns = np.asarray(self.candidate.columns(self.equations.problem, shape), np.float64)
@@ -110,6 +120,8 @@ def optimised_shape(equations: NormalEquations, others: Sequence[Term], term: Te
         return equations, term
     if not any(name in term.group.shape for name in candidate.free):
         return _self_consistent(equations, others, term)
+    if candidate.stated_coefficients(term.group.shape) is not None:
+        return _at_its_coefficients(equations, others, term, candidate)
     profile = shape_profile(equations, others, candidate, term.wheels)
     best, gain = dict(term.group.shape), profile(term.group.shape)
     for name, bounds in candidate.bounds(equations.problem, best).items():
@@ -120,6 +132,36 @@ def optimised_shape(equations: NormalEquations, others: Sequence[Term], term: Te
                 best, gain = {**best, name: value}, found
     equations, term = _reshaped(equations, term, best)
     return _self_consistent(equations, others, term)
+
+
+def _at_its_coefficients(
+    equations: NormalEquations, others: Sequence[Term], term: Term, candidate: Candidate
+) -> tuple[NormalEquations, Term]:
+    """Return the term in the shape, of any kind that states its coefficients, that has the largest Δχ² at these."""
+    problem, profile = equations.problem, shape_profile(equations, others, candidate, term.wheels)
+
+    def gain(shape: Shape) -> float:
+        stated = candidate.stated_coefficients(shape)
+        return -float("inf") if stated is None else profile.at(shape, stated)
+
+    def along(shape: Shape, name: str) -> Callable[[float], float]:
+        return lambda value: gain({**shape, name: value})
+
+    kinds: dict[frozenset[str], tuple[float, Shape]] = {}
+    for shape in candidate.shapes(problem):
+        kind, found = frozenset(shape), gain(shape)
+        if found > kinds.get(kind, (-float("inf"), shape))[0]:
+            kinds[kind] = found, shape
+    for kind, (_, shape) in kinds.items():
+        for name in kind & set(candidate.free):
+            between = candidate.search_range(problem, shape, name, candidate.bounds(problem, shape)[name])
+            value, found = maximise(along(shape, name), *between)
+            kinds[kind] = found, {**shape, name: value}
+    best = max(kinds.values(), key=lambda pair: pair[0])[1]
+    equations, term = _reshaped(equations, term, best)
+    fit = equations.fit((*others, term))
+    values = fit.coefficients[fit.of_term(len(others))] / equations.design.scale[list(term.group.columns)]
+    return _reshaped(equations, term, candidate.shape_at(best, values.tolist()))
 
 
 def _self_consistent(equations: NormalEquations, others: Sequence[Term], term: Term) -> tuple[NormalEquations, Term]:
