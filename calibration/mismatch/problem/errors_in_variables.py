@@ -5,6 +5,9 @@ way: the residual correlates with candidates though no physics is missing. Repla
 removes this; the error that remains is of Berkson's kind, uncorrelated with what is computed from it (Carroll et al.,
 2006, chapter 4). The truth is modelled as first-order autoregressive about its mean, with the correlation of the
 recording, so that a signal that jumps is hardly smoothed. With a stated error of 0 nothing changes.
+
+A sensor with noise does not read exactly 0 twice: where it does, it is at rest or within its dead band, and stays 0. A
+simulation may have a step there, as friction has.
 """
 
 from __future__ import annotations
@@ -43,9 +46,15 @@ def expected_inputs(recording: Recording, sensors: Mapping[str, SensorError]) ->
         for column in recording.channels[name].T
     ]
     starts = np.flatnonzero(np.diff(recording.run, prepend=recording.run[0] - 1))
-    smooth = conditional_expectation(values, np.array(scale) ** 2, starts)
+    smooth = np.where(_at_rest(values), 0.0, conditional_expectation(values, np.array(scale) ** 2, starts))
     parts = np.split(smooth, len(names), axis=1)
     return recording.with_channels(**dict(zip(names, parts, strict=True)))
+
+
+def _at_rest(values: Array) -> NDArray[np.bool_]:
+    """Return where a reading, shape (time, column), and one beside it are exactly 0."""
+    zero = np.pad(values == 0, ((1, 1), (0, 0)))
+    return zero[1:-1] & (zero[:-2] | zero[2:])
 
 
 def known_mean(values: Array, axis: int = 0) -> Array:
