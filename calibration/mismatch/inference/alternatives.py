@@ -18,6 +18,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     passes_entry_test,
 )
 from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
+from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what_pulls_parameters_out
 from regolithd.calibration.mismatch.selection.smooth_terms import covariate_of, drop_what_a_curve_explains
 
 if TYPE_CHECKING:
@@ -74,6 +75,7 @@ def _admissible(decision: Decision, fit: Fit) -> bool:
         and (not curves or not _is_a_laws_misfit(decision, fit, named, curves[-1]))
         and all(len(drop_what_a_curve_explains(equations, named, curve).terms) == len(named.terms) for curve in curves)
         and len(drop_what_a_changed_parameter_explains(equations, named).terms) == len(named.terms)
+        and len(drop_what_pulls_parameters_out(equations, named).terms) == len(named.terms)
     )
 
 

@@ -15,6 +15,7 @@ from regolithd.calibration.mismatch.regression.smooth_groups import with_periodi
 from regolithd.calibration.mismatch.selection.best_subsets import best_subsets, passes_entry_test
 from regolithd.calibration.mismatch.selection.cross_validation import drop_what_does_not_transfer
 from regolithd.calibration.mismatch.selection.noise_estimation import noise_beside_terms, noise_of_whitened, whitened
+from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what_pulls_parameters_out
 from regolithd.calibration.mismatch.selection.released_parameters import released
 from regolithd.calibration.mismatch.selection.sign_flip_test import entry_threshold
 from regolithd.calibration.mismatch.selection.smooth_terms import weigh_against_smooth_terms
@@ -61,6 +62,7 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
     equations = with_proposed_shapes(equations, candidates)
     equations, subsets = best_subsets(equations)
     named = _largest_that_passes(equations, subsets, threshold)
+    named = drop_what_pulls_parameters_out(equations, named)
     named = drop_what_does_not_transfer(equations, named, threshold)
     simpler = [fit for fit in subsets[1:] if len(fit.terms) < len(named.terms)]
     chosen = named
