@@ -57,32 +57,35 @@ def unexplained_if_intermittent(decision: Decision) -> Decision:
 
 
 def skewed_wheels(decision: Decision) -> list[int]:
-    """Return the wheels on which what is left, as read or along the motion, has more skewness than noise by chance.
-
-    What is small against the named effects there is the misfit of their laws, and has any distribution.
-    """
+    """Return the wheels on which what is left, as read or along the motion, has more skewness than noise by chance."""
     equations, problem = decision.equations, decision.equations.problem
     left = residual_of(equations, decision.whole)
     explained = np.zeros(left.shape)
     for index in range(len(decision.named.terms)):
         explained += contribution(equations, decision.named, index)
-    misfit = equations.thresholds.form_misfit * np.sum(np.where(problem.mask, explained, 0.0) ** 2, axis=0)
     along = np.nan_to_num(problem.covariates.get("direction", np.ones(left.shape)))
     found = []
     for wheel in range(left.shape[1]):
         here = problem.mask[:, wheel]
         moving = here & (along[:, wheel] != 0)
-        courses = (left[here, wheel], left[moving, wheel] * along[moving, wheel])
-        large = np.sum(courses[0] ** 2) > misfit[wheel]
-        if large and any(is_skewed(_without_single(course), equations.thresholds) for course in courses):
-            found.append(wheel)
+        for course, by in ((here, 1.0), (moving, along[moving, wheel])):
+            if is_skewed(left[course, wheel] * by, explained[course, wheel] * by, equations.thresholds):
+                found.append(wheel)
+                break
     return found
 
 
-def is_skewed(values: Array, thresholds: Thresholds = THRESHOLDS) -> bool:
-    """Return whether the running means of a course (time,), of any length, are skewed by more than chance."""
-    found = (skewness_of(means, thresholds) for means in _running_means(values))
-    return any(abs(skewness) > max(LEAST_SKEWNESS, MOST_STANDARD_ERRORS * error) for skewness, error in found)
+def is_skewed(left: Array, explained: Array, thresholds: Thresholds = THRESHOLDS) -> bool:
+    """Return whether running means of what is left (time,), of any length, are skewed by more than chance.
+
+    Means that are small against those of what the named effects explain are the misfit of laws, of any distribution.
+    """
+    for means, beside in zip(_running_means(_without_single(left)), _running_means(explained), strict=False):
+        skewness, error = skewness_of(means, thresholds)
+        large = np.sum(means**2) > thresholds.form_misfit * np.sum(beside**2)
+        if large and abs(skewness) > max(LEAST_SKEWNESS, MOST_STANDARD_ERRORS * error):
+            return True
+    return False
 
 
 def _running_means(values: Array) -> Iterator[Array]:
