@@ -230,12 +230,15 @@ class Candidate:
         """
         return shape
 
-    def stated_coefficients(self, shape: Shape) -> Sequence[float] | None:  # noqa: ARG002
-        """Return the coefficients at which a shape is exact, where it states them: it is then optimised at these."""
+    def stated_coefficient(self, shape: Shape) -> tuple[float, float] | None:  # noqa: ARG002
+        """Return the coefficient at which a shape is exact, and its relative standard deviation, where it states one.
+
+        The shape is then optimised with that as the coefficient's prior.
+        """
         return None
 
-    def shape_at(self, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002
-        """Return the shape whose columns have the stated coefficients, when it was fitted with `values`."""
+    def shape_at(self, shape: Shape, value: float) -> Shape:  # noqa: ARG002
+        """Return the shape whose column has the stated coefficient, when it was fitted with `value`."""
         return shape
 
     def onset_profiles(self, problem: Problem) -> Sequence[Shape]:

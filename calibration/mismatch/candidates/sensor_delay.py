@@ -23,6 +23,8 @@ LEAST_READINGS = 1.25
 solver that holds it, or interpolates it, is early or late by up to one (a choice: a quarter of a reading more)."""
 PASSED = "passed"
 """The shape parameter of a delay of the predicted channel: the share of the predicted change that was recorded."""
+PASSED_STD = 0.2
+"""Standard deviation of that share about 1 (a choice: inputs whose noise is a fifth of the change's power)."""
 LEAST_PASSED = 0.5
 """That share, or its reciprocal, below which something else than a delay is fitted (a choice)."""
 RATIO_OF_CHANNEL, RATIO_OF_INPUT = 2.0, 4.0
@@ -109,14 +111,14 @@ class SensorDelay(Candidate):
         passed = float(shape.get(PASSED, 1.0))
         return values[0] >= LEAST_READINGS * problem.recording.step_s and LEAST_PASSED <= passed <= 1 / LEAST_PASSED
 
-    def stated_coefficients(self, shape: Shape) -> Sequence[float] | None:
-        """Return the delay of the predicted channel."""
-        return next(([float(shape[kind])] for kind in OF_CHANNEL if kind in shape), None)
+    def stated_coefficient(self, shape: Shape) -> tuple[float, float] | None:
+        """Return the delay of the predicted channel, and how well the share of the change is known to be 1."""
+        return next(((float(shape[kind]), PASSED_STD) for kind in OF_CHANNEL if kind in shape), None)
 
-    def shape_at(self, shape: Shape, values: Sequence[float]) -> Shape:
+    def shape_at(self, shape: Shape, value: float) -> Shape:
         """Return the shape with the share of the predicted change that was recorded."""
-        (delay,) = self.stated_coefficients(shape) or values
-        return {**shape, PASSED: float(shape.get(PASSED, 1.0)) * values[0] / delay}
+        delay = next(float(shape[kind]) for kind in OF_CHANNEL if kind in shape)
+        return {**shape, PASSED: float(shape.get(PASSED, 1.0)) * value / delay}
 
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
         """Return the shape at the fitted delay, with the same share of the change."""

@@ -62,11 +62,12 @@ class ShapeProfile:
             self.equations.thresholds.least_tolerance,
         )
 
-    def at(self, shape: Shape, coefficients: Sequence[float]) -> float:
-        """Return the further Δχ² with these coefficients, the other terms fitted."""
-        moment, complement, _ = self._sums(shape)
-        values = np.array(coefficients, np.float64)
-        return float(2 * values @ moment - values @ complement @ values)
+    def at(self, shape: Shape, coefficient: float, relative_std: float) -> float:
+        """Return the further Δχ² of a shape's one column whose coefficient has this prior."""
+        (moment,), ((complement,),), _ = self._sums(shape)
+        prior = 1 / relative_std**2
+        along, energy = coefficient * moment, coefficient**2 * complement
+        return float((along + prior) ** 2 / (energy + prior) - prior)
 
     def _sums(self, shape: Shape) -> tuple[Array, Array, Array]:
         """Return moments, the products beside the other terms, and all products of the shape's columns."""
@@ -120,8 +121,8 @@ def optimised_shape(equations: NormalEquations, others: Sequence[Term], term: Te
         return equations, term
     if not any(name in term.group.shape for name in candidate.free):
         return _self_consistent(equations, others, term)
-    if candidate.stated_coefficients(term.group.shape) is not None:
-        return _at_its_coefficients(equations, others, term, candidate)
+    if candidate.stated_coefficient(term.group.shape) is not None:
+        return _at_its_coefficient(equations, others, term, candidate)
     profile = shape_profile(equations, others, candidate, term.wheels)
     best, gain = dict(term.group.shape), profile(term.group.shape)
     for name, bounds in candidate.bounds(equations.problem, best).items():
@@ -134,15 +135,15 @@ def optimised_shape(equations: NormalEquations, others: Sequence[Term], term: Te
     return _self_consistent(equations, others, term)
 
 
-def _at_its_coefficients(
+def _at_its_coefficient(
     equations: NormalEquations, others: Sequence[Term], term: Term, candidate: Candidate
 ) -> tuple[NormalEquations, Term]:
-    """Return the term in the shape, of any kind that states its coefficients, that has the largest Δχ² at these."""
+    """Return the term in the shape, of any kind that states its coefficient, that has the largest Δχ² beside that."""
     problem, profile = equations.problem, shape_profile(equations, others, candidate, term.wheels)
 
     def gain(shape: Shape) -> float:
-        stated = candidate.stated_coefficients(shape)
-        return -float("inf") if stated is None else profile.at(shape, stated)
+        stated = candidate.stated_coefficient(shape)
+        return -float("inf") if stated is None else profile.at(shape, *stated)
 
     def along(shape: Shape, name: str) -> Callable[[float], float]:
         return lambda value: gain({**shape, name: value})
@@ -160,8 +161,8 @@ def _at_its_coefficients(
     best = max(kinds.values(), key=lambda pair: pair[0])[1]
     equations, term = _reshaped(equations, term, best)
     fit = equations.fit((*others, term))
-    values = fit.coefficients[fit.of_term(len(others))] / equations.design.scale[list(term.group.columns)]
-    return _reshaped(equations, term, candidate.shape_at(best, values.tolist()))
+    (value,) = fit.coefficients[fit.of_term(len(others))] / equations.design.scale[list(term.group.columns)]
+    return _reshaped(equations, term, candidate.shape_at(best, float(value)))
 
 
 def _self_consistent(equations: NormalEquations, others: Sequence[Term], term: Term) -> tuple[NormalEquations, Term]:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from linear_machine import NOISE, equations_of, problem_of, table, term_of
+from linear_machine import CANDIDATES, NOISE, equations_of, problem_of, table, term_of
 
+from regolithd.calibration.mismatch import Candidate, Coefficient, Problem, Shape
 from regolithd.calibration.mismatch.inference import held_out
 from regolithd.calibration.mismatch.inference.held_out import chosen_effects, held_out_errors
+from regolithd.calibration.mismatch.selection.best_subsets import optimised_shapes
 
 
 def test_errors_fall_from_the_effect_to_the_noise() -> None:
@@ -33,6 +35,29 @@ def test_an_effect_on_one_axis_is_measured_there() -> None:
     _, found = held_out_errors(equations, named, equations.design.groups, 8.0)
     assert found.without[0] == pytest.approx(np.hypot(NOISE, 0.4), rel=0.1)
     assert found.without[0] > found.before > found.after
+
+
+def test_a_fold_may_take_the_answers_effect_where_its_optimised_shape_scores_more() -> None:
+    """A power of 1.5, between the grid's, loses to a rival on the grid, and beats it once it is optimised."""
+
+    class Rival(Candidate):
+        """A law of the speed that is nearer to the truth than the grid's powers."""
+
+        name, covariate, equation, words, signature = "rival", "wheel_speed", "ΔV = r |ω|^1.45", "a rival", "a curve"
+        experiment, source = "drive fast and slowly", "test"
+        coefficients: ClassVar = (Coefficient("factor", "{unit}"),)
+
+        def columns(self, problem: Problem, shape: Shape) -> np.ndarray:  # noqa: ARG002
+            """Return |ω|^1.45."""
+            return np.abs(problem.covariates["wheel_speed"])[None] ** 1.45
+
+    recorded = table(factor=3.0, power=1.5, noise=0.05)
+    equations = equations_of(problem_of(recorded), (*CANDIDATES, Rival()))
+    grid = equations.design.groups
+    assert {term.name for term in chosen_effects(equations, 1e3)} == {"rival"}
+    equations, terms = optimised_shapes(equations, (term_of(equations, "power"),))
+    _, found = held_out_errors(equations, equations.fit(terms), grid, 1e3)
+    assert found.after < 0.2 * found.before
 
 
 def test_without_effects_before_and_after_are_the_same() -> None:

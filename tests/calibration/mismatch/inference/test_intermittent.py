@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from linear_machine import AXES, CANDIDATES, INSTANTS, equations_of, problem_of, table
 
-from regolithd.calibration.mismatch.inference.intermittent import skewness_of, unexplained_if_intermittent
+from regolithd.calibration.mismatch.inference.intermittent import is_skewed, skewness_of, unexplained_if_intermittent
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection.decision import Decision, decide
@@ -40,6 +40,26 @@ def test_the_misfit_of_a_large_effects_law_is_no_finding() -> None:
     decision = decided(in_spells(0.8) + 5.0)
     assert {term.name for term in decision.named.terms} == {"drag"}
     assert unexplained_if_intermittent(decision) is decision
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_three_long_spells_are_unexplained_whatever_their_sign(sign: float) -> None:
+    """They are twice the noise of a reading, and far above that of a mean over their length."""
+    spells = np.zeros((INSTANTS, AXES))
+    for begin in (120, 390, 610):
+        spells[begin : begin + 20, 0] = 0.5 * sign
+    decision = unexplained_if_intermittent(decided(spells))
+    assert [(term.name, term.wheels) for term in decision.unnamed] == [("time", (0,))]
+
+
+def test_slow_noise_is_not_intermittent() -> None:
+    """Noise with a memory of a hundredth of the recording wanders to both sides."""
+    skewed = 0
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        slow = np.convolve(random.normal(size=4000 + 400), np.exp(-np.arange(401) / 40), "valid")
+        skewed += is_skewed(slow + random.normal(size=4000), np.zeros(4000))
+    assert skewed == 0
 
 
 @pytest.mark.parametrize("drag", [0.0, 0.3])

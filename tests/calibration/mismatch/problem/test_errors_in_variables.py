@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from regolithd.calibration.mismatch.problem.errors_in_variables import conditional_expectation
+from regolithd.calibration.mismatch import SensorError
+from regolithd.calibration.mismatch.data.recording import from_columns
+from regolithd.calibration.mismatch.problem.errors_in_variables import conditional_expectation, expected_inputs
 
 START = np.array([0])
 
@@ -33,3 +35,15 @@ def test_what_is_unknown_stays_unknown_and_does_not_spread() -> None:
     values[100:200] = np.nan
     estimate = conditional_expectation(values, np.array([0.01]), START)
     np.testing.assert_array_equal(np.isnan(estimate), np.isnan(values))
+
+
+def test_a_sensor_that_rests_at_zero_stays_there() -> None:
+    """Readings of exactly 0 beside each other have no noise; a single one may be chance, and is smoothed."""
+    random = np.random.default_rng(4)
+    speed = np.where(np.arange(1200) % 400 < 300, 5 + random.normal(0, 0.2, 1200), 0.0)
+    speed[50] = 0.0
+    recording = from_columns({"t_s": np.arange(1200) / 10, "speed": speed})
+    found = expected_inputs(recording, {"speed": SensorError(absolute=0.2)}).channels["speed"][:, 0]
+    resting = np.arange(1200) % 400 >= 300
+    assert not found[resting].any()
+    assert found[~resting].all()

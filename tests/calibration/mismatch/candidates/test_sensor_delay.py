@@ -1,0 +1,146 @@
+"""A late channel: dead time or a filter, told apart, with the delay that it has."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay, filtered, shifted
+from regolithd.calibration.mismatch.data.recording import from_columns
+from regolithd.calibration.mismatch.problem.build import build_problem
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from regolithd.calibration.mismatch.problem.problem import Problem
+
+Array = NDArray[np.float64]
+COUNT, STEP_S = 4000, 0.1
+TIME_S = STEP_S * np.arange(COUNT)
+DELAY = SensorDelay()
+
+
+class Lift(Simulation):
+    """The current of a lift is its load; at standstill the simulation says nothing."""
+
+    channel, unit = "current_A", "A"
+    inputs = ("load_A", "moving")
+    parameters: ClassVar = {"gain": Prior(1.0, 0.02, "1")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the load while it moves."""
+        return np.where(inputs["moving"] > 0.5, values["gain"] * inputs["load_A"], np.nan)
+
+
+def loads() -> tuple[Array, Array]:
+    """Return the load that steps every 2 to 6 s, and whether the lift moves, shape (time,) each."""
+    random = np.random.default_rng(5)
+    lengths = random.integers(20, 60, 300)
+    load = np.repeat(random.uniform(2, 8, 300), lengths)[:COUNT]
+    return load, (np.repeat(random.random(300) > 0.3, lengths)[:COUNT]).astype(float)
+
+
+def problem_of(recorded: Array, load: Array, moving: Array) -> Problem:
+    """Return the problem that a recording of the lift poses."""
+    columns = {"t_s": TIME_S, "load_A": load, "moving": moving, "current_A": recorded}
+    return build_problem(from_columns(columns), Lift())
+
+
+def late(values: Array, kind: str, delay: float) -> Array:
+    """Return values (time,) late by a dead time, or behind a first-order filter, by their definitions."""
+    if kind == "secant_s":
+        return np.interp(TIME_S - delay, TIME_S, values)
+    found, fine = values[0], 200
+    course = []
+    for before, now in zip(np.append(values[0], values[:-1]), values, strict=True):
+        for part in range(fine):
+            found += (before + (now - before) * (part + 0.5) / fine - found) * STEP_S / fine / delay
+        course.append(found)
+    return np.array(course)
+
+
+@pytest.mark.parametrize("delay", [0.15, 0.8, 4.0])
+def test_a_filter_is_that_of_its_differential_equation(delay: float) -> None:
+    """τ dy/dt = x − y, with x on straight lines between the readings, integrated in fine steps."""
+    load, moving = loads()
+    recording = problem_of(load, load, moving).recording
+    np.testing.assert_allclose(
+        filtered(recording, load[:, None], delay)[:, 0], late(load, "filter_s", delay), atol=0.02
+    )
+
+
+def test_a_filter_begins_anew_after_a_gap_and_in_each_run() -> None:
+    """Nothing is known of what it held meanwhile."""
+    load, moving = loads()
+    recording = problem_of(load, load, moving).recording
+    times = recording.time_s + 50.0 * (np.arange(COUNT) >= 1000)
+    gone = replace(recording, time_s=times, run=(np.arange(COUNT) >= 2500).astype(int))
+    found = filtered(gone, load[:, None], 2.0)[:, 0]
+    assert found[[0, 1000, 2500]] == pytest.approx(load[[0, 1000, 2500]])
+
+
+@pytest.mark.parametrize("kind", ["secant_s", "filter_s"])
+def test_a_late_channel_reports_at_a_start_what_it_was_at_standstill(kind: str) -> None:
+    """Where the simulation says nothing, what was recorded there stands for it."""
+    load, moving = loads()
+    true = np.where(moving > 0.5, load, 0.3)
+    problem = problem_of(late(true, kind, 0.5), load, moving)
+    (column,) = DELAY.columns(problem, {"late": "current_A", kind: 0.5})
+    starts = np.flatnonzero(np.diff(moving) > 0) + 1
+    expected = (late(true, kind, 0.5) - load) / 0.5
+    np.testing.assert_allclose(column[starts[5:], 0], expected[starts[5:]], atol=0.6)
+    assert np.isfinite(column[problem.mask]).all()
+
+
+def test_without_a_reading_a_straight_line_bridges_the_gap() -> None:
+    """So that one blank does not blank a filter's whole run."""
+    load, moving = loads()
+    recorded = np.where(moving > 0.5, load, np.nan)
+    problem = problem_of(recorded, load, moving)
+    for kind in ("secant_s", "filter_s"):
+        (column,) = DELAY.columns(problem, {"late": "current_A", kind: 0.5})
+        assert np.isfinite(column[problem.mask]).all()
+
+
+@pytest.mark.parametrize("kind", ["secant_s", "filter_s"])
+@pytest.mark.parametrize("delay", [0.25, 0.9])
+def test_either_kind_is_found_with_its_delay(kind: str, delay: float) -> None:
+    """From two and a half readings on; the other kind is not taken for it."""
+    load, _ = loads()
+    random = np.random.default_rng(3)
+    recorded = late(load, kind, delay) + 0.5 * random.normal(size=COUNT)
+    columns = {"t_s": TIME_S, "load_A": load, "moving": np.ones(COUNT), "current_A": recorded}
+    found = compare(columns, Lift())
+    (effect,) = found.answer.effects
+    assert effect.name == "sensor-delay"
+    assert effect.parameters["delay_s"].value == pytest.approx(delay, rel=0.1)
+    assert kind in found.evidence.contributions[0].shape
+
+
+def test_the_share_of_the_change_is_kept_apart_from_the_delay() -> None:
+    """With it in the shape the coefficient is the delay; far from 1 it is no delay."""
+    load, moving = loads()
+    problem = problem_of(load, load, moving)
+    shape = {"late": "current_A", "secant_s": 0.5}
+    assert DELAY.stated_coefficient(shape) == (0.5, 0.2)
+    assert DELAY.stated_coefficient({"late": "load_A", "input_secant_s": 0.5}) is None
+    with_share = DELAY.shape_at(shape, 0.4)
+    assert with_share["passed"] == pytest.approx(0.8)
+    np.testing.assert_allclose(
+        0.5 * DELAY.columns(problem, with_share), 0.4 * DELAY.columns(problem, shape), equal_nan=True
+    )
+    assert DELAY.plausible(problem, with_share, [0.5])
+    assert not DELAY.plausible(problem, {**shape, "passed": 0.4}, [0.5])
+    assert not DELAY.plausible(problem, {**shape, "passed": 2.5}, [0.5])
+
+
+def test_a_shift_is_within_its_run() -> None:
+    """What another run ended with is not what this one begins with."""
+    load, moving = loads()
+    recording = replace(problem_of(load, load, moving).recording, run=(np.arange(COUNT) >= 2000).astype(int))
+    assert shifted(recording, load[:, None], -5.0)[2000:2050, 0] == pytest.approx(np.full(50, load[2000]))
