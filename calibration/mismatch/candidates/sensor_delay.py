@@ -81,7 +81,7 @@ class SensorDelay(Candidate):
         for kind, delayed in OF_CHANNEL.items():
             if kind in shape:
                 delay = float(shape[kind])
-                behind = delayed(problem.recording, _without_blanks(problem), delay)
+                behind = delayed(problem.recording, _without_blanks(problem, delay), delay)
                 return (float(shape.get(PASSED, 1.0)) * (behind - problem.prediction) / delay)[None]
         late, delay = str(shape["late"]), float(shape["input_secant_s"])
         key = (f"{late} late", delay)
@@ -135,19 +135,20 @@ def _delays(problem: Problem, ratio: float) -> list[float]:
     return [float(delay) for delay in shortest * ratio ** np.arange(count)]
 
 
-def _without_blanks(problem: Problem) -> Array:
-    """Return the prediction; where the simulation says nothing, the median of what was recorded until it does again.
+def _without_blanks(problem: Problem, delay_s: float) -> Array:
+    """Return the prediction; where the simulation says nothing for long, the median of what was recorded there.
 
-    What a late channel reports just after a standstill is what it would have reported at standstill. Where nothing was
-    recorded either, a straight line bridges the gap.
+    What a late channel reports just after a standstill is what it would have reported at standstill: as it does once
+    the delay has passed. A straight line bridges what is shorter than two delays, or was not recorded either.
     """
+    late = int(np.ceil(delay_s / problem.recording.step_s))
     found = np.array(problem.prediction)
     for k in range(found.shape[1]):
         blank = np.isnan(found[:, k])
         edges = np.flatnonzero(np.diff(blank, prepend=False, append=False))
         for first, end in zip(edges[::2], edges[1::2], strict=True):
-            recorded = problem.measured[first:end, k]
-            if np.isfinite(recorded).any():
+            recorded = problem.measured[first + late : end, k]
+            if end - first >= 2 * late and np.isfinite(recorded).any():
                 found[first:end, k] = np.nanmedian(recorded)
         known = np.flatnonzero(np.isfinite(found[:, k]))
         if known.size:

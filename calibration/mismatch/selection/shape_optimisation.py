@@ -63,11 +63,15 @@ class ShapeProfile:
         )
 
     def at(self, shape: Shape, coefficient: float, relative_std: float) -> float:
-        """Return the further Δχ² of a shape's one column whose coefficient has this prior."""
+        """Return the further Δχ² of a shape's one column whose coefficient has this prior, and is not beyond it.
+
+        Noise of inputs makes a coefficient smaller, never larger.
+        """
         (moment,), ((complement,),), _ = self._sums(shape)
         prior = 1 / relative_std**2
         along, energy = coefficient * moment, coefficient**2 * complement
-        return float((along + prior) ** 2 / (energy + prior) - prior)
+        share = min((along + prior) / (energy + prior), 1.0)
+        return float(2 * share * along - share**2 * energy - prior * (share - 1) ** 2)
 
     def _sums(self, shape: Shape) -> tuple[Array, Array, Array]:
         """Return moments, the products beside the other terms, and all products of the shape's columns."""
