@@ -26,7 +26,8 @@ PASSED = "passed"
 PASSED_STD = 0.2
 """Standard deviation of that share about 1 (a choice: inputs whose noise is a fifth of the change's power)."""
 LEAST_PASSED = 0.5
-"""That share, or its reciprocal, below which something else than a delay is fitted (a choice)."""
+"""That share, or its reciprocal, below which something else than a delay is fitted; and the ratio of an input's delay
+to that which its change was computed for (a choice; the grid's ratio of 4 is the square of its reciprocal)."""
 RATIO_OF_CHANNEL, RATIO_OF_INPUT = 2.0, 4.0
 """Ratio of neighbouring delays in the grid, for the predicted channel and for an input (a choice: a fitted delay is
 refined from the nearest; each delay of an input costs a run of the simulation)."""
@@ -107,9 +108,14 @@ class SensorDelay(Candidate):
         return {"delay_s": float(values[0])}
 
     def plausible(self, problem: Problem, shape: Shape, values: Sequence[float]) -> bool:
-        """Return whether the delay is more than sampling itself leaves open, and shows in steps of about their size."""
-        passed = float(shape.get(PASSED, 1.0))
-        return values[0] >= LEAST_READINGS * problem.recording.step_s and LEAST_PASSED <= passed <= 1 / LEAST_PASSED
+        """Return whether the delay is more than sampling itself leaves open, and about that of its shape.
+
+        Of the predicted channel, it shows in changes of about the predicted size.
+        """
+        share = float(shape.get(PASSED, 1.0))
+        if "input_secant_s" in shape:
+            share = float(values[0]) / float(shape["input_secant_s"])
+        return values[0] >= LEAST_READINGS * problem.recording.step_s and LEAST_PASSED <= share <= 1 / LEAST_PASSED
 
     def stated_coefficient(self, shape: Shape) -> tuple[float, float] | None:
         """Return the delay of the predicted channel, and how well the share of the change is known to be 1."""

@@ -15,6 +15,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     best_of_each_candidate,
     best_of_each_smooth_term,
     entry_cost,
+    optimised_shapes,
     passes_entry_test,
 )
 from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
@@ -61,7 +62,14 @@ def alternatives(decision: Decision) -> tuple[Alternative, ...]:
         if names != _names(chosen.terms) and plausible and _admissible(decision, fit):
             best[names] = evidence, fit.terms
     found = [Alternative(names, ahead - evidence, of) for names, (evidence, of) in best.items()]
+    found = [other for other in found if other.margin >= 0 or _stands_optimised(decision, other)]
     return tuple(sorted(found, key=lambda each: each.margin))
+
+
+def _stands_optimised(decision: Decision, other: Alternative) -> bool:
+    """Return whether an answer that is ahead is still acceptable once the shapes of its effects are optimised."""
+    equations, terms = optimised_shapes(decision.equations, [term for term in other.terms if term.group.named])
+    return acceptable(equations, equations.fit(terms))
 
 
 def _admissible(decision: Decision, fit: Fit) -> bool:
