@@ -62,13 +62,20 @@ def _acceptable_term(equations: NormalEquations, fit: Fit, index: int) -> bool:
     term, values = fit.terms[index], fit.coefficients[fit.of_term(index)]
     if any(sign * value < 0 for sign, value in zip(term.group.signs, values, strict=True)):
         return False
-    if term.group.candidate is not None:
-        physical = (values / equations.design.scale[list(term.group.columns)]).tolist()
-        if not term.group.candidate.plausible(equations.problem, term.group.shape, physical):
-            return False
+    if not physically_plausible(equations, fit, index):
+        return False
     if term.group.named and relative_size(equations, fit, index) < equations.thresholds.smallest_effect:
         return False
     return term.group.own_channel is None or _agrees_with_own_channel(equations, fit, index)
+
+
+def physically_plausible(equations: NormalEquations, fit: Fit, index: int) -> bool:
+    """Return whether a term's candidate calls its coefficients possible."""
+    term, values = fit.terms[index], fit.coefficients[fit.of_term(index)]
+    if term.group.candidate is None:
+        return True
+    physical = (values / equations.design.scale[list(term.group.columns)]).tolist()
+    return term.group.candidate.plausible(equations.problem, term.group.shape, physical)
 
 
 def _agrees_with_own_channel(equations: NormalEquations, fit: Fit, index: int) -> bool:

@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import with_periodic_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_subsets, passes_entry_test
 from regolithd.calibration.mismatch.selection.cross_validation import drop_what_does_not_transfer
+from regolithd.calibration.mismatch.selection.implausible_effects import drop_what_the_implausible_explains
 from regolithd.calibration.mismatch.selection.noise_estimation import noise_beside_terms, noise_of_whitened, whitened
 from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what_pulls_parameters_out
 from regolithd.calibration.mismatch.selection.released_parameters import released
@@ -63,6 +64,7 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
     equations, subsets = best_subsets(equations)
     named = _largest_that_passes(equations, subsets, threshold)
     named = drop_what_pulls_parameters_out(equations, named)
+    named = drop_what_the_implausible_explains(equations, named, threshold)
     named = drop_what_does_not_transfer(equations, named, threshold)
     simpler = [fit for fit in subsets[1:] if len(fit.terms) < len(named.terms)]
     chosen = named
