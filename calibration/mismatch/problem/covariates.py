@@ -53,8 +53,10 @@ def covariates_of(
         speed = found["wheel_speed"]
         read = speed if as_read is None else simulation.covariates(as_read)["wheel_speed"]
         found["direction"] = direction_of(read)
-        found["wheel_acceleration"] = _derivative(speed, recording)
-        found["wheel_angle"] = _integral(speed, recording)
+        rate, angle = _derivative(speed, recording), _integral(speed, recording)
+        given = found.get("wheel_acceleration", rate)
+        found["wheel_acceleration"] = np.where(np.isfinite(given), given, rate)
+        found["wheel_angle"] = _measured_angle(found.get("wheel_angle", angle), angle)
     measured = {name: values for name, values in found.items() if np.isfinite(values).any()}
     varying = {name: values for name, values in found.items() if name in KEPT_WHERE_CONSTANT or _varies(values)}
     return varying, {name: values for name, values in measured.items() if name not in varying}
@@ -115,6 +117,19 @@ def _derivative(values: Array, recording: Recording) -> Array:
     rate = np.where(whole[:, None], ahead / np.where(whole, steps, 1.0)[:, None], 0.0)
     before, after = np.vstack((rate[:1] * 0, rate)), np.vstack((rate, rate[:1] * 0))
     return np.nan_to_num(0.5 * (before + after))
+
+
+def _measured_angle(measured: Array, integrated: Array) -> Array:
+    """Return measured angles (time, wheel), blanks on straight lines; of a wheel without any, the integrated angle.
+
+    One that never changes is that of a drive that the simulation predicts with its usual inputs, not a measured one.
+    """
+    found = np.array(integrated)
+    for k, column in enumerate(measured.T):
+        known = np.flatnonzero(np.isfinite(column))
+        if _varies(column):
+            found[:, k] = np.interp(np.arange(len(column)), known, column[known])
+    return found
 
 
 def _integral(values: Array, recording: Recording) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+import pytest
 
 from regolithd.calibration.mismatch import Prior, SensorError, Simulation
 from regolithd.calibration.mismatch.data.recording import from_columns
@@ -78,3 +79,45 @@ def test_a_speed_that_is_smoothed_stands_where_it_was_read_as_zero() -> None:
     assert not problem.covariates["direction"][standing].any()
     assert not problem.prediction[standing].any()
     assert np.any(problem.recording.channels["speed_m_s"][~standing, 0] != read[~standing])
+
+
+class Encoder(Belt):
+    """A belt whose angle, and whose acceleration, are measured."""
+
+    def covariates(self, inputs: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+        """Return the speed and what of the motion was recorded."""
+        measured = {name: inputs[name] for name in ("wheel_angle", "wheel_acceleration") if name in inputs}
+        return {"wheel_speed": inputs["speed_m_s"], **measured}
+
+
+def turning(**columns: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+    """Return the covariates of an axis that turns with 2 rad/s, with these columns measured."""
+    table = {"t_s": 0.1 * np.arange(200), "speed_m_s": np.full(200, 2.0), "current_A": np.ones(200), **columns}
+    return dict(build_problem(from_columns(table), Encoder()).covariates)
+
+
+@pytest.mark.parametrize("name", ["wheel_angle", "wheel_acceleration"])
+def test_what_a_class_returns_of_the_motion_is_not_computed_from_the_speed(name: str) -> None:
+    """An encoder knows the angle better than an integrated speed does."""
+    measured = np.random.default_rng(3).normal(size=200)
+    np.testing.assert_array_equal(turning(**{name: measured})[name][:, 0], measured)
+
+
+def test_blanks_of_a_measured_angle_are_bridged() -> None:
+    """No reading is lost for them."""
+    angle = 0.3 * np.arange(200)
+    blank = np.where(np.arange(200) % 7 == 2, np.nan, angle)
+    np.testing.assert_allclose(turning(wheel_angle=blank)["wheel_angle"][:, 0], angle)
+
+
+def test_an_angle_that_never_changes_is_integrated_from_the_speed() -> None:
+    """Nor is one that is blank throughout known."""
+    for measured in (np.full(200, 4.0), np.full(200, np.nan)):
+        np.testing.assert_allclose(turning(wheel_angle=measured)["wheel_angle"][:, 0], 0.2 * np.arange(200))
+
+
+def test_blanks_of_a_measured_acceleration_follow_from_the_speed() -> None:
+    """A speed that is constant has none."""
+    measured = np.where(np.arange(200) < 50, np.nan, 1.0)
+    found = turning(wheel_acceleration=measured)["wheel_acceleration"][:, 0]
+    np.testing.assert_array_equal(found, np.nan_to_num(measured))
