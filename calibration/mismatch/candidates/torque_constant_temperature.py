@@ -28,7 +28,10 @@ LARGEST_LOSS = 2 / 3
 
 
 class TorqueConstantTemperature(Candidate):
-    """k_t = k_0 (1 − α (T − T_0)): remanence falls with temperature, and the current is the torque over k_t."""
+    """k_t = k_0 (1 − α (T − T_0)): remanence falls with temperature, and the current is the torque over k_t.
+
+    T_0 is the best of 25 °C, 20 °C, 0 °C and the recording's mean temperature. It cannot be stated.
+    """
 
     name = "torque-constant-temperature"
     covariate = "temperature"

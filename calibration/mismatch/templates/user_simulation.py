@@ -19,7 +19,8 @@ class Joint(Simulation):
     """Inertia and viscous friction of one joint.
 
     What else a class may state (several channels, errors and slower sensors of inputs, states, machines that run one
-    way, effects of its own): docs/how-to/simulation.md, or python -m pydoc regolithd.calibration.mismatch.Simulation.
+    way or stand, effects of its own): docs/how-to/simulation.md, or
+    python -m pydoc regolithd.calibration.mismatch.Simulation.
     What is looked for with it: regolithd mismatch --effects --simulation SIM.toml.
     """
 
