@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.problem.covariates import USUAL_SPEED_QUANTILE
 from regolithd.calibration.mismatch.signal.noise import estimate_noise
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ TRANSITIONS = (0.0025, 0.005, 0.01, 0.02, 0.04)
 """Speeds at which the friction has turned round by three quarters, as shares of the highest usual speed (a choice: from
 where it is a step for most readings to where it would be taken for viscous friction); the best is refined between its
 neighbours."""
-USUAL_SPEED_QUANTILE = 0.98
 REFINED_TO = 0.05
 """Relative tolerance of the refined transition (a choice: its effect on the residual is of second order)."""
 LEAST_WITHIN = 0.01

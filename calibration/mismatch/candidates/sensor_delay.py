@@ -43,8 +43,8 @@ class SensorDelay(Candidate):
     series); per second of delay, so that the coefficient is the delay. That of the predicted channel is optimised with
     its coefficient, since a delay shows in when the channel steps. How far it steps is predicted from inputs with
     errors: `passed` is the share of the predicted change that was recorded, 1 ± 0.2 before the recording and from a
-    half to two after it. The delay of an input costs a run of the
-    simulation, and only follows the fit until both agree.
+    half to two after it. The delay of an input costs a run of the simulation, and only follows the fit until both
+    agree.
     """
 
     name = "sensor-delay"

@@ -24,6 +24,7 @@ SLOW_SHARE = 0.05
 """Share of the highest usual speed below which an axis may stand (a choice): no more of it is noise of a speed sensor
 that is of use."""
 USUAL_SPEED_QUANTILE = 0.98
+"""Quantile of the magnitudes of a speed that counts as the highest usual one (a choice)."""
 STANDSTILL_DEVIATIONS = 3.0
 """Standard deviations of its noise within which a speed has no sign: 1 reading in 370 of an axis that stands is beyond
 (normal density)."""
