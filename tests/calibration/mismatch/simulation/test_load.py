@@ -52,14 +52,19 @@ def test_a_key_has_a_line(keys: tuple[str, ...], line: int | None) -> None:
             "class",
             '"my_simulation:Joint"',
             "my_simulation",
-            "is not TOML: Invalid value (at line 9, column 9)",
+            "is not TOML: Invalid value (at line {line}, column 9)",
         ),
-        ("class", "my_simulation:Joint", "my_simulation", "SIM.toml, line 9: [simulation] model must be"),
+        ("class", "my_simulation:Joint", "my_simulation", "SIM.toml, line {line}: [simulation] model must be"),
         ("class", "my_simulation:", "your_simulation:", "say where it is with [simulation] path"),
-        ("class", "# path =", "path = 3 #", "SIM.toml, line 10: [simulation] path must be a folder's name"),
+        ("class", "# path =", "path = 3 #", "SIM.toml, line {line}: [simulation] path must be a folder's name"),
         ("class", "value = 0.50", 'value = "half"', "a finite number is needed, not 'half'"),
         ("class", "value = 0.50", "valu = 0.50", "did you mean value?"),
-        ("class", "inertia_kg_m2", "inertia_kgm2", "SIM.toml, line 12: [parameters]: the simulation has no parameter"),
+        (
+            "class",
+            "inertia_kg_m2",
+            "inertia_kgm2",
+            "SIM.toml, line {line}: [parameters]: the simulation has no parameter",
+        ),
         ("class", "[parameters.v", "[effects]\n[parameters.v", "effects are tables, [[effects]]"),
         ("rover-wheel", "cohesion_Pa =", "cohesion_kPa =", "did you mean cohesion_Pa?"),
         ("rover-wheel", "[soil]", "[ground]", "soil: Field required"),
@@ -67,15 +72,16 @@ def test_a_key_has_a_line(keys: tuple[str, ...], line: int | None) -> None:
     ],
 )
 def test_a_mistake_is_told_with_its_line(kind: str, old: str, new: str, told: str, tmp_path: Path) -> None:
-    """The message begins with the file."""
+    """The message begins with the file; `{line}` is that of the mistake."""
     write_templates(kind, tmp_path)
     path = tmp_path / "SIM.toml"
-    assert old in path.read_text()
-    path.write_text(path.read_text().replace(old, new, 1))
+    before, found, after = path.read_text().partition(old)
+    assert found
+    path.write_text(before + new + after)
     with pytest.raises(SimulationError) as caught:
         load_simulation(path)
     assert str(caught.value).startswith(str(path))
-    assert told in str(caught.value)
+    assert told.format(line=before.count("\n") + 1) in str(caught.value)
 
 
 @pytest.mark.parametrize("content", [b"\xff\xfe[\x00", b"[simulation]\nmodel = '\xe9'\n"])
