@@ -47,6 +47,8 @@ UNITS_OF_NO_LOAD = frozenset(
 )
 """Units of temperature, place, motion, acceleration, content and flow: a drive's load may change them, but is not made
 of them. Any other unit, a percentage or counts too, may be that of a load."""
+OF_A_LOAD = "a predicted force, torque, pressure, current, voltage or power"
+"""What an effect needs that is a load, in words."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +115,8 @@ class Candidate:
     requires: ClassVar[tuple[str, ...]] = ()
     """Covariates that must have been recorded and vary; without them the candidate is not looked for."""
     needs: ClassVar[str] = ""
-    """What `applies` asks for beside `requires`, as a noun phrase: "a predicted current"."""
+    """What `applies` asks for beside `requires`, as a noun phrase: "a predicted current"; by default nothing, or
+    `OF_A_LOAD` where the effect `loads` a drive."""
     sharing: ClassVar[tuple[Sharing, ...]] = ("all", "one")
     """Wheels that may have the effect: `all` with the same coefficients, or `one` alone."""
     channel: ClassVar[str | None] = None
@@ -134,8 +137,10 @@ class Candidate:
     """Whether the effect is there with the wheels lifted, where soil and load have no part in the channel."""
 
     def __init_subclass__(cls) -> None:
-        """Derive the label from the name."""
+        """Derive the label from the name, and other attributes that follow from those that are stated."""
         super().__init_subclass__()
+        if cls.loads and not cls.needs:
+            cls.needs = OF_A_LOAD
         if "name" in vars(cls) and "label" not in vars(cls):
             cls.label = " ".join(cls.name.rsplit("-", 1)).replace("_", " ")
         if "covariate" in vars(cls) and "vary" not in vars(cls):

@@ -42,9 +42,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 
-OF_A_LOAD = "a predicted force, torque, pressure, current, voltage or power"
-
-
 def answer_of(
     decision: Decision, held_out: HeldOutErrors, candidates: Sequence[Candidate], applicable: Sequence[Candidate]
 ) -> Answer:
@@ -208,8 +205,7 @@ def _not_looked_for(problem: Problem, candidates: Sequence[Candidate], applicabl
         if candidate.name not in applicable:
             missing = [name for name in candidate.requires if name not in problem.covariates]
             told = [f"{name} that varies" if name in problem.constants else name for name in missing]
-            needs = candidate.needs or (OF_A_LOAD if candidate.loads else "")
-            lacking = covariates.setdefault(listed(told), []) if told else others.setdefault(needs, [])
+            lacking = covariates.setdefault(listed(told), []) if told else others.setdefault(candidate.needs, [])
             lacking.append(candidate.name)
     parts = [f"without {needs}: {', '.join(names)}" for needs, names in covariates.items()]
     return [

@@ -42,8 +42,6 @@ def _type(value: Mapping[str, Any]) -> str:
         return " or ".join(_type(each) for each in any_of)
     if "$ref" in value:
         return _linked(value["$ref"])
-    if either := value.get("anyOf") or value.get("oneOf"):
-        return " or ".join(_type(each) for each in either)
     return _json_type(value)
 
 
