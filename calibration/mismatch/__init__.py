@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.data.recording import Recording, as_recording, from_columns, read_recording
     from regolithd.calibration.mismatch.errors import MismatchError, RecordingError, SimulationError
     from regolithd.calibration.mismatch.fleet.comparison import Member, compare
+    from regolithd.calibration.mismatch.problem.covariates import direction_of
     from regolithd.calibration.mismatch.problem.prior import Prior, SensorError
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.simulation.load import load_simulation
@@ -39,6 +40,7 @@ __all__ = [
     "SimulationError",
     "as_recording",
     "compare",
+    "direction_of",
     "from_columns",
     "library",
     "load_simulation",
@@ -51,6 +53,7 @@ _HOME = {
     "data.recording": ("Recording", "as_recording", "from_columns", "read_recording"),
     "errors": ("MismatchError", "RecordingError", "SimulationError"),
     "fleet.comparison": ("Member", "compare"),
+    "problem.covariates": ("direction_of",),
     "problem.prior": ("Prior", "SensorError"),
     "problem.problem": ("Problem",),
     "simulation.load": ("load_simulation",),

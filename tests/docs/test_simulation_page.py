@@ -5,12 +5,12 @@ from __future__ import annotations
 import inspect
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pytest
 
-from regolithd.calibration.mismatch import compare
+from regolithd.calibration.mismatch import Prior, compare
 from regolithd.calibration.mismatch.data.recording import TIME_UNITS_S, read_recording
 from regolithd.calibration.mismatch.data.slow_channels import filled_between
 from regolithd.calibration.mismatch.simulation.checked import checked
@@ -18,7 +18,11 @@ from regolithd.calibration.mismatch.simulation.checked_candidate import STATED
 from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
+
+    from regolithd.calibration.mismatch import Array
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs/how-to/simulation.md").read_text(encoding="utf-8")
 
@@ -103,3 +107,61 @@ def test_the_whole_example_names_what_its_recording_conceals(fans: dict[str, Any
     told = [*answer.notes, *(one.experiment for one in answer.indistinguishable)]
     assert any("without the channel rise_Pa: filter-clogging" in note for note in told)
     assert not any("to and fro" in text or "both ways" in text for text in told)
+
+
+def test_friction_in_a_predict_is_zero_where_a_noisy_speed_stands() -> None:
+    """The page's line gives the friction's whole size in motion, and none within the sensor's noise at rest."""
+    code = next(text for text in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL) if "direction_of(" in text)
+    rng, count = np.random.default_rng(2), 2000
+    moving = np.repeat([1.0, 0.0, -1.0, 0.0], count // 4)
+    speed = (moving + rng.normal(0, 0.01, count))[:, None]
+    names: dict[str, Any] = {"values": {"friction_Nm": 3.0}, "inputs": {"speed_rad_s": speed}}
+    exec(code, names)
+    np.testing.assert_array_equal(names["friction"][moving != 0, 0], 3.0 * moving[moving != 0])
+    assert np.mean(names["friction"][moving == 0] != 0) < 0.01
+
+
+class Winding(Simulation):
+    """A motor's current, and the temperature of its winding: by the predicted current, or by the recorded one."""
+
+    channels: ClassVar = {"motor_current_A": "A", "winding_degC": "°C"}
+    inputs = ("load_Nm", "speed_rad_s", "motor_current_A")
+    parameters: ClassVar = {"current_per_load": Prior(0.5, 0.005, "A/(N·m)"), "heating": Prior(8.0, 0.1, "K/(s A²)")}
+
+    def __init__(self, *, recorded: bool) -> None:
+        self.recorded = recorded
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Any:
+        """Return both columns."""
+        current = values["current_per_load"] * inputs["load_Nm"]
+        heated_by = inputs["motor_current_A"] if self.recorded else current
+        return {"motor_current_A": current, "winding_degC": heated(heated_by, values["heating"])}
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the speed."""
+        return {"wheel_speed": inputs["speed_rad_s"]}
+
+
+def heated(current: Array, heating: float, step_s: float = 0.5) -> Array:
+    """Return a winding's temperature [°C], (time, wheel): warmed by the current, cooled to 20 °C within 150 s."""
+    found = np.full(current.shape, 20.0)
+    for k in range(1, len(found)):
+        rate = (heating * current[k - 1] ** 2 - (found[k - 1] - 20) / 1.5) / 100
+        found[k] = found[k - 1] + step_s * rate
+    return found
+
+
+@pytest.mark.parametrize(("recorded", "verdict"), [(False, "unexplained"), (True, "missing-physics")])
+def test_friction_that_heats_a_winding_is_named_in_the_current_alone(recorded: bool, verdict: str) -> None:
+    """The temperature is unexplained where it follows from the predicted current, and not where from the recorded."""
+    rng, time_s = np.random.default_rng(2), 0.5 * np.arange(3000)
+    load = 2 + np.sin(0.17 * time_s) + 0.5 * np.sin(0.56 * time_s)
+    speed = np.choose((time_s // 60).astype(int) % 4, [1.0, -1.0, 1.0, 0.0]) * (1 + 0.5 * np.sin(0.065 * time_s))
+    current = 0.5 * load + 0.3 * np.sign(speed) + rng.normal(0, 0.001, len(time_s))
+    winding = heated(current[:, None], 8.0)[:, 0] + rng.normal(0, 0.1, len(time_s))
+    columns = {"t_s": time_s, "load_Nm": load, "speed_rad_s": speed, "motor_current_A": current}
+    answer = compare(columns | {"winding_degC": winding}, Winding(recorded=recorded)).answer
+    assert [(each.name, each.channel) for each in answer.effects] == [("coulomb-friction", "motor_current_A")]
+    assert answer.effects[0].wheels == (1,)
+    assert answer.verdict == verdict
+    assert all(rest.channel == "winding_degC" for rest in answer.unexplained)

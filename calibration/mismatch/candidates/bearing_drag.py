@@ -32,6 +32,9 @@ class BearingDrag(Candidate):
 
     g is 0 before the onset. After it, it is a step to 1, an exponential approach to 1, or a power of the time since the
     onset that is 1 at the end of the recording: `drag_current` is the drag at the end.
+
+    On a machine with one axis the onset alone tells it from Coulomb friction, which is the same from the first reading
+    on. Both may be named: the friction that was always there, and the drag that was added to it.
     """
 
     name = "bearing-drag"

@@ -24,6 +24,8 @@ class RotorInertia(Candidate):
     """Current in proportion to the acceleration; the rotor's inertia times the gear ratio squared dominates.
 
     The current may lag behind the acceleration: drivetrains are elastic, and controllers low-pass what they report.
+    The acceleration is the derivative of `wheel_speed` unless the simulation gives another; noise in it makes the
+    inertia too small.
     """
 
     name = "rotor-inertia"

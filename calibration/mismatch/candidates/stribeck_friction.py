@@ -30,7 +30,11 @@ together pass for Coulomb friction."""
 
 
 class StribeckFriction(Candidate):
-    """Boundary friction above the Coulomb level, negligible at several times the Stribeck speed."""
+    """Boundary friction above the Coulomb level, negligible at several times the Stribeck speed.
+
+    The parameter is called `stribeck_speed_rad_s` on every machine; its `unit` is that of `wheel_speed`, m/s where the
+    machine moves in a line.
+    """
 
     name = "stribeck-friction"
     covariate = "wheel_speed"

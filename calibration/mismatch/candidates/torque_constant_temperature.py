@@ -31,6 +31,10 @@ class TorqueConstantTemperature(Candidate):
     """k_t = k_0 (1 − α (T − T_0)): remanence falls with temperature, and the current is the torque over k_t.
 
     T_0 is the best of 25 °C, 20 °C, 0 °C and the recording's mean temperature. It cannot be stated.
+
+    It is looked for in every predicted load, as a reading that exceeds the prediction by a share that grows with the
+    temperature: a torque or a force that was computed from the current does so. That of a sensor of its own does not:
+    leave the effect out of `candidates` there.
     """
 
     name = "torque-constant-temperature"

@@ -36,7 +36,11 @@ what a quarter of the readings resolves is no alias, and the others may tell of 
 
 
 class WheelAngleRipple(Candidate):
-    """A sine of the wheel's angle, with or without its first overtone, each wheel with a phase of its own."""
+    """A sine of the wheel's angle, with or without its first overtone, each wheel with a phase of its own.
+
+    The angle is the integral of `wheel_speed` unless the simulation gives another. Where the speed is in m/s it is the
+    travel in m, and a ripple of order n repeats every 2π/n m.
+    """
 
     name = "wheel-angle-ripple"
     covariate = "wheel_angle"

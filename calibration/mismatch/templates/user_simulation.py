@@ -40,5 +40,9 @@ class Joint(Simulation):
         )
 
     def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
-        """Return what left-out physics may depend on; `wheel_speed` is the speed that friction opposes."""
+        """Return what left-out physics may depend on.
+
+        `wheel_speed` is the speed that friction opposes, in rad/s or m/s; acceleration and angle follow from it.
+        Friction in `predict` takes its sign from regolithd.calibration.mismatch.direction_of, 0 at standstill.
+        """
         return {"wheel_speed": inputs["speed_rad_s"]}
