@@ -53,6 +53,8 @@ class Effect:
     wheels: their names in the recording
     onset_s: when it begins, None where it was there from the start
     rmse_before, rmse_after: held-out root mean squares on its wheels, without and with the effect
+    form: which of the law's forms was found, by its name; empty where it has only one
+    shape: the law's shape parameters, as `[[effects]]` of a corrected simulation has them
     """
 
     name: str
@@ -65,6 +67,8 @@ class Effect:
     parameters: Mapping[str, Parameter]
     rmse_before: float
     rmse_after: float
+    form: str = ""
+    shape: Mapping[str, float | str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

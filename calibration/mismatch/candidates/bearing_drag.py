@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 from regolithd.calibration.mismatch.candidates.candidate import (
+    GROWTHS,
     Array,
     Candidate,
     Coefficient,
     Shape,
     growth,
+    growth_form,
     onset_grid,
     onset_range,
 )
@@ -48,9 +50,14 @@ class BearingDrag(Candidate):
     requires = ("direction",)
     parameter_labels: ClassVar = {"drag_current": "drag"}
     loads = True
+    forms = GROWTHS
     coefficients: ClassVar = (Coefficient("drag_current", "{unit}"),)
     sharing: ClassVar = ("one",)
     free: ClassVar = {"onset_s": (0.0, float("inf"))}
+
+    def form_of(self, shape: Shape) -> str:
+        """Return how the drag grows after its onset."""
+        return growth_form(shape)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """For each onset: a step, two exponential rises, and growth by a power of the time since the onset."""

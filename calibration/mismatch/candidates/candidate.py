@@ -108,6 +108,9 @@ class Candidate:
     imitated_over: ClassVar[str] = ""
     """The covariate over which a smooth curve can imitate the effect, by default `covariate`; `none` where no curve
     can, as what follows how fast a channel changes is a function of no covariate."""
+    forms: ClassVar[tuple[str, ...]] = ()
+    """Names of the law's forms, where it has several that differ in more than a number: "dead time". A name stands in
+    brackets after `words`; `form_of` tells which one a shape has."""
     label: ClassVar[str] = ""
     """The name as text for people; by default `name` with its last hyphen as a space: "multi-pass compaction"."""
     parameter_labels: ClassVar[Mapping[str, str]] = {}
@@ -156,6 +159,10 @@ class Candidate:
     def words_for(self, shape: Shape) -> str:  # noqa: ARG002  # subclasses look
         """Return the words for one shape, where that says more (which channel is late); by default `words`."""
         return self.words
+
+    def form_of(self, shape: Shape) -> str:  # noqa: ARG002  # subclasses look
+        """Return which of `forms` a shape has; empty where the law has only one."""
+        return ""
 
     def instruction(self, simulation: Predictor) -> str:
         """Return the experiment for a simulation's machine: that of a machine that runs one way, where it does."""
@@ -279,6 +286,18 @@ def onset_grid(problem: Problem, count: int = ONSET_COUNT) -> list[float]:
 def onset_range(problem: Problem) -> tuple[float, float]:
     """Return the times between which an onset is optimised [s]: what was before it and after it must be seen."""
     return FIRST_ONSET * problem.length_s, LAST_ONSET * problem.length_s
+
+
+GROWTHS = ("step", "exponential rise", "power of time")
+"""Names of the forms that `growth` has."""
+
+
+def growth_form(shape: Shape) -> str:
+    """Return which of `GROWTHS` a shape has."""
+    step, rise, power = GROWTHS
+    if "full_at_s" in shape:
+        return power
+    return rise if shape["rise_s"] else step
 
 
 def growth(problem: Problem, shape: Shape) -> Array:

@@ -55,9 +55,16 @@ class ColdLubricantFriction(Candidate):
     source = "Vogel–Fulcher viscosity of low-temperature greases: a factor e in 10 to 40 K; linear in a small range"
     requires = ("temperature", "direction")
     loads = True
+    forms = ("constant, Vogel's law", "constant, a line", "viscous, Vogel's law", "viscous, a line")
     parameter_labels: ClassVar = {"scale_K": "temperature scale"}
     coefficients: ClassVar = (Coefficient("cold_drag", "{unit} ({per_speed})^p"),)
     free: ClassVar = {"scale_K": (STEEPEST_K, 80.0), "no_drag_above_degC": (-60.0, 80.0)}
+
+    def form_of(self, shape: Shape) -> str:
+        """Return how the drag depends on speed and on temperature."""
+        over_speed = "viscous" if float(shape["power"]) else "constant"
+        over_temperature = "Vogel's law" if "scale_K" in shape else "a line"
+        return f"{over_speed}, {over_temperature}"
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return Vogel's law with several scales, and straight lines that end at several temperatures."""

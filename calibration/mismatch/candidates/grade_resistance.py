@@ -28,11 +28,16 @@ class GradeResistance(Candidate):
     source = "statics: at most weight × radius / gain"
     requires = ("pitch",)
     loads = True
+    forms = ("shared evenly", "shared by load")
     along_motion = False
     acts_unloaded = False
     parameter_labels: ClassVar = {"grade_current": "grade resistance"}
     coefficients: ClassVar = (Coefficient("grade_current", "{unit}"),)
     sharing: ClassVar = ("all",)
+
+    def form_of(self, shape: Shape) -> str:
+        """Return how the wheels share the weight."""
+        return f"shared {shape['shared']}"
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return sharing in proportion to each wheel's load over the mean one here, where it is known, or evenly."""

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import (
+    GROWTHS,
     Array,
     Candidate,
     Coefficient,
     Shape,
     growth,
+    growth_form,
     onset_grid,
     onset_range,
 )
@@ -139,8 +141,13 @@ class DriftOfPredictedLoad(LoadCellDrift):
     signature = "one reading departs from the prediction after some time, by an amount that does not depend on the load"
     experiment = "take the load off, note the reading, and repeat with a known load"
     along_motion = False
+    forms = GROWTHS[1:]
     coefficients: ClassVar = (Coefficient("drift", "{unit}", 0),)
     free: ClassVar = {"onset_s": (0.0, float("inf"))}
+
+    def form_of(self, shape: Shape) -> str:
+        """Return how the reading departs after the onset."""
+        return growth_form(shape)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return, for each onset, two exponential approaches (creep) and a steady ramp."""

@@ -37,22 +37,35 @@ class LoadDependentEfficiency(Candidate):
     effect is identified; it is part of the shape (`reference_size`, in the channel's unit), so that the law holds for
     any other recording.
 
-    `power`: the relative loss grows as a power of the torque; with power 0 it is constant, so that the stated gain is
-    wrong by more than its stated uncertainty. `light`: the loss decays exponentially with torque. `bent`: the
-    efficiency is the stated one at the reference torque and falls linearly with the torque above it, so that the
-    current is I/(1 − a x).
+    `power`: the relative loss grows as a power p of the torque; with power 0 it is a constant share, so that the stated
+    gain is wrong by more than its stated uncertainty. `light`: the loss decays exponentially with the torque, by a
+    factor e over `light` reference torques. `bent`: the efficiency is the stated one at the reference torque and falls
+    linearly with the torque above it, so that the current is I/(1 − a x); `bent` is a.
     """
 
     name = "load-dependent-efficiency"
     covariate = "torque"
-    equation = "ΔI = a |I_sim| |I_sim/I_ref|^p sign(ω), or |I_sim| (1/(1 − a x) − 1) sign(ω), x = |I_sim|/I_ref − 1"
+    equation = (
+        "ΔI = a |I_sim| |I_sim/I_ref|^p sign(ω), a |I_sim| exp(−|I_sim|/(l I_ref)) sign(ω), "
+        "or |I_sim| (1/(1 − a x) − 1) sign(ω), x = |I_sim|/I_ref − 1"
+    )
     words = "a loss that depends on the transmitted torque"
     signature = "a residual along the predicted current, curved against it"
     experiment = "carry at least three different loads at each {wheel_speed}"
     source = "CSF-11 efficiency over load (maker's chart): 0.3 to 0.7 from a tenth of rated torque to rated"
     requires = ("torque",)
     loads = True
+    forms = ("constant share", "power of the torque", "exponential decay with the torque", "linear efficiency")
     coefficients: ClassVar = (Coefficient("relative_loss", "1", 0),)
+
+    def form_of(self, shape: Shape) -> str:
+        """Return what the relative loss, or the efficiency, is as a function of the torque."""
+        constant, power, light, bent = self.forms
+        if "bent" in shape:
+            return bent
+        if "light" in shape:
+            return light
+        return power if shape["power"] else constant
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return powers from proportional to strongly curved, losses at light load, and linear efficiencies."""

@@ -21,6 +21,12 @@ if TYPE_CHECKING:
 
 KEPT = (0.0, 0.5, 1.0)
 """Change by each further pass over that by the first (tests: most of it by the first pass)."""
+FORMS = {
+    "current": "in proportion to the prediction",
+    "stiffness": "of the soil's stiffness",
+    "soil": "of stiffness, shear modulus and cohesion",
+}
+"""Names of what a pass changes, in the answer."""
 STEP = 0.3
 """Relative change of stiffness and shear modulus of the prediction's difference quotient (a choice: as in a rut)."""
 
@@ -42,12 +48,17 @@ class MultiPassCompaction(Candidate):
     requires = ("torque",)
     needs = "wheels one behind the other (row of the simulation)"
     acts_unloaded = False
+    forms = tuple(FORMS.values())
     coefficients: ClassVar = (
         Coefficient("relative_change_per_pass", "1", 0),
         Coefficient("relative_shear_modulus_per_pass", "1", 0),
         Coefficient("relative_cohesion_per_pass", "1", 0),
     )
     sharing: ClassVar = ("all",)
+
+    def form_of(self, shape: Shape) -> str:
+        """Return what a pass changes."""
+        return FORMS[str(shape["by"])]
 
     def applies(self, problem: Problem) -> bool:
         """Return whether the machine has rows of wheels."""

@@ -56,12 +56,18 @@ class SensorDelay(Candidate):
     source = "filters, buses and polling: a first-order filter delays slow changes by its time constant"
     along_motion = False
     imitated_over = "none"
+    forms = ("dead time", "first-order filter")
     coefficients: ClassVar = (Coefficient("delay_s", "s", 1),)
     free: ClassVar = {"secant_s": (0.0, float("inf")), "filter_s": (0.0, float("inf"))}
 
     def words_for(self, shape: Shape) -> str:
         """Return which column is late."""
         return f"a delay of {shape['late']}" if "late" in shape else self.words
+
+    def form_of(self, shape: Shape) -> str:
+        """Return what delays the column; an input is tried as late by a dead time."""
+        dead_time, of_first_order = self.forms
+        return of_first_order if "filter_s" in shape else dead_time
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the predicted channel and each input, late by two readings up to a tenth of the recording."""

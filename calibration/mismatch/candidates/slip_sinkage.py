@@ -26,8 +26,14 @@ class SlipSinkage(Candidate):
     source = "Lyasko (2010), Eq. 8 of the paper: s = 1"
     requires = ("slip",)
     acts_unloaded = False
+    forms = ("by the soil model", "in proportion to slip")
     coefficients: ClassVar = (Coefficient("strength", "1"),)
     sharing: ClassVar = ("all",)
+
+    def form_of(self, shape: Shape) -> str:
+        """Return what the sinkage is computed by."""
+        soil_model, proportional = self.forms
+        return soil_model if "step" in shape else proportional
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the soil model at small and full strength, and a law proportional to slip."""

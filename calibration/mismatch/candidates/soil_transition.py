@@ -34,10 +34,15 @@ class SoilTransition(Candidate):
     run_unloaded = True
     source = "Table 1 of the paper: strengths differ by a factor of five between soils"
     acts_unloaded = False
+    forms = ("at one time", "at one place")
     needs = "the parameters cohesion_Pa and friction_angle_deg"
     coefficients: ClassVar = (Coefficient("relative_strength_change", "1", 0),)
     sharing: ClassVar = ("all",)
     free: ClassVar = {"onset_s": (0.0, float("inf"))}
+
+    def form_of(self, shape: Shape) -> str:
+        """Return where the other soil begins: under all wheels at once, or where each of them crosses a border."""
+        return f"at one {shape['along']}"
 
     def applies(self, problem: Problem) -> bool:
         """Return whether the simulation has cohesion and friction angle as parameters."""

@@ -21,6 +21,8 @@ FADES: dict[str, Callable[[Array], Array]] = {
     "quotient": lambda ratio: 1 / (1 + ratio**2),
 }
 """Share of the extra drag that is left, as a function of speed over the Stribeck speed."""
+FORMS = {"exponent 1": "exponential", "exponent 2": "Gaussian", "quotient": "quotient"}
+"""Names of these laws in the answer."""
 SPEED_COUNT = 7
 """Stribeck speeds that are searched, in geometric steps (a choice)."""
 SLOWEST, FASTEST = (0.5, 0.02), (0.5, 0.98)
@@ -47,10 +49,15 @@ class StribeckFriction(Candidate):
     source = "Armstrong-Hélouvry, Dupont and Canudas de Wit (1994): δ from 1 to 2; Hess and Soom (1990): the quotient"
     requires = ("wheel_speed",)
     loads = True
+    forms = tuple(FORMS.values())
     label = "Stribeck friction"
     parameter_labels: ClassVar = {"stribeck_current": "Stribeck friction", "stribeck_speed_rad_s": "Stribeck speed"}
     coefficients: ClassVar = (Coefficient("stribeck_current", "{unit}"),)
     free: ClassVar = {"stribeck_speed_rad_s": (0.0, np.inf)}
+
+    def form_of(self, shape: Shape) -> str:
+        """Return how the drag decays with speed."""
+        return FORMS[str(shape["fades"])]
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return Stribeck speeds between the slowest and half of the highest speed, in three forms."""

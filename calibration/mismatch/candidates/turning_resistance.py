@@ -40,9 +40,15 @@ class TurningResistance(Candidate):
     source = "skid-steer terramechanics: lateral friction saturates within a few degrees of side slip"
     requires = ("yaw_rate", "direction")
     loads = True
+    forms = ("over the yaw rate", "over the slip angle")
     acts_unloaded = False
     coefficients: ClassVar = (Coefficient("drag", "{unit}", 0), Coefficient("moment", "{unit}", 0))
     sharing: ClassVar = ("all",)
+
+    def form_of(self, shape: Shape) -> str:
+        """Return what the scrub grows with."""
+        rate, angle = self.forms
+        return rate if shape["by"] == "rate" else angle
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return saturating laws of yaw rate or slip angle, on all rows alike or more at the ends."""

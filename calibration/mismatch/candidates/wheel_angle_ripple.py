@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 BINS_PER_CYCLE = 4
 """Least angle bins, for the spectrum, in a cycle of the highest order that is looked at."""
+FORMS = {"drag": "along the motion", "torque": "whatever the motion", "load": "in proportion to the prediction"}
+"""Names of the ripples, in the answer, by what the sine is a factor of: the direction, 1, the relative prediction."""
 LOWEST_ORDER, HIGHEST_ORDER = 0.9, 64
 """Cycles per turn (a choice: above any number of grousers; ripples of single teeth are faster than the readings)."""
 LAGS = (0.0, -0.5, 0.5)
@@ -53,7 +55,12 @@ class WheelAngleRipple(Candidate):
     requires = ("wheel_angle",)
     coefficients: ClassVar = (Coefficient("amplitude", "{unit}", 0),)
     sharing: ClassVar = ("all", "one")
+    forms = tuple(FORMS.values())
     free: ClassVar = {"order": (LOWEST_ORDER, HIGHEST_ORDER)}
+
+    def form_of(self, shape: Shape) -> str:
+        """Return what the sine is a factor of."""
+        return FORMS[str(shape["kind"])]
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
         """Return none: a spectrum of the residual finds the order among thousands at once."""

@@ -25,8 +25,7 @@ from regolithd.calibration.mismatch.inference.located import share_of_residual, 
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
 from regolithd.calibration.mismatch.inference.ranges import range_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
-from regolithd.calibration.mismatch.inference.statements import listed, statement
-from regolithd.calibration.mismatch.problem.words import in_words
+from regolithd.calibration.mismatch.inference.statements import listed, statement, words_of
 from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 
@@ -132,7 +131,7 @@ def _effect(problem: Problem, term: Term, parameters: Mapping[str, Parameter], e
     assert candidate is not None  # noqa: S101  # named terms are candidates
     wheels = wheel_names(problem, term.wheels)
     onset = parameters.get(candidate.change_point)
-    words = in_words(candidate.words_for(term.group.shape), problem.labels)
+    words = words_of(candidate, term.group.shape, problem.labels)
     all_wheels = len(problem.recording.wheels)
     return Effect(
         name=term.name,
@@ -145,6 +144,8 @@ def _effect(problem: Problem, term: Term, parameters: Mapping[str, Parameter], e
         parameters=parameters,
         rmse_before=errors[0],
         rmse_after=errors[1],
+        form=candidate.form_of(term.group.shape),
+        shape=term.group.shape,
     )
 
 

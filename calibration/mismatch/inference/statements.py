@@ -6,10 +6,13 @@ import re
 from math import floor, isfinite, log10
 from typing import TYPE_CHECKING
 
+from regolithd.calibration.mismatch.problem.words import in_words
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.answer import Parameter
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
 
 
 def listed(items: Sequence[str]) -> str:
@@ -53,6 +56,12 @@ def on_wheels(wheels: Sequence[int | str], of: int, kind: str = "wheel") -> str:
     """Return ', on ' and `wheels_in_words`; empty where there is one alone."""
     words = wheels_in_words(wheels, of, kind)
     return f", on {words}" if words else ""
+
+
+def words_of(candidate: Candidate, shape: Shape, labels: Mapping[str, str]) -> str:
+    """Return what an effect is, in the words of the machine, with the form of its law in brackets."""
+    form = candidate.form_of(shape)
+    return in_words(candidate.words_for(shape), labels) + (f" ({form})" if form else "")
 
 
 def statement(

@@ -78,6 +78,8 @@ def _rows(candidate: Candidate, labels: Mapping[str, str], unit: str) -> Iterato
     yield "needs", _needs(candidate)
     yield "wheels", " or ".join(WHEELS[each] for each in candidate.sharing)
     yield "parameters", ", ".join(_parameters(candidate, labels, unit))
+    if candidate.forms:
+        yield "forms", "; ".join(f"`{form}`" for form in candidate.forms)
     yield "in a residual", candidate.signature
     yield "experiment", in_words(candidate.experiment, labels)
     if candidate.experiment_one_way:

@@ -22,9 +22,9 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
 from regolithd.calibration.mismatch.fleet.told.intervals import onset_places, size_stds
 from regolithd.calibration.mismatch.fleet.told.recordings import shown_beside
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
-from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost
+from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost, words_of
 from regolithd.calibration.mismatch.problem.problem import LeftOut
-from regolithd.calibration.mismatch.problem.words import in_units, in_words
+from regolithd.calibration.mismatch.problem.words import in_units
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -156,6 +156,8 @@ def _effect(chosen: Chosen, index: int, held_out: tuple[Array, Array, list[Array
         parameters=parameters,
         rmse_before=errors[0],
         rmse_after=errors[1],
+        form=candidate.form_of(term.group.shape),
+        shape=term.group.shape,
         rovers=rovers,
         recordings=tuple(names.recordings[i] for i in np.flatnonzero(where.any(axis=1))),
         since=names.date(term.course.first) if since else None,
@@ -205,7 +207,7 @@ def _statement(chosen: Chosen, term: FleetTerm, wheels: str, size: Parameter, er
         "until": f" until {at}",
         "growing": f" since {at}, growing",
     }[course.kind]
-    words = in_words(term.group.candidate.words_for(term.group.shape), chosen.simulation.covariate_labels)
+    words = words_of(term.group.candidate, term.group.shape, chosen.simulation.covariate_labels)
     return f"{capital(words)}{wheels}{of}{when}: {size_and_cost(size, errors)}."
 
 

@@ -10,6 +10,7 @@ import pytest
 from rover_drives import columns, recording, simulation
 
 from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.candidates.load_cell_drift import DriftOfPredictedLoad
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
@@ -170,6 +171,41 @@ def test_inertia_may_come_late(problem: Problem) -> None:
     assert np.allclose(one[1:], at_once[:-1])
     assert np.allclose(two[2:], at_once[:-2])
     assert np.allclose(between, 0.5 * (one + two))
+
+
+@pytest.mark.parametrize("candidate", library(), ids=lambda c: c.name)
+def test_every_shape_has_one_of_the_forms(candidate: Candidate, problem: Problem) -> None:
+    """Each form that is documented is searched, and each shape that is searched has a documented form."""
+    shapes = [*candidate.shapes(problem), *candidate.propose_shapes(problem, np.where(problem.mask, 0.001, 0.0))]
+    assert {candidate.form_of(shape) for shape in shapes} == set(candidate.forms or {""})
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "form"),
+    [
+        ("sensor-delay", {"late": "torque_Nm", "secant_s": 0.1}, "dead time"),
+        ("sensor-delay", {"late": "torque_Nm", "filter_s": 0.1}, "first-order filter"),
+        ("sensor-delay", {"late": "load_N", "input_secant_s": 0.1}, "dead time"),
+        ("load-dependent-efficiency", {"power": 0.0}, "constant share"),
+        ("load-dependent-efficiency", {"power": 0.5}, "power of the torque"),
+        ("load-dependent-efficiency", {"light": 0.5}, "exponential decay with the torque"),
+        ("load-dependent-efficiency", {"bent": 0.0}, "linear efficiency"),
+        ("bearing-drag", {"onset_s": 3.0, "rise_s": 0.0}, "step"),
+        ("bearing-drag", {"onset_s": 3.0, "rise_s": 2.0}, "exponential rise"),
+        ("bearing-drag", {"onset_s": 3.0, "full_at_s": 9.0, "power": 0.5}, "power of time"),
+        ("turning-resistance", {"by": "angle"}, "over the slip angle"),
+        ("slip-sinkage", {"power": 1.0}, "in proportion to slip"),
+    ],
+)
+def test_a_shape_tells_the_form_of_its_law(name: str, shape: Shape, form: str) -> None:
+    """The name that the answer gives belongs to the law that was fitted."""
+    assert next(each for each in library() if each.name == name).form_of(shape) == form
+
+
+def test_a_predicted_load_drifts_in_one_of_its_forms(problem: Problem) -> None:
+    """Creep has an exponential rise, wear a power of time."""
+    candidate = DriftOfPredictedLoad()
+    assert {candidate.form_of(shape) for shape in candidate.shapes(problem)} == set(candidate.forms)
 
 
 def test_a_delay_names_the_column_that_is_late() -> None:

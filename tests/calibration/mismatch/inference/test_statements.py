@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import pytest
 
 from regolithd.calibration.mismatch.answer import Parameter
-from regolithd.calibration.mismatch.inference.statements import noun_of, on_wheels, plural, statement, told
+from regolithd.calibration.mismatch.candidates.cold_lubricant_friction import ColdLubricantFriction
+from regolithd.calibration.mismatch.candidates.coulomb_friction import CoulombFriction
+from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
+from regolithd.calibration.mismatch.inference.statements import noun_of, on_wheels, plural, statement, told, words_of
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.candidates.candidate import Shape
 
 
 @pytest.mark.parametrize(
@@ -60,3 +68,16 @@ def test_a_small_effect_has_a_decimal() -> None:
     parameters = {"relative_size": Parameter(0.039, 0.037, 0.041, "1")}
     sentence = statement("inertia of the parts that move", (1,), 1, parameters, (1.1, 1.0), "drum")
     assert sentence.startswith("Inertia of the parts that move: 3.9 % of the mean reading (90 % sure: 3.7 to 4.1 %); ")
+
+
+def test_a_law_with_several_forms_tells_which_was_found() -> None:
+    """In brackets after what it is, in the machine's own words; a law with one form has none."""
+    labels = {"temperature": "oil temperature (°C)"}
+    cold: Shape = {"power": 1.0, "no_drag_above_degC": 30.0}
+    assert words_of(SensorDelay(), {"late": "torque_Nm", "filter_s": 0.2}, {}) == (
+        "a delay of torque_Nm (first-order filter)"
+    )
+    assert words_of(ColdLubricantFriction(), cold, labels) == (
+        "drag that grows as the oil temperature falls (viscous, a line)"
+    )
+    assert words_of(CoulombFriction(), {}, {}) == CoulombFriction.words
