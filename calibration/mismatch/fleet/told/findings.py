@@ -22,6 +22,7 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
 from regolithd.calibration.mismatch.fleet.told.intervals import onset_places, size_stds
 from regolithd.calibration.mismatch.fleet.told.recordings import shown_beside
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
+from regolithd.calibration.mismatch.inference.intervals import unit_of
 from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost, words_of
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 from regolithd.calibration.mismatch.problem.words import in_units
@@ -69,6 +70,12 @@ class Chosen:
     names: Names
     found: tuple[Found, ...]
     simulation: Simulation
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """What covariates are called, with their units: as the simulation states it, else as the columns are."""
+        of_columns = {name: label for found in reversed(self.found) for name, label in found.labels.items()}
+        return {**of_columns, **self.simulation.covariate_labels}
 
     @property
     def equations(self) -> FleetEquations:
@@ -178,14 +185,14 @@ def _sizes(chosen: Chosen, index: int) -> dict[str, Parameter]:
     mean = np.sum(weights * values, axis=0) / np.sum(weights, axis=0)
     std = np.maximum(1 / np.sqrt(np.sum(weights, axis=0)), np.std(values, axis=0))
     found = {}
-    unit = chosen.simulation.unit
+    unit, labels = chosen.simulation.unit, chosen.labels
     for coefficient, value, spread in zip(term.group.candidate.coefficients, mean, std, strict=False):
         reach = NINETY_PERCENT_STDS * spread
-        told = in_units(coefficient.unit, unit, chosen.simulation.covariate_labels)
+        told = in_units(coefficient.unit, unit, labels)
         found[coefficient.name] = Parameter(float(value), float(value - reach), float(value + reach), told)
     for name, value in term.group.shape.items():
         if name in term.group.candidate.free and name != term.group.candidate.change_point:
-            found[name] = Parameter(float(value), float("nan"), float("nan"), "1")
+            found[name] = Parameter(float(value), float("nan"), float("nan"), unit_of(name, labels))
     size = relative_size(equations, fit, index)
     share = NINETY_PERCENT_STDS * float(np.max(std / np.maximum(np.abs(mean), 1e-300)))
     return {**found, "relative_size": Parameter(size, size * (1 - share), size * (1 + share), "1")}
@@ -207,7 +214,7 @@ def _statement(chosen: Chosen, term: FleetTerm, wheels: str, size: Parameter, er
         "until": f" until {at}",
         "growing": f" since {at}, growing",
     }[course.kind]
-    words = words_of(term.group.candidate, term.group.shape, chosen.simulation.covariate_labels)
+    words = words_of(term.group.candidate, term.group.shape, chosen.labels)
     return f"{capital(words)}{wheels}{of}{when}: {size_and_cost(size, errors)}."
 
 

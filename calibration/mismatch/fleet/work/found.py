@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,6 +70,7 @@ class Found:
     entry_threshold: score above which an effect was named
     terms: named effects, then smooth terms
     shapes: the grid of each candidate that this recording allows, by name
+    labels: what covariates are called, with their units
     """
 
     answer: Answer
@@ -79,6 +80,7 @@ class Found:
     entry_threshold: float
     terms: tuple[FoundTerm, ...]
     shapes: dict[str, Shapes]
+    labels: dict[str, str] = field(default_factory=dict)
 
 
 def one_channel(simulation: Simulation, channel: str) -> Simulation:
@@ -110,6 +112,7 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
         entry_threshold=decision.entry_threshold,
         terms=tuple(_found_term(decision, term) for term in whole.terms),
         shapes=shapes_in(problem, search.candidates),
+        labels=dict(problem.labels),
     )
 
 

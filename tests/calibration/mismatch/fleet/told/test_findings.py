@@ -15,6 +15,7 @@ from sample_answer import CONSISTENT, NO_CHANGE, WORN
 from synthetic_fleet import DEVIATION, DRAG, GROUPS, WAVE, WEAR, drive, equations_of, on_both, term
 
 from regolithd.calibration.mismatch.answer import Unexplained
+from regolithd.calibration.mismatch.candidates.stribeck_friction import StribeckFriction
 from regolithd.calibration.mismatch.fleet.catalogue import catalogue_rows
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, Units, fleet_equations
@@ -112,6 +113,20 @@ def test_the_catalogue_of_a_season_is_the_reviewed_one(season: Chosen) -> None:
     rows = catalogue_rows(season, answer_of_fleet(season))
     lines = [", ".join(str(rounded(value)) for value in vars(row).values()) for row in rows]
     assert_golden("\n".join(lines) + "\n", GOLDEN / "catalogue.txt")
+
+
+def test_parameters_have_the_units_of_the_machine() -> None:
+    """A speed in the law is in the unit of the column that is the speed, as in the answer of one recording."""
+    drives = [drive(n, on_both(1, 0.3)) for n in range(4)]
+    group = replace(DRAG, candidate=StribeckFriction(), shape={"stribeck_speed_rad_s": 0.05, "fades": "exponent 1"})
+    always = FleetTerm(group, Units((0,), (0, 1), "fleet"), Course("always"))
+    in_metres = replace(found(), labels={"wheel_speed": "carriage speed (m/s)"})
+    (effect,) = answer_of_fleet(chosen(equations_of(drives, (0,) * 4), (always,), [in_metres] * 4)).effects
+    assert effect.parameters["stribeck_speed_rad_s"].unit == "m/s"
+    assert effect.form == "exponential"
+    assert effect.statement.startswith(
+        "Extra drag near standstill that decays with speed (exponential), on both wheels: "
+    )
 
 
 def test_each_effect_pays_in_held_out_error_where_it_acts(season: Chosen) -> None:
