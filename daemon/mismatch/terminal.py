@@ -7,16 +7,20 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from regolithd.calibration.mismatch.inference.statements import on_wheels
+from regolithd.calibration.mismatch.inference.statements import (
+    after_number,
+    beyond_prior_in_words,
+    notes_beside_priors,
+    on_wheels,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from rich.console import Console
 
     from regolithd.calibration.mismatch.answer import (
         Answer,
-        CalibratedParameter,
         FitImprovement,
         Indistinguishable,
         Parameter,
@@ -69,12 +73,12 @@ def _lines(answer: Answer, labels: Labels, wheels: Sequence[int | str]) -> list[
             f"{effect.name}{f' in {effect.channel}' if several else ''}: {effect.statement}"
             for effect in answer.effects
         ),
-        *map(_moved, moved),
+        *(f"parameter {beyond_prior_in_words(each)}" for each in moved),
         *(line for rest in answer.unexplained for line in _unexplained(rest, labels, len(wheels), several=several)),
         *(_not_distinguished(each, {effect.name for effect in answer.effects}) for each in answer.indistinguishable),
         sure_of(answer),
         *map(_error, answer.fits or (answer.fit,)),
-        *(f"note: {note}" for note in _other_notes(answer.notes, moved)),
+        *(f"note: {note}" for note in notes_beside_priors(answer.notes, moved)),
     ]
 
 
@@ -84,20 +88,6 @@ def _not_distinguished(found: Indistinguishable, named: set[str]) -> str:
     if named.intersection(found.effects):
         return f"{names}: this recording does not distinguish them. {found.experiment}"
     return f"{names}, were one of them there: this recording would not distinguish them. {found.experiment}"
-
-
-def _moved(parameter: CalibratedParameter) -> str:
-    return (
-        f"parameter {parameter.name} had to leave its prior: {parameter.value:.4g}{_unit(parameter.unit)} instead of "
-        f"{parameter.prior:.4g} ± {parameter.prior_std:.2g}, {parameter.prior_stds_away:.1f} standard deviations away. "
-        "Check the stated value and its standard deviation, or look for physics that acts as this parameter does."
-    )
-
-
-def _other_notes(notes: Sequence[str], moved: Sequence[CalibratedParameter]) -> Iterator[str]:
-    """Return the notes without those about parameters that are told under the verdict."""
-    told = [f"{each.name} had to leave its prior" for each in moved]
-    return (note for note in notes if not any(each in note for each in told))
 
 
 def _unexplained(rest: Unexplained, labels: Labels, of: int, *, several: bool) -> list[str]:
@@ -118,7 +108,7 @@ def _curve_lines(rest: Unexplained, labels: Labels) -> list[str]:
     if rest.curve is None:
         return []
     curve = rest.curve
-    reach = f"{curve.at[0]:.4g} to {curve.at[-1]:.4g}{_unit(curve.covariate_unit)}"
+    reach = f"{curve.at[0]:.4g} to {curve.at[-1]:.4g}{after_number(curve.covariate_unit)}"
     before = curve.held_out_rmse_before
     error = _compared(curve.held_out_rmse_after, before)
     lines = [f"empirical curve over {labels.the(rest.covariate)}, {reach}: held-out error {error} with it"]
@@ -135,12 +125,7 @@ def _compared(error: float, without: float) -> str:
 
 
 def _value(name: str, parameter: Parameter) -> str:
-    return f"{name} = {parameter.value:.4g}{_unit(parameter.unit)}"
-
-
-def _unit(unit: str) -> str:
-    """Return a unit after its number; nothing for a pure number."""
-    return f" {unit}" if unit not in {"", "1"} else ""
+    return f"{name} = {parameter.value:.4g}{after_number(parameter.unit)}"
 
 
 def _error(fit: FitImprovement) -> str:

@@ -25,7 +25,7 @@ from regolithd.calibration.mismatch.inference.located import share_of_residual, 
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
 from regolithd.calibration.mismatch.inference.ranges import range_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
-from regolithd.calibration.mismatch.inference.statements import listed, statement, words_of
+from regolithd.calibration.mismatch.inference.statements import beyond_prior_in_words, listed, statement, words_of
 from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 
@@ -67,7 +67,7 @@ def answer_of(
         probability=probability(rest, equations.thresholds) if known else None,
         alternatives=other_answers(rest, equations.thresholds),
         notes=(
-            *map(_beyond_prior_in_words, moved),
+            *map(beyond_prior_in_words, moved),
             *map(change_in_words, changes),
             *problem.recording.notes,
             *_about_the_mask(problem),
@@ -185,14 +185,6 @@ def _about_the_mask(problem: Problem) -> list[str]:
         for each in problem.left_out
     ]
     return notes
-
-
-def _beyond_prior_in_words(parameter: CalibratedParameter) -> str:
-    return (
-        f"{parameter.name} had to leave its prior: {parameter.value:.4g} {parameter.unit}, "
-        f"{parameter.prior_stds_away:.1f} standard deviations from {parameter.prior:.4g}. Check the stated value and "
-        "its standard deviation, or look for physics that acts as this parameter does."
-    )
 
 
 def _not_looked_for(problem: Problem, candidates: Sequence[Candidate], applicable: Sequence[str]) -> list[str]:

@@ -1,4 +1,4 @@
-"""The answer's sentence about one effect: what, on which wheels, since when, how large, and the error without it."""
+"""The answer's sentences: about an effect (what, where, since when, how large), and a parameter beyond its prior."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.problem.words import in_words
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.answer import Parameter
+    from regolithd.calibration.mismatch.answer import CalibratedParameter, Parameter
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
 
 
@@ -105,3 +105,28 @@ def size_and_cost(size: Parameter, errors: tuple[float, float]) -> str:
         f"{value} % of the mean reading (90 % sure: {low} to {high} %); "
         f"left out, it makes the held-out error there {abs(costs):.1f} % {'larger' if costs >= 0 else 'smaller'}"
     )
+
+
+def had_to_leave_its_prior(name: str) -> str:
+    """Return how each text about a parameter beyond its prior begins."""
+    return f"{name} had to leave its prior"
+
+
+def beyond_prior_in_words(parameter: CalibratedParameter) -> str:
+    """Return what is told of a parameter beyond its prior: where it is, how far away, and what to do."""
+    return (
+        f"{had_to_leave_its_prior(parameter.name)}: {parameter.value:.4g}{after_number(parameter.unit)} instead of "
+        f"{parameter.prior:.4g} ± {parameter.prior_std:.2g}, {parameter.prior_stds_away:.1f} standard deviations away. "
+        "Check the stated value and its standard deviation, or look for physics that acts as this parameter does."
+    )
+
+
+def notes_beside_priors(notes: Sequence[str], moved: Sequence[CalibratedParameter]) -> list[str]:
+    """Return the notes without those about parameters beyond their priors: each channel has a value of its own."""
+    told = [had_to_leave_its_prior(each.name) for each in moved]
+    return [note for note in notes if not any(each in note for each in told)]
+
+
+def after_number(unit: str) -> str:
+    """Return a unit as it follows a number; nothing for a pure number."""
+    return f" {unit}" if unit not in {"", "1"} else ""

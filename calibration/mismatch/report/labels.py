@@ -9,7 +9,14 @@ import numpy as np
 
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import direction_of
-from regolithd.calibration.mismatch.inference.statements import capital, listed, noun_of, plural, wheels_in_words
+from regolithd.calibration.mismatch.inference.statements import (
+    capital,
+    had_to_leave_its_prior,
+    listed,
+    noun_of,
+    plural,
+    wheels_in_words,
+)
 from regolithd.calibration.mismatch.problem.words import COVARIATES
 
 if TYPE_CHECKING:
@@ -111,7 +118,8 @@ def verdict_sentence(answer: Answer, labels: Labels | None = None) -> str:
         return "Simulation and recording agree to within the noise."
     left_out = _left_out_sentence(answer, labels)
     changed = [f"{capital(labels.effect(change.name))} is {_than_corrected(change)}." for change in answer.changes]
-    moved = [f"The parameter {each.name} had to leave its prior." for each in answer.parameters if each.beyond_prior()]
+    beyond = [each.name for each in answer.parameters if each.beyond_prior()]
+    moved = [f"The parameter {had_to_leave_its_prior(name)}." for name in beyond]
     return " ".join(sentence for sentence in (left_out, *dict.fromkeys(changed), *moved) if sentence)
 
 

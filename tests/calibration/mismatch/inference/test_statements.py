@@ -6,11 +6,20 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from regolithd.calibration.mismatch.answer import Parameter
+from regolithd.calibration.mismatch.answer import CalibratedParameter, Parameter
 from regolithd.calibration.mismatch.candidates.cold_lubricant_friction import ColdLubricantFriction
 from regolithd.calibration.mismatch.candidates.coulomb_friction import CoulombFriction
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
-from regolithd.calibration.mismatch.inference.statements import noun_of, on_wheels, plural, statement, told, words_of
+from regolithd.calibration.mismatch.inference.statements import (
+    beyond_prior_in_words,
+    notes_beside_priors,
+    noun_of,
+    on_wheels,
+    plural,
+    statement,
+    told,
+    words_of,
+)
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Shape
@@ -81,3 +90,15 @@ def test_a_law_with_several_forms_tells_which_was_found() -> None:
         "drag that grows as the oil temperature falls (viscous, a line)"
     )
     assert words_of(CoulombFriction(), {}, {}) == CoulombFriction.words
+
+
+def test_a_parameter_beyond_its_prior_is_told_once() -> None:
+    """With its unit, if it has one; a channel's note about it is no other note."""
+    loss = CalibratedParameter("loss", "W/K", 4.0, 0.16, 4.97, 4.9, 5.0)
+    gain = CalibratedParameter("gain", "1", 1.0, 0.1, 1.5, 1.4, 1.6)
+    told = beyond_prior_in_words(loss)
+    assert told.startswith("loss had to leave its prior: 4.97 W/K instead of 4 ± 0.16, 6.1 standard deviations away. ")
+    assert "prior: 1.5 instead of 1 ± 0.1, " in beyond_prior_in_words(gain)
+    notes = ["It rained.", f"level_m: {told}", beyond_prior_in_words(gain)]
+    assert notes_beside_priors(notes, [loss]) == ["It rained.", notes[2]]
+    assert notes_beside_priors(notes, []) == notes
