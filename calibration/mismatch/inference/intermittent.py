@@ -27,14 +27,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-MOST_STANDARD_ERRORS = 5.0
-"""Standard errors of the skewness beyond which a residual is skewed. In 94 recordings of twelve machines with nothing,
-or what was found, left out, it was at most 4.0 at any length of the mean."""
-LEAST_SKEWNESS = 0.8
-"""Skewness below which it is no finding: laws and sensors are not quite linear. In those recordings it was at most 0.6
-where it was beyond 2.5 standard errors; with drag in spells, a sticking valve or slipstream 0.9 to 1.7."""
-FEWEST_MEANS = 40
-"""Means that do not overlap, below which their skewness is not asked for (a choice)."""
 CONSTANT = frozenset({"direction", "none"})
 """Covariates of effects of constant size."""
 
@@ -80,18 +72,20 @@ def is_skewed(left: Array, explained: Array, thresholds: Thresholds = THRESHOLDS
 
     Means that are small against those of what the named effects explain are the misfit of laws, of any distribution.
     """
-    for means, beside in zip(_running_means(_without_single(left)), _running_means(explained), strict=False):
+    fewest = thresholds.fewest_means
+    courses = (_running_means(course, fewest) for course in (_without_single(left), explained))
+    for means, beside in zip(*courses, strict=False):
         skewness, error = skewness_of(means, thresholds)
         large = np.sum(means**2) > thresholds.form_misfit * np.sum(beside**2)
-        if large and abs(skewness) > max(LEAST_SKEWNESS, MOST_STANDARD_ERRORS * error):
+        if large and abs(skewness) > max(thresholds.least_skewness, thresholds.most_skewness_errors * error):
             return True
     return False
 
 
-def _running_means(values: Array) -> Iterator[Array]:
-    """Yield a course's running means over 1, 2, 4, … readings, as long as there are enough of them."""
+def _running_means(values: Array, fewest: int) -> Iterator[Array]:
+    """Yield a course's running means over 1, 2, 4, … readings, as long as so many of them do not overlap."""
     total, length = np.concatenate(([0.0], np.cumsum(values))), 1
-    while FEWEST_MEANS * length <= len(values):
+    while fewest * length <= len(values):
         yield (total[length:] - total[:-length]) / length
         length *= 2
 

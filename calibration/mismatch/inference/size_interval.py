@@ -17,11 +17,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-COMMON_DISCREPANCY_STD = 0.025
-"""Standard deviation of the share by which an effect's size is off as a whole: a derivative of a sampled speed, a
-reading interpolated at a delay, errors of the inputs. The discrepancies of laws at knots cancel in the size. Of 442
-intervals (seeds 608151401, 127741224, 538660261) 84 % held without it; with 0.02 to 0.03, 89 to 91 % would have."""
-
 
 def relative_size_interval(equations: NormalEquations, fit: Fit, index: int, columns: Array, moved: Array) -> Parameter:
     """Return the effect's root mean square on its wheels over the channel's mean magnitude.
@@ -36,7 +31,8 @@ def relative_size_interval(equations: NormalEquations, fit: Fit, index: int, col
     drawn = moved.copy()
     drawn[:, : len(term.group.columns)] += fit.coefficients[fit.of_term(index)]
     sizes = np.sqrt(np.maximum(np.einsum("da,ab,db->d", drawn, gram, drawn), 0)) / problem.mean_size
-    sizes *= np.exp(COMMON_DISCREPANCY_STD * np.random.default_rng(1).standard_normal(len(sizes)))
+    spread = equations.thresholds.size_discrepancy_std
+    sizes *= np.exp(spread * np.random.default_rng(1).standard_normal(len(sizes)))
     value = _rms(equations, fit, index)
     return interval(value, np.concatenate(_over_kinds_of_shape(equations, fit, index, sizes, value)), "1")
 

@@ -2,57 +2,52 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import Any
+from dataclasses import dataclass, fields
 
-from regolithd.calibration.mismatch.thresholds import Threshold
-
-
-def _threshold(value: float, meaning: str, found: str) -> Any:  # noqa: ANN401  # a dataclass field of the value's type
-    return field(default=value, metadata={"meaning": meaning, "found": found})
+from regolithd.calibration.mismatch.thresholds.threshold import Threshold, threshold
 
 
 @dataclass(frozen=True)
 class OnlineThresholds:
     """The deciding numbers of the sequential test; `table` returns them with meaning and source."""
 
-    alarm: float = _threshold(
+    alarm: float = threshold(
         25.0,
         "Δχ² of the best law, wheels and onset together, above which a change is reported.",
         "simulation (`make online`): of 100 sound drives, 183 h, two pass it, and the tail of their largest statistics "
         "gives 25.3 ± 1.1 for one false report in 100 h",
     )
-    interval_s: float = _threshold(
+    interval_s: float = threshold(
         60.0,
         "Time between two decisions, and resolution of an onset [s].",
         "choice: six correlation times of a noise that is correlated for 10 s",
     )
-    learning_intervals: int = _threshold(
+    learning_intervals: int = threshold(
         10,
         "Intervals that the noise is estimated from before the first decision.",
         "choice: a correlation of 15 s is then known to a fifth from six wheels",
     )
-    history_intervals: int = _threshold(
+    history_intervals: int = threshold(
         60,
         "Latest intervals whose residual is kept, to estimate the noise from.",
         "choice: an hour of six wheels at 10 Hz is 1.7 MB",
     )
-    most_segments: int = _threshold(
+    most_segments: int = threshold(
         32,
         "Segments of time whose sums are kept apart: onsets that are tried.",
         "choice: of a drive of three hours, onsets are then kept to a tenth of their age",
     )
-    leading_share: float = _threshold(
+    leading_share: float = threshold(
         0.5,
         "Share of `alarm` from which the leading change is taken out of the residual before it counts as noise.",
         "choice, as `noise_term_share` of the whole comparison: what is left in makes the noise seem larger",
     )
-    kept_share: float = _threshold(
+    kept_share: float = threshold(
         0.5,
         "Share of `alarm` below which a reported change is withdrawn.",
         "choice: a report that needs the threshold again each minute would come and go",
     )
-    most_changes: int = _threshold(6, "Changes that are reported at once.", "choice: more is another machine")
+    most_changes: int = threshold(6, "Changes that are reported at once.", "choice: more is another machine")
 
     def table(self) -> tuple[Threshold, ...]:
         """Return every threshold with its value here, its meaning and how it was found."""

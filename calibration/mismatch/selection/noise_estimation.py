@@ -46,7 +46,7 @@ def whitened(equations: NormalEquations, residual: Array) -> NormalEquations:
         deviation = float(np.sqrt(np.mean(values[places] ** 2))) if len(places) else 0.0
         if deviation > 0:
             courses.append((values[places] / deviation, runs))
-    equations = equations.whitened(estimate_whitening(courses), equations.weights)
+    equations = equations.whitened(estimate_whitening(courses, equations.thresholds), equations.weights)
     return equations.weighted(noise_of_whitened(equations.design, residual).weights)
 
 

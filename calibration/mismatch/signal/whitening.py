@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
+
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
@@ -29,11 +31,6 @@ SHORTEST_BLOCK = 32
 """Readings that are filtered at once, at least (a choice: shorter ones are no quicker)."""
 LEAST_READINGS_PER_LAG = 20
 """Readings for each lag of the autoregression (a choice)."""
-LEAST_WHITE = 3.0
-"""White noise, in variances of the noise, that is added before its autoregression is estimated. Without it,
-quick changes are believed to a precision that no law, time stamp or controlled input has: with 0.1, laws that are 10 %
-off left a second effect, and 3 of 45 sound blind recordings were not consistent. With 3, evidence was 1.1 to 1.8 times
-that of readings as they were read; with 0.1, up to 2.6 times."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +94,9 @@ NOT_WHITENED = Whitening(np.zeros(0), np.zeros(0))
 """Leaves readings as they are."""
 
 
-def estimate_whitening(courses: Sequence[tuple[Array, Sequence[slice]]]) -> Whitening:
+def estimate_whitening(
+    courses: Sequence[tuple[Array, Sequence[slice]]], thresholds: Thresholds = THRESHOLDS
+) -> Whitening:
     """Estimate an autoregression from courses of readings, each with its runs, scaled alike; its order by Akaike's AIC.
 
     Readings follow each other as they were read: of a sensor that is read in every tenth row, ten rows apart.
@@ -112,7 +111,7 @@ def estimate_whitening(courses: Sequence[tuple[Array, Sequence[slice]]]) -> Whit
                 covariance[lag] += part[: len(part) - lag] @ part[lag:]
     if not covariance[0] > 0:
         return NOT_WHITENED
-    correlation = covariance / covariance[0] / (1 + LEAST_WHITE)
+    correlation = covariance / covariance[0] / (1 + thresholds.least_white)
     correlation[0] = 1.0
     fits = [_fitted(correlation, groups) for groups in _nested(highest)]
     criterion = [count * np.log(variance) + 2 * groups for groups, (_, variance) in enumerate(fits)]

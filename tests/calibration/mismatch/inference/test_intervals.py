@@ -12,10 +12,11 @@ from linear_machine import NOISE, Power, equations_of, problem_of, table, term_o
 from regolithd.calibration.mismatch.inference.intervals import normal_draws, parameters_of, unit_of
 from regolithd.calibration.mismatch.inference.parameter_interval import interval
 from regolithd.calibration.mismatch.inference.sandwich import block_sums, linearised, sandwich
-from regolithd.calibration.mismatch.inference.size_interval import COMMON_DISCREPANCY_STD, _over_kinds_of_shape, _rms
+from regolithd.calibration.mismatch.inference.size_interval import _over_kinds_of_shape, _rms
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
 from regolithd.calibration.mismatch.signal.noise import NoiseModel
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
@@ -98,7 +99,7 @@ def test_no_size_is_known_better_than_the_common_discrepancy() -> None:
         equations, equations.fit([term_of(equations, "drag")]), blocks_of_time(equations.problem, WHITE)
     )
     size = found["relative_size"]
-    assert (size.high - size.low) / (2 * 1.645 * size.value) > 0.95 * COMMON_DISCREPANCY_STD
+    assert (size.high - size.low) / (2 * 1.645 * size.value) > 0.95 * THRESHOLDS.size_discrepancy_std
 
 
 def test_a_shape_parameter_has_its_interval() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from regolithd.calibration.mismatch.signal import whitening
 from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED, Whitening, estimate_whitening
+from regolithd.calibration.mismatch.thresholds import Thresholds
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 WHOLE = (slice(0, 20_000),)
+NO_WHITE = Thresholds(least_white=0.0)
+"""Adds no white noise to the estimate."""
 
 
 def slow_noise(keeps: float, white: float, readings: int = 20_000) -> Array:
@@ -33,14 +35,11 @@ def powers(values: Array) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(("keeps", "white"), [(0.9, 0.0), (0.98, 0.5)])
-def test_every_frequency_has_the_same_power_once_whitened(
-    keeps: float, white: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_frequency_has_the_same_power_once_whitened(keeps: float, white: float) -> None:
     """With no white noise added to the estimate, also under a memory that is longer than the single lags."""
-    monkeypatch.setattr(whitening, "LEAST_WHITE", 0.0)
     noise = slow_noise(keeps, white)
     assert powers(noise)[0] > 10
-    low, high = powers(estimate_whitening([(noise, WHOLE)]).apply(noise, WHOLE))
+    low, high = powers(estimate_whitening([(noise, WHOLE)], NO_WHITE).apply(noise, WHOLE))
     assert low == pytest.approx(1, abs=0.3)
     assert high == pytest.approx(1, abs=0.1)
 
@@ -83,12 +82,11 @@ def test_a_run_begins_anew() -> None:
     np.testing.assert_allclose(found.apply(noise, (slice(0, 150), slice(150, 300))), np.concatenate(parts))
 
 
-def test_the_first_readings_of_a_run_vary_as_the_later_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_first_readings_of_a_run_vary_as_the_later_ones() -> None:
     """They have fewer readings before them, and are scaled to the same variance."""
-    monkeypatch.setattr(whitening, "LEAST_WHITE", 0.0)
     noise = slow_noise(0.95, 0.1, 200_000)
     runs = tuple(slice(first, first + 100) for first in range(0, len(noise), 100))
-    white = estimate_whitening([(noise, runs)]).apply(noise, runs).reshape(-1, 100)
+    white = estimate_whitening([(noise, runs)], NO_WHITE).apply(noise, runs).reshape(-1, 100)
     assert np.mean(white[:, :3] ** 2) == pytest.approx(np.mean(white[:, 20:] ** 2), rel=0.05)
 
 
