@@ -52,7 +52,7 @@ class WheelAngleRipple(Candidate):
     experiment = "hold three values of the {wheel_speed}, sampled at four times the ripple's frequency"
     vary: ClassVar = ("wheel_speed",)
     source = "grousers: as many cycles per turn as there are; harmonic drive: two per turn of its wave generator"
-    requires = ("wheel_angle",)
+    requires = ("wheel_angle", "wheel_speed")
     coefficients: ClassVar = (Coefficient("amplitude", "{unit}", 0),)
     sharing: ClassVar = ("all", "one")
     forms = tuple(FORMS.values())

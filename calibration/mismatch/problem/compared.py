@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.problem.covariates import FOLLOW_SPEED
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 from regolithd.calibration.mismatch.problem.words import word_for
 from regolithd.calibration.mismatch.signal.robust import robust_std
@@ -51,7 +52,7 @@ def blanks_of(
     """Return the covariates that are known well enough, and where each of them is blank.
 
     A covariate that is never known at a wheel says nothing there, and costs no reading. One that is known nowhere, or
-    is blank too often, is left out as a whole, rather than the readings.
+    is blank too often, is left out as a whole, rather than the readings; with a speed, what follows from it.
     """
     kept, blanks = {}, {}
     for name, values in covariates.items():
@@ -63,6 +64,10 @@ def blanks_of(
             kept[name] = values
         elif partly.sum() <= (1 - thresholds.least_known_share) * compared[:, partly.any(axis=0)].sum():
             kept[name], blanks[name] = values, partly
+    if "wheel_speed" in covariates and "wheel_speed" not in kept:
+        for name in FOLLOW_SPEED:
+            kept.pop(name, None)
+            blanks.pop(name, None)
     return kept, blanks
 
 

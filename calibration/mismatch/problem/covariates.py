@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-KEPT_WHERE_CONSTANT = frozenset({"wheel_speed", "direction", "wheel_acceleration", "wheel_angle", "time", "torque"})
+FOLLOW_SPEED = ("direction", "wheel_acceleration", "wheel_angle")
+"""Covariates that are derived from `wheel_speed`, or completed by it."""
+KEPT_WHERE_CONSTANT = frozenset({"wheel_speed", *FOLLOW_SPEED, "time", "torque"})
 """Covariates that candidates need even where they are constant."""
 UNIT_WORD = re.compile(r"[munkM]?(A|V|N|Nm|W|J|m|s|g|Pa|Hz|bar|l)[23]?|K|deg[CF]?|rad[2]?|min|h|rpm|per|percent")
 """A part of a column's name that is of its unit: `A` of `current_A`, `m` and `s` of `flow_m_s`."""
@@ -50,7 +52,7 @@ def covariates_of(
     if not simulation.arbitrary_zero:
         # Torque is what something that turns carries; of anything else the prediction is the quantity that it is.
         found.setdefault("torque" if "wheel_speed" in found else quantity(simulation.channel), np.abs(prediction))
-    if "wheel_speed" in found:
+    if "wheel_speed" in found and np.isfinite(found["wheel_speed"]).any():
         speed = found["wheel_speed"]
         read = speed if as_read is None else simulation.covariates(as_read)["wheel_speed"]
         found["direction"] = direction_of(read)

@@ -90,6 +90,18 @@ def test_a_covariate_that_is_mostly_blank_is_left_out_as_a_whole() -> None:
     assert not blanks
 
 
+def test_what_follows_from_a_speed_is_left_out_with_it() -> None:
+    """Where the speed is mostly blank, an angle or an acceleration that was completed by it says nothing."""
+    compared = np.ones((COUNT, 1), np.bool_)
+    speed, known = np.full((COUNT, 1), np.nan), np.ones((COUNT, 1))
+    speed[:400] = 0.1
+    followers = {"direction": np.sign(speed), "wheel_acceleration": known, "wheel_angle": known}
+    kept, blanks = blanks_of({"wheel_speed": speed, **followers, "load": known}, frozenset(), compared, LIMITS)
+    assert (list(kept), blanks) == (["load"], {})
+    kept, _ = blanks_of({"wheel_acceleration": known}, frozenset(), compared, LIMITS)
+    assert list(kept) == ["wheel_acceleration"]
+
+
 def test_what_does_not_apply_is_no_blank() -> None:
     """The slip of a wheel that stands is undefined, as the simulation says."""
     slip = np.full((COUNT, 1), np.nan)

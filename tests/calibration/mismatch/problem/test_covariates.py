@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 import pytest
 
-from regolithd.calibration.mismatch import Prior, SensorError, Simulation
+from regolithd.calibration.mismatch import Prior, SensorError, Simulation, compare
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.covariates import direction_of
@@ -121,3 +121,39 @@ def test_blanks_of_a_measured_acceleration_follow_from_the_speed() -> None:
     measured = np.where(np.arange(200) < 50, np.nan, 1.0)
     found = turning(wheel_acceleration=measured)["wheel_acceleration"][:, 0]
     np.testing.assert_array_equal(found, np.nan_to_num(measured))
+
+
+class Hoist(Simulation):
+    """A hoist whose force follows from its load; only covariates read the motion."""
+
+    channel, unit = "force_N", "N"
+    inputs = ("load_N",)
+    parameters: ClassVar = {"share": Prior(1.0, 0.01, "1")}
+
+    def __init__(self, *motion: str) -> None:
+        self.motion = motion
+
+    def predict(self, inputs: Mapping[str, NDArray[np.float64]], values: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return the load's force."""
+        return values["share"] * inputs["load_N"]
+
+    def covariates(self, inputs: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+        """Return what is known of the motion."""
+        return {name: inputs[name] for name in self.motion}
+
+
+@pytest.mark.parametrize(
+    ("motion", "known"),
+    [(("wheel_speed",), 0.4), (("wheel_speed",), 0.0), (("wheel_speed", "wheel_angle"), 0.4), (("wheel_angle",), 0.0)],
+)
+def test_a_motion_that_is_hardly_known_is_compared_without_it(motion: tuple[str, ...], known: float) -> None:
+    """A speed that is blank for most of the recording, or throughout, or not there at all, costs no reading."""
+    time_s, random = 0.1 * np.arange(600), np.random.default_rng(4)
+    speed = np.where(time_s < known * time_s[-1], np.sin(time_s), np.nan)
+    load = 50 + 20 * np.sin(0.27 * time_s)
+    columns = {"t_s": time_s, "load_N": load, "force_N": load + random.normal(0, 2, len(time_s))}
+    columns |= {"wheel_speed": speed, "wheel_angle": 1 - np.cos(time_s)}
+    answer = compare(columns, Hoist(*motion)).answer
+    assert (answer.verdict, answer.left_out) == ("consistent", ())
+    sizes = {each.name: each.smallest_detectable for each in answer.sensitivity}
+    assert sizes["coulomb-friction"] == sizes["rotor-inertia"] == sizes["wheel-angle-ripple"] == np.inf
