@@ -13,6 +13,9 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.problem.problem import Problem
 
+POWER, POWER_STD = 1.0, 0.2
+"""Prior of the power: mean, and standard deviation (a choice: 0.7 and 1.4 are one in ten and one in twenty)."""
+
 
 class ViscousFriction(Candidate):
     """Drag proportional to a power of speed near 1 (below: shear-thinning grease)."""
@@ -34,6 +37,10 @@ class ViscousFriction(Candidate):
     def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
         """Return the law proportional to speed, then a shear-thinning and a churning one."""
         return [{"power": 1.0}, {"power": 0.75}, {"power": 1.35}]
+
+    def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
+        """Charge a power that is far from 1: at the ends of its range the law is nearly another one."""
+        return ((float(shape["power"]) - POWER) / POWER_STD) ** 2
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return sign(ω)|ω|^p."""

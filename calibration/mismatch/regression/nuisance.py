@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+LEAST_KNOWN = 0.5
+"""Posterior variance of a parameter over its prior's, up to which the readings know it as well as its prior does."""
+
 
 @dataclass(frozen=True)
 class Nuisance:
@@ -48,10 +51,23 @@ class Nuisance:
         fitted = fit.coefficients[: len(self.columns)]
         return np.asarray(np.abs(fitted - self.centre) * np.sqrt(self.precision))
 
+    def contradicting_their_priors(self, fit: Fit, problem: Problem) -> NDArray[np.int64]:
+        """Return the places of the simulation's own parameters whose priors the readings contradict in a fit.
+
+        Where the readings know a parameter no better than its prior does, the prior holds it half way back. A shift
+        from the prior has the prior's variance less the posterior's, if the prior is right (Box 1980); of the
+        posterior's variance at most half the prior's counts: readings that say less contradict nothing.
+        """
+        count = len(self.columns)
+        known = np.clip(np.diag(fit.covariance)[:count] * self.precision, 0.0, LEAST_KNOWN)
+        return self._own_beyond(self.prior_stds_away(fit) / np.sqrt(1 - known), problem)
+
     def leaving_their_priors(self, fit: Fit, problem: Problem) -> NDArray[np.int64]:
         """Return the places of the simulation's own parameters that are beyond their priors in a fit."""
+        return self._own_beyond(self.prior_stds_away(fit), problem)
+
+    def _own_beyond(self, away: Array, problem: Problem) -> NDArray[np.int64]:
         own = [name in problem.simulation.parameters for name in self.names]
-        away = self.prior_stds_away(fit)
         return np.flatnonzero((away > problem.thresholds.furthest_prior_stds) & np.array(own, bool))
 
 

@@ -17,7 +17,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import entry_cost
 from regolithd.calibration.mismatch.selection.smooth_terms import unexplained_beside
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Sequence
 
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
@@ -27,27 +27,40 @@ WRONG_STATEMENT_PENALTY = 9.2
 
 
 def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold: float) -> NormalEquations | None:
-    """Return equations with the priors of those parameters widened that would have to leave them.
+    """Return equations with the priors of those parameters widened that the readings contradict.
 
-    None where no parameter would, where one would go further than a wrong statement explains
+    Of parameters that could stand for each other the one whose release has most evidence is released, or all together.
+    None where the readings contradict none, where one would go further than a wrong statement explains
     (`furthest_linearisation_stds`), where something stays unexplained all the same, or where the evidence of `whole`,
     names and curves within the priors, is larger.
     """
-    limits, nuisance = equations.thresholds, equations.nuisance
-    leaving = nuisance.leaving_their_priors(equations.fit(named.terms), equations.problem)
-    if not leaving.size:
-        return None
-    wider = nuisance
-    for place in leaving:
-        wide = nuisance.precision[place] / limits.furthest_linearisation_stds**2
-        wider = wider.with_precision(int(place), float(wide))
-    freed = equations.with_nuisance(wider)
+    contradicted = equations.nuisance.contradicting_their_priors(equations.fit(named.terms), equations.problem).tolist()
+    best, most = None, _evidence(equations, whole, (), entry_threshold)
+    for places in dict.fromkeys([*((place,) for place in contradicted), tuple(contradicted)]):
+        freed = _with_wide_priors(equations, places)
+        evidence = _evidence(equations, freed.fit(named.terms), places, entry_threshold)
+        if places and evidence >= most and _is_all_that_is_wrong(equations, freed, named, places):
+            best, most = freed, evidence
+    return best
+
+
+def _with_wide_priors(equations: NormalEquations, places: Sequence[int]) -> NormalEquations:
+    """Return equations with these parameters' priors widened as far as a wrong statement goes."""
+    wider = equations.nuisance
+    for place in places:
+        wide = wider.precision[place] / equations.thresholds.furthest_linearisation_stds**2
+        wider = wider.with_precision(place, float(wide))
+    return equations.with_nuisance(wider)
+
+
+def _is_all_that_is_wrong(
+    equations: NormalEquations, freed: NormalEquations, named: Fit, places: Sequence[int]
+) -> bool:
+    """Return whether no released parameter goes too far, and nothing significant is left beside them."""
     fit = freed.fit(named.terms)
-    too_far = np.any(nuisance.prior_stds_away(fit)[leaving] > limits.furthest_linearisation_stds)
-    if too_far or unexplained_beside(freed, fit, tolerated=0.0) is not None:
-        return None
-    within = _evidence(equations, whole, (), entry_threshold)
-    return freed if _evidence(equations, fit, leaving.tolist(), entry_threshold) >= within else None
+    away = equations.nuisance.prior_stds_away(fit)[list(places)]
+    too_far = bool(np.any(away > equations.thresholds.furthest_linearisation_stds))
+    return not too_far and unexplained_beside(freed, fit, tolerated=0.0) is None
 
 
 def _evidence(equations: NormalEquations, fit: Fit, free: Collection[int], entry_threshold: float) -> float:

@@ -48,8 +48,12 @@ class ShapeProfile:
     left: Single
 
     def along(self, shape: Shape, name: str) -> Callable[[float], float]:
-        """Return Δχ² as a function of one shape parameter."""
-        return lambda value: self({**shape, name: value})
+        """Return Δχ², less what the shape must gain by its prior, as a function of one shape parameter."""
+        return lambda value: self.less_prior({**shape, name: value})
+
+    def less_prior(self, shape: Shape) -> float:
+        """Return the further Δχ² less what the shape must gain by its prior."""
+        return self(shape) - self.candidate.prior_penalty(self.equations.problem, shape)
 
     def __call__(self, shape: Shape) -> float:
         """Return the further Δχ²."""
@@ -128,7 +132,7 @@ def optimised_shape(equations: NormalEquations, others: Sequence[Term], term: Te
     if candidate.stated_coefficient(term.group.shape) is not None:
         return _at_its_coefficient(equations, others, term, candidate)
     profile = shape_profile(equations, others, candidate, term.wheels)
-    best, gain = dict(term.group.shape), profile(term.group.shape)
+    best, gain = dict(term.group.shape), profile.less_prior(term.group.shape)
     for name, bounds in candidate.bounds(equations.problem, best).items():
         if name in best:
             between = candidate.search_range(equations.problem, best, name, bounds)
