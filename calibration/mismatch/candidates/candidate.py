@@ -133,6 +133,8 @@ class Candidate:
     change_point: ClassVar[str] = "onset_s"
     """The shape parameter, where a candidate has it, that is the time at which the effect begins. Its Δχ² is no smooth
     function of it, so that it has an interval of its own."""
+    wanders: ClassVar[bool] = False
+    """Whether the effect takes a random course after its onset, so that no shape is ever exact."""
     loads: ClassVar[bool] = False
     """Whether the effect is a force or a torque on a drive. It is told in the predicted channel's unit, and is not
     looked for where that is no force, torque, or what a drive takes for one (current, voltage, power, pressure)."""

@@ -142,6 +142,7 @@ class DriftOfPredictedLoad(LoadCellDrift):
     experiment = "take the load off, note the reading, and repeat with a known load"
     along_motion = False
     forms = GROWTHS[1:]
+    wanders = True
     coefficients: ClassVar = (Coefficient("drift", "{unit}", 0),)
     free: ClassVar = {"onset_s": (0.0, float("inf"))}
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.inference.parameter_interval import NINE_TENTHS
 from regolithd.calibration.mismatch.selection.shape_optimisation import shape_profile
 from regolithd.calibration.mismatch.signal.density import quantiles
 
@@ -38,7 +39,11 @@ BISECTIONS = 6
 
 
 def onset_interval(equations: NormalEquations, fit: Fit, index: int) -> tuple[float, float, float]:
-    """Return a term's onset [s] and the bounds that hold it nine times in ten."""
+    """Return a term's onset [s] and the bounds that hold it nine times in ten.
+
+    Of an effect that wanders the bounds are quantiles of the same likelihood as the estimate: where none of the
+    developments is the true one, the best of them is no measure of what chance allows.
+    """
     term, problem = fit.terms[index], equations.problem
     candidate, shape = term.group.candidate, term.group.shape
     assert candidate is not None  # noqa: S101  # only named terms come here
@@ -53,19 +58,21 @@ def onset_interval(equations: NormalEquations, fit: Fit, index: int) -> tuple[fl
     def within(onset_s: float) -> bool:
         return max(gains(onset_s)) > least
 
+    grid = np.linspace(*candidate.bounds(problem, shape)[onset], GRID)
+    density = _density(np.array([gains(float(onset_s)) for onset_s in grid]))
+    low, value, high = quantiles(grid, density, (NINE_TENTHS[0], 0.5, NINE_TENTHS[1]))
+    if candidate.wanders:
+        return value, low, high
     least = max(profile(shape), *gains(at)) - equations.thresholds.onset_fall
     low = max(at - _distance(lambda far: within(at - far), length_s), 0.0)
     high = min(at + _distance(lambda far: within(at + far), length_s), length_s)
-    grid = np.linspace(*candidate.bounds(problem, shape)[onset], GRID)
-    value = _median(grid, np.array([gains(float(onset_s)) for onset_s in grid]))
     inside = low + MARGIN * (high - low), high - MARGIN * (high - low)
     return float(np.clip(value, *inside)), low, high
 
 
-def _median(grid: Array, gains: Array) -> float:
-    """Return the median onset of the likelihood exp(Δχ²/2), every development as likely before, shape (onset, way)."""
-    density = np.exp((gains - gains.max()) / (2 * OVERCONFIDENCE)).sum(axis=1)
-    return quantiles(grid, density, (0.5,))[0]
+def _density(gains: Array) -> Array:
+    """Return the likelihood exp(Δχ²/2) of each onset, every development as likely before, of gains (onset, way)."""
+    return np.asarray(np.exp((gains - gains.max()) / (2 * OVERCONFIDENCE)).sum(axis=1))
 
 
 def _distance(inside: Callable[[float], bool], length_s: float) -> float:

@@ -37,7 +37,7 @@ class Heated(Simulation):
         return found
 
 
-def answer(loss_W_K: float, leak_W: float = 0.0) -> Answer:
+def answer(loss_W_K: float, leak_W: float = 0.0, noise_K: float = 12.0) -> Answer:
     """Compare with a body whose loss is this, from half of the time on with a further constant loss."""
     generator = np.random.default_rng(4)
     time_s = np.arange(ROWS, dtype=float)
@@ -47,7 +47,7 @@ def answer(loss_W_K: float, leak_W: float = 0.0) -> Answer:
     )[:, 0]
     noise = np.convolve(generator.normal(0, 1, ROWS + 11), np.ones(12) / np.sqrt(12), "valid")
     return compare(
-        from_columns({"t_s": time_s, "power_W": power, "body_temperature_degC": true + 12 * noise}), Heated()
+        from_columns({"t_s": time_s, "power_W": power, "body_temperature_degC": true + noise_K * noise}), Heated()
     ).answer
 
 
@@ -72,3 +72,26 @@ def test_a_wrong_statement_has_a_price(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(released_parameters, "WRONG_STATEMENT_PENALTY", 1e6)
     loss = next(parameter for parameter in answer(3.4).parameters if parameter.name == "loss_W_K")
     assert loss.value > 3.41
+
+
+def test_a_prior_as_firm_as_the_readings_does_not_hide_that_it_is_wrong() -> None:
+    """It would hold the parameter half way back, within three of its deviations."""
+    found = answer(3.55)
+    loss = next(parameter for parameter in found.parameters if parameter.name == "loss_W_K")
+    assert (found.verdict, found.effects, found.unexplained) == ("missing-physics", (), ())
+    assert loss.beyond_prior()
+    assert loss.low < 3.55 < loss.high
+
+
+def test_readings_that_say_little_contradict_no_prior() -> None:
+    """Noise moves a parameter that the readings hardly know, and its prior holds it."""
+    found = answer(3.9, noise_K=60.0)
+    assert (found.verdict, found.effects) == ("consistent", ())
+    assert not any(parameter.beyond_prior() for parameter in found.parameters)
+
+
+def test_of_parameters_that_are_like_each_other_one_is_released() -> None:
+    """The loss alone explains what is wrong: the capacity stays within its prior."""
+    found = {parameter.name: parameter for parameter in answer(3.4).parameters}
+    assert found["loss_W_K"].beyond_prior()
+    assert not found["capacity_J_K"].beyond_prior()
