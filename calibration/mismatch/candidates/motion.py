@@ -29,6 +29,8 @@ where it is a step for most readings to where it would be taken for viscous fric
 neighbours."""
 REFINED_TO = 0.05
 """Relative tolerance of the refined transition (a choice: its effect on the residual is of second order)."""
+FADING = (0.02, 0.06, 0.2)
+"""Stribeck speeds that are tried beside a step, as shares of that speed (a choice: in steps of three)."""
 LEAST_WITHIN = 0.01
 """Share of the readings in motion that must be within a transition, to tell it from a step (a choice)."""
 LEAST_GAIN = 10.8
@@ -90,16 +92,27 @@ def _squares_left(problem: Problem, width: float) -> float:
 
 
 def _left_beside_friction(problem: Problem, shape: Shape) -> Array:
-    """Return what the free parameters and friction of any usual law leave of the residual, shape (time, wheel)."""
+    """Return what the free parameters and friction of any usual law leave of the residual, shape (time, wheel).
+
+    Beside a step one of these laws is extra drag near standstill (Stribeck), which else a transition would stand for.
+    """
     direction, speed = along_motion(problem, shape), np.nan_to_num(np.abs(problem.covariates["wheel_speed"]))
     laws = [direction, direction * np.sqrt(speed), direction * speed, direction * np.abs(problem.filled)]
     free = [problem.tangent(name) for name, prior in problem.simulation.parameters.items() if prior.std > 0]
     here = problem.mask
+    usual = float(np.nanquantile(speed[here & (speed > 0)], USUAL_SPEED_QUANTILE))
+    fading = () if TRANSITION in shape else [direction * np.exp(-speed / (share * usual)) for share in FADING]
     residual = np.where(here, problem.measured - problem.filled, 0.0)
     columns = np.stack([column[here] for column in (*free, *laws)], axis=1)
-    fitted = np.linalg.lstsq(columns, residual[here], rcond=None)[0]
-    residual[here] -= columns @ fitted
+    asked = np.stack([residual[here], *(column[here] for column in fading)], axis=1)
+    left, *extra = (asked - columns @ np.linalg.lstsq(columns, asked, rcond=None)[0]).T
+    residual[here] = left - max((_part_along(column, left) for column in extra), key=_squares, default=0.0)
     return residual
+
+
+def _part_along(column: Array, values: Array) -> Array:
+    """Return the part of values that follows a column with a positive factor; none where it is negative."""
+    return np.asarray(column * max(float(column @ values) / max(_squares(column), 1e-300), 0.0))
 
 
 def _squares(residual: Array) -> float:
