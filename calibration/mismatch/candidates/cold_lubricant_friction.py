@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 
+POWERS = (0.0, 1.0)
+"""Power of the speed: from dry contact, or a grease that thins with shear (power-law index 0.1 to 0.5), to an oil."""
 POLES_DEGC = (-125.0, -95.0)
 """Pole temperatures of Vogel's law that bracket low-temperature greases [°C] (data sheets)."""
 SCALES_K = (6.0, 11.0, 20.0, 45.0)
@@ -58,11 +60,11 @@ class ColdLubricantFriction(Candidate):
     forms = ("constant, Vogel's law", "constant, a line", "viscous, Vogel's law", "viscous, a line")
     parameter_labels: ClassVar = {"scale_K": "temperature scale"}
     coefficients: ClassVar = (Coefficient("cold_drag", "{unit} ({per_speed})^p"),)
-    free: ClassVar = {"scale_K": (STEEPEST_K, 80.0), "no_drag_above_degC": (-60.0, 80.0)}
+    free: ClassVar = {"power": POWERS, "scale_K": (STEEPEST_K, 80.0), "no_drag_above_degC": (-60.0, 80.0)}
 
     def form_of(self, shape: Shape) -> str:
         """Return how the drag depends on speed and on temperature."""
-        over_speed = "viscous" if float(shape["power"]) else "constant"
+        over_speed = "viscous" if float(shape["power"]) > 0.5 else "constant"
         over_temperature = "Vogel's law" if "scale_K" in shape else "a line"
         return f"{over_speed}, {over_temperature}"
 
@@ -73,7 +75,7 @@ class ColdLubricantFriction(Candidate):
         top = max(float(np.nanmax(temperature)), soonest)
         ends = np.unique(np.maximum([*np.nanquantile(temperature, END_QUANTILES), top], soonest)).tolist()
         found: list[Shape] = []
-        for power in (0.0, 1.0):
+        for power in POWERS:
             cold: Shape = {**transition_of(problem), "power": power, "reference_degC": _coldest(problem)}
             found += [{**cold, "pole_degC": pole, "scale_K": scale} for pole in POLES_DEGC for scale in SCALES_K]
             found += [{**cold, "no_drag_above_degC": end} for end in (*ends, top + BEYOND_K)]
@@ -87,7 +89,7 @@ class ColdLubricantFriction(Candidate):
         """Return g(T) sign(ω)|ω|^p; g is 1 at the reference temperature."""
         drag = along_motion(problem, shape) * self._growth(problem, shape)
         if float(shape["power"]) and "wheel_speed" in problem.covariates:
-            drag = drag * np.abs(problem.covariates["wheel_speed"])
+            drag = drag * np.abs(problem.covariates["wheel_speed"]) ** float(shape["power"])
         return drag[None]
 
     def _growth(self, problem: Problem, shape: Shape) -> Array:
@@ -107,7 +109,14 @@ class ColdLubricantFriction(Candidate):
         temperature = temperature_degC(problem)[problem.mask]
         soonest = max(float(np.nanquantile(temperature, LOWEST_END_QUANTILE)), _coldest(problem) + STEEPEST_K)
         ends = (soonest, max(float(np.nanmax(temperature)), soonest) + FURTHEST_END_K)
-        return {"scale_K": self.free["scale_K"]} if "scale_K" in shape else {"no_drag_above_degC": ends}
+        falls = {"scale_K": self.free["scale_K"]} if "scale_K" in shape else {"no_drag_above_degC": ends}
+        return {"power": POWERS, **falls} if "wheel_speed" in problem.covariates else falls
+
+    def search_range(
+        self, problem: Problem, shape: Shape, name: str, bounds: tuple[float, float]
+    ) -> tuple[float, float]:
+        """Return the whole range of the power: the grid has its ends alone."""
+        return bounds if name == "power" else super().search_range(problem, shape, name, bounds)
 
 
 def _coldest(problem: Problem) -> float:

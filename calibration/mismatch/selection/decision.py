@@ -72,7 +72,7 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
     kept = chosen if unnamed else named
     whole = equations.fit((*named.terms, *unnamed))
     if (freed := released(equations, kept, whole, threshold)) is not None:
-        equations, named, unnamed = freed, freed.fit(kept.terms), ()
+        (equations, named), unnamed = freed, ()
         whole = named
     left = residual_of(equations, whole)
     noise = estimate_noise(left, problem.mask, limits)

@@ -17,31 +17,44 @@ from regolithd.calibration.mismatch.selection.best_subsets import entry_cost
 from regolithd.calibration.mismatch.selection.smooth_terms import unexplained_beside
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
-    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+    Fitted = tuple[NormalEquations, Fit]
 
 WRONG_STATEMENT_PENALTY = 9.2
 """Δχ² charged for a parameter that was stated wrongly: odds of one in a hundred before the recording, 2 ln 100."""
 
 
-def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold: float) -> NormalEquations | None:
-    """Return equations with the priors of those parameters widened that the readings contradict.
+def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold: float) -> Fitted | None:
+    """Return equations with the priors of those parameters widened that the readings contradict, and the names' fit.
 
-    Of parameters that could stand for each other the one whose release has most evidence is released, or all together.
+    Of parameters that could stand for each other the one whose release has most evidence is released, or all together;
+    in the place of a name, where it is ahead of that by more than chance (`lead_margin`).
     None where the readings contradict none, where one would go further than a wrong statement explains
     (`furthest_linearisation_stds`), where something stays unexplained all the same, or where the evidence of `whole`,
     names and curves within the priors, is larger.
     """
-    contradicted = equations.nuisance.contradicting_their_priors(equations.fit(named.terms), equations.problem).tolist()
+    lead = equations.thresholds.lead_margin
     best, most = None, _evidence(equations, whole, (), entry_threshold)
-    for places in dict.fromkeys([*((place,) for place in contradicted), tuple(contradicted)]):
-        freed = _with_wide_priors(equations, places)
-        evidence = _evidence(equations, freed.fit(named.terms), places, entry_threshold)
-        if places and evidence >= most and _is_all_that_is_wrong(equations, freed, named, places):
-            best, most = freed, evidence
+    for kept in (named.terms, *(named.without(index) for index in range(len(named.terms)))):
+        least = lead * (len(named.terms) - len(kept))
+        for freed, places in _releases(equations, kept):
+            fit = freed.fit(kept)
+            evidence = _evidence(equations, fit, places, entry_threshold) - least
+            if evidence >= most and _is_all_that_is_wrong(equations, freed, fit, places):
+                best, most = (freed, fit), evidence
     return best
+
+
+def _releases(equations: NormalEquations, kept: Sequence[Term]) -> Iterator[tuple[NormalEquations, tuple[int, ...]]]:
+    """Yield equations with each contradicted parameter's prior widened, then with all, and these parameters' places."""
+    contradicted = equations.nuisance.contradicting_their_priors(equations.fit(kept), equations.problem).tolist()
+    for places in dict.fromkeys([*((place,) for place in contradicted), tuple(contradicted)]):
+        if places:
+            yield _with_wide_priors(equations, places), places
 
 
 def _with_wide_priors(equations: NormalEquations, places: Sequence[int]) -> NormalEquations:
@@ -53,11 +66,8 @@ def _with_wide_priors(equations: NormalEquations, places: Sequence[int]) -> Norm
     return equations.with_nuisance(wider)
 
 
-def _is_all_that_is_wrong(
-    equations: NormalEquations, freed: NormalEquations, named: Fit, places: Sequence[int]
-) -> bool:
+def _is_all_that_is_wrong(equations: NormalEquations, freed: NormalEquations, fit: Fit, places: Sequence[int]) -> bool:
     """Return whether no released parameter goes too far, and nothing significant is left beside them."""
-    fit = freed.fit(named.terms)
     away = equations.nuisance.prior_stds_away(fit)[list(places)]
     too_far = bool(np.any(away > equations.thresholds.furthest_linearisation_stds))
     return not too_far and unexplained_beside(freed, fit, tolerated=0.0) is None
