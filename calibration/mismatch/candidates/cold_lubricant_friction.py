@@ -43,7 +43,7 @@ BEYOND_K = 20.0
 
 
 class ColdLubricantFriction(Candidate):
-    """Coulomb (power 0) or viscous (power 1) drag times a falling function of temperature: Vogel's law or a line.
+    """Drag times a falling function of temperature, Vogel's law or a line; with speed it grows by a power from 0 to 1.
 
     The function is 1 at a reference temperature, the coldest of the recording in which the drag is identified.
     """
@@ -57,16 +57,14 @@ class ColdLubricantFriction(Candidate):
     source = "Vogel–Fulcher viscosity of low-temperature greases: a factor e in 10 to 40 K; linear in a small range"
     requires = ("temperature", "direction")
     loads = True
-    forms = ("constant, Vogel's law", "constant, a line", "viscous, Vogel's law", "viscous, a line")
+    forms = ("Vogel's law", "a line")
     parameter_labels: ClassVar = {"scale_K": "temperature scale"}
     coefficients: ClassVar = (Coefficient("cold_drag", "{unit} ({per_speed})^p"),)
     free: ClassVar = {"power": POWERS, "scale_K": (STEEPEST_K, 80.0), "no_drag_above_degC": (-60.0, 80.0)}
 
     def form_of(self, shape: Shape) -> str:
-        """Return how the drag depends on speed and on temperature."""
-        over_speed = "viscous" if float(shape["power"]) > 0.5 else "constant"
-        over_temperature = "Vogel's law" if "scale_K" in shape else "a line"
-        return f"{over_speed}, {over_temperature}"
+        """Return how the drag depends on temperature."""
+        return "Vogel's law" if "scale_K" in shape else "a line"
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return Vogel's law with several scales, and straight lines that end at several temperatures."""

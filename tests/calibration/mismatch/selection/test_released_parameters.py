@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
+from linear_machine import CANDIDATES, equations_of, problem_of, table, term_of
 
-from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch import Candidate, Coefficient, Prior, Simulation, compare
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.selection import released_parameters
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from regolithd.calibration.mismatch import Problem, Shape
     from regolithd.calibration.mismatch.answer import Answer
 
 ROWS = 3000
@@ -95,3 +97,31 @@ def test_of_parameters_that_are_like_each_other_one_is_released() -> None:
     found = {parameter.name: parameter for parameter in answer(3.4).parameters}
     assert found["loss_W_K"].beyond_prior()
     assert not found["capacity_J_K"].beyond_prior()
+
+
+class Waving(Candidate):
+    """An offset with a wave of a fifth of its size: without the wave it acts as the parameter `level` does."""
+
+    name, covariate, equation, words, signature = "waving", "none", "ΔV = c (1 + s/5)", "a level", "a level"
+    experiment, source = "wait", "test"
+    coefficients: ClassVar = (Coefficient("height", "{unit}", 0),)
+
+    def columns(self, problem: Problem, shape: Shape) -> NDArray[np.float64]:  # noqa: ARG002
+        """Return 1 with the wave."""
+        return np.broadcast_to(1 + 0.2 * np.sin(problem.time_s / 3), problem.mask.shape)[None]
+
+
+@pytest.mark.parametrize(("wave", "is_named"), [(0.0, False), (0.2, True)])
+def test_a_name_that_a_wrong_statement_explains_as_well_is_given_up(wave: float, is_named: bool) -> None:
+    """A level that is 6 deviations off is no effect; what has the effect's own wave is one."""
+    columns = table(noise=2.0)
+    columns["reading_V"] = columns["reading_V"] + 3.0 * (1 + wave * np.sin(columns["t_s"] / 3))
+    equations = equations_of(problem_of(columns), (*CANDIDATES, Waving()))
+    equations = equations.weighted(np.full(2, 2.0**-2))
+    named = equations.fit([term_of(equations, "waving")])
+    found = released_parameters.released(equations, named, named, 5.0)
+    assert (found is None) == is_named
+    if found:
+        freed, fit = found
+        assert fit.terms == ()
+        assert fit.coefficients[0] / freed.design.scale[0] == pytest.approx(3.0, abs=0.3)
