@@ -112,9 +112,10 @@ def compare(
             one = OneChannel(simulation, channel, known)
             return _labelled(compare(recorded, one, effects=own, thresholds=thresholds, progress=progress), channel)
 
-        found = {channel: of_channel(channel, {}) for channel in simulation.channels}
-        for channel, one in found.items():
-            others = [other.answer for name, other in found.items() if name != channel]
+        alone = {channel: of_channel(channel, {}) for channel in simulation.channels}
+        found = dict(alone)
+        for channel, one in alone.items():
+            others = [other.answer for name, other in alone.items() if name != channel]
             if known := priors_from_others(one.answer, others):
                 found[channel] = of_channel(channel, known)
         return merged(list(found.values()), simulation)

@@ -237,6 +237,13 @@ class Candidate:
         """Return whether fitted coefficients are possible; their signs are tested before."""
         return True
 
+    def without_covariate(self, shape: Shape) -> Shape | None:  # noqa: ARG002
+        """Return the shape of the same law without its dependence on the covariate, if there is one to be held against.
+
+        A term must gain more than that by as much as its shapes cost.
+        """
+        return None
+
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:  # noqa: ARG002
         """Return the shape that agrees with its fitted coefficients `values`, where the law is not linear in them.
 

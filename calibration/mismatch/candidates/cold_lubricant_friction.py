@@ -83,6 +83,11 @@ class ColdLubricantFriction(Candidate):
         """Charge a drag that does not change on any wheel: there Coulomb or viscous friction is the simpler model."""
         return 0.0 if problem.changes_within(self._growth(problem, shape)) else UNLIKELY_SHAPE_PENALTY
 
+    def without_covariate(self, shape: Shape) -> Shape:
+        """Return the same drag at any temperature, which would gain by its power of the speed alone."""
+        kept = {name: value for name, value in shape.items() if name != "no_drag_above_degC"}
+        return {**kept, "pole_degC": POLES_DEGC[0], "scale_K": np.inf}
+
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return g(T) sign(ω)|ω|^p; g is 1 at the reference temperature."""
         drag = along_motion(problem, shape) * self._growth(problem, shape)

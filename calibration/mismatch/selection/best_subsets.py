@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, relative_size
-from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
+from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape, shape_profile
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -66,7 +66,20 @@ def _acceptable_term(equations: NormalEquations, fit: Fit, index: int) -> bool:
         return False
     if term.group.named and relative_size(equations, fit, index) < equations.thresholds.smallest_effect:
         return False
+    if not _gains_by_its_covariate(equations, fit, index):
+        return False
     return term.group.own_channel is None or _agrees_with_own_channel(equations, fit, index)
+
+
+def _gains_by_its_covariate(equations: NormalEquations, fit: Fit, index: int) -> bool:
+    """Return whether a term gains more than its law without its covariate by what the choice of its shape costs."""
+    term = fit.terms[index]
+    candidate = term.group.candidate
+    without = candidate.without_covariate(term.group.shape) if candidate else None
+    if candidate is None or without is None:
+        return True
+    profile = shape_profile(equations, fit.without(index), candidate, term.wheels)
+    return profile(term.group.shape) - profile(without) > term.group.selection_penalty
 
 
 def physically_plausible(equations: NormalEquations, fit: Fit, index: int) -> bool:

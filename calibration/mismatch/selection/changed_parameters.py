@@ -10,6 +10,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
+import numpy as np
+
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, growth
 from regolithd.calibration.mismatch.selection.shape_optimisation import shape_profile
 
@@ -17,6 +19,9 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+SAME_ACTION = 0.99
+"""Cosine of two courses above which they are one action (a choice: a fiftieth of the power differs)."""
 
 
 class _ChangedParameter(Candidate):
@@ -51,11 +56,21 @@ def _is_changed_parameter(equations: NormalEquations, named: Fit, index: int, te
     others, shape = named.without(index), term.group.shape
     gain = named.delta_chi2 - equations.fit(others).delta_chi2
     beside = shape_profile(equations, others, candidate, equations.all_wheels)
-    changes = (
-        replace(beside, candidate=_ChangedParameter(name))
-        for name, prior in equations.problem.simulation.parameters.items()
-        if prior.std > 0
-    )
+    changes = [
+        _ChangedParameter(name) for name, prior in equations.problem.simulation.parameters.items() if prior.std > 0
+    ]
+    rivals = [change for change in changes if not _is_the_effect(equations.problem, change, term)]
     limits = equations.thresholds
     least = gain + limits.lead_margin + limits.further_share * gain
-    return any(change(shape) > least for change in changes)
+    return any(replace(beside, candidate=change)(shape) > least for change in rivals)
+
+
+def _is_the_effect(problem: Problem, change: _ChangedParameter, term: Term) -> bool:
+    """Return whether a change of a parameter acts as the effect does: a no-load current that rises is a drag."""
+    assert term.group.candidate is not None  # noqa: S101  # only named terms come here
+    shape, elsewhere = term.group.shape, [k for k in range(problem.mask.shape[1]) if k not in term.wheels]
+    changed = np.where(problem.mask, change.columns(problem, shape)[0], 0.0)
+    effect = np.where(problem.mask, term.group.candidate.columns(problem, shape)[0], 0.0)
+    effect[:, elsewhere] = 0.0
+    along = float(np.sum(changed * effect))
+    return abs(along) > SAME_ACTION * float(np.linalg.norm(changed) * np.linalg.norm(effect))

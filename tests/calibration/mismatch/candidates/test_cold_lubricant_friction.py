@@ -42,14 +42,14 @@ class Joint(Simulation):
         }
 
 
-def effects_of(power: float) -> tuple[Effect, ...]:
-    """Return what is found where cold drag grows by this power of the speed."""
+def effects_of(power: float, *, scale_K: float = 12.0) -> tuple[Effect, ...]:
+    """Return what is found where drag grows by this power of the speed and falls by a factor e in `scale_K`."""
     rng = np.random.default_rng(7)
     t_s = np.arange(INSTANTS) * STEP_S
     angle = 1.2 * np.sin(t_s / 7) + 0.8 * np.sin(t_s / 2.3)
     speed = np.gradient(angle, STEP_S)
     temperature = 12.0 - 14.0 * np.cos(t_s / 90)
-    drag = 0.5 * np.exp(-(temperature + 2.0) / 12.0) * np.sign(speed) * np.abs(speed) ** power
+    drag = 0.5 * np.exp(-(temperature + 2.0) / scale_K) * np.sign(speed) * np.abs(speed) ** power
     noise = np.convolve(rng.normal(0, 1, INSTANTS + 7), np.ones(8) / np.sqrt(8), "valid")
     columns = {
         "t_s": t_s,
@@ -70,3 +70,9 @@ def test_a_grease_is_one_effect_whatever_its_power(power: float) -> None:
     assert told.value == pytest.approx(power, abs=0.15)
     # A power at an end of its range is not inside the interval, which is within the range.
     assert told.low - 0.02 <= power <= told.high + 0.02
+
+
+@pytest.mark.parametrize("power", [0.1, 0.3])
+def test_drag_that_does_not_depend_on_temperature_is_not_cold(power: float) -> None:
+    """A power that no other law has does not earn the name."""
+    assert "cold-lubricant-friction" not in {effect.name for effect in effects_of(power, scale_K=1e6)}

@@ -27,6 +27,16 @@ def test_a_step_stays_a_step() -> None:
     assert transition_of(problem_of(with_friction(0.0))) == {}
 
 
+@pytest.mark.parametrize("fades_at", [0.05, 0.15])
+def test_extra_drag_near_standstill_is_no_transition(fades_at: float) -> None:
+    """On a machine that turns one way a drag that fades with speed would else be taken for a gradual reversal."""
+    columns = table(noise=0.05)
+    speed = np.abs(columns["speed_rad_s"])
+    drag = 0.8 / (1 + (speed / (fades_at * FASTEST)) ** 2)
+    problem = problem_of({**columns, "speed_rad_s": speed, "reading_V": columns["reading_V"] + drag})
+    assert transition_of(problem) == {}
+
+
 def test_without_friction_there_is_no_transition() -> None:
     """Noise alone prefers no transition."""
     assert transition_of(problem_of(table())) == {}

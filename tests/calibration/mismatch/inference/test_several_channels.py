@@ -138,3 +138,34 @@ def test_a_note_of_one_channel_is_told_with_the_channel() -> None:
     heat = replace(ANSWER, notes=("a gap",), fit=replace(ANSWER.fit, channel="heat_W"))
     assert notes_of([current, heat]) == ("a gap", "current_A: no speed")
     assert notes_of([replace(current, notes=("current_A is blank",)), heat]) == ("current_A is blank", "heat_W: a gap")
+
+
+class Loaded(Simulation):
+    """A gain that two channels show, the second more precisely."""
+
+    channels: ClassVar = {"coarse_V": "V", "fine_A": "A"}
+    inputs = ("speed_rad_s",)
+    parameters: ClassVar = {"gain": Prior(2.0, 0.05)}
+
+    def predict(self, inputs: Mapping[str, Any], values: Mapping[str, float]) -> Any:
+        """Return both channels in proportion to the speed."""
+        return {name: values["gain"] * inputs["speed_rad_s"] for name in self.channels}
+
+    def covariates(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the time."""
+        return {"time": inputs["t_s"]}
+
+
+def test_a_parameter_that_both_channels_show_to_be_wrong_is_told_from_its_stated_prior() -> None:
+    """What one channel knows is the other's prior for its own comparison, and not the answer's."""
+    generator, time_s = np.random.default_rng(6), 0.1 * np.arange(2400)
+    speed = 3 + np.sin(time_s / 9)
+    columns = {
+        "coarse_V": 2.3 * speed + generator.normal(0, 0.5, len(time_s)),
+        "fine_A": 2.3 * speed + generator.normal(0, 0.3, len(time_s)),
+    }
+    answer = compare(from_columns({"t_s": time_s, "speed_rad_s": speed, **columns}), Loaded()).answer
+    (gain,) = answer.parameters
+    assert (answer.verdict, gain.prior, gain.prior_std) == ("missing-physics", 2.0, 0.05)
+    assert gain.beyond_prior()
+    assert gain.value == pytest.approx(2.3, abs=0.02)

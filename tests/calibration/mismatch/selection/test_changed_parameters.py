@@ -13,6 +13,8 @@ from regolithd.calibration.mismatch.selection.changed_parameters import drop_wha
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from regolithd.calibration.mismatch import Problem, Shape
 
 ONSET_S = 160.0
@@ -58,3 +60,27 @@ def test_effects_of_all_axes_are_left_alone() -> None:
     equations = equations_of(problem_of(columns))
     named = equations.fit([term_of(equations, "step", place=3)])
     assert drop_what_a_changed_parameter_explains(equations, named) is named
+
+
+class Wavy(Fault):
+    """A step with a wave of a share of its size."""
+
+    name = "wavy"
+
+    def __init__(self, wave: float) -> None:
+        self._wave = wave
+
+    def columns(self, problem: Problem, shape: Shape) -> NDArray[np.float64]:
+        """Return the step with its wave."""
+        return np.asarray(super().columns(problem, shape) * (1 + self._wave * np.sin(problem.time_s / 3)))
+
+
+@pytest.mark.parametrize(("wave", "kept"), [(0.17, True), (0.35, False)])
+def test_a_parameter_that_is_the_effect_itself_is_no_other_explanation(wave: float, kept: bool) -> None:
+    """On one axis a level that changes is an offset that begins, but where the two have another course."""
+    columns = {name: values[::2] for name, values in table().items()}
+    columns["reading_V"] = columns["reading_V"] + 3.0 * (columns["t_s"] >= ONSET_S - STEP_S / 2)
+    fault = Wavy(wave)
+    equations = equations_of(problem_of(columns), (*CANDIDATES, fault))
+    named = equations.fit([term_of(equations, "wavy", wheels=(0,))])
+    assert bool(drop_what_a_changed_parameter_explains(equations, named).terms) is kept
