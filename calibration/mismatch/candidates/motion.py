@@ -16,8 +16,6 @@ from regolithd.calibration.mismatch.problem.covariates import USUAL_SPEED_QUANTI
 from regolithd.calibration.mismatch.signal.noise import estimate_noise
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from regolithd.calibration.mismatch.candidates.candidate import Shape
     from regolithd.calibration.mismatch.problem.problem import Problem
 
@@ -31,8 +29,6 @@ where it is a step for most readings to where it would be taken for viscous fric
 neighbours."""
 REFINED_TO = 0.05
 """Relative tolerance of the refined transition (a choice: its effect on the residual is of second order)."""
-FADING = (0.01, 0.017, 0.03, 0.05, 0.08, 0.14, 0.24, 0.4)
-"""Stribeck speeds that are tried beside a step and a transition, as shares of that speed (a choice: steps of 1.7)."""
 LEAST_WITHIN = 0.01
 """Share of the readings in motion that must be within a transition, to tell it from a step (a choice)."""
 LEAST_GAIN = 10.8
@@ -68,17 +64,16 @@ def _best_transition(problem: Problem) -> float:
     widths = [width for width in widths if np.mean(moving < width) > LEAST_WITHIN]
     if not widths:
         return 0.0
-    step = _left_beside_friction(problem, {}, FADING)
+    step = _left_beside_friction(problem, {})
     noise = estimate_noise(step, problem.mask, problem.thresholds)
     count = float(problem.mask.sum()) / noise.autocorrelation_time
-    best = _refined(problem, min(widths, key=lambda width: _squares_left(problem, width)))
-    left = _squares(_left_beside_friction(problem, {TRANSITION: best}, FADING))
+    best, left = _refined(problem, min(widths, key=lambda width: _squares_left(problem, width)))
     gain = count * (1 - left / max(_squares(step), 1e-300))
     return best if gain > LEAST_GAIN else 0.0
 
 
-def _refined(problem: Problem, width: float) -> float:
-    """Return the best transition between half and twice this one."""
+def _refined(problem: Problem, width: float) -> tuple[float, float]:
+    """Return the best transition between half and twice this one, and the sum of squares that it leaves."""
     from scipy.optimize import minimize_scalar  # noqa: PLC0415  # most recordings need no transition, and no SciPy for it
 
     found = minimize_scalar(
@@ -87,37 +82,24 @@ def _refined(problem: Problem, width: float) -> float:
         method="bounded",
         options={"xatol": REFINED_TO},
     )
-    return float(np.exp(found.x))
+    return float(np.exp(found.x)), float(found.fun)
 
 
 def _squares_left(problem: Problem, width: float) -> float:
     return _squares(_left_beside_friction(problem, {TRANSITION: width}))
 
 
-def _left_beside_friction(problem: Problem, shape: Shape, fading: Sequence[float] = ()) -> Array:
-    """Return what the free parameters and friction of any usual law leave of the residual, shape (time, wheel).
-
-    Of extra drag near standstill (Stribeck) that fades at one of the speeds `fading`, shares of the highest usual one,
-    the best is one of these laws: else a transition would stand for it.
-    """
+def _left_beside_friction(problem: Problem, shape: Shape) -> Array:
+    """Return what the free parameters and friction of any usual law leave of the residual, shape (time, wheel)."""
     direction, speed = along_motion(problem, shape), np.nan_to_num(np.abs(problem.covariates["wheel_speed"]))
     laws = [direction, direction * np.sqrt(speed), direction * speed, direction * np.abs(problem.filled)]
     free = [problem.tangent(name) for name, prior in problem.simulation.parameters.items() if prior.std > 0]
     here = problem.mask
-    usual = float(np.nanquantile(speed[here & (speed > 0)], USUAL_SPEED_QUANTILE))
-    ratios = [speed / (share * usual) for share in fading]
-    extra_drag = [direction * fade for ratio in ratios for fade in (np.exp(-ratio), 1 / (1 + ratio**2))]
     residual = np.where(here, problem.measured - problem.filled, 0.0)
     columns = np.stack([column[here] for column in (*free, *laws)], axis=1)
-    asked = np.stack([residual[here], *(column[here] for column in extra_drag)], axis=1)
-    left, *extra = (asked - columns @ np.linalg.lstsq(columns, asked, rcond=None)[0]).T
-    residual[here] = left - max((_part_along(column, left) for column in extra), key=_squares, default=0.0)
+    fitted = np.linalg.lstsq(columns, residual[here], rcond=None)[0]
+    residual[here] -= columns @ fitted
     return residual
-
-
-def _part_along(column: Array, values: Array) -> Array:
-    """Return the part of values that follows a column with a positive factor; none where it is negative."""
-    return np.asarray(column * max(float(column @ values) / max(_squares(column), 1e-300), 0.0))
 
 
 def _squares(residual: Array) -> float:

@@ -60,9 +60,15 @@ class StribeckFriction(Candidate):
         return FORMS[str(shape["fades"])]
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """Return Stribeck speeds between the slowest and half of the highest speed, in three forms."""
+        """Return Stribeck speeds between the slowest and half of the highest speed, in three forms.
+
+        Extra drag near standstill looks like a friction that turns round gradually, and the other way about: where the
+        recording shows such a transition, both a step and the transition are tried.
+        """
+        steps: list[Shape] = [{}, transition_of(problem)] if transition_of(problem) else [{}]
         return [
-            {**transition_of(problem), "stribeck_speed_rad_s": float(speed), "fades": fades}
+            {**turns, "stribeck_speed_rad_s": float(speed), "fades": fades}
+            for turns in steps
             for fades in FADES
             for speed in np.geomspace(*self._range(problem), SPEED_COUNT)
         ]

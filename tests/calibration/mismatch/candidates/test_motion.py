@@ -9,6 +9,7 @@ from linear_machine import problem_of, table
 from regolithd.calibration.mismatch.candidates.bearing_drag import BearingDrag
 from regolithd.calibration.mismatch.candidates.coulomb_friction import CoulombFriction
 from regolithd.calibration.mismatch.candidates.motion import TRANSITIONS, along_motion, transition_of
+from regolithd.calibration.mismatch.candidates.stribeck_friction import StribeckFriction
 
 FASTEST = 2.0
 """About the highest usual speed of the linear machine [rad/s]."""
@@ -27,14 +28,15 @@ def test_a_step_stays_a_step() -> None:
     assert transition_of(problem_of(with_friction(0.0))) == {}
 
 
-@pytest.mark.parametrize("fades_at", [0.05, 0.15])
-def test_extra_drag_near_standstill_is_no_transition(fades_at: float) -> None:
-    """On a machine that turns one way a drag that fades with speed would else be taken for a gradual reversal."""
-    columns = table(noise=0.05)
+def test_extra_drag_near_standstill_is_tried_as_a_step_as_well() -> None:
+    """On a machine that turns one way a drag that fades with speed is taken for a gradual reversal."""
+    columns = table(noise=0.02)
     speed = np.abs(columns["speed_rad_s"])
-    drag = 0.8 / (1 + (speed / (fades_at * FASTEST)) ** 2)
+    drag = 0.8 / (1 + (speed / (0.05 * FASTEST)) ** 2)
     problem = problem_of({**columns, "speed_rad_s": speed, "reading_V": columns["reading_V"] + drag})
-    assert transition_of(problem) == {}
+    assert transition_of(problem) != {}
+    turns = {"transition_rad_s" in shape for shape in StribeckFriction().shapes(problem)}
+    assert turns == {False, True}
 
 
 def test_without_friction_there_is_no_transition() -> None:

@@ -149,7 +149,7 @@ class Loaded(Simulation):
 
     def predict(self, inputs: Mapping[str, Any], values: Mapping[str, float]) -> Any:
         """Return both channels in proportion to the speed."""
-        return {name: values["gain"] * inputs["speed_rad_s"] for name in self.channels}
+        return dict.fromkeys(self.channels, values["gain"] * inputs["speed_rad_s"])
 
     def covariates(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Return the time."""

@@ -86,9 +86,7 @@ def test_a_law_with_several_forms_tells_which_was_found() -> None:
     assert words_of(SensorDelay(), {"late": "torque_Nm", "filter_s": 0.2}, {}) == (
         "a delay of torque_Nm (first-order filter)"
     )
-    assert words_of(ColdLubricantFriction(), cold, labels) == (
-        "drag that grows as the oil temperature falls (viscous, a line)"
-    )
+    assert words_of(ColdLubricantFriction(), cold, labels) == ("drag that grows as the oil temperature falls (a line)")
     assert words_of(CoulombFriction(), {}, {}) == CoulombFriction.words
 
 
