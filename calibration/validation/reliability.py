@@ -85,7 +85,7 @@ def answers_of(batch: Path) -> list[Stated]:
         truth = json.loads(opened.read_text())["truth"]
         told = json.loads((batch / "answers" / opened.name).read_text())
         answer = told["answers"][0] if "answers" in told else told["answer"]
-        if truth.get("group") != "constant" and "probability" in answer:
+        if truth.get("group") != "constant" and answer.get("probability") is not None:
             found.append(Stated(answer["probability"], is_right(truth, answer)))
     return found
 

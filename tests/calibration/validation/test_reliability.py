@@ -59,13 +59,14 @@ def test_answers_are_counted_by_their_probability() -> None:
 
 
 def test_batches_become_a_table_figures_and_a_picture(tmp_path: Path) -> None:
-    """Of both kinds of batch; recordings at one constant speed are left out."""
+    """Of both kinds of batch; recordings at one constant speed and answers without a probability are left out."""
     for folder in ("opened", "answers"):
         (tmp_path / folder).mkdir()
     rows = [
         (DRAG, {"answers": [answer("missing-physics", "coulomb-friction")]}),
         ({"group": "nothing", "effects": []}, {"answer": answer("consistent", probability=0.97)}),
         ({"group": "constant", "effects": [{"name": "viscous-friction"}]}, {"answer": answer("consistent")}),
+        (UNKNOWN, {"answers": [{**answer("unexplained"), "probability": None}]}),
     ]
     for number, (truth, told) in enumerate(rows):
         (tmp_path / "opened" / f"{number:04d}.json").write_text(json.dumps({"truth": truth}))
