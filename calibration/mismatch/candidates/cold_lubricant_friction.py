@@ -64,7 +64,8 @@ class ColdLubricantFriction(Candidate):
 
     def form_of(self, shape: Shape) -> str:
         """Return how the drag depends on temperature."""
-        return "Vogel's law" if "scale_K" in shape else "a line"
+        vogel, line = self.forms
+        return vogel if "scale_K" in shape else line
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return Vogel's law with several scales, and straight lines that end at several temperatures."""

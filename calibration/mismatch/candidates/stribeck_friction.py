@@ -65,10 +65,11 @@ class StribeckFriction(Candidate):
         Extra drag near standstill looks like a friction that turns round gradually, and the other way about: where the
         recording shows such a transition, both a step and the transition are tried.
         """
-        steps: list[Shape] = [{}, transition_of(problem)] if transition_of(problem) else [{}]
+        transition = transition_of(problem)
+        ways_to_turn: list[Shape] = [{}, transition] if transition else [{}]
         return [
-            {**turns, "stribeck_speed_rad_s": float(speed), "fades": fades}
-            for turns in steps
+            {**turn, "stribeck_speed_rad_s": float(speed), "fades": fades}
+            for turn in ways_to_turn
             for fades in FADES
             for speed in np.geomspace(*self._range(problem), SPEED_COUNT)
         ]

@@ -1,9 +1,8 @@
-"""Parameters that were stated wrongly, against smooth terms: a value beyond its prior explains more than a curve.
+"""Parameters that were stated wrongly, against smooth terms and names: a value beyond its prior explains more.
 
-The prior of a parameter holds as long as its statement is right. Where a fit pulls parameters beyond
-`furthest_prior_stds`, the prior would bias them, and a free curve beside them is paid twice: for what it fits, and for
-every deviation that the parameters need not go then. So these priors are widened; if the parameters are all that is
-wrong, nothing significant is left beside them.
+The prior of a parameter holds as long as its statement is right. Where the readings contradict it, it would bias the
+parameter, and a curve or a name beside it is paid twice: for what it fits, and for every deviation that the parameter
+need not go then. So the prior is widened; if the parameter is all that is wrong, nothing significant is left beside it.
 """
 
 from __future__ import annotations
