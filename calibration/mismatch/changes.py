@@ -16,7 +16,7 @@ from regolithd.calibration.mismatch.answer import Change, Contribution
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.candidates.motion import TRANSITION, transition_of
 from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw
-from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
 
 if TYPE_CHECKING:
@@ -173,7 +173,10 @@ def stated_in(
     for inside, listed in ((False, _merged(effects)), (True, _merged(in_simulation))):
         for effect in listed:
             if effect.name not in known:
-                raise SimulationError(f"there is no effect {effect.name!r}; known are {', '.join(sorted(known))}")
+                raise SimulationError(
+                    f"the simulation has the effect {effect.name}, but there is no such candidate, by which a change "
+                    f"of it would be seen: leave none out that it has; {did_you_mean(effect.name, sorted(known))}"
+                )
             found.append(Stated(known[effect.name], effect, inside))
     laws = [EmpiricalCurveLaw(curve) for curve in curves]
     found += [Stated(law, Contribution(law.name, {}, (1.0,), law.stated.wheels), in_simulation=False) for law in laws]

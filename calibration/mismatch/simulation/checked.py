@@ -14,9 +14,10 @@ import numpy as np
 
 from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.data.recording import Recording
-from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
+from regolithd.calibration.mismatch.errors import RecordingError, SimulationError, did_you_mean
 from regolithd.calibration.mismatch.simulation.checked_candidate import checked_candidate
 from regolithd.calibration.mismatch.simulation.simulation import Array, Simulation
+from regolithd.calibration.mismatch.simulation.stated_sensors import unrecorded
 from regolithd.calibration.mismatch.simulation.statement import check_statement
 from regolithd.calibration.mismatch.simulation.user_code import Columns, Parameters, array_of, called
 
@@ -68,7 +69,7 @@ class CheckedSimulation(Simulation):
             for name, values in prepared.channels.items()
         }
         self._check_needed(channels, columns)
-        return replace(prepared, channels=channels)
+        return replace(prepared, channels=channels).with_notes(*unrecorded(self.inner, channels))
 
     def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
         """Return the predicted channel, shape (time, wheel)."""
@@ -132,9 +133,14 @@ class CheckedSimulation(Simulation):
         """Return the physics to look for; the user's own candidates are checked like the simulation."""
         found = called(self.inner, "candidates", library)
         try:
-            return tuple(checked_candidate(candidate, self._method("candidates")) for candidate in found)
+            of = tuple(checked_candidate(candidate, self._method("candidates")) for candidate in found)
         except TypeError as error:
             raise SimulationError(f"{self._method('candidates')} must return a sequence of candidates") from error
+        known = sorted({each.name for each in (*library, *of)})
+        for name in self.without_effects:
+            if name not in known:
+                raise SimulationError(f"without_effects: there is no effect {name}; {did_you_mean(name, known)}")
+        return tuple(each for each in of if each.name not in self.without_effects)
 
     def corrected_tables(self, values: Mapping[str, float]) -> dict[str, Any]:
         """Return SIM.toml's tables with the parameters at the values that the recording gave them."""

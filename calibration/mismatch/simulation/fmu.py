@@ -14,6 +14,9 @@
     value = 0.5
     std = 0.01
 
+    [sensors]                                # standard errors of recorded inputs
+    pump_voltage_std_V = 0.05
+
 Which variables are inputs, which outputs, and their units, the FMU says. Every mapped output that the recording has is
 compared. Each run of the recording is simulated by itself, from its first instant.
 """
@@ -33,13 +36,18 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
 from regolithd.calibration.mismatch.problem.prior import Prior
 from regolithd.calibration.mismatch.simulation.simulation import Simulation
-from regolithd.calibration.mismatch.simulation.stated_priors import finite_number
+from regolithd.calibration.mismatch.simulation.stated_priors import SENSORS, finite_number
+from regolithd.calibration.mismatch.simulation.stated_sensors import stated_sensors
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
 Array = NDArray[np.float64]
 
+TABLES = ("simulation", "variables", "covariates", "parameters", SENSORS, "effects", "empirical_curves")
+"""Tables of an FMU's SIM.toml."""
+OF_SIMULATION = ("model", "path", "wheel_column", "one_way", "without_effects")
+"""Keys of its `[simulation]`."""
 KEPT_RESULTS = 64
 """Simulated results that are kept (a choice: what one comparison asks for)."""
 
@@ -49,6 +57,7 @@ class FmuSimulation(Simulation):
 
     def __init__(self, path: Path, tables: Mapping[str, Any]) -> None:
         fmpy = _fmpy()
+        _check_keys(tables)
         self.stated = tables
         self._description = _described(fmpy, path)
         known = {variable.name: variable for variable in self._description.modelVariables}
@@ -65,6 +74,7 @@ class FmuSimulation(Simulation):
         self.one_way = _stated_flag(tables.get("simulation", {}), "one_way")
         self._covariates = _covariates(tables.get("covariates", {}))
         self.parameters = _parameters(tables.get("parameters", {}), known, path)
+        self.sensors = stated_sensors(tables, self)
         self._unpacked = Path(tempfile.mkdtemp(prefix="fmu-"))
         weakref.finalize(self, shutil.rmtree, self._unpacked, ignore_errors=True)
         fmpy.extract(str(path), str(self._unpacked))
@@ -186,6 +196,17 @@ def _mapped(tables: Mapping[str, Any], known: Mapping[str, Any], path: Path) -> 
             told = f"[variables] {name}: the name of a recorded column is needed, not {column!r}"
             raise SimulationError(told, ("variables", name))
     return dict(stated)
+
+
+def _check_keys(tables: Mapping[str, Any]) -> None:
+    """Check that every table and every key of `[simulation]` is one that is read."""
+    for name in tables:
+        if name not in TABLES:
+            raise SimulationError(f"[{name}] is no table of an FMU's SIM.toml; {did_you_mean(name, TABLES)}", (name,))
+    for name in tables.get("simulation", {}):
+        if name not in OF_SIMULATION:
+            told = f"[simulation] has no key {name}; {did_you_mean(name, OF_SIMULATION)}"
+            raise SimulationError(told, ("simulation", name))
 
 
 def _stated_flag(table: Mapping[str, Any], name: str) -> bool | None:

@@ -90,6 +90,7 @@ def _loaded(
     made = _of_model(model, tables, model_folder(tables, beside), announce)
     made.corrected_effects, made.empirical_curves = stated_effects(tables), stated_curves(tables)
     made.source = source
+    made.without_effects = (*made.without_effects, *_without_effects(table.get("without_effects", [])))
     return checked(made)
 
 
@@ -107,6 +108,13 @@ def _of_model(model: str, tables: Mapping[str, Any], folder: Path, announce: Cal
     if model.count(":") != 1:
         raise SimulationError(f"[simulation] {MODELS}, not {model!r}", ("simulation", "model"))
     return _made(_imported(model, folder), tables)
+
+
+def _without_effects(names: object) -> list[str]:
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        told = f'[simulation] without_effects must be a list of names, ["grade-resistance"], not {names!r}'
+        raise SimulationError(told, ("simulation", "without_effects"))
+    return names
 
 
 def _check_effects(effects: object) -> None:

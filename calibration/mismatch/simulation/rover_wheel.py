@@ -45,6 +45,7 @@ class SimulationTable(Table):
 
     model: str = "rover-wheel"
     slip_without_ground_speed: float = Field(default=0.025, gt=-1, lt=1)
+    without_effects: tuple[str, ...] = ()
 
 
 class RoverWheelTables(Table):

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.simulation.stated_priors import stated_priors
+from regolithd.calibration.mismatch.simulation.stated_sensors import stated_sensors
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -64,7 +65,10 @@ class Simulation:
     library or a word of your own: {"friction_Nm": "coulomb-friction", "gain": "drive-gain"}."""
     unlikely_effects: ClassVar[frozenset[str]] = frozenset()
     """Names of candidates that this machine hardly has: each must gain `Thresholds.unlikely_penalty` more than others.
-    Physics that it cannot have at all is left out of `candidates`."""
+    Physics that it cannot have at all is named in `without_effects`."""
+    without_effects: Sequence[str] = ()
+    """Names of candidates that are not looked for, as the machine cannot have them; SIM.toml's `[simulation]
+    without_effects` adds to them."""
     covariate_labels: ClassVar[Mapping[str, str]] = {}
     """Axis labels with units for the report, by covariate: {"wheel_speed": "carriage speed (m/s)"}."""
     unloaded_experiment: ClassVar[str] = ""
@@ -93,14 +97,14 @@ class Simulation:
     source: Path | None = None
     """The SIM.toml that the simulation was loaded from."""
     sensors: Mapping[str, SensorError] = {}
-    """The errors of the recorded inputs, by column."""
+    """The errors of the recorded inputs, by column; SIM.toml's `[sensors]` replaces them."""
 
     @classmethod
     def from_tables(cls, tables: Mapping[str, Any]) -> Self:
         """Build from SIM.toml's tables.
 
         `[parameters.NAME] value, std` replaces a prior. So does a key of any other table that has a parameter's name:
-        `area_m2 = 0.5`, with `area_m2_std` or `area_m2_relative_std` beside it.
+        `area_m2 = 0.5`, with `area_m2_std` or `area_m2_relative_std` beside it. `[sensors]` has errors of inputs.
 
         Raises
         ------
@@ -110,6 +114,7 @@ class Simulation:
         made = cls()
         made.stated = tables
         made.parameters = stated_priors(tables, made.parameters, made.own_tables)
+        made.sensors = stated_sensors(tables, made)
         return made
 
     def prepare(self, recording: Recording) -> Recording:

@@ -16,6 +16,8 @@ ENGINE_TABLES = ("simulation", "effects", "empirical_curves")
 """Tables that are no parameters."""
 FIELDS = ("value", "std", "unit")
 """Keys of `[parameters.NAME]`."""
+SENSORS = "sensors"
+"""The table of the errors of recorded inputs; a key of it that is no parameter is one of these."""
 LEAST_NUMBER = 1e-100
 """Size below which a number is 0."""
 
@@ -49,7 +51,7 @@ def stated_priors(
         for key, given in table.items():
             if name == "parameters":
                 stated.setdefault(_known(key, parameters, "[parameters]", (name, key)), {}).update(_fields(key, given))
-            else:
+            elif name != SENSORS or names_parameter(key, parameters):
                 _take((name, key), given, parameters, table, stated)
     return {name: replace(prior, **stated[name]) if name in stated else prior for name, prior in parameters.items()}
 
@@ -76,16 +78,25 @@ def _take(
 ) -> None:
     """Take one key of a table of the user's own."""
     key = keys[1]
-    for ending, field in (("_relative_std", "std"), ("_std", "std"), ("", "value")):
-        name = key.removesuffix(ending) if ending else key
-        if (key in parameters and ending) or name not in parameters or (ending and name == key):
-            continue
-        value = finite_number(given, keys)
-        if ending == "_relative_std":
-            value *= abs(finite_number(table.get(name, parameters[name].value), (keys[0], name)))
-        stated.setdefault(name, {})[field] = value
+    ending = _ending(key, parameters)
+    if ending is None:
+        _known(key, parameters, _shown(keys), keys)
         return
-    _known(key, parameters, _shown(keys), keys)
+    name, value = key.removesuffix(ending), finite_number(given, keys)
+    if ending == "_relative_std":
+        value *= abs(finite_number(table.get(name, parameters[name].value), (keys[0], name)))
+    stated.setdefault(name, {})["std" if ending else "value"] = value
+
+
+def names_parameter(key: str, parameters: Mapping[str, Prior]) -> bool:
+    """Return whether a key of a table is a parameter's value or standard deviation."""
+    return _ending(key, parameters) is not None
+
+
+def _ending(key: str, parameters: Mapping[str, Prior]) -> str | None:
+    """Return what follows a parameter's name in a key; None where the key names no parameter. A name comes first."""
+    endings = ("", "_relative_std", "_std")
+    return next((each for each in endings if key.endswith(each) and key.removesuffix(each) in parameters), None)
 
 
 def _known(parameter: str, parameters: Mapping[str, Prior], where: str, keys: tuple[str, ...]) -> str:
@@ -100,7 +111,7 @@ def finite_number(value: object, keys: tuple[str, ...]) -> float:
     """Return a number; a standard deviation is not negative, and one whose square has no digits is 0."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not _is_finite(value):
         raise SimulationError(f"{_shown(keys)}: a finite number is needed, not {value!r}", keys)
-    if value < 0 and (keys[-1] == "std" or keys[-1].endswith("_std")):
+    if value < 0 and (keys[-1] == "std" or keys[-1].endswith("_std") or (keys[0] == SENSORS and "_std_" in keys[-1])):
         raise SimulationError(f"{_shown(keys)}: a standard deviation is 0 (exact) or more, not {value!r}", keys)
     return float(value) if abs(value) >= LEAST_NUMBER else 0.0
 

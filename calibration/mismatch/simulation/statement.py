@@ -38,7 +38,7 @@ def _mistakes(simulation: Simulation) -> Iterator[str]:
             yield f"{name} must be text, not {getattr(simulation, name)!r}"
     if not isinstance(simulation.one_way, bool | None):
         yield f"one_way must be True or False, not {simulation.one_way!r}"
-    for name in ("inputs", "own_tables"):
+    for name in ("inputs", "own_tables", "without_effects"):
         found = getattr(simulation, name)
         if not isinstance(found, tuple | list) or not all(isinstance(each, str) for each in found):
             yield f'{name} must be a tuple of names, ("speed_rad_s",) with its comma, not {found!r}'

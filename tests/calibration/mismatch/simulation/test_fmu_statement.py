@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.problem.prior import Prior
+from regolithd.calibration.mismatch.problem.prior import Prior, SensorError
 from regolithd.calibration.mismatch.simulation import fmu
 from regolithd.calibration.mismatch.simulation.fmu import FmuSimulation
 
@@ -110,6 +110,21 @@ def test_the_fmu_says_which_variables_are_inputs_and_outputs(tmp_path: Path) -> 
     assert (found.channels, found.wheel_column) == ({"flow": "1", "level_m": "m"}, "tank")
     stated = {"area": {"value": 2, "unit": "ha"}}
     assert loaded(tmp_path, parameters=stated).parameters == {"area": Prior(2.0, 0.0, "ha")}
+
+
+@pytest.mark.usefixtures("tank")
+def test_an_fmu_has_errors_of_inputs_as_a_class_has(tmp_path: Path) -> None:
+    """`[sensors]`, by the columns' names."""
+    assert loaded(tmp_path, sensors={"pump_std_V": 0.1}).sensors == {"pump_V": SensorError(absolute=0.1)}
+
+
+@pytest.mark.usefixtures("tank")
+def test_a_table_or_key_that_is_not_read_is_an_error(tmp_path: Path) -> None:
+    """A misspelt table would be left out without a word."""
+    with pytest.raises(SimulationError, match=r"\[parameter\] is no table .*; did you mean parameters\?"):
+        loaded(tmp_path, parameter={"area": {"value": 1.0}})
+    with pytest.raises(SimulationError, match=r"\[simulation\] has no key oneway; did you mean one_way\?"):
+        loaded(tmp_path, simulation={"model": "tank.fmu", "oneway": True})
 
 
 def test_the_fmu_is_unpacked_once_and_its_folder_goes_with_it(tank: Tank, tmp_path: Path) -> None:

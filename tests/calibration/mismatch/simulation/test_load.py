@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.simulation.load import load_simulation
 from regolithd.calibration.mismatch.simulation.toml_place import line_of
@@ -65,6 +66,7 @@ def test_a_key_has_a_line(keys: tuple[str, ...], line: int | None) -> None:
             "inertia_kgm2",
             "SIM.toml, line {line}: [parameters]: the simulation has no parameter",
         ),
+        ("class", "# path =", "without_effects = 'x' #", "line {line}: [simulation] without_effects must be a list of"),
         ("class", "[parameters.v", "[effects]\n[parameters.v", "effects are tables, [[effects]]"),
         ("rover-wheel", "cohesion_Pa =", "cohesion_kPa =", "did you mean cohesion_Pa?"),
         ("rover-wheel", "[soil]", "[ground]", "soil: Field required"),
@@ -96,3 +98,20 @@ def test_an_absent_file_is_told(tmp_path: Path) -> None:
     """It is one of the tool's own errors."""
     with pytest.raises(SimulationError, match=r"SIM\.toml cannot be read"):
         load_simulation(tmp_path / "SIM.toml")
+
+
+@pytest.mark.parametrize("kind", ["class", "rover-wheel"])
+def test_effects_that_a_machine_cannot_have_are_left_out_by_the_file(kind: str, tmp_path: Path) -> None:
+    """`[simulation] without_effects`, whatever the kind of simulation; a name that nobody knows is an error."""
+    write_templates(kind, tmp_path)
+    path = tmp_path / "SIM.toml"
+    text = path.read_text()
+    all_names = {each.name for each in load_simulation(path).candidates(library())}
+    path.write_text(
+        text.replace("[simulation]", '[simulation]\nwithout_effects = ["slip-sinkage", "rotor-inertia"]', 1)
+    )
+    names = {each.name for each in load_simulation(path).candidates(library())}
+    assert all_names - names == {"slip-sinkage", "rotor-inertia"}
+    path.write_text(text.replace("[simulation]", '[simulation]\nwithout_effects = ["slip-sinking"]', 1))
+    with pytest.raises(SimulationError, match=r"there is no effect slip-sinking; did you mean slip-sinkage\?"):
+        load_simulation(path).candidates(library())
