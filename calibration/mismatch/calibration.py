@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.regression.equations import free_parameter_equations
+from regolithd.calibration.mismatch.regression.equations import equations_of, free_parameter_equations
+from regolithd.calibration.mismatch.selection.noise_estimation import noise_beside_terms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -25,9 +26,10 @@ STEPS = 6
 
 
 def linearised_where_it_fits(pose: Callable[[Mapping[str, float] | None], Problem]) -> Problem:
-    """Return the problem, linearised where its parameters alone fit the recording best.
+    """Return the problem, linearised where its parameters fit the recording best: alone, then beside smooth curves.
 
-    `pose` builds the problem at given values, or at the stated ones.
+    An effect that is left out moves the parameters. Curves over the covariates hold most of it, whatever it is, so that
+    the search for its name begins where it will end. `pose` builds the problem at given values, or at the stated ones.
     """
     problem = pose(None)
     for _ in range(STEPS):
@@ -36,7 +38,9 @@ def linearised_where_it_fits(pose: Callable[[Mapping[str, float] | None], Proble
         if not bent(problem, values):
             break
         problem = pose(values)
-    return problem
+    equations, _ = equations_of(problem, ())
+    values = moved_values(equations, noise_beside_terms(equations)[1])
+    return pose(values) if bent(problem, values) else problem
 
 
 def moved_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:

@@ -57,7 +57,7 @@ class Decision:
 def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decision:
     """Choose the named effects, and the smooth terms that nothing named explains."""
     problem, limits = equations.problem, equations.thresholds
-    noise, left = noise_beside_terms(equations)
+    left = residual_of(equations, noise_beside_terms(equations)[1])
     equations = whitened(equations, left)
     threshold = entry_threshold(equations, left, blocks_of_time(problem, noise_of_whitened(equations.design, left)))
     equations = with_proposed_shapes(equations, candidates)

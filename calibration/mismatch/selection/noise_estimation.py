@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
-    from regolithd.calibration.mismatch.regression.group import Term
+    from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 
 
-def noise_beside_terms(equations: NormalEquations) -> tuple[NoiseModel, Array]:
-    """Return the noise and the residual [time, wheel] that is left when all that explains something is taken out."""
+def noise_beside_terms(equations: NormalEquations) -> tuple[NoiseModel, Fit]:
+    """Return the noise when all that explains something is taken out, and the fit of that with the free parameters."""
     limits = equations.thresholds
     first = _noise_beside(equations, ())
     short = min(first.autocorrelation_time, limits.provisional_autocorrelation_time)
@@ -36,7 +36,7 @@ def noise_beside_terms(equations: NormalEquations) -> tuple[NoiseModel, Array]:
     weighted = equations.weighted(second.weights)
     least_score = limits.noise_term_share * limits.smooth_term_entry
     terms = _most_significant(weighted, 2 * limits.provisional_terms, least_score)
-    return _noise_beside(weighted, terms), residual_of(weighted, weighted.fit(terms))
+    return _noise_beside(weighted, terms), weighted.fit(terms)
 
 
 def whitened(equations: NormalEquations, residual: Array) -> NormalEquations:

@@ -66,3 +66,13 @@ def test_what_is_called_calibrated_has_been_run() -> None:
     level = Tank().predict({"inflow_m3_s": recording.channels["inflow_m3_s"]}, values)
     rmse = float(np.sqrt(np.mean((recording.channels["level_m"] - level) ** 2)))
     assert rmse == pytest.approx(answer.fit.held_out_rmse_after, rel=0.02)
+
+
+def test_an_effect_that_moves_parameters_far_is_searched_for_once() -> None:
+    """Curves over the covariates stand for it before the search, so that this begins where the parameters end."""
+    recording, told = filled((1.5, -1.5)), list[str]()
+    leak = 0.3 * recording.channels["inflow_m3_s"] / 0.01
+    columns = {name: values[:, 0] for name, values in recording.channels.items()}
+    columns = {**columns, "t_s": recording.time_s, "level_m": columns["level_m"] + leak[:, 0]}
+    compare(from_columns(columns), Tank(), progress=told.append)
+    assert told.count("searching") == 1

@@ -16,18 +16,18 @@ def test_an_effect_does_not_count_as_noise() -> None:
     equations = equations_of(problem_of(table(drag=0.6)))
     mask = equations.problem.mask
     naive = estimate_noise(residual_of(equations, equations.fit(())), mask)
-    noise, left = noise_beside_terms(equations)
+    noise, significant = noise_beside_terms(equations)
     np.testing.assert_allclose(noise.deviation, NOISE, rtol=0.05)
     assert noise.autocorrelation_time == pytest.approx(1.0, abs=0.3)
     assert naive.autocorrelation_time > 5
-    assert left.std() == pytest.approx(NOISE, rel=0.05)
+    assert residual_of(equations, significant).std() == pytest.approx(NOISE, rel=0.05)
 
 
 def test_without_candidates_it_is_the_noise_of_the_residual() -> None:
     """Nothing can be taken out."""
     equations = equations_of(problem_of(table()), ())
-    noise, left = noise_beside_terms(equations)
+    noise, significant = noise_beside_terms(equations)
     direct = estimate_noise(residual_of(equations, equations.fit(())), equations.problem.mask)
     assert noise.autocorrelation_time == direct.autocorrelation_time
     np.testing.assert_allclose(noise.deviation, direct.deviation, rtol=1e-6)
-    assert left.shape == equations.problem.mask.shape
+    assert significant.terms == ()
