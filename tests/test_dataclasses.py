@@ -90,7 +90,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
             "Chooser",
             "Chosen",
         ),
-        *("Searched", "_Search"),
+        *("Decided", "_Search"),
         "AsRead",
         *("Batch", "Left"),
         "Whitening",

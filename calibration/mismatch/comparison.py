@@ -16,8 +16,8 @@ from regolithd.calibration.mismatch.data.recording import as_recording
 from regolithd.calibration.mismatch.empirical.found import curves_of
 from regolithd.calibration.mismatch.empirical.stated import beyond_the_range
 from regolithd.calibration.mismatch.inference.evidence import empirical_fits, evidence_of
-from regolithd.calibration.mismatch.inference.findings import answer_of
-from regolithd.calibration.mismatch.inference.held_out import earned
+from regolithd.calibration.mismatch.inference.findings import Findings, answer_of, findings_of
+from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, earned
 from regolithd.calibration.mismatch.inference.several_channels import merged_answers, priors_from_others
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.equations import equations_of
@@ -73,12 +73,36 @@ class Comparison:
 
 
 @dataclass(frozen=True, eq=False)
-class Searched:
-    """A comparison of one channel, what was decided, and the candidates in their forms for the simulation."""
+class Decided:
+    """What was decided of one channel.
 
-    comparison: Comparison
+    Attributes
+    ----------
+    decision, held_out: the effects that earned their names, and their errors
+    candidates: the library in its forms for the simulation
+    applicable: those of them that the recording allows
+    """
+
     decision: Decision
+    held_out: HeldOutErrors
     candidates: tuple[Candidate, ...]
+    applicable: tuple[Candidate, ...]
+
+    def findings(self) -> Findings:
+        """Return what was found by itself, without what else could be true."""
+        return findings_of(self.decision, self.held_out, self.candidates, self.applicable)
+
+    def told(self, simulation: Simulation) -> Comparison:
+        """Return the answer and its evidence."""
+        problem = self.decision.equations.problem
+        answer = answer_of(self.decision, self.held_out, self.candidates, self.applicable)
+        evidence = replace(
+            evidence_of(self.decision),
+            candidates=self.candidates,
+            covariate_labels=problem.labels,
+            wheel_column=simulation.wheel_column,
+        )
+        return Comparison(answer, evidence, simulation)
 
 
 def compare(
@@ -119,15 +143,15 @@ def compare(
             if known := priors_from_others(one.answer, others):
                 found[channel] = of_channel(channel, known)
         return merged(list(found.values()), simulation)
-    search = searched(recorded, simulation, effects=effects, thresholds=thresholds, progress=progress)
-    if search.decision.unnamed:
+    chosen = decided(recorded, simulation, effects=effects, thresholds=thresholds, progress=progress)
+    comparison = chosen.told(simulation)
+    if chosen.decision.unnamed:
         progress("fitting a curve to what stays unexplained")
-    return with_curves(search)
+    return with_curves(comparison, chosen.decision)
 
 
-def with_curves(found: Searched) -> Comparison:
+def with_curves(comparison: Comparison, decision: Decision) -> Comparison:
     """Return the comparison with the empirical curves of what stays unexplained."""
-    decision, comparison = found.decision, found.comparison
     curves = curves_of(decision)
     told = []
     for term, place in zip(decision.unnamed, comparison.answer.unexplained, strict=True):
@@ -141,15 +165,15 @@ def with_curves(found: Searched) -> Comparison:
     )
 
 
-def searched(
+def decided(
     recorded: Recording,
     simulation: Simulation,
     *,
     effects: Sequence[Contribution],
     thresholds: Thresholds = THRESHOLDS,
     progress: Callable[[str], None] = lambda _: None,
-) -> Searched:
-    """Compare the one channel of a simulation, as `compare` does, and return the decision as well."""
+) -> Decided:
+    """Choose the effects in the one channel of a simulation."""
     progress("simulating")
     candidates: Sequence[Candidate] = [each.form_for(simulation) for each in simulation.candidates(library())]
     stated = stated_in(candidates, effects, simulation.stated_effects(), simulation.empirical_curves)
@@ -162,15 +186,7 @@ def searched(
     search = _search(problem, candidates, pose, progress)
     progress("measuring on held-out blocks and comparing with rivals")
     decision, held_out = earned(search.decision, search.grid)
-    decision = in_regions(decision)
-    answer = answer_of(decision, held_out, candidates, search.applicable)
-    evidence = replace(
-        evidence_of(decision),
-        candidates=tuple(candidates),
-        covariate_labels=decision.equations.problem.labels,
-        wheel_column=simulation.wheel_column,
-    )
-    return Searched(Comparison(answer, evidence, simulation), decision, tuple(candidates))
+    return Decided(in_regions(decision), held_out, tuple(candidates), search.applicable)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ from regolithd.calibration.mismatch.answer import (
     Sensitivity,
     Unexplained,
 )
+from regolithd.calibration.mismatch.inference.findings import Findings
 from regolithd.calibration.mismatch.report.page import Provenance
 
 FROM = Provenance("drive.csv", "SIM.toml", "ab" * 32, "cd" * 32, "regolithd mismatch drive.csv --simulation SIM.toml")
@@ -89,4 +90,13 @@ ANSWER = Answer(
     notes=("bus_voltage_V was never measured.",),
 )
 NO_CHANGE = FitImprovement("motor_current_A", 0.0061, 0.0061, 0.006)
+FINDINGS = Findings(
+    verdict=ANSWER.verdict,
+    effects=ANSWER.effects,
+    changes=ANSWER.changes,
+    unexplained=ANSWER.unexplained,
+    parameters=ANSWER.parameters,
+    left_out=ANSWER.left_out,
+    notes=ANSWER.notes,
+)
 CONSISTENT = Answer("consistent", (), (), (), ANSWER.sensitivity, NO_CHANGE)

@@ -69,7 +69,7 @@ def _row(chosen: Chosen, recording: int, **content: object) -> CatalogueRow:
         rover=names.rovers[int(chosen.equations.rover[recording])],
         recording=names.recordings[recording],
         begins=names.begins[recording],
-        verdict=chosen.found[recording].answer.verdict,
+        verdict=chosen.found[recording].findings.verdict,
         **content,  # type: ignore[arg-type]
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,45 +36,74 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Change, Indistinguishable, Verdict
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors
-    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.problem.problem import LeftOut, Problem
     from regolithd.calibration.mismatch.regression.as_read import AsRead
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 
-def answer_of(
+@dataclass(frozen=True)
+class Findings:
+    """What a decision found by itself, as `Answer` has it, without what else could be true."""
+
+    verdict: Verdict
+    effects: tuple[Effect, ...]
+    changes: tuple[Change, ...]
+    unexplained: tuple[Unexplained, ...]
+    parameters: tuple[CalibratedParameter, ...]
+    left_out: tuple[LeftOut, ...]
+    notes: tuple[str, ...]
+
+
+def findings_of(
     decision: Decision, held_out: HeldOutErrors, candidates: Sequence[Candidate], applicable: Sequence[Candidate]
-) -> Answer:
-    """Return what is told of a decision; `applicable` are those candidates that this recording allows."""
-    equations, threshold = decision.equations, decision.entry_threshold
-    problem, named = equations.problem, decision.named
+) -> Findings:
+    """Return what was found; `applicable` are those candidates that this recording allows."""
+    problem = decision.equations.problem
     effects, changes = named_effects(decision, held_out)
     parameters = calibrated_parameters(decision)
-    moved = [each for each in parameters if each.beyond_prior(equations.thresholds)]
-    known = decided_by_evidence(decision)
-    rest = alternatives(decision) if known else ()
-    extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold, rest)
-    channel, floor = problem.simulation.channel, noise_floor(decision)
-    return Answer(
+    moved = [each for each in parameters if each.beyond_prior(decision.equations.thresholds)]
+    return Findings(
         verdict=verdict_of(decision, moved),
         effects=effects,
-        unexplained=unexplained(decision),
-        indistinguishable=sets,
-        sensitivity=sensitivities(extended, decision.whole, candidates, threshold),
-        fit=FitImprovement(channel, held_out.before, held_out.after if named.terms else held_out.before, floor),
-        parameters=parameters,
         changes=changes,
+        unexplained=unexplained(decision),
+        parameters=parameters,
         left_out=problem.left_out,
-        probability=probability(rest, equations.thresholds) if known else None,
-        alternatives=other_answers(rest, equations.thresholds),
         notes=(
             *map(beyond_prior_in_words, moved),
             *map(change_in_words, changes),
             *problem.recording.notes,
             *_about_the_mask(problem),
-            *one_way_only(problem, sets),
             *_not_looked_for(problem, candidates, [candidate.name for candidate in applicable]),
         ),
+    )
+
+
+def answer_of(
+    decision: Decision, held_out: HeldOutErrors, candidates: Sequence[Candidate], applicable: Sequence[Candidate]
+) -> Answer:
+    """Return what was found, and what else could be true."""
+    equations, threshold = decision.equations, decision.entry_threshold
+    problem, thresholds = equations.problem, equations.thresholds
+    found = findings_of(decision, held_out, candidates, applicable)
+    known = decided_by_evidence(decision)
+    rest = alternatives(decision) if known else ()
+    extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold, rest)
+    after = held_out.after if decision.named.terms else held_out.before
+    return Answer(
+        verdict=found.verdict,
+        effects=found.effects,
+        unexplained=found.unexplained,
+        indistinguishable=sets,
+        sensitivity=sensitivities(extended, decision.whole, candidates, threshold),
+        fit=FitImprovement(problem.simulation.channel, held_out.before, after, noise_floor(decision)),
+        parameters=found.parameters,
+        changes=found.changes,
+        left_out=found.left_out,
+        probability=probability(rest, thresholds) if known else None,
+        alternatives=other_answers(rest, thresholds),
+        notes=(*found.notes, *one_way_only(problem, sets)),
     )
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from regolithd.calibration.mismatch.calibration import linearised_where_it_fits
 from regolithd.calibration.mismatch.candidates.library import library
-from regolithd.calibration.mismatch.comparison import searched
+from regolithd.calibration.mismatch.comparison import decided
 from regolithd.calibration.mismatch.data.recording import read_recording
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.equations import equations_of
@@ -37,7 +37,7 @@ def scores_of(decision: Decision) -> dict[str, float]:
 
 def answered(recording: Recording, simulation: Simulation) -> dict[str, Any]:
     """Return the answer of `regolithd mismatch`, without scores."""
-    return {"answer": searched(recording, simulation, effects=()).comparison.to_json(), "scores": {}}
+    return {"answer": decided(recording, simulation, effects=()).told(simulation).to_json(), "scores": {}}
 
 
 def named(recording: Recording, simulation: Simulation) -> dict[str, Any]:

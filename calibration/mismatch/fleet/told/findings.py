@@ -309,7 +309,7 @@ def _smallest(chosen: Chosen, others: Sequence[FleetTerm], term: FleetTerm) -> f
 def _left_out(chosen: Chosen) -> tuple[LeftOut, ...]:
     total: dict[tuple[str, str], int] = {}
     for found in chosen.found:
-        for each in found.answer.left_out:
+        for each in found.findings.left_out:
             total[each.channel, each.reason] = total.get((each.channel, each.reason), 0) + each.readings
     return tuple(LeftOut(channel, readings, reason) for (channel, reason), readings in total.items())
 
@@ -318,7 +318,7 @@ def _notes(chosen: Chosen) -> tuple[str, ...]:
     """Return the notes of the recordings, each once with the recordings that it is of."""
     of: dict[str, list[str]] = {}
     for name, found in zip(chosen.names.recordings, chosen.found, strict=True):
-        for note in found.answer.notes:
+        for note in found.findings.notes:
             if not note.startswith("Readings of"):
                 of.setdefault(note, []).append(name)
     count = len(chosen.names.recordings)

@@ -45,9 +45,9 @@ def shown_beside(equations: FleetEquations, fit: FleetFit, found: Sequence[Found
             if gain_beside(equations, fit, i, k) <= needed:
                 continue
             if term.named:
-                effects += [(i, each) for each in of_recording.answer.effects if each.name == term.name][:1]
+                effects += [(i, each) for each in of_recording.findings.effects if each.name == term.name][:1]
             else:
-                rest += [(i, each) for each in of_recording.answer.unexplained[k - len(named) : k - len(named) + 1]]
+                rest += [(i, each) for each in of_recording.findings.unexplained[k - len(named) : k - len(named) + 1]]
     return Shown(tuple(effects), tuple(rest))
 
 

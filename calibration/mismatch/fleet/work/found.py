@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.comparison import searched
+from regolithd.calibration.mismatch.comparison import decided
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
@@ -16,9 +16,9 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.answer import Answer
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
     from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.inference.findings import Findings
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
@@ -60,11 +60,11 @@ class Shapes:
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """The answer of one recording, and what the sums over the fleet need of it.
+    """What was found in one recording, and what the sums over the fleet need of it.
 
     Attributes
     ----------
-    answer: as `regolithd mismatch` gives it for this recording alone
+    findings: as `regolithd mismatch` has them for this recording alone
     values: the parameters at which the simulation was linearised
     deviation, autocorrelation_time: of the noise beside all that was found, shape (wheel,); and in readings
     entry_threshold: score above which an effect was named
@@ -73,7 +73,7 @@ class Found:
     labels: what covariates are called, with their units
     """
 
-    answer: Answer
+    findings: Findings
     values: dict[str, float]
     deviation: Array
     autocorrelation_time: float
@@ -98,20 +98,20 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
     """
     of_channel = one_channel(simulation, channel)
     effects = [each for each in simulation.corrected_effects if not simulation.channels or each.channel == channel]
-    search = searched(recording, of_channel, effects=effects, thresholds=thresholds)
-    decision = search.decision
+    of_recording = decided(recording, of_channel, effects=effects, thresholds=thresholds)
+    decision = of_recording.decision
     problem, whole = decision.equations.problem, decision.whole
     values = {
         name: problem.values[name] for name in calibrated_values(decision.equations, whole) if name in problem.values
     }
     return Found(
-        answer=search.comparison.answer,
+        findings=of_recording.findings(),
         values=values,
         deviation=decision.noise.deviation,
         autocorrelation_time=decision.noise.autocorrelation_time,
         entry_threshold=decision.entry_threshold,
         terms=tuple(_found_term(decision, term) for term in whole.terms),
-        shapes=shapes_in(problem, search.candidates),
+        shapes=shapes_in(problem, of_recording.candidates),
         labels=dict(problem.labels),
     )
 

@@ -18,7 +18,7 @@ import numpy as np
 from regolithd.calibration.mismatch import answer as answers
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm, Shapes
 from regolithd.calibration.mismatch.fleet.work.sums import Sums
-from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
+from regolithd.calibration.mismatch.inference.findings import Findings
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 
 if TYPE_CHECKING:
@@ -33,19 +33,13 @@ KINDS: Mapping[str, type] = {
         Shapes,
         Sums,
         LeftOut,
-        answers.Answer,
+        Findings,
         answers.Parameter,
         answers.Effect,
         answers.Range,
-        answers.Suggestion,
-        EmpiricalCurve,
         answers.Unexplained,
-        answers.Indistinguishable,
-        answers.Sensitivity,
-        answers.FitImprovement,
         answers.CalibratedParameter,
         answers.Change,
-        answers.OtherAnswer,
     )
 }
 """Data classes that may be in a file."""

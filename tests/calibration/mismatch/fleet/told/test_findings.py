@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 import pytest
 from golden import assert_golden, rounded
-from sample_answer import CONSISTENT, NO_CHANGE, WORN
+from sample_answer import WORN
 from synthetic_fleet import DEVIATION, DRAG, GROUPS, WAVE, WEAR, drive, equations_of, on_both, term
 
 from regolithd.calibration.mismatch.answer import Unexplained
@@ -23,6 +23,7 @@ from regolithd.calibration.mismatch.fleet.choice.search import penalty, places_o
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
 from regolithd.calibration.mismatch.fleet.told.findings import Chosen, Names, answer_of_fleet
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
+from regolithd.calibration.mismatch.inference.findings import Findings
 from regolithd.calibration.mismatch.problem.prior import Prior
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 from regolithd.calibration.mismatch.simulation.simulation import Simulation
@@ -30,13 +31,12 @@ from regolithd.calibration.mismatch.simulation.simulation import Simulation
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from regolithd.calibration.mismatch.answer import Answer
     from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, Level
 
 GOLDEN = Path(__file__).parent / "golden"
 FIRST = datetime(2026, 3, 1, 8, 0, tzinfo=UTC)
 ROVER = (0, 1) * 4
-SILENT: Answer = replace(CONSISTENT, sensitivity=(), fit=NO_CHANGE, notes=())
+SILENT = Findings("consistent", (), (), (), (), (), ())
 
 
 class Machine(Simulation):
@@ -46,9 +46,9 @@ class Machine(Simulation):
     parameters: ClassVar = {"gain": Prior(1.5, 0.2, "A/A"), "offset": Prior(0.1, 0.0, "A")}
 
 
-def found(answer: Answer = SILENT, *terms: FoundTerm) -> Found:
+def found(findings: Findings = SILENT, *terms: FoundTerm) -> Found:
     """Return what one recording was found to show."""
-    return Found(answer, {}, DEVIATION, 1.0, 8.0, terms, {})
+    return Found(findings, {}, DEVIATION, 1.0, 8.0, terms, {})
 
 
 def chosen(

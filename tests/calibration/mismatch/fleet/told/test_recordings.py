@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from sample_answer import ANSWER
+from sample_answer import FINDINGS
 from synthetic_fleet import DEVIATION, DRAG, GROUPS, PRIOR_STD, WAVE, Drive, drive, on_both, term
 
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
@@ -32,7 +32,7 @@ def with_own(each: Drive, count: int = 1, last: Drive | None = None) -> FleetEqu
 
 def found(*terms: FoundTerm) -> Found:
     """Return what a recording was found to show."""
-    return Found(ANSWER, {}, DEVIATION, 1.0, 10.0, terms, {})
+    return Found(FINDINGS, {}, DEVIATION, 1.0, 10.0, terms, {})
 
 
 def shown(name: str, *, named: bool, penalty: float = 2.0) -> FoundTerm:
@@ -100,5 +100,5 @@ def test_a_finding_is_told_as_its_recording_tells_it() -> None:
     fit = of.fit(())
     of_recording = found(shown("viscous-friction", named=True), shown("voltage", named=False))
     result = shown_beside(of, fit, [found(), of_recording, found()], ["a", "b", "c"])
-    assert result.effects == ((1, ANSWER.effects[1]),)
-    assert result.unexplained == ((1, ANSWER.unexplained[0]),)
+    assert result.effects == ((1, FINDINGS.effects[1]),)
+    assert result.unexplained == ((1, FINDINGS.unexplained[0]),)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from sample_answer import ANSWER
+from sample_answer import FINDINGS
 from synthetic_fleet import DEVIATION, Drag, Wave, Wear
 
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm, Shapes
@@ -24,7 +24,7 @@ def powers(count: int, first: float = 0.0) -> tuple[dict[str, float | str], ...]
 def found(terms: tuple[FoundTerm, ...] = (), **shapes: Shapes) -> Found:
     """Return what a recording shows, with the grids of candidates; `_` in a name stands for a hyphen."""
     return Found(
-        ANSWER, {}, DEVIATION, 1.0, 8.0, terms, {name.replace("_", "-"): each for name, each in shapes.items()}
+        FINDINGS, {}, DEVIATION, 1.0, 8.0, terms, {name.replace("_", "-"): each for name, each in shapes.items()}
     )
 
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from sample_answer import ANSWER
+from sample_answer import FINDINGS
 
 from regolithd.calibration.mismatch import answer as answers
 from regolithd.calibration.mismatch.fleet.work.store import KINDS, Store
+from regolithd.calibration.mismatch.inference.findings import Findings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -23,20 +24,19 @@ class Unknown:
     value: float
 
 
-def test_an_answer_with_every_part_comes_back(tmp_path: Path) -> None:
-    """Equal to what was written, the other answers too."""
-    whole = replace(ANSWER, probability=0.9, alternatives=(answers.OtherAnswer(("viscous-friction",), True, 0.05),))
+def test_findings_with_every_part_come_back(tmp_path: Path) -> None:
+    """Equal to what was written."""
     store = Store(tmp_path / "parts")
-    store.write("key", whole)
-    assert store.read("key") == whole
+    store.write("key", FINDINGS)
+    assert store.read("key") == FINDINGS
 
 
-def test_every_part_of_an_answer_may_be_stored() -> None:
-    """A data class that is added to the answer has to be added to the store's kinds."""
+def test_every_part_of_the_findings_may_be_stored() -> None:
+    """A data class that is added to the findings has to be added to the store's kinds."""
     parts = {each for each in vars(answers).values() if isinstance(each, type) and is_dataclass(each)}
-    of_the_answer = {each for each in parts if any(each.__name__ in str(f.type) for f in fields(answers.Answer))}
-    assert len(of_the_answer) >= 7
-    assert {each.__name__ for each in of_the_answer} <= set(KINDS)
+    of_the_findings = {each for each in parts if any(each.__name__ in str(f.type) for f in fields(Findings))}
+    assert len(of_the_findings) >= 4
+    assert {each.__name__ for each in of_the_findings} <= set(KINDS)
 
 
 def test_arrays_and_mappings_come_back(tmp_path: Path) -> None:
