@@ -89,7 +89,6 @@ ANSWER = Answer(
     FitImprovement("motor_current_A", 0.0061, 0.0049, 0.0048),
     notes=("bus_voltage_V was never measured.",),
 )
-NO_CHANGE = FitImprovement("motor_current_A", 0.0061, 0.0061, 0.006)
 FINDINGS = Findings(
     verdict=ANSWER.verdict,
     effects=ANSWER.effects,
@@ -99,4 +98,6 @@ FINDINGS = Findings(
     left_out=ANSWER.left_out,
     notes=ANSWER.notes,
 )
-CONSISTENT = Answer("consistent", (), (), (), ANSWER.sensitivity, NO_CHANGE)
+CONSISTENT = Answer(
+    "consistent", (), (), (), ANSWER.sensitivity, FitImprovement("motor_current_A", 0.0061, 0.0061, 0.006)
+)
