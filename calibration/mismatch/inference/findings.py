@@ -23,10 +23,11 @@ from regolithd.calibration.mismatch.inference.evidence import calibrated_values,
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
 from regolithd.calibration.mismatch.inference.intervals import parameters_of
 from regolithd.calibration.mismatch.inference.located import share_of_residual, spell_of
+from regolithd.calibration.mismatch.inference.not_looked_for import not_looked_for
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
 from regolithd.calibration.mismatch.inference.ranges import range_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
-from regolithd.calibration.mismatch.inference.statements import beyond_prior_in_words, listed, statement, words_of
+from regolithd.calibration.mismatch.inference.statements import beyond_prior_in_words, statement, words_of
 from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 
@@ -75,7 +76,7 @@ def findings_of(
             *map(change_in_words, changes),
             *problem.recording.notes,
             *_about_the_mask(problem),
-            *_not_looked_for(problem, candidates, [candidate.name for candidate in applicable]),
+            *not_looked_for(problem, candidates, {candidate.name for candidate in applicable}),
         ),
     )
 
@@ -215,29 +216,6 @@ def _about_the_mask(problem: Problem) -> list[str]:
         for each in problem.left_out
     ]
     return notes
-
-
-def _not_looked_for(problem: Problem, candidates: Sequence[Candidate], applicable: Sequence[str]) -> list[str]:
-    """Return notes of the candidates that this recording or simulation does not allow, by what they lack.
-
-    Missing covariates are in one note; what else the machine lacks is in one each, as channels differ in it.
-    """
-    covariates: dict[str, list[str]] = {}
-    others: dict[str, list[str]] = {}
-    for candidate in candidates:
-        if candidate.name not in applicable:
-            missing = [name for name in candidate.requires if name not in problem.covariates]
-            told = [f"{name} that varies" if name in problem.constants else name for name in missing]
-            lacking = covariates.setdefault(listed(told), []) if told else others.setdefault(candidate.needs, [])
-            lacking.append(candidate.name)
-    parts = [f"without {needs}: {', '.join(names)}" for needs, names in covariates.items()]
-    return [
-        *([f"Not looked for {'; '.join(parts)}."] if parts else []),
-        *(
-            f"Not looked for without {needs or 'another kind of machine'}: {', '.join(names)}."
-            for needs, names in others.items()
-        ),
-    ]
 
 
 def one_way_only(problem: Problem, sets: Sequence[Indistinguishable]) -> list[str]:
