@@ -152,21 +152,40 @@ def _without_blanks(problem: Problem, delay_s: float) -> Array:
     """Return the prediction; where the simulation says nothing for long, the median of what was recorded there.
 
     What a late channel reports just after a standstill is what it would have reported at standstill: as it does once
-    the delay has passed. A straight line bridges what is shorter than two delays, or was not recorded either.
+    the delay has passed. A straight line bridges what is shorter than two delays, or was not recorded either. A
+    simulation that says nothing near standstill would say there what it says beside, as long as the motion goes on.
     """
     late = int(np.ceil(delay_s / problem.recording.step_s))
     found = np.array(problem.prediction)
+    direction = problem.covariates.get("direction", np.zeros_like(found))
     for k in range(found.shape[1]):
         blank = np.isnan(found[:, k])
         edges = np.flatnonzero(np.diff(blank, prepend=False, append=False))
         for first, end in zip(edges[::2], edges[1::2], strict=True):
-            recorded = problem.measured[first + late : end, k]
-            if end - first >= 2 * late and np.isfinite(recorded).any():
-                found[first:end, k] = np.nanmedian(recorded)
+            standing = _standing(direction[:, k], first, end)
+            found[first : standing.start, k] = found[max(first - 1, 0), k]
+            found[standing.stop : end, k] = found[min(end, len(found) - 1), k]
+            recorded = problem.measured[standing.start + late : standing.stop, k]
+            if standing.stop - standing.start >= 2 * late and np.isfinite(recorded).any():
+                found[standing, k] = np.nanmedian(recorded)
         known = np.flatnonzero(np.isfinite(found[:, k]))
         if known.size:
             found[:, k] = np.interp(np.arange(len(found)), known, found[known, k])
     return found
+
+
+def _standing(direction: Array, first: int, end: int) -> slice:
+    """Return the part of a blank without the rows in which the axis still moves as before it, or already as after it.
+
+    The whole blank where the direction does not change in it: then it is no standstill.
+    """
+    before, after = direction[max(first - 1, 0)], direction[min(end, len(direction) - 1)]
+    changed = np.flatnonzero(direction[first:end] != before)
+    if before == 0 or after == 0 or (changed.size == 0 and before == after):
+        return slice(first, end)
+    still = first + (int(changed[0]) if changed.size else end - first)
+    other = np.flatnonzero(direction[still:end] != after)
+    return slice(still, still + int(other[-1]) + 1 if other.size else still)
 
 
 def filtered(recording: Recording, values: Array, time_constant_s: float) -> Array:

@@ -144,3 +144,43 @@ def test_a_shift_is_within_its_run() -> None:
     load, moving = loads()
     recording = replace(problem_of(load, load, moving).recording, run=(np.arange(COUNT) >= 2000).astype(int))
     assert shifted(recording, load[:, None], -5.0)[2000:2050, 0] == pytest.approx(np.full(50, load[2000]))
+
+
+class Cart(Simulation):
+    """A cart rolls; near standstill, where the friction's sign is not certain, the simulation says nothing."""
+
+    channel, unit = "current_A", "A"
+    inputs = ("speed_rad_s",)
+    parameters: ClassVar = {"friction_A": Prior(2.0, 0.1, "A")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the friction."""
+        speed = inputs["speed_rad_s"]
+        return np.where(np.abs(speed) > 0.4, values["friction_A"] * np.sign(speed), np.nan)
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the speed."""
+        return {"wheel_speed": inputs["speed_rad_s"]}
+
+
+def test_near_standstill_the_prediction_goes_on_as_long_as_the_motion() -> None:
+    """The cart slows down, stands and goes on or turns round: a late friction begins and ends with the motion."""
+    speed = np.round(np.clip(1.5 * np.sin(TIME_S / 9) + 0.8 * np.sin(TIME_S / 4), -1, 1), 1)
+    friction = np.where(speed == 0, 0.3, 2.0 * np.sign(speed))
+    problem = build_problem(
+        from_columns({"t_s": TIME_S, "speed_rad_s": speed, "current_A": late(friction, "secant_s", 0.5)}), Cart()
+    )
+    (column,) = DELAY.columns(problem, {"late": "current_A", "secant_s": 0.5})
+    behind = np.where(problem.mask, problem.prediction + 0.5 * column, problem.measured)
+    np.testing.assert_allclose(behind[5:], problem.measured[5:], atol=1e-9)
+
+
+def test_a_blank_without_a_change_of_direction_is_no_standstill() -> None:
+    """What the simulation does not predict there is what was recorded there."""
+    speed = np.where(np.arange(COUNT) // 100 % 2, 0.3, 0.9)
+    recorded = np.where(speed > 0.4, 2.0, 5.0)
+    columns = {"t_s": TIME_S, "speed_rad_s": speed, "current_A": late(recorded, "secant_s", 0.5)}
+    problem = build_problem(from_columns(columns), Cart())
+    (column,) = DELAY.columns(problem, {"late": "current_A", "secant_s": 0.5})
+    behind = np.where(problem.mask, problem.prediction + 0.5 * column, problem.measured)
+    np.testing.assert_allclose(behind[5:], problem.measured[5:], atol=1e-9)
