@@ -15,6 +15,17 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
 
 
+NOUNS = """
+actuator antenna arm axis axle bay bearing belt bench blade boat body boom box brake branch bus cabin car
+carriage cell chain channel compressor conveyor crane cylinder device door drive drone drum engine fan finger
+flap gate gearbox gimbal gripper heater hoist hopper jaw jet joint key leg lift line link machine mast motor
+node nozzle oven pack pile pipe pitch press propeller pulley pump rack rail robot roll roller rotor rover screw
+sensor servo shaft side slide spindle spring stage stand station tank thruster tool tower track train trolley
+truck tube turbine unit valve vehicle wagon wheel winch wing zone
+"""
+"""What machines have several of, in English; a plural of any other word (`achse`) would be a guess."""
+
+
 def listed(items: Sequence[str]) -> str:
     """Return 'a', 'a and b', or 'a, b and c'."""
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
@@ -26,7 +37,9 @@ def capital(sentence: str) -> str:
 
 
 def plural(noun: str) -> str:
-    """Return the plural: wheels, axes, bodies, boxes."""
+    """Return the plural: wheels, axes, bodies, boxes; a noun whose last word is not known in English as it is."""
+    if noun.rsplit(" ", 1)[-1].lower() not in NOUNS.split():
+        return noun
     if noun.endswith("is"):
         return noun[:-2] + "es"
     if re.search(r"[^aeiou]y$", noun):
@@ -42,13 +55,13 @@ def noun_of(column: str) -> str:
 def wheels_in_words(wheels: Sequence[int | str], of: int, kind: str = "wheel") -> str:
     """Return 'all 6 wheels', 'both axes', 'wheel 4', 'wheels 1, 3 and 5'; empty where there is one alone.
 
-    `kind` is the column that tells them apart.
+    `kind` is the column that tells them apart; one whose plural is not known gives 'each achse', 'achse 1 and 3'.
     """
     if of == 1:
         return ""
     noun = noun_of(kind)
     if len(wheels) == of:
-        return f"{'both' if of == 2 else f'all {of}'} {plural(noun)}"
+        return f"each {noun}" if plural(noun) == noun else f"{'both' if of == 2 else f'all {of}'} {plural(noun)}"
     return f"{plural(noun) if len(wheels) > 1 else noun} {listed([str(wheel) for wheel in wheels])}"
 
 

@@ -34,10 +34,17 @@ if TYPE_CHECKING:
         ("bay", "bays"),
         ("box", "boxes"),
         ("branch", "branches"),
+        ("bench", "benches"),
+        ("bus", "buses"),
+        ("drum side", "drum sides"),
+        ("Axis", "Axes"),
+        ("axes", "axes"),
+        ("achse", "achse"),
+        ("Prüfstand", "Prüfstand"),
     ],
 )
 def test_a_plural_is_that_of_the_noun(noun: str, expected: str) -> None:
-    """English endings of what machines are made of."""
+    """English endings of what machines are made of; what is no such word stays as it is."""
     assert plural(noun) == expected
 
 
@@ -54,6 +61,8 @@ def test_the_axes_are_named_only_where_there_are_several() -> None:
     assert on_wheels((1,), 1, "pump") == ""
     assert on_wheels(("left", "right"), 2, "track_id") == ", on both tracks"
     assert on_wheels((1, 3), 4, "zone") == ", on zones 1 and 3"
+    assert on_wheels((1, 2), 2, "achse") == ", on each achse"
+    assert on_wheels((1, 3), 4, "achse") == ", on achse 1 and 3"
 
 
 @pytest.mark.parametrize(
