@@ -28,6 +28,8 @@ Single = NDArray[np.float32]
 Index = NDArray[np.int64]
 Readings = tuple[Index, tuple[slice, ...]]
 
+LEAST_SCALE = float(np.finfo(np.float32).tiny)
+"""Root mean square below which a column is one of zeros: it cannot be divided by in single precision."""
 LONGEST_BRIDGE = 4
 """Usual steps between readings that may be left out before a new run begins (a choice: blanks are short)."""
 
@@ -165,7 +167,8 @@ class DesignMatrix:
         fresh = _arranged(self.problem, self.order, columns)
         energy = np.array([np.sum(column.astype(np.float64) ** 2) for column in fresh])
         scale = np.sqrt(energy / max(int(self.problem.mask.sum()), 1))
-        scale = np.where(scale > 0, scale, 1.0)
+        fresh[scale < LEAST_SCALE] = 0.0
+        scale = np.where(scale >= LEAST_SCALE, scale, 1.0)
         fresh /= scale[:, None, None].astype(np.float32)
         places = np.arange(self._as_read.count, self._as_read.count + len(fresh))
         self._as_read.append(fresh, _begins(fresh, self.order))

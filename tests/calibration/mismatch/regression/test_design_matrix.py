@@ -146,8 +146,9 @@ def test_the_order_of_time_is_restored(empty: DesignMatrix) -> None:
     np.testing.assert_allclose(restored, np.where(design.problem.mask, COLUMNS[0], 0), atol=1e-5)
 
 
-def test_a_column_of_zeros_keeps_the_scale_one(empty: DesignMatrix) -> None:
-    """Nothing is divided by nothing."""
-    design, _ = empty.extended([np.zeros((INSTANTS, AXES))])
+@pytest.mark.parametrize("size", [0.0, 1e-300, 1e-42])
+def test_a_column_of_zeros_keeps_the_scale_one(empty: DesignMatrix, size: float) -> None:
+    """Nothing is divided by nothing, nor by what is nothing in single precision."""
+    design, _ = empty.extended([np.full((INSTANTS, AXES), size)])
     assert design.scale[0] == 1
     assert not design.columns([0]).any()
