@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 import pytest
 
-from regolithd.calibration.mismatch import Prior, compare
+from regolithd.calibration.mismatch import Prior, compare, direction_of
+from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.data.recording import TIME_UNITS_S, read_recording
 from regolithd.calibration.mismatch.data.slow_channels import filled_between
 from regolithd.calibration.mismatch.simulation.checked import checked
@@ -18,7 +19,7 @@ from regolithd.calibration.mismatch.simulation.checked_candidate import STATED
 from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
@@ -109,8 +110,8 @@ def test_the_whole_example_names_what_its_recording_conceals(fans: dict[str, Any
     assert not any("to and fro" in text or "both ways" in text for text in told)
 
 
-def test_friction_in_a_predict_is_zero_where_a_noisy_speed_stands() -> None:
-    """The page's line gives the friction's whole size in motion, and none within the sensor's noise at rest."""
+def test_friction_in_a_predict_is_not_known_where_a_noisy_speed_stands() -> None:
+    """The page's lines give the friction's whole size in motion, and NaN within the sensor's noise at rest."""
     code = next(text for text in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL) if "direction_of(" in text)
     rng, count = np.random.default_rng(2), 2000
     moving = np.repeat([1.0, 0.0, -1.0, 0.0], count // 4)
@@ -118,7 +119,55 @@ def test_friction_in_a_predict_is_zero_where_a_noisy_speed_stands() -> None:
     names: dict[str, Any] = {"values": {"friction_Nm": 3.0}, "inputs": {"speed_rad_s": speed}}
     exec(code, names)
     np.testing.assert_array_equal(names["friction"][moving != 0, 0], 3.0 * moving[moving != 0])
-    assert np.mean(names["friction"][moving == 0] != 0) < 0.01
+    assert np.mean(np.isfinite(names["friction"][moving == 0])) < 0.01
+
+
+class Joint(Simulation):
+    """A joint whose friction is known, in a law of its own near standstill."""
+
+    channel, unit = "torque_Nm", "N·m"
+    inputs = ("acceleration_rad_s2", "speed_rad_s")
+    parameters: ClassVar = {"inertia_kg_m2": Prior(0.5, 0.01, "kg·m²"), "friction_Nm": Prior(0.4, 0.02, "N·m")}
+    parameter_effects: ClassVar = {"friction_Nm": "coulomb-friction"}
+
+    def __init__(self, law: Callable[[Array], Array | float]) -> None:
+        self.law = law
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return inertia and friction."""
+        friction = values["friction_Nm"] * self.law(inputs["speed_rad_s"])
+        return values["inertia_kg_m2"] * inputs["acceleration_rad_s2"] + friction
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the speed."""
+        return {"wheel_speed": inputs["speed_rad_s"]}
+
+
+def stop_and_go() -> dict[str, Array]:
+    """Return a drive that stands for a third of the time, with noise of all sensors."""
+    rng, count, step_s = np.random.default_rng(3), 4000, 0.05
+    speed = np.convolve(np.repeat(rng.choice([-5.0, -2, 0, 0, 2, 5], count // 50), 50), np.ones(15) / 15, "same")
+    speed[np.abs(speed) < 1e-9] = 0
+    acceleration = np.gradient(speed, step_s)
+    return {
+        "t_s": step_s * np.arange(count),
+        "torque_Nm": 0.5 * acceleration + 0.4 * np.sign(speed) + rng.normal(0, 0.08, count),
+        "speed_rad_s": speed + rng.normal(0, 0.02, count),
+        "acceleration_rad_s2": acceleration + rng.normal(0, 0.05, count),
+    }
+
+
+def test_friction_in_a_predict_is_written_as_the_page_says() -> None:
+    """NaN at rest, and friction stated as an effect, are consistent with a machine that has it; a sign is not."""
+    recording = stop_and_go()
+    resting = Joint(lambda speed: np.where(direction_of(speed) == 0, np.nan, np.sign(speed)))
+    assert compare(recording, resting).answer.verdict == "consistent"
+    without = Joint(lambda _: 0.0)
+    without.parameters = {"inertia_kg_m2": Joint.parameters["inertia_kg_m2"], "friction_Nm": Prior(0.0)}  # type: ignore[misc]
+    without.corrected_effects = (Contribution("coulomb-friction", {}, (0.4,), (1,), 0.05),)
+    assert compare(recording, without).answer.verdict == "consistent"
+    for law in (np.sign, lambda speed: np.tanh(speed / 0.005)):
+        assert compare(recording, Joint(law)).answer.verdict != "consistent"
 
 
 class Winding(Simulation):
