@@ -36,17 +36,19 @@ Shape = dict[str, float | str]
 Sharing = Literal["all", "one"]
 
 
-UNITS_OF_NO_LOAD = frozenset(
-    (
-        *("°C", "degC", "K", "mK", "°F", "degF"),
-        *("m", "mm", "cm", "µm", "km", "rad", "mrad", "deg", "°"),
-        *("m/s", "mm/s", "cm/s", "m/min", "km/h", "mph", "rad/s", "deg/s", "°/s", "rpm", "1/min", "r/min", "Hz"),
-        *("m/s²", "mm/s²", "rad/s²", "deg/s²", "°/s²"),
-        *("l", "L", "m³", "m³/s", "m³/h", "l/s", "L/s", "l/min", "L/min", "l/h", "kg/s", "kg/h"),
-    )
-)
-"""Units of temperature, place, motion, acceleration, content and flow: a drive's load may change them, but is not made
-of them. Any other unit, a percentage or counts too, may be that of a load."""
+NO_LOADS: Mapping[str, tuple[str, ...]] = {
+    "temperature": ("°C", "degC", "K", "mK", "°F", "degF"),
+    "place or angle": ("m", "mm", "cm", "µm", "km", "rad", "mrad", "deg", "°"),
+    "speed": ("m/s", "mm/s", "cm/s", "m/min", "km/h", "mph", "rad/s", "deg/s", "°/s", "rpm", "1/min", "r/min", "Hz"),
+    "acceleration": ("m/s²", "mm/s²", "rad/s²", "deg/s²", "°/s²", "m/s2", "mm/s2", "rad/s2", "deg/s2"),
+    "content or flow": (
+        *("l", "L", "m³", "m3", "m³/s", "m3/s", "m³/h", "m3/h"),
+        *("l/s", "L/s", "l/min", "L/min", "l/h", "kg/s", "kg/h"),
+    ),
+}
+"""Units of what a drive's load may change but is not made of, by quantity. Any other unit, a percentage or counts too,
+may be that of a load."""
+UNITS_OF_NO_LOAD = frozenset(unit for units in NO_LOADS.values() for unit in units)
 OF_A_LOAD = "a predicted force, torque, pressure, current, voltage or power"
 """What an effect needs that is a load, in words."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from inspect import cleandoc
 from typing import TYPE_CHECKING
 
+from regolithd.calibration.mismatch.candidates.candidate import NO_LOADS, OF_A_LOAD
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.inference.intervals import unit_of
 from regolithd.calibration.mismatch.problem.words import in_units, in_words
@@ -24,7 +25,7 @@ CHANNEL_UNIT = "channel's unit"
 def effect_sections(candidates: Sequence[Candidate] | None = None) -> str:
     """Return a table of all effects and a section for each, as Markdown; by default of the library."""
     of = library() if candidates is None else candidates
-    return "\n".join([*_overview(of), *(line for candidate in of for line in _section(candidate))])
+    return "\n".join([*_overview(of), *_units(), *(line for candidate in of for line in _section(candidate))])
 
 
 def effects_as_text(candidates: Sequence[Candidate], labels: Mapping[str, str], unit: str = CHANNEL_UNIT) -> str:
@@ -62,6 +63,22 @@ def _overview(candidates: Sequence[Candidate]) -> Iterator[str]:
         cells = (link, in_words(candidate.words, {}), rows["depends on"], rows["needs"])
         yield f"| {' | '.join(map(_cell, cells))} |"
     yield ""
+
+
+def _units() -> Iterator[str]:
+    yield "## Units of a load\n"
+    yield (
+        f"What needs *{OF_A_LOAD}* is looked for in a predicted column of any unit but these, whatever the column is "
+        "called; no unit (`1`), percent and counts may be a load's too.\n"
+    )
+    yield "| a column that is a | is in |\n|---|---|"
+    yield from (f"| {quantity} | {', '.join(f'`{unit}`' for unit in units)} |" for quantity, units in NO_LOADS.items())
+    yield (
+        "\nThe unit is that of `unit` or `channels` of your class, or the FMU's own; it is for the answer alone, and "
+        "nothing is converted. If a column is no load and its unit is not in the list, write the unit as it is here "
+        "(`m` for `metre`), or [leave the effects out](../how-to/simulation.md#effects-to-leave-out). "
+        "If it is a load in one of these units (a drive's command in `Hz`), state another unit in your class (`1`).\n"
+    )
 
 
 def _section(candidate: Candidate) -> Iterator[str]:

@@ -8,6 +8,7 @@ import numpy as np
 from linear_machine import Constant, Level, table
 
 from regolithd.calibration.mismatch import from_columns, library
+from regolithd.calibration.mismatch.candidates.candidate import UNITS_OF_NO_LOAD
 from regolithd.calibration.mismatch.inference.not_looked_for import WITHOUT_SPEED, not_looked_for
 from regolithd.calibration.mismatch.problem.build import build_problem
 
@@ -99,3 +100,9 @@ def test_a_unit_of_no_load_is_told_where_all_else_is_there() -> None:
 def test_an_effect_of_the_users_own_says_what_it_asks_for() -> None:
     """It is never another machine's."""
     assert notes_of(WarmOven(), OnlyElsewhere()) == ["Not looked for without the channel rise_Pa: clogging."]
+
+
+def test_a_unit_is_no_load_s_however_it_is_written() -> None:
+    """FMUs have `m3/s`, people `m³/s`; a torque may be in any unit that is not listed."""
+    assert {"m3/s", "m³/s", "m/s2", "m/s²", "degC", "rpm"} <= UNITS_OF_NO_LOAD
+    assert UNITS_OF_NO_LOAD.isdisjoint({"N", "N·m", "A", "W", "bar", "1", "%", "lbf ft"})
