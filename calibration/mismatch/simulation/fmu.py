@@ -46,6 +46,8 @@ Array = NDArray[np.float64]
 
 TABLES = ("simulation", "variables", "covariates", "parameters", SENSORS, "effects", "empirical_curves")
 """Tables of an FMU's SIM.toml."""
+PREDICTED = ("output", "local")
+"""What variables are, that can be compared with a recorded column."""
 OF_SIMULATION = ("model", "path", "wheel_column", "one_way", "without_effects")
 """Keys of its `[simulation]`."""
 KEPT_RESULTS = 64
@@ -63,7 +65,7 @@ class FmuSimulation(Simulation):
         known = {variable.name: variable for variable in self._description.modelVariables}
         mapped = _mapped(tables, known, path)
         self._inputs = {column: name for name, column in mapped.items() if known[name].causality == "input"}
-        self._outputs = {column: name for name, column in mapped.items() if known[name].causality == "output"}
+        self._outputs = {column: name for name, column in mapped.items() if known[name].causality in PREDICTED}
         if not self._outputs:
             raise SimulationError(f"[variables] maps no output of {path.name} to a column: there is nothing to compare")
         units = {column: str(known[name].unit or "1") for column, name in self._outputs.items()}
@@ -178,6 +180,9 @@ def _fmpy() -> Any:  # noqa: ANN401  # a module without types
 
 
 def _described(fmpy: Any, path: Path) -> Any:  # noqa: ANN401  # FMPy's own type
+    if not path.exists():
+        told = f"there is no file {path}; [simulation] path says where the FMU is, relative to SIM.toml"
+        raise SimulationError(told, ("simulation", "model"))
     try:
         return fmpy.read_model_description(str(path))
     except Exception as error:  # FMPy raises plain Exception for a damaged file
@@ -195,6 +200,10 @@ def _mapped(tables: Mapping[str, Any], known: Mapping[str, Any], path: Path) -> 
         if not isinstance(column, str):
             told = f"[variables] {name}: the name of a recorded column is needed, not {column!r}"
             raise SimulationError(told, ("variables", name))
+        if (kind := known[name].causality) not in {"input", *PREDICTED}:
+            told = f"[variables] {name} is neither input nor output of {path.name}, but of the kind {kind}"
+            cure = f"; state it as [parameters.{name}] value = …, std = …" if kind == "parameter" else ""
+            raise SimulationError(told + cure, ("variables", name))
     return dict(stated)
 
 

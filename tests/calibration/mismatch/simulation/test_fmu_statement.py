@@ -33,6 +33,7 @@ VARIABLES = [
     variable("flow", "output", None, reference=9),
     variable("area", "parameter", "m2", start="0.5"),
     variable("label", "parameter", None, start="tank"),
+    variable("pressure", "local", "Pa", reference=10),
 ]
 TABLES: dict[str, Any] = {
     "simulation": {"model": "tank.fmu"},
@@ -85,6 +86,7 @@ def tank(monkeypatch: pytest.MonkeyPatch) -> Tank:
 
 def loaded(tmp_path: Path, **tables: Any) -> FmuSimulation:
     """Return the tank with some tables replaced."""
+    (tmp_path / "tank.fmu").touch()
     return FmuSimulation.from_file(tmp_path / "tank.fmu", {**TABLES, **tables})
 
 
@@ -105,6 +107,7 @@ def test_the_fmu_says_which_variables_are_inputs_and_outputs(tmp_path: Path) -> 
     assert loaded(tmp_path, simulation=pump).one_way
     with pytest.raises(SimulationError, match=r"\[simulation\] one_way must be true or false, not 'yes'"):
         loaded(tmp_path, simulation=pump | {"one_way": "yes"})
+    assert loaded(tmp_path, variables={"voltage": "pump_V", "pressure": "p_Pa"}).channel == "p_Pa"
     several = {"voltage": "pump_V", "flow": "flow", "level": "level_m"}
     found = loaded(tmp_path, variables=several, simulation={"model": "tank.fmu", "wheel_column": "tank"})
     assert (found.channels, found.wheel_column) == ({"flow": "1", "level_m": "m"}, "tank")
@@ -275,6 +278,11 @@ def test_corrected_tables_have_the_values_of_the_recording(tmp_path: Path) -> No
             r"^\[variables\] leve: tank\.fmu has no such variable; did you mean level\?",
             ("variables", "leve"),
         ),
+        (
+            {"variables": {"area": "area_m2"}},
+            r"area is neither input nor output .*, but of the kind parameter; state it as \[parameters\.area\]",
+            ("variables", "area"),
+        ),
         ({"variables": {"level": 3}}, r"level: the name of a recorded column .* not 3", ("variables", "level")),
         ({"covariates": ["time"]}, r"^\[covariates\] takes name = \"recorded column\"", ("covariates",)),
         ({"parameters": [1]}, r"^\[parameters\] must be a table of tables", ("parameters",)),
@@ -298,8 +306,16 @@ def test_a_mistake_is_one_message_with_its_key(
 @pytest.mark.usefixtures("tank")
 def test_a_file_that_is_no_fmu_is_told(tmp_path: Path) -> None:
     """With FMPy's own words."""
+    (tmp_path / "damaged.fmu").touch()
     with pytest.raises(SimulationError, match=r"damaged\.fmu is not an FMU that can be read: no modelDescription\.xml"):
         FmuSimulation.from_file(tmp_path / "damaged.fmu", TABLES)
+
+
+@pytest.mark.usefixtures("tank")
+def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
+    """With what says where it is."""
+    with pytest.raises(SimulationError, match=r"there is no file .*lost\.fmu; \[simulation\] path says"):
+        FmuSimulation.from_file(tmp_path / "lost.fmu", TABLES)
 
 
 def test_fmpy_is_needed_for_an_fmu_alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
