@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from regolithd.calibration.mismatch import load_simulation
+from regolithd.calibration.mismatch import SensorError, library, load_simulation
 from regolithd.calibration.validation.machine_trials.cases.fmu import build_fmu
 
 if TYPE_CHECKING:
@@ -44,3 +44,17 @@ def test_a_current_follows_its_voltage_without_a_step_of_delay(tmp_path: Path) -
     warm = found["oven_temperature_degC"]
     assert warm[90, 0] == pytest.approx(20.0)
     assert warm[91, 0] > 20.5
+
+
+def test_errors_of_inputs_and_effects_to_leave_out_stand_in_the_file(tmp_path: Path) -> None:
+    """As for a class."""
+    if not shutil.which(os.environ.get("CC", "cc")):
+        pytest.skip("no C compiler for the FMU: apt-get install gcc")
+    build_fmu("oven", tmp_path / "oven.fmu")
+    text = SIM.replace('"oven.fmu"', '"oven.fmu"\nwithout_effects = ["slip-sinkage"]', 1)
+    (tmp_path / "SIM.toml").write_text(f"{text}\n[sensors]\nheater_voltage_relative_std = 0.01\n")
+    simulation = load_simulation(tmp_path / "SIM.toml")
+    assert simulation.sensors == {"heater_voltage_V": SensorError(relative=0.01)}
+    assert {each.name for each in library()} - {each.name for each in simulation.candidates(library())} == {
+        "slip-sinkage"
+    }
