@@ -292,6 +292,7 @@ class Contribution:
     coefficients: one for each of its columns
     wheels: the names of the wheels that have it
     relative_std: relative standard deviation of its size
+    shape_std: standard deviations of shape parameters, by name
     channel: the predicted channel that it acts on; empty where there is one alone
     """
 
@@ -301,6 +302,7 @@ class Contribution:
     wheels: tuple[int | str, ...]
     relative_std: float = 0.0
     channel: str = ""
+    shape_std: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -72,7 +72,23 @@ class Stated:
 
     def deviations(self, problem: Problem) -> tuple[Array, ...]:
         """Return what one standard deviation of each number in the law, other than its size, adds to the prediction."""
-        return tuple(self.candidate.deviations(problem)) if isinstance(self.candidate, EmpiricalCurveLaw) else ()
+        if isinstance(self.candidate, EmpiricalCurveLaw):
+            return tuple(self.candidate.deviations(problem))
+        return tuple(self._deviation(problem, name, std) for name, std in self.contribution.shape_std.items())
+
+    def _deviation(self, problem: Problem, name: str, std: float) -> Array:
+        """Return what one standard deviation of a shape parameter adds beside a change of the effect's size."""
+        least, most = self.candidate.free.get(name, (-np.inf, np.inf))
+        at = float(self.contribution.shape[name])
+        low, high = (float(np.clip(at + far, least, most)) for far in (-std, std))
+        ends = [
+            replace(self, contribution=replace(self.contribution, shape={**self.contribution.shape, name: value}))
+            for value in (low, high)
+        ]
+        slope = (ends[1].column(problem) - ends[0].column(problem)) / max(high - low, 1e-300)
+        column = self.column(problem)
+        along = float(np.vdot(column, slope)) / max(float(np.vdot(column, column)), 1e-300)
+        return std * (slope - along * column)
 
     def bent(self, problem: Problem) -> bool:
         """Return whether the law is not linear in its size: twice the coefficients would ask for another shape."""
@@ -109,6 +125,7 @@ class ChangedSize(Candidate):
     """A relative change of an effect that the simulation was corrected by."""
 
     coefficients: ClassVar = (Coefficient(RELATIVE_CHANGE, "1", 0),)
+    stated_size = 1.0
 
     def __init__(self, stated: Stated, place: int) -> None:
         of = stated.candidate

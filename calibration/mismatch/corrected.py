@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+ONSET = "onset_s"
 FURTHEST_STD = 3.0
 """Standard deviations of its prior that a parameter may move (a choice: one in 370 lies further)."""
 
@@ -94,7 +95,7 @@ def corrected_tables(
     named, changes = contributions[: len(effects)], contributions[len(effects) :]
     held_curves, changes = with_changed_sizes(stated_curves(tables), changes)
     pairs = zip(named, effects, strict=True)
-    contributions = [*(replace(term, relative_std=_relative_std(effect)) for term, effect in pairs), *changes]
+    contributions = [*(_with_stds(term, effect) for term, effect in pairs), *changes]
     held = _within_three_std(simulation, values) if within_priors else values
     calibrated = {**tables, **simulation.corrected_tables(held)}
     corrected, rest = simulation.absorb_effects(calibrated, contributions)
@@ -109,8 +110,9 @@ def corrected_tables(
 def _entry(effect: Contribution) -> dict[str, Any]:
     """Return an entry of `[[effects]]`; it names its channel where the simulation predicts several."""
     entry: dict[str, Any] = _plain(asdict(effect))
-    if not effect.channel:
-        del entry["channel"]
+    for name in ("channel", "shape_std"):
+        if not entry[name]:
+            del entry[name]
     return entry
 
 
@@ -134,10 +136,16 @@ def _within_three_std(simulation: Simulation, values: Mapping[str, float]) -> di
     return kept
 
 
-def _relative_std(effect: Effect) -> float:
-    """Return the relative standard deviation of an effect's size, from its 90 % interval."""
+def _with_stds(term: Contribution, effect: Effect) -> Contribution:
+    """Return an effect's term with the standard deviations of its size and of its law, from its 90 % intervals.
+
+    Those of the law are of what it says anywhere, as a power of the speed; when the effect began is of one recording.
+    """
     size = effect.parameters.get("relative_size")
-    return 0.0 if size is None or size.value == 0 else std_of_interval(size.low, size.high) / size.value
+    relative_std = 0.0 if size is None or size.value == 0 else std_of_interval(size.low, size.high) / size.value
+    told = {name: each for name, each in effect.parameters.items() if name in term.shape and name != ONSET}
+    shape_std = {name: std_of_interval(each.low, each.high) for name, each in told.items()}
+    return replace(term, relative_std=relative_std, shape_std=shape_std)
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401  # what TOML can hold

@@ -132,6 +132,10 @@ class Candidate:
     free: ClassVar[Mapping[str, tuple[float, float]]] = {}
     """Continuous shape parameters with their least and greatest value. The ending of the name is the unit: `_s`, `_K`,
     `_degC`, `_rad_s`; without one of these it has none."""
+    shape_priors: ClassVar[Mapping[str, tuple[float, float]]] = {}
+    """Mean and standard deviation of those of them that are known before the recording."""
+    stated_size: ClassVar[float] = 0.0
+    """The coefficient that the prediction has already: that of a change of a corrected effect is relative to it."""
     change_point: ClassVar[str] = "onset_s"
     """The shape parameter, where a candidate has it, that is the time at which the effect begins. Its Δχ² is no smooth
     function of it, so that it has an interval of its own."""
@@ -232,8 +236,8 @@ class Candidate:
         return {**found, **{name: float(shape[name]) for name in self.free if name in shape}}
 
     def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
-        """Return the Δχ² that a shape must gain beyond others, for contradicting what was stated before."""
-        return 0.0
+        """Return the Δχ² that a shape must gain beyond others, for contradicting what was known before."""
+        return sum(((float(shape[name]) - mean) / std) ** 2 for name, (mean, std) in self.shape_priors.items())
 
     def plausible(self, problem: Problem, shape: Shape, values: Sequence[float]) -> bool:  # noqa: ARG002
         """Return whether fitted coefficients are possible; their signs are tested before."""

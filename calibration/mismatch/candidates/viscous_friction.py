@@ -13,8 +13,9 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.problem.problem import Problem
 
-POWER, POWER_STD = 1.0, 0.2
-"""Prior of the power: mean, and standard deviation (a choice: 0.7 and 1.4 are one in ten and one in twenty)."""
+POWER_PRIOR = (1.0, 0.2)
+"""Mean and standard deviation of the power (a choice: 0.7 and 1.4 are one in ten and one in twenty). At the ends of its
+range the law is nearly another one."""
 
 
 class ViscousFriction(Candidate):
@@ -33,14 +34,11 @@ class ViscousFriction(Candidate):
     loads = True
     coefficients: ClassVar = (Coefficient("viscous_coefficient", "{unit} ({per_speed})^p"),)
     free: ClassVar = {"power": (0.7, 1.4)}
+    shape_priors: ClassVar = {"power": POWER_PRIOR}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
         """Return the law proportional to speed, then a shear-thinning and a churning one."""
         return [{"power": 1.0}, {"power": 0.75}, {"power": 1.35}]
-
-    def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
-        """Charge a power that is far from 1: at the ends of its range the law is nearly another one."""
-        return ((float(shape["power"]) - POWER) / POWER_STD) ** 2
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return sign(ω)|ω|^p."""

@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     passes_entry_test,
 )
 from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
+from regolithd.calibration.mismatch.selection.law_misfit import law_misfit
 from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what_pulls_parameters_out
 from regolithd.calibration.mismatch.selection.smooth_terms import covariate_of, drop_what_a_curve_explains
 
@@ -102,7 +103,7 @@ def _is_a_laws_misfit(decision: Decision, fit: Fit, named: Fit, curve: Term) -> 
     instead_of = named if named.terms or decision.unnamed else decision.named
     if not instead_of.terms:
         return False
-    share = (fit.delta_chi2 - instead_of.delta_chi2) / max(fit.delta_chi2, 1e-9)
+    share = law_misfit(decision.equations, instead_of, fit)
     of_its_covariate = not named.terms and all(covariate_of(term) == curve.name for term in instead_of.terms)
     return of_its_covariate or share < decision.equations.thresholds.form_misfit
 

@@ -46,7 +46,7 @@ def collinear_sets(
             continue
         seen.add(frozenset(members))
         first = [terms[member][0] for member in members]
-        names = (*members, *parameters_like(equations, given.terms, first))
+        names = tuple(dict.fromkeys((*members, *parameters_like(equations, given.terms, first))))
         if len(names) > 1 and not taken & set(names):
             found.append(with_experiment(names, experimenter.on(equations), given.terms, first, others))
     return tuple(found)

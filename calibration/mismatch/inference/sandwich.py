@@ -21,7 +21,7 @@ from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
@@ -55,12 +55,14 @@ class Linearisation:
     ----------
     columns: coefficients' columns, then shape parameters' slopes, then discrepancies, shape (column, time, wheel)
     precision: prior precision of each, shape (column,)
+    pull: slope of the log prior where the fit stands, shape (column,); of what was not fitted as a coefficient alone
     slopes: what the columns after the coefficients' are
     ends: where each term's discrepancies begin, and after the last one end, shape (term + 1,)
     """
 
     columns: Array
     precision: Array
+    pull: Array
     slopes: tuple[ShapeSlope, ...]
     ends: Index
 
@@ -84,9 +86,22 @@ def linearised(equations: NormalEquations, fit: Fit) -> Linearisation:
     precision = np.full(sum(sizes), equations.thresholds.discrepancy_std**-2)
     precision = np.concatenate((np.zeros(len(columns)), precision))
     precision[: len(equations.nuisance.columns)] = equations.nuisance.precision
+    pull = np.zeros_like(precision)
+    for place, slope in enumerate(slopes, len(fit.columns)):
+        precision[place], pull[place] = _prior_of_shape(fit.terms[slope.term], slope)
     stacked = np.stack(columns) if columns else np.zeros((0, *shape))
     ends = len(columns) + np.cumsum([0, *sizes])
-    return Linearisation(np.concatenate((stacked, *discrepancies)), precision, tuple(slopes), ends)
+    return Linearisation(np.concatenate((stacked, *discrepancies)), precision, pull, tuple(slopes), ends)
+
+
+def _prior_of_shape(term: Term, slope: ShapeSlope) -> tuple[float, float]:
+    """Return the prior precision of a slope's coefficient, and the slope of its log prior where the fit stands."""
+    priors = term.group.candidate.shape_priors if term.group.candidate else {}
+    if slope.name not in priors:
+        return 0.0, 0.0
+    mean, std = priors[slope.name]
+    away = mean - float(term.group.shape[slope.name])
+    return 1 / (std * slope.scale) ** 2, away / (std**2 * slope.scale)
 
 
 def _shape_slopes(equations: NormalEquations, fit: Fit) -> Iterator[tuple[ShapeSlope, Array]]:
@@ -124,7 +139,8 @@ def sandwich(equations: NormalEquations, fit: Fit, linearisation: Linearisation,
     sums = block_sums(scores, blocks)
     count = int(blocks.max()) + 1
     middle = sums.T @ sums * count / max(count - 1, 1) + np.diag(precision)
-    pull = np.where(np.arange(len(information)) < len(fit.columns), 0.0, sums.sum(axis=0))
+    fitted = np.arange(len(information)) < len(fit.columns)
+    pull = np.where(fitted, 0.0, sums.sum(axis=0) + linearisation.pull)
     return inverse @ pull, inverse @ middle @ inverse
 
 

@@ -32,6 +32,10 @@ STANDSTILL_DEVIATIONS = 3.0
 (normal density)."""
 ONE_STD_QUANTILE = 0.6827
 """Quantile of a normal magnitude at one standard deviation."""
+ALTERNATING_MEDIAN = 3.01
+"""Median of |x| + 2|y| + |z| of three normal values, in standard deviations: of second differences that alternate."""
+FEWEST_ALTERNATIONS = 3
+"""Alternations about 0 from which they are noise (a choice: one may be a machine that was nudged)."""
 LONGEST_STEP = 3.0
 """Steps of time longer than so many usual ones are gaps: nothing is differentiated across them."""
 
@@ -78,7 +82,9 @@ def direction_of(speed: Array) -> Array:
 def _noise_at_standstill(speed: Array) -> float:
     """Return the reach of a speed's noise (time,) about zero, by its second differences while it is slow.
 
-    These are free of a constant speed and of a ramp through zero. At most the share of the usual speed that is slow.
+    These are free of a constant speed and of a ramp through zero. Where most of a standstill is exactly 0 (a dead
+    band, a speed that is set to 0 while a brake holds), the noise is that of what alternates about 0: +, −, +, as only
+    noise does. At most the share of the usual speed that is slow.
     """
     known = speed[np.isfinite(speed)]
     slow_below = SLOW_SHARE * float(np.quantile(np.abs(known), USUAL_SPEED_QUANTILE)) if known.size else 0.0
@@ -86,9 +92,13 @@ def _noise_at_standstill(speed: Array) -> float:
     inside = slow[:-2] & slow[1:-1] & slow[2:]
     if not inside.any():
         return 0.0
-    second = np.abs(np.diff(speed, 2)[inside])
-    deviation = float(np.quantile(second, ONE_STD_QUANTILE)) / np.sqrt(6)  # variance 1 + 4 + 1
-    return min(STANDSTILL_DEVIATIONS * float(deviation), slow_below)
+    second = np.abs(np.diff(speed, 2))
+    deviation = float(np.quantile(second[inside], ONE_STD_QUANTILE)) / np.sqrt(6)  # variance 1 + 4 + 1
+    turned = speed[:-1] * speed[1:] < 0
+    alternating = inside & turned[:-1] & turned[1:]
+    if alternating.sum() >= FEWEST_ALTERNATIONS:
+        deviation = max(deviation, float(np.median(second[alternating])) / ALTERNATING_MEDIAN)
+    return min(STANDSTILL_DEVIATIONS * deviation, slow_below)
 
 
 def quantity(channel: str) -> str:

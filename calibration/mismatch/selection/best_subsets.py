@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, relative_size
+from regolithd.calibration.mismatch.selection.law_misfit import explained
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape, shape_profile
 
 if TYPE_CHECKING:
@@ -175,7 +176,7 @@ def passes_entry_test(equations: NormalEquations, more: Fit, less: Fit, entry_th
     """Return whether a larger set scores enough more than a smaller one for its further effects."""
     limits = equations.thresholds
     remaining = float(chi2_of(equations, less).sum())
-    worthwhile = min(limits.further_share * less.delta_chi2, limits.remaining_share * remaining)
+    worthwhile = min(limits.further_share * explained(equations, less), limits.remaining_share * remaining)
     faulty = wheels_of_faulty_sensors(more)
     if any(term.group.own_channel is None and set(term.wheels) <= faulty for term in more.terms):
         worthwhile = limits.beside_smooth_share * less.delta_chi2

@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     wheels_of_faulty_sensors,
 )
 from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
+from regolithd.calibration.mismatch.selection.law_misfit import law_misfit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -91,7 +92,7 @@ def _explains_more(equations: NormalEquations, curve: Fit, named: Fit, entry_thr
     ahead = equations.score(curve) - equations.score(named)
     if all(term.group.named for term in named.terms):
         of_its_covariate = all(covariate_of(term) == curve.terms[-1].name for term in named.terms)
-        misfit = (curve.delta_chi2 - named.delta_chi2) / max(curve.delta_chi2, 1e-9)
+        misfit = law_misfit(equations, named, curve)
         return not of_its_covariate and misfit > limits.form_misfit and ahead > limits.smooth_term_entry
     further = sum(term.group.named for term in named.terms) - sum(term.group.named for term in curve.terms)
     return ahead >= -entry_threshold * max(further, 0)
@@ -125,11 +126,10 @@ def unexplained_beside(equations: NormalEquations, named: Fit, *, tolerated: flo
     power = np.sum(contribution(equations, beside, len(named.terms))[:, on] ** 2)
     if power < limits.smooth_term_power * np.sum(residual_of(equations, named)[:, on] ** 2):
         return None
-    misfit = (beside.delta_chi2 - named.delta_chi2) / max(beside.delta_chi2, 1e-9)
     if tolerated is None:
         leaving = equations.nuisance.leaving_their_priors(named, equations.problem)
         tolerated = 0.0 if leaving.size else limits.form_misfit
-    return None if named.terms and misfit < tolerated else curve
+    return None if named.terms and law_misfit(equations, named, beside) < tolerated else curve
 
 
 def covariate_of(term: Term) -> str:

@@ -30,6 +30,7 @@ def stated_effects(tables: Mapping[str, Any]) -> tuple[Contribution, ...]:
                     tuple(w if isinstance(w, str) else int(w) for w in effect["wheels"]),
                     float(effect.get("relative_std", 0.0)),
                     str(effect.get("channel", "")),
+                    {str(name): float(std) for name, std in dict(effect.get("shape_std", {})).items()},
                 )
             )
         except (KeyError, TypeError, ValueError) as error:

@@ -10,7 +10,7 @@ import pytest
 from rover_drives import TABLES, columns, simulation
 from servo import ServoAxis
 
-from regolithd.calibration.mismatch.answer import CalibratedParameter, Contribution, Parameter
+from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, CalibratedParameter, Contribution, Parameter
 from regolithd.calibration.mismatch.comparison import Comparison, compare
 from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects, write_corrected
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
@@ -87,6 +87,19 @@ def test_an_effect_without_a_relative_size_has_no_standard_deviation(size: Param
     servo = {"simulation": {"model": "servo:ServoAxis"}}
     tables = corrected_tables(servo, ServoAxis(), {"mass_kg": 96.0}, (term,), (effect,))
     assert [each["relative_std"] for each in tables["effects"]] == [0.0]
+
+
+def test_how_well_a_law_is_known_is_written_and_read() -> None:
+    """Its power has a standard deviation; when it began, is of one recording."""
+    term = Contribution("bearing-drag", {"onset_s": 60.0, "power": 0.8}, (0.5,), (1,))
+    told = {"onset_s": Parameter(60.0, 50.0, 70.0, "s"), "power": Parameter(0.8, 0.6, 1.0, "1")}
+    effect: Any = SimpleNamespace(parameters={"relative_size": Parameter(0.1, 0.09, 0.11, "1"), **told})
+    servo = {"simulation": {"model": "servo:ServoAxis"}}
+    tables = corrected_tables(servo, ServoAxis(), {"mass_kg": 96.0}, (term,), (effect,))
+    (written,) = tables["effects"]
+    assert written["shape_std"] == {"power": pytest.approx(0.2 / NINETY_PERCENT_STDS)}
+    (read,) = stated_effects(tomllib.loads(to_toml(tables)))
+    assert read.shape_std == written["shape_std"]
 
 
 def test_the_user_s_comments_and_order_stay(found: Comparison) -> None:

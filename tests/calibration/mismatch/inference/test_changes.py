@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.changes import (
 )
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.problem.build import build_problem
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 STEP_S = 0.05
 COULOMB = Contribution("coulomb-friction", {}, (0.5,), (1,), relative_std=0.04)
+VISCOUS = Contribution("viscous-friction", {"power": 0.85}, (0.5,), (1,), relative_std=0.04, shape_std={"power": 0.1})
 
 
 class Axis(Simulation):
@@ -207,3 +209,35 @@ def test_a_change_is_told_with_both_sizes_and_the_interval() -> None:
     )
     assert change_in_words(Change("drag", "d", 1.0, 0.01, -0.02, 0.04)).startswith("drag is gone: d 0.01 (90 % sure")
     assert direction_of(Change("drag", "d", 0.0, 0.5, 0.4, 0.6)) == "larger"
+
+
+def test_a_power_that_is_not_known_exactly_adds_what_is_no_change_of_size() -> None:
+    """One standard deviation of it, to first order, beside the effect's own course."""
+    problem = build_problem(moving(1, 0.0), Axis())
+    (stated,) = stated_in(library(), [VISCOUS], [])
+    (deviation,) = stated.deviations(problem)
+    column = stated.column(problem)
+    assert abs(np.vdot(deviation, column)) < 1e-9 * float(np.vdot(column, column))
+    speed = problem.covariates["wheel_speed"]
+    steeper = 0.5 * np.sign(speed) * (np.abs(speed) ** 0.95 - np.abs(speed) ** 0.85)
+    steeper -= np.vdot(steeper, column) / np.vdot(column, column) * column
+    assert float(np.linalg.norm(deviation - steeper)) < 0.1 * float(np.linalg.norm(steeper))
+
+
+@pytest.mark.parametrize("times", [1.0, 3.0])
+def test_a_power_found_a_little_wrong_is_no_further_effect(times: float) -> None:
+    """The true power is 1; the corrected file has 0.85 ± 0.1, and the friction stays or has grown."""
+    recording = moving(5, 0.0)
+    more = replace_force(recording, 0.5 * times * recording.channels["speed_m_s"])
+    answer = compare(more, Axis(), effects=[VISCOUS]).answer
+    assert answer.effects == ()
+    assert answer.unexplained == ()
+    assert [change.name for change in answer.changes] == (["viscous-friction"] if times > 1 else [])
+    for change in answer.changes:
+        assert change.now / change.corrected == pytest.approx(times, rel=0.15)
+
+
+def replace_force(recording: Recording, more_N: Array) -> Recording:
+    """Return a recording with more force, shape (time, 1)."""
+    columns = {name: values[:, 0] for name, values in recording.channels.items()}
+    return from_columns({**columns, "t_s": recording.time_s, "force_N": columns["force_N"] + more_N[:, 0]})

@@ -34,6 +34,16 @@ def test_noise_at_standstill_is_no_direction() -> None:
     np.testing.assert_array_equal(found[true != 0], np.sign(true[true != 0]))
 
 
+def test_noise_shows_beside_a_standstill_that_is_set_to_zero() -> None:
+    """While a brake holds the speed is exactly 0; before it does, the sensor's noise alternates."""
+    true = moves()
+    read = true + np.random.default_rng(1).normal(0, 0.1, true.shape)
+    held = (true == 0) & (np.arange(COUNT)[:, None] % 150 > 15)
+    found = direction_of(np.where(held, 0.0, read))
+    assert np.mean(found[true == 0] != 0) < 0.01
+    np.testing.assert_array_equal(found[true != 0], np.sign(true[true != 0]))
+
+
 def test_a_speed_without_noise_has_its_sign() -> None:
     """Also where it passes zero slowly; what is not known has none."""
     speed = np.sin(np.arange(COUNT) / 300)[:, None]

@@ -1,0 +1,38 @@
+"""What effects explain as a whole, and how much of it their laws miss.
+
+No law is exact to the last percent. A corrected effect that has changed is inexact by a share of its whole size, of
+which the prediction has a part already.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+KNOWN = 1e12
+"""Prior precision of a scaled coefficient that is held where it was stated."""
+
+
+def law_misfit(equations: NormalEquations, names: Fit, with_curve: Fit) -> float:
+    """Return the share of Δχ² that a curve adds to names, or has in their place."""
+    gain = with_curve.delta_chi2 - names.delta_chi2
+    return gain / max(explained(equations, names) + gain, 1e-9)
+
+
+def explained(equations: NormalEquations, fit: Fit) -> float:
+    """Return the Δχ² of a fit, with what is in the prediction already of corrected effects that it changes."""
+    total, held = fit.delta_chi2, equations.nuisance
+    for place, name in enumerate(held.names):
+        held = held.with_precision(place, KNOWN) if name in held.stated else held
+    for index, term in enumerate(fit.terms):
+        if term.group.candidate is None or not term.group.candidate.stated_size:
+            continue
+        scale = equations.design.scale[list(term.group.columns)]
+        change = fit.coefficients[fit.of_term(index)]
+        now = change + term.group.candidate.stated_size * scale
+        _, energy = equations.with_nuisance(held).own_and_complement(fit.without(index), term)
+        total += max(float(now @ energy @ now - change @ energy @ change), 0.0)
+    return total
