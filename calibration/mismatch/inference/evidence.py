@@ -12,7 +12,7 @@ from regolithd.calibration.mismatch.changes import ChangedSize, contribution_of_
 from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.residuals import residual_of
-from regolithd.calibration.mismatch.regression.smooth_groups import WITHOUT_SMOOTH_TERM
+from regolithd.calibration.mismatch.regression.smooth_groups import has_smooth_term
 from regolithd.calibration.mismatch.signal.binning import binned_means, even_edges
 
 if TYPE_CHECKING:
@@ -31,7 +31,6 @@ Index = NDArray[np.int64]
 CURVE_BINS = 24
 FEWEST_READINGS = 100
 """Readings below which no curve is made."""
-WITHOUT_CURVE = WITHOUT_SMOOTH_TERM - {"direction"}
 
 
 def evidence_of(decision: Decision) -> Evidence:
@@ -133,7 +132,7 @@ def _curves(decision: Decision, before: Array, after: Array) -> tuple[Curve, ...
     found = [
         _curve(problem, name, coupling, (before * factor, after * factor), decision.noise, wheels)
         for name in problem.covariates
-        if name not in WITHOUT_CURVE
+        if name == "direction" or has_smooth_term(problem, name)
         for coupling, factor in couplings.items()
     ]
     curves = [curve for curve in found if curve is not None]

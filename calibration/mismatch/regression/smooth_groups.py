@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-WITHOUT_SMOOTH_TERM = frozenset({"direction", "wheel_angle", "wheel_acceleration", "place"})
+WITHOUT_SMOOTH_TERM = frozenset({"direction", "wheel_angle", "wheel_acceleration"})
 """Covariates of two values, without bound, or with their own candidates alone."""
+LEAST_PASSES = 3.0
+"""Length of the way over the range of places, from which a place is more than another name of the time (a choice)."""
 PERIODIC = "drag, periodic"
 """Coupling of a sine over time."""
 
@@ -31,7 +33,7 @@ def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
     problem = design.problem
     couplings = couplings_of(problem)
     for name, values in problem.covariates.items():
-        if name not in WITHOUT_SMOOTH_TERM and not _differs_between_wheels_only(problem, values):
+        if has_smooth_term(problem, name) and not _differs_between_wheels_only(problem, values):
             curve = np.abs(values) if name == "wheel_speed" else values
             hats = hat_functions(curve, problem.mask, problem.thresholds.curve_knots)
             for coupling, factor, sharing in (
@@ -46,6 +48,17 @@ def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
     coupling = "drag" if "drag" in couplings else "offset"
     hats = hat_functions(problem.covariates["time"], problem.mask, problem.thresholds.time_knots)
     return _with_group(design, "time", [hat * couplings[coupling] for hat in hats], coupling)
+
+
+def has_smooth_term(problem: Problem, covariate: str) -> bool:
+    """Return whether a curve over a covariate may explain something; over a place, where the machine returns to it."""
+    if covariate != "place":
+        return covariate not in WITHOUT_SMOOTH_TERM
+    for column in problem.covariates[covariate].T:
+        known = column[np.isfinite(column)]
+        if known.size and float(np.sum(np.abs(np.diff(known)))) >= LEAST_PASSES * float(np.ptp(known)) > 0:
+            return True
+    return False
 
 
 def couplings_of(problem: Problem) -> dict[str, Array]:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, relative_size
 from regolithd.calibration.mismatch.selection.law_misfit import explained
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape, shape_profile
@@ -25,12 +27,44 @@ def best_of_each_candidate(equations: NormalEquations, given: Sequence[Term]) ->
     """Return each candidate's best shape and wheels beside `given`, with Δχ² less penalty, best first."""
     taken = [(term.name, set(term.wheels)) for term in given]
     groups = [group for group in equations.design.groups if group.named]
+    found = equations.further(given, groups)
+    hardly_shared = _that_one_wheel_shows_alone(equations, found)
     scored = [
         (gain - equations.penalty(term), term.group.name, term)
-        for gain, term in equations.further(given, groups)
+        for gain, term in found
         if all(term.group.name != name or wheels.isdisjoint(term.wheels) for name, wheels in taken)
+        and (len(term.wheels) == 1 or id(term.group) not in hardly_shared)
     ]
     return _best_of_each(scored)
+
+
+def _that_one_wheel_shows_alone(equations: NormalEquations, found: Sequence[Scored]) -> set[int]:
+    """Return the groups, by identity, of which each wheel has its own coefficients, and only one wheel's are not zero.
+
+    On several wheels such a law gains a little more than on one, by chance: the others have to show it too.
+    """
+    alone: dict[int, float] = {}
+    shared: dict[int, tuple[float, Term]] = {}
+    for gain, term in found:
+        if term.group.acting is None or "one" not in term.group.sharing:
+            continue
+        key = id(term.group)
+        if len(term.wheels) == 1:
+            alone[key] = max(gain, alone.get(key, 0.0))
+        elif key not in shared or gain > shared[key][0]:
+            shared[key] = gain, term
+    return {
+        key
+        for key, (gain, term) in shared.items()
+        if key in alone and gain - alone[key] < _by_chance(equations, term)
+    }
+
+
+def _by_chance(equations: NormalEquations, term: Term) -> float:
+    """Return the Δχ² that the coefficients of all but one wheel gain by chance."""
+    acting = term.group.acting
+    own = acting[:, list(term.wheels)].sum(axis=0) if acting is not None else np.zeros(1)
+    return chi2_quantile(equations, int(own.sum() - own.max()))
 
 
 def best_of_each_smooth_term(equations: NormalEquations, given: Sequence[Term]) -> list[Scored]:
@@ -197,3 +231,10 @@ def wheels_of_faulty_sensors(fit: Fit) -> set[int]:
     The fault's course is known only as well as that channel shows it: what it leaves on its wheel proves nothing.
     """
     return {wheel for term in fit.terms if term.group.own_channel is not None for wheel in term.wheels}
+
+
+def chi2_quantile(equations: NormalEquations, columns: int) -> float:
+    """Return the Δχ² that so many coefficients gain by chance at the level of a single test."""
+    from scipy.special import chdtri  # noqa: PLC0415  # the laptop's; reading a recording must not load SciPy
+
+    return float(chdtri(columns, equations.thresholds.single_test_level))

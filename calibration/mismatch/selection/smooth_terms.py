@@ -16,6 +16,7 @@ from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_smooth_term,
+    chi2_quantile,
     wheels_of_faulty_sensors,
 )
 from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
@@ -198,15 +199,9 @@ def drop_transients(equations: NormalEquations, named: Fit) -> Fit:
         shares = [
             gain / (gain + named.delta_chi2)
             for gain, curve in beside
-            if curve.wheels == term.wheels and gain > _chi2_quantile(equations, len(curve.group.columns))
+            if curve.wheels == term.wheels and gain > chi2_quantile(equations, len(curve.group.columns))
         ]
         if max(shares, default=0.0) < equations.thresholds.form_misfit:
             kept.append(term)
     return named if len(kept) == len(named.terms) else equations.fit(kept)
 
-
-def _chi2_quantile(equations: NormalEquations, columns: int) -> float:
-    """Return the Δχ² that so many coefficients gain by chance at the level of the test of transients."""
-    from scipy.special import chdtri  # noqa: PLC0415  # the laptop's; reading a recording must not load SciPy
-
-    return float(chdtri(columns, equations.thresholds.transient_level))

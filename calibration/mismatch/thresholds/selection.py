@@ -159,8 +159,9 @@ class SelectionThresholds:
         "Share of Δχ² that a smooth term may add to an effect's law, which is then still taken as the right law.",
         f"{TRIALS}: laws of the generator differ from the candidates'",
     )
-    transient_level: float = threshold(
+    single_test_level: float = threshold(
         1e-3,
-        "Level of the test that a change comes and goes, by a curve over time beside it.",
-        f"{CHOICE}: one test for each change that is named",
+        "Level of a test that is not one of many: that a change comes and goes, by a curve over time beside it; that a "
+        "law of which each wheel has its own coefficients acts on more than one wheel.",
+        f"{CHOICE}: one test for each effect that is named",
     )
