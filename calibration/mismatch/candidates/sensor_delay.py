@@ -45,6 +45,10 @@ class SensorDelay(Candidate):
     errors: `passed` is the share of the predicted change that was recorded, 1 ± 0.2 before the recording and from a
     half to two after it. The delay of an input costs a run of the simulation, and only follows the fit until both
     agree.
+
+    A delay of less than 1.25 readings has no name, since a sampled input does not say what it was between two readings:
+    what it changes stays unexplained. `shape.late` is the column that is late; the effect's `channel` is the predicted
+    one, in which that shows.
     """
 
     name = "sensor-delay"

@@ -31,6 +31,8 @@ LINEAR_TO = 1e-6
 """Share of a covariate's change that may be no linear function of a channel which sets it: rounding."""
 LEAST_RESPONSE = 1e-3
 """Relative change of a prediction below which a channel does not set it (a choice)."""
+SAME_SHARE = 0.95
+"""Share of the sampled rows whose prediction is the same in any order, where there is no state (a choice)."""
 SAMPLED_ROWS = 64
 """Rows that are predicted alone, to see whether a prediction depends on the rows before."""
 ROUNDING = 1e-6
@@ -102,7 +104,8 @@ def usual_inputs(problem: Problem) -> dict[str, Array]:
 def predicts_row_by_row(problem: Problem) -> bool:
     """Return whether a prediction depends on its own row alone, so that any inputs can be put together.
 
-    Some rows are predicted in the reverse order, at ascending times: what integrates over time gives something else.
+    Some rows are predicted in the reverse order, at ascending times: what integrates over time gives something else
+    nearly everywhere. Few may differ: `direction_of` has the noise at standstill of the rows that it is given.
     """
     rows = np.unique(np.linspace(0, len(problem.mask) - 1, SAMPLED_ROWS).astype(np.int64))
     inputs = {name: values[rows[::-1]] for name, values in complete_inputs(problem.recording).items()}
@@ -112,7 +115,7 @@ def predicts_row_by_row(problem: Problem) -> bool:
         alone = problem.simulation.predict(inputs, values)[::-1]
     known = problem.mask[rows]
     apart = np.abs(alone - (problem.prediction - problem.added)[rows])[known]
-    return bool(np.all(apart <= ROUNDING * max(problem.mean_size, 1e-300)))
+    return bool(np.mean(apart <= ROUNDING * max(problem.mean_size, 1e-300)) >= SAME_SHARE)
 
 
 def _probed(problem: Problem, medians: Mapping[str, Array], channel: str) -> tuple[Array, dict[str, Array]]:
