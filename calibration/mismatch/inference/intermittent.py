@@ -45,7 +45,8 @@ def unexplained_if_intermittent(decision: Decision) -> Decision:
     told = {wheel for term in curves for wheel in term.wheels}
     named = equations.fit([term for term in decision.named.terms if not _constant_on(term, told)])
     unnamed = (*decision.unnamed, *curves)
-    return replace(decision, named=named, unnamed=unnamed, whole=equations.fit((*named.terms, *unnamed)))
+    whole = equations.fit((*named.terms, *unnamed))
+    return replace(decision, named=named, unnamed=unnamed, whole=whole, intermittent=tuple(curves))
 
 
 def skewed_wheels(decision: Decision) -> list[int]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.inference.alternatives import Alternative
+    from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
@@ -28,12 +29,18 @@ TOLD = 3
 def decided_by_evidence(decision: Decision) -> bool:
     """Return whether each curve of what is unexplained scores as much as an effect must, to enter.
 
-    Else it stands for another finding, and the evidence says nothing of how probable the answer is.
+    Else it stands for another finding, and the evidence says nothing of how probable the answer is: one that stands for
+    what comes and goes has to score as a curve that is told for its own sake.
     """
     equations, whole = decision.equations, decision.whole
-    least = equations.score(whole) - decision.entry_threshold
+    told = equations.score(whole)
+
+    def gain(curve: Term) -> float:
+        return told - equations.score(equations.fit([term for term in whole.terms if term is not curve]))
+
+    on_its_own = equations.thresholds.smooth_term_entry
     return all(
-        least > equations.score(equations.fit([term for term in whole.terms if term is not curve]))
+        gain(curve) > (on_its_own if curve in decision.intermittent else decision.entry_threshold)
         for curve in decision.unnamed
     )
 

@@ -23,9 +23,14 @@ def coefficient_signs(candidate: Candidate, count: int) -> tuple[int, ...]:
 
 
 def implausibility(problem: Problem, candidate: Candidate, shape: Shape) -> float:
-    """Return the Δχ² that a candidate must gain for being hardly possible on this machine, or in this shape."""
+    """Return the Δχ² that a candidate must gain for being hardly possible on this machine, or in this shape.
+
+    Beside effects that the simulation was corrected by, what is new is charged: that these changed is more likely.
+    """
     unlikely = candidate.name in problem.simulation.unlikely_effects
-    return candidate.prior_penalty(problem, shape) + (problem.thresholds.unlikely_penalty if unlikely else 0.0)
+    new = bool(problem.stated) and not candidate.stated_size
+    charged = problem.thresholds.unlikely_penalty * unlikely + problem.thresholds.new_effect_penalty * new
+    return candidate.prior_penalty(problem, shape) + charged
 
 
 def with_candidate(

@@ -54,9 +54,7 @@ def _that_one_wheel_shows_alone(equations: NormalEquations, found: Sequence[Scor
         elif key not in shared or gain > shared[key][0]:
             shared[key] = gain, term
     return {
-        key
-        for key, (gain, term) in shared.items()
-        if key in alone and gain - alone[key] < _by_chance(equations, term)
+        key for key, (gain, term) in shared.items() if key in alone and gain - alone[key] < _by_chance(equations, term)
     }
 
 

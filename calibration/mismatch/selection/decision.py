@@ -44,6 +44,7 @@ class Decision:
     named: fit of the named effects
     unnamed: smooth terms that nothing named explains
     whole: fit of both together
+    intermittent: those of the smooth terms that stand for what comes and goes, which no curve describes
     """
 
     equations: NormalEquations
@@ -52,6 +53,7 @@ class Decision:
     named: Fit
     unnamed: tuple[Term, ...]
     whole: Fit
+    intermittent: tuple[Term, ...] = ()
 
 
 def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decision:

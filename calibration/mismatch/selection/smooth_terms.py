@@ -204,4 +204,3 @@ def drop_transients(equations: NormalEquations, named: Fit) -> Fit:
         if max(shares, default=0.0) < equations.thresholds.form_misfit:
             kept.append(term)
     return named if len(kept) == len(named.terms) else equations.fit(kept)
-

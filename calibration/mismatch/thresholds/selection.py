@@ -43,6 +43,11 @@ class SelectionThresholds:
         "Penalty, in Δχ², of one wheel (or some) for an effect that all wheels may have.",
         f"{CHOICE}: prior odds of about 20 to 1 (2 ln 20) that what all wheels are built with is on all",
     )
+    new_effect_penalty: float = threshold(
+        9.2,
+        "Penalty, in Δχ², of an effect that is new beside those which the simulation was corrected by.",
+        f"{CHOICE}: odds of 100 to 1 (2 ln 100) that a known effect has changed, against one new one of many",
+    )
     unlikely_penalty: float = threshold(
         9.2,
         "Penalty, in Δχ², of an effect that the simulation calls unlikely on its machine.",

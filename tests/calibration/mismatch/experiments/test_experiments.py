@@ -11,7 +11,7 @@ import pytest
 import rover_drives
 from linear_machine import AXES, NOISE, STEP_S, Drag, Level, Power, equations_of, problem_of, table, term_of
 
-from regolithd.calibration.mismatch import from_columns
+from regolithd.calibration.mismatch import direction_of, from_columns
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.experiments.choice import experimenter_of
@@ -124,6 +124,19 @@ def test_a_simulation_with_a_state_is_not_predicted() -> None:
     experimenter = experimenter_of(equations_of(problem, (Drag(),)), THRESHOLD)
     assert experimenter.drives is None
     assert experimenter.unpredictable == "the simulation has a state, which depends on what was before"
+
+
+def test_a_direction_of_a_noisy_speed_is_no_state() -> None:
+    """`direction_of` estimates the noise at standstill from the rows that it is given: few of them differ."""
+
+    class Rolling(Warm):
+        def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+            return values["level"] + 0.5 * direction_of(inputs["speed_rad_s"])
+
+    columns = table()
+    noise = np.random.default_rng(3).normal(0, 0.002, columns["speed_rad_s"].shape)
+    columns = {**columns, "speed_rad_s": columns["speed_rad_s"] + noise, "motor_degC": 20 + 0 * noise}
+    assert predicts_row_by_row(build_problem(from_columns(columns, unit="axis"), Rolling()))
 
 
 def test_a_simulation_that_refuses_a_drive_has_no_predicted_experiment() -> None:

@@ -14,12 +14,18 @@ from regolithd.calibration.mismatch.changes import (
     SECANT_CHANGE,
     ChangedSize,
     change_in_words,
+    corrected_problem,
     direction_of,
     stated_in,
+    with_changes,
 )
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.regression.candidate_groups import implausibility
+from regolithd.calibration.mismatch.regression.equations import equations_of
+from regolithd.calibration.mismatch.regression.group import Term
+from regolithd.calibration.mismatch.selection.law_misfit import explained
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -241,3 +247,33 @@ def replace_force(recording: Recording, more_N: Array) -> Recording:
     """Return a recording with more force, shape (time, 1)."""
     columns = {name: values[:, 0] for name, values in recording.channels.items()}
     return from_columns({**columns, "t_s": recording.time_s, "force_N": columns["force_N"] + more_N[:, 0]})
+
+
+def test_beside_a_corrected_effect_what_is_new_is_charged() -> None:
+    """That the known friction changed is more likely than that another loss began."""
+    recording = moving(1, 0.9)
+    stated = stated_in(library(), [COULOMB], [])
+    problem = corrected_problem(build_problem(recording, Axis()), stated)
+    known = next(each for each in with_changes(problem, library(), stated) if each.name == "coulomb-friction")
+    other = next(each for each in library() if each.name == "quadratic-drag")
+    charged = problem.thresholds.new_effect_penalty
+    assert implausibility(problem, other, {}) == charged > 0
+    assert implausibility(problem, known, {}) == 0
+    assert implausibility(build_problem(recording, Axis()), other, {}) == 0
+
+
+def test_a_law_s_misfit_is_of_the_whole_effect() -> None:
+    """A corrected effect that is half as large again explains (1 + 1/2)² of its energy, not a quarter of it."""
+    recording = moving(1, 0.75)
+    stated = stated_in(library(), [COULOMB], [])
+    problem = corrected_problem(build_problem(recording, Axis()), stated)
+    equations, _ = equations_of(problem, with_changes(problem, (), stated))
+    (group,) = [each for each in equations.design.groups if each.named]
+    fit = equations.fit([Term(group, (0,))])
+    size = fit.coefficients[-1] / equations.design.scale[group.columns[0]]
+    assert size == pytest.approx(0.5, abs=0.1)
+    place = equations.nuisance.names.index("coulomb-friction as corrected")
+    held = equations.with_nuisance(equations.nuisance.with_precision(place, 1e12))
+    gained = held.fit([Term(group, (0,))]).delta_chi2
+    beyond = explained(equations, fit) - fit.delta_chi2
+    assert beyond == pytest.approx(gained * ((1 + size) ** 2 - size**2) / size**2, rel=0.1)

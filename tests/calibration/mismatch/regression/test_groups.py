@@ -13,7 +13,12 @@ from regolithd.calibration.mismatch.regression.candidate_groups import coefficie
 from regolithd.calibration.mismatch.regression.discrepancy_basis import discrepancy_basis
 from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
 from regolithd.calibration.mismatch.regression.residuals import active_rms, contribution
-from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, with_periodic_terms, with_smooth_terms
+from regolithd.calibration.mismatch.regression.smooth_groups import (
+    PERIODIC,
+    has_smooth_term,
+    with_periodic_terms,
+    with_smooth_terms,
+)
 
 if TYPE_CHECKING:
     from linear_machine import Array
@@ -138,3 +143,13 @@ def test_columns_say_on_which_wheels_they_act() -> None:
     np.testing.assert_array_equal(alone.acting, [[True, False], [False, False]])
     _, (single,) = with_candidate(design_of(problem), Power(), [{"power": 1.0}])
     assert single.acting is None
+
+
+@pytest.mark.parametrize(("passes", "curve"), [(1, False), (2, False), (5, True)])
+def test_a_place_that_is_passed_again_is_more_than_another_name_of_the_time(passes: int, curve: bool) -> None:
+    """A curve over it is tried where the way is at least three times the range of places."""
+    there_and_back = np.abs((np.linspace(0, passes, INSTANTS) + 1) % 2 - 1)
+    place = 100 * np.stack([there_and_back, np.full(INSTANTS, np.nan)], axis=1)
+    problem = replace(PROBLEM, covariates={**PROBLEM.covariates, "place": place})
+    assert has_smooth_term(problem, "place") == curve
+    assert not has_smooth_term(problem, "wheel_angle")

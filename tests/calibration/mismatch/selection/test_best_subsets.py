@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
-from linear_machine import equations_of, group_of, problem_of, table, term_of
+from linear_machine import INSTANTS, Array, Power, equations_of, group_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
@@ -22,6 +22,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
 )
 
 if TYPE_CHECKING:
+    from regolithd.calibration.mismatch import Problem, Shape
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 
@@ -130,3 +131,27 @@ def test_a_further_effect_must_gain_a_share_of_what_the_others_gained(equations:
     one, both = subsets[1], subsets[2]
     more, less = (strict.fit([term_of(strict, t.name, t.wheels) for t in fit.terms]) for fit in (both, one))
     assert not passes_entry_test(strict, more, less, 8.0)
+
+
+class OfEachAxis(Power):
+    """A column of each axis's own."""
+
+    sharing: ClassVar = ("all", "one")
+
+    def columns(self, problem: Problem, shape: Shape) -> Array:
+        """Return |ω|^p of one axis after the other."""
+        (both,) = super().columns(problem, shape)
+        return np.stack([np.where(np.arange(2) == axis, both, 0.0) for axis in range(2)])
+
+
+@pytest.mark.parametrize(("on", "found"), [((0.6, 0.0), (0,)), ((0.0, 0.6), (1,)), ((0.6, 0.4), (0, 1))])
+def test_a_law_of_each_axis_s_own_is_on_several_only_where_they_show_it(
+    on: tuple[float, float], found: tuple[int, ...]
+) -> None:
+    """One coefficient more gains a little by chance."""
+    columns = table()
+    speed = columns["speed_rad_s"].reshape(INSTANTS, 2)
+    reading = columns["reading_V"].reshape(INSTANTS, 2) + np.array(on) * np.abs(speed)
+    equations = equations_of(problem_of({**columns, "reading_V": reading.ravel()}), (OfEachAxis(),))
+    ((_, term),) = best_of_each_candidate(equations, ())
+    assert term.wheels == found
