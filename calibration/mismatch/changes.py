@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.answer import Change, Contribution
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.candidates.motion import TRANSITION, transition_of
+from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of, lateness
 from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw
 from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
@@ -114,7 +115,7 @@ class Stated:
                 "record it, or take the effect out of the file"
             )
         try:
-            return self.candidate.columns(known, self.candidate.self_consistent_shape(known, shape, coefficients))
+            return columns_of(known, self.candidate, self.candidate.self_consistent_shape(known, shape, coefficients))
         except KeyError as error:
             raise SimulationError(
                 f"[[effects]] {name}: its shape lacks {error}; find the effect again with --corrected"
@@ -126,6 +127,7 @@ class ChangedSize(Candidate):
 
     coefficients: ClassVar = (Coefficient(RELATIVE_CHANGE, "1", 0),)
     stated_size = 1.0
+    late_with_channel = False  # its columns are made as shown
 
     def __init__(self, stated: Stated, place: int) -> None:
         of = stated.candidate
@@ -219,6 +221,9 @@ def _merged(effects: Sequence[Contribution]) -> list[Contribution]:
 
 def corrected_problem(problem: Problem, stated: Sequence[Stated]) -> Problem:
     """Return the problem whose prediction has the effects, with how well the size of each is known."""
+    channel = problem.simulation.channel
+    late = [lateness(each.contribution.name, channel, each.contribution.shape) for each in stated]
+    problem = replace(problem, late=next((each for each in late if each), None))
     effects = tuple(
         StatedEffect(
             name=each.contribution.name,

@@ -40,10 +40,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 
-SEARCHES = 2
-"""Searches at most (a choice): the second where the effects that were found move the parameters far."""
-
-
 @dataclass(frozen=True)
 class Comparison:
     """The answer, the arrays behind it, and the simulation; a notebook shows it as the report."""
@@ -204,15 +200,18 @@ def _search(
     pose: Callable[[Mapping[str, float] | None], Problem],
     progress: Callable[[str], None],
 ) -> _Search:
-    """Search, and once more where the effects that were found move the parameters far."""
-    for _ in range(SEARCHES - 1):
-        found = _search_at(problem, candidates, progress)
-        values = moved_values(found.decision.equations, found.decision.whole)
-        if not bent(problem, values):
-            return found
+    """Search, and once more where what was found moves the parameters far, or makes all else late with the channel."""
+    found = _search_at(problem, candidates, progress)
+    values = moved_values(found.decision.equations, found.decision.whole)
+    if bent(problem, values):
         del found  # memory holds the matrix of one search at a time
         problem = pose(values)
-    return _search_at(problem, candidates, progress)
+        found = _search_at(problem, candidates, progress)
+    late = found.decision.late
+    if late is None or late == problem.late:
+        return found
+    again = _search_at(replace(problem, late=late), candidates, progress)
+    return again if again.decision.late else found
 
 
 def _search_at(problem: Problem, candidates: Sequence[Candidate], progress: Callable[[str], None]) -> _Search:

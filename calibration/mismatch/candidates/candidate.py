@@ -134,6 +134,8 @@ class Candidate:
     `_degC`, `_rad_s`; without one of these it has none."""
     shape_priors: ClassVar[Mapping[str, tuple[float, float]]] = {}
     """Mean and standard deviation of those of them that are known before the recording."""
+    late_with_channel: ClassVar[bool] = True
+    """Whether it shows later where the predicted channel is late: all do but the delay itself."""
     stated_size: ClassVar[float] = 0.0
     """The coefficient that the prediction has already: that of a change of a corrected effect is relative to it."""
     change_point: ClassVar[str] = "onset_s"

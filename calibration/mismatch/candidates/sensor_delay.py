@@ -46,6 +46,9 @@ class SensorDelay(Candidate):
     half to two after it. The delay of an input costs a run of the simulation, and only follows the fit until both
     agree.
 
+    What acts on the machine shows as late as the predicted channel is: once that is named, all else is searched for
+    again, late by as much.
+
     A delay of less than 1.25 readings has no name, since a sampled input does not say what it was between two readings:
     what it changes stays unexplained. `shape.late` is the column that is late; the effect's `channel` is the predicted
     one, in which that shows.
@@ -60,6 +63,7 @@ class SensorDelay(Candidate):
     source = "filters, buses and polling: a first-order filter delays slow changes by its time constant"
     along_motion = False
     imitated_over = "none"
+    late_with_channel = False
     forms = ("dead time", "first-order filter")
     coefficients: ClassVar = (Coefficient("delay_s", "s", 1),)
     free: ClassVar = {"secant_s": (0.0, float("inf")), "filter_s": (0.0, float("inf"))}
@@ -227,3 +231,24 @@ OF_CHANNEL: Mapping[str, Callable[[Recording, Array, float], Array]] = {
     "filter_s": filtered,
 }
 """What delays the predicted channel, by the shape parameter that holds the delay: dead time, or a filter."""
+
+
+def columns_of(problem: Problem, candidate: Candidate, shape: Shape) -> Array:
+    """Return a candidate's columns as the predicted channel shows them: late where it is late."""
+    columns = np.asarray(candidate.columns(problem, shape), np.float64)
+    return as_shown(problem, columns) if candidate.late_with_channel else columns
+
+
+def as_shown(problem: Problem, columns: Array) -> Array:
+    """Return what acts on the machine, shape (column, time, wheel), when the predicted channel shows it."""
+    if problem.late is None or not len(columns):
+        return columns
+    kind, delay = problem.late
+    return np.stack([np.nan_to_num(OF_CHANNEL[kind](problem.recording, column, delay)) for column in columns])
+
+
+def lateness(name: str, channel: str, shape: Shape) -> tuple[str, float] | None:
+    """Return how an effect makes a predicted channel late, and by how much [s]; None where it does not."""
+    if name != SensorDelay.name or shape.get("late") != channel:
+        return None
+    return next(((kind, float(shape[kind])) for kind in OF_CHANNEL if kind in shape), None)

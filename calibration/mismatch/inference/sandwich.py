@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.regression.as_read import columns_on_wheels
 from regolithd.calibration.mismatch.regression.discrepancy_basis import discrepancy_basis
 from regolithd.calibration.mismatch.regression.residuals import whitened_residual_of
@@ -116,8 +117,8 @@ def _shape_slopes(equations: NormalEquations, fit: Fit) -> Iterator[tuple[ShapeS
             if name not in shape or name == candidate.change_point:
                 continue
             step = equations.thresholds.slope_step * (high - low)
-            changed = candidate.columns(problem, {**shape, name: float(shape[name]) + step})
-            slope = np.einsum("c,ctw->tw", values, changed - candidate.columns(problem, shape)) / step
+            changed = columns_of(problem, candidate, {**shape, name: float(shape[name]) + step})
+            slope = np.einsum("c,ctw->tw", values, changed - columns_of(problem, candidate, shape)) / step
             on = np.zeros(slope.shape[1])
             on[list(term.wheels)] = 1
             slope = np.where(problem.mask, slope, 0.0) * on

@@ -72,6 +72,8 @@ class Problem:
     side, row: each wheel's place on the machine, or None
     thresholds: the numbers that decide
     made: what candidates have computed, for use again: a cache, by name and step
+    late: how the predicted channel is late, by `sensor_delay.OF_CHANNEL`, and by how much [s]: what acts on the machine
+        shows so much later; None: it is not, or it is not known yet
     """
 
     recording: Recording
@@ -89,6 +91,7 @@ class Problem:
     stated: tuple[StatedEffect, ...] = ()
     thresholds: Thresholds = THRESHOLDS
     made: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)
+    late: tuple[str, float] | None = None
 
     @property
     def time_s(self) -> Array:

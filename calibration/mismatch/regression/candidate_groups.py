@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.regression.group import Group
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def with_candidate(
     problem, groups = design.problem, []
     selected_from_many = 2 * float(np.log(candidate.shape_count(problem)))
     for shape, reduction in zip(shapes, noise_reductions or [1.0] * len(shapes), strict=True):
-        found = np.asarray(candidate.columns(problem, shape), np.float64)
+        found = columns_of(problem, candidate, shape)
         design, places = design.extended(list(found))
         groups.append(
             Group(

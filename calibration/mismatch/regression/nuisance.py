@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.problem.prior import own_name
 
 if TYPE_CHECKING:
@@ -94,12 +95,14 @@ def tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
     """Return names, prior standard deviations and tangents, shape (time, wheel) each."""
     simulation, wheels = problem.simulation, problem.recording.wheels
     free = {name: prior.std for name, prior in simulation.parameters.items() if prior.std > 0}
-    names, stds, found = list(free), list(free.values()), [problem.tangent(name) for name in free]
+    shown = as_shown(problem, np.array([problem.tangent(name) for name in free]))
+    names, stds, found = list(free), list(free.values()), list(shown)
+    of_parameter = dict(zip(names, found, strict=True))
     for name in free if len(wheels) > 1 else ():
         if name in simulation.own_to_each_wheel:
             names += [own_name(name, wheel) for wheel in wheels]
             stds += [problem.thresholds.own_share * free[name]] * len(wheels)
-            found += [np.where(np.array(wheels) == wheel, problem.tangent(name), 0.0) for wheel in wheels]
+            found += [np.where(np.array(wheels) == wheel, of_parameter[name], 0.0) for wheel in wheels]
     uncertain = [effect for effect in problem.stated if effect.relative_std > 0]
     names += [stated_name(effect.name) for effect in uncertain]
     stds += [effect.relative_std for effect in uncertain]

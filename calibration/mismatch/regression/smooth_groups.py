@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.regression.group import Group
 from regolithd.calibration.mismatch.signal.hat_basis import FEWEST_KNOTS, hat_functions
 from regolithd.calibration.mismatch.signal.spectrum import padded_length, power_of_sums
@@ -105,7 +106,7 @@ def _with_group(
     selection_penalty: float = 0.0,
 ) -> DesignMatrix:
     """Add columns of either sign as one group."""
-    design, places = design.extended(columns)
+    design, places = design.extended(list(as_shown(design.problem, np.asarray(columns, np.float64))))
     if not places:
         return design
     group = Group(

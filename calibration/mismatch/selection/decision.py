@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.candidates.sensor_delay import lateness
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.candidate_groups import with_candidate
 from regolithd.calibration.mismatch.regression.residuals import residual_of
@@ -54,6 +55,13 @@ class Decision:
     unnamed: tuple[Term, ...]
     whole: Fit
     intermittent: tuple[Term, ...] = ()
+
+    @property
+    def late(self) -> tuple[str, float] | None:
+        """How the predicted channel is late by a named effect, and by how much [s]; None: it is not."""
+        channel = self.equations.problem.simulation.channel
+        told = (lateness(term.name, channel, term.group.shape) for term in self.named.terms)
+        return next((each for each in told if each), None)
 
 
 def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decision:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.regression.candidate_groups import coefficient_signs, with_candidate
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.normal_equations import membership
@@ -85,7 +86,7 @@ class ShapeProfile:
         return (rows @ self.left).astype(np.float64), schur_complement(own, cross.T, self.inverse), own
 
     def _weighted_rows(self, shape: Shape) -> Single:
-        columns = np.asarray(self.candidate.columns(self.equations.problem, shape), np.float64)
+        columns = columns_of(self.equations.problem, self.candidate, shape)
         fresh = _fitted(self.equations, self.equations.design.whitened_readings(columns, self.wheels))
         return (fresh * _root_weights(self.equations, self.wheels)).reshape(len(fresh), -1)
 

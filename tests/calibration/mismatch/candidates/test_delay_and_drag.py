@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import sys
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -10,9 +12,11 @@ import pytest
 from regolithd.calibration.mismatch import Prior, Simulation, compare
 from regolithd.calibration.mismatch.candidates.sensor_delay import shifted
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.simulation.load import load_simulation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -38,7 +42,7 @@ class Axis(Simulation):
         return {"wheel_speed": inputs["speed_rad_s"], "time": inputs["t_s"]}
 
 
-def swinging(seed: int, quadratic: float = 0.0, delay_s: float = 0.0) -> Recording:
+def swinging(seed: int, quadratic: float = 0.0, delay_s: float = 0.0, coulomb: float = 0.0) -> Recording:
     """Return four minutes of a joint that swings, under autocorrelated noise of a tenth of the mean current."""
     generator = np.random.default_rng(seed)
     time_s = STEP_S * np.arange(12000)
@@ -46,7 +50,7 @@ def swinging(seed: int, quadratic: float = 0.0, delay_s: float = 0.0) -> Recordi
     angle = sum(size * np.sin(2 * np.pi * f * time_s + phase) / (1 + 2 * f) for f, size, phase in waves)
     speed = np.gradient(angle, STEP_S)
     acceleration = np.gradient(speed, STEP_S)
-    current = 0.5 * acceleration + 0.2 * speed + quadratic * speed * np.abs(speed)
+    current = 0.5 * acceleration + 0.2 * speed + quadratic * speed * np.abs(speed) + coulomb * np.sign(speed)
     late = np.interp(time_s - delay_s, time_s, current)
     noise = np.convolve(generator.normal(0, 1, len(time_s) + 7), np.ones(8) / np.sqrt(8), "valid")
     measured = late + 0.1 * np.mean(np.abs(current)) * noise
@@ -65,6 +69,38 @@ def test_a_late_current_is_named_with_its_delay(delay_s: float) -> None:
     found = answer_to(swinging(1, delay_s=delay_s))
     assert [effect.name for effect in found.effects] == ["sensor-delay"]
     assert found.effects[0].parameters["delay_s"].value == pytest.approx(delay_s, abs=STEP_S)
+
+
+def late_with_friction(seed: int) -> Recording:
+    """Return a joint with friction, of which the current is late by a quarter of a second."""
+    return swinging(seed, delay_s=0.25, coulomb=0.3)
+
+
+def test_what_else_acts_is_late_with_the_channel() -> None:
+    """Friction that is late by twelve readings has its size, and the parameters stay where they are."""
+    found = answer_to(late_with_friction(3))
+    effects = {effect.name: effect.parameters for effect in found.effects}
+    assert effects.keys() == {"sensor-delay", "coulomb-friction"}
+    assert effects["sensor-delay"]["delay_s"].value == pytest.approx(0.25, abs=0.2 * STEP_S)
+    friction = effects["coulomb-friction"]["coulomb_current"]
+    assert friction.low < 0.3 < friction.high
+    assert all(each.prior_stds_away < 2 for each in found.parameters)
+    assert found.fit.held_out_rmse_after < 1.02 * found.fit.noise_floor_rmse
+
+
+def test_a_corrected_delay_makes_a_later_recording_s_friction_late_too(tmp_path: Path) -> None:
+    """Nothing has changed in it; with more friction it is that which has grown."""
+    (tmp_path / "joint.py").write_text(inspect.getsource(sys.modules[__name__]))
+    (tmp_path / "SIM.toml").write_text('[simulation]\nmodel = "joint:Axis"\n')
+    first = compare(late_with_friction(3), load_simulation(tmp_path / "SIM.toml"))
+    first.write_corrected(tmp_path / "NEW.toml")
+    corrected = load_simulation(tmp_path / "NEW.toml")
+    assert compare(late_with_friction(4), corrected).answer.verdict == "consistent"
+    grown = compare(swinging(5, delay_s=0.25, coulomb=0.5), corrected).answer
+    assert grown.effects == ()
+    (change,) = grown.changes
+    assert change.name == "coulomb-friction"
+    assert change.low < 0.5 < change.high
 
 
 def test_drag_with_the_square_of_speed_is_not_called_viscous() -> None:
