@@ -34,6 +34,9 @@ ONE_STD_QUANTILE = 0.6827
 """Quantile of a normal magnitude at one standard deviation."""
 ALTERNATING_MEDIAN = 3.01
 """Median of |x| + 2|y| + |z| of three normal values, in standard deviations: of second differences that alternate."""
+ALTERNATING_SHARE = 0.15
+"""Share of the highest usual speed below which what alternates is noise (a choice: with three standard deviations of a
+noise that reaches further, hardly a start or stop would be left)."""
 FEWEST_ALTERNATIONS = 3
 """Alternations about 0 from which they are noise (a choice: one may be a machine that was nudged)."""
 LONGEST_STEP = 3.0
@@ -83,22 +86,28 @@ def _noise_at_standstill(speed: Array) -> float:
     """Return the reach of a speed's noise (time,) about zero, by its second differences while it is slow.
 
     These are free of a constant speed and of a ramp through zero. Where most of a standstill is exactly 0 (a dead
-    band, a speed that is set to 0 while a brake holds), the noise is that of what alternates about 0: +, −, +, as only
-    noise does. At most the share of the usual speed that is slow.
+    band, a speed that is set to 0 while a brake holds), and where the noise reaches further than what is slow, it is
+    that of what alternates about 0: +, −, +, as only noise does. At most the share of the usual speed in either case.
     """
     known = speed[np.isfinite(speed)]
-    slow_below = SLOW_SHARE * float(np.quantile(np.abs(known), USUAL_SPEED_QUANTILE)) if known.size else 0.0
-    slow = np.abs(speed) < slow_below
-    inside = slow[:-2] & slow[1:-1] & slow[2:]
-    if not inside.any():
-        return 0.0
-    second = np.abs(np.diff(speed, 2))
-    deviation = float(np.quantile(second[inside], ONE_STD_QUANTILE)) / np.sqrt(6)  # variance 1 + 4 + 1
-    turned = speed[:-1] * speed[1:] < 0
-    alternating = inside & turned[:-1] & turned[1:]
+    usual = float(np.quantile(np.abs(known), USUAL_SPEED_QUANTILE)) if known.size else 0.0
+    second, turned = np.abs(np.diff(speed, 2)), speed[:-1] * speed[1:] < 0
+    slow = _thrice_below(speed, SLOW_SHARE * usual)
+    reach = 0.0
+    if slow.any():
+        deviation = float(np.quantile(second[slow], ONE_STD_QUANTILE)) / np.sqrt(6)  # variance 1 + 4 + 1
+        reach = min(STANDSTILL_DEVIATIONS * deviation, SLOW_SHARE * usual)
+    alternating = _thrice_below(speed, ALTERNATING_SHARE * usual) & turned[:-1] & turned[1:]
     if alternating.sum() >= FEWEST_ALTERNATIONS:
-        deviation = max(deviation, float(np.median(second[alternating])) / ALTERNATING_MEDIAN)
-    return min(STANDSTILL_DEVIATIONS * deviation, slow_below)
+        deviation = float(np.median(second[alternating])) / ALTERNATING_MEDIAN
+        reach = max(reach, min(STANDSTILL_DEVIATIONS * deviation, ALTERNATING_SHARE * usual))
+    return reach
+
+
+def _thrice_below(speed: Array, limit: float) -> NDArray[np.bool_]:
+    """Return where three readings one after the other are slower than a limit, shape (time − 2,)."""
+    below = np.abs(speed) < limit
+    return below[:-2] & below[1:-1] & below[2:]
 
 
 def quantity(channel: str) -> str:

@@ -34,6 +34,15 @@ def test_noise_at_standstill_is_no_direction() -> None:
     np.testing.assert_array_equal(found[true != 0], np.sign(true[true != 0]))
 
 
+@pytest.mark.parametrize("noise", [0.1, 0.25, 0.4])
+def test_noise_of_a_few_percent_of_the_usual_speed_is_no_direction(noise: float) -> None:
+    """Its three standard deviations reach beyond a twentieth of that speed."""
+    true = moves()
+    found = direction_of(true + np.random.default_rng(1).normal(0, noise, true.shape))
+    assert np.mean(found[true == 0] != 0) < 0.01
+    np.testing.assert_array_equal(found[true != 0], np.sign(true[true != 0]))
+
+
 def test_noise_shows_beside_a_standstill_that_is_set_to_zero() -> None:
     """While a brake holds the speed is exactly 0; before it does, the sensor's noise alternates."""
     true = moves()
