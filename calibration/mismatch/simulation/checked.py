@@ -69,7 +69,8 @@ class CheckedSimulation(Simulation):
             for name, values in prepared.channels.items()
         }
         self._check_needed(channels, columns)
-        return replace(prepared, channels=channels).with_notes(*unrecorded(self.inner, channels))
+        notes = unrecorded(self.inner, type(self.inner).sensors, channels)
+        return replace(prepared, channels=channels).with_notes(*notes)
 
     def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
         """Return the predicted channel, shape (time, wheel)."""

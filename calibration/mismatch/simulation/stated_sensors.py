@@ -11,23 +11,38 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
 from regolithd.calibration.mismatch.problem.covariates import quantity
+from regolithd.calibration.mismatch.problem.predictor import Predictor
 from regolithd.calibration.mismatch.problem.prior import SensorError
 from regolithd.calibration.mismatch.simulation.stated_priors import SENSORS, finite_number, names_parameter
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
 
-    from regolithd.calibration.mismatch.simulation.simulation import Simulation
-
 EXAMPLE = "write speed_std_rad_s = 0.02 for the column speed_rad_s, or load_relative_std = 0.02 for load_N"
 KEY = re.compile(r"(?P<quantity>.+?)(?:_(?P<relative>relative))?_std(?:_(?P<unit>.+))?")
 
 
-def stated_sensors(tables: Mapping[str, Any], simulation: Simulation) -> Mapping[str, SensorError]:
+class WithSensors(Predictor, Protocol):
+    """A simulation as it is loaded from a SIM.toml."""
+
+    @property
+    def channels(self) -> Mapping[str, str]:
+        """Predicted columns with their units, where there are several."""
+
+    @property
+    def own_tables(self) -> tuple[str, ...]:
+        """Tables of SIM.toml that the simulation reads itself."""
+
+    @property
+    def stated(self) -> Mapping[str, Any]:
+        """SIM.toml's tables."""
+
+
+def stated_sensors(tables: Mapping[str, Any], simulation: WithSensors) -> Mapping[str, SensorError]:
     """Return the errors of inputs by column: the simulation's own, with those of `[sensors]` in their place.
 
     Parameters
@@ -53,14 +68,14 @@ def stated_sensors(tables: Mapping[str, Any], simulation: Simulation) -> Mapping
     return {**simulation.sensors, **{column: SensorError(**kinds) for column, kinds in stated.items()}}
 
 
-def unrecorded(simulation: Simulation, columns: Collection[str]) -> list[str]:
-    """Return notes of columns that `[sensors]` names and that are neither recorded nor derived."""
+def unrecorded(simulation: WithSensors, of_class: Collection[str], columns: Collection[str]) -> list[str]:
+    """Return notes of columns that `[sensors]` names, and not the class, and that are neither recorded nor derived."""
     if SENSORS not in simulation.stated:
         return []
     return [
         f"[{SENSORS}] states an error of {name}, a column that nobody recorded; {did_you_mean(name, columns)}"
         for name in simulation.sensors
-        if name not in {*type(simulation).sensors, *columns}
+        if name not in {*of_class, *columns}
     ]
 
 

@@ -85,7 +85,7 @@ def test_a_mistake_is_told_with_the_cure(key: str, value: object, told: str) -> 
 
 
 def test_a_column_that_nobody_recorded_is_noted() -> None:
-    """It may be misspelt; a recording may also lack the sensor. What the class states is not noted."""
+    """It may be misspelt, or a recording lacks the sensor; what the class states is not noted."""
     time_s = np.arange(5.0)
     columns = dict.fromkeys(("torque_Nm", "speed_rad_s", "load_N", "opening"), time_s + 1)
     recording = from_columns({"t_s": time_s, **columns})
