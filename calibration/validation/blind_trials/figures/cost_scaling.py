@@ -168,7 +168,8 @@ def write_long(trial: Trial, folder: Path) -> None:
 def picture(found: list[Cost]) -> str:
     """Draw seconds and MiB over rows, seconds over candidates, and over workers where these were measured."""
     most = max(cost.candidates for cost in found)
-    by_rows = [(cost.rows / 1000, cost.cpu_s, cost.memory_MiB) for cost in found if cost.candidates == most]
+    all_cores = {cost.rows: cost for cost in found if cost.candidates == most}  # the last of each is on most cores
+    by_rows = [(rows / 1000, cost.cpu_s, cost.memory_MiB) for rows, cost in all_cores.items()]
     full = max(cost.rows for cost in found if cost.candidates < most)
     by_count = sorted((float(cost.candidates), cost.cpu_s) for cost in found if cost.rows == full)
     several = {cost.rows for cost in found if cost.workers > 1}
@@ -183,10 +184,12 @@ def picture(found: list[Cost]) -> str:
     parts = [STYLE]
     for at, (across, up, points, limit) in enumerate(panels):
         wide = 1.1 * max(x for x, _ in points)
-        panel = Panel(62 + 280 * at, 24, 200, 150, (0, wide), (0, 1.15 * max(limit, *(y for _, y in points))))
+        top = 1.15 * max(limit, *(y for _, y in points))
+        panel = Panel(62 + 280 * at, 24, 200, 150, (0, wide), (0, top))
         parts += [box(panel), axes(panel, across, "", x_about=4), text(panel.left, 15, up)]
         parts.append(line([(panel.at_x(x), panel.at_y(limit)) for x in (0, wide)], "zero"))
-        parts.append(text(panel.left + 196, panel.at_y(limit) - 4, GOALS[limit], anchor="end"))
+        beside = 13 if limit > top / 4 else -4  # below its line, where there is room
+        parts.append(text(panel.left + 196, panel.at_y(limit) + beside, GOALS[limit], anchor="end"))
         parts.append(line([(panel.at_x(x), panel.at_y(y)) for x, y in points], "after"))
         for x, y in points:
             parts.append(f'<circle class="dot" cx="{panel.at_x(x):.1f}" cy="{panel.at_y(y):.1f}" r="3"/>')
