@@ -24,15 +24,18 @@ def law_misfit(equations: NormalEquations, names: Fit, with_curve: Fit) -> float
 
 def explained(equations: NormalEquations, fit: Fit) -> float:
     """Return the Δχ² of a fit, with what is in the prediction already of corrected effects that it changes."""
-    total, held = fit.delta_chi2, equations.nuisance
+    sizes = [term.group.candidate.stated_size if term.group.candidate else 0.0 for term in fit.terms]
+    if not any(sizes):
+        return fit.delta_chi2
+    held = equations.nuisance
     for place, name in enumerate(held.names):
         held = held.with_precision(place, KNOWN) if name in held.stated else held
-    for index, term in enumerate(fit.terms):
-        if term.group.candidate is None or not term.group.candidate.stated_size:
+    as_stated, total = equations.with_nuisance(held), fit.delta_chi2
+    for index, (term, size) in enumerate(zip(fit.terms, sizes, strict=True)):
+        if not size:
             continue
-        scale = equations.design.scale[list(term.group.columns)]
         change = fit.coefficients[fit.of_term(index)]
-        now = change + term.group.candidate.stated_size * scale
-        _, energy = equations.with_nuisance(held).own_and_complement(fit.without(index), term)
+        now = change + size * equations.design.scale[list(term.group.columns)]
+        _, energy = as_stated.own_and_complement(fit.without(index), term)
         total += max(float(now @ energy @ now - change @ energy @ change), 0.0)
     return total

@@ -30,9 +30,24 @@ def stated_effects(tables: Mapping[str, Any]) -> tuple[Contribution, ...]:
                     tuple(w if isinstance(w, str) else int(w) for w in effect["wheels"]),
                     float(effect.get("relative_std", 0.0)),
                     str(effect.get("channel", "")),
-                    {str(name): float(std) for name, std in dict(effect.get("shape_std", {})).items()},
+                    _shape_std(effect),
                 )
             )
         except (KeyError, TypeError, ValueError) as error:
             raise SimulationError(f"effect {number} needs name, shape, coefficients and wheels: {error}") from error
     return tuple(found)
+
+
+def _shape_std(effect: Mapping[str, Any]) -> dict[str, float]:
+    """Return the standard deviations of an effect's shape parameters.
+
+    Raises
+    ------
+    ValueError
+        When one is of no number in its shape.
+    """
+    found = {str(name): float(std) for name, std in dict(effect.get("shape_std", {})).items()}
+    numbers = {name for name, value in dict(effect["shape"]).items() if isinstance(value, int | float)}
+    if unknown := sorted(set(found) - numbers):
+        raise ValueError(f"shape_std has {', '.join(unknown)}, which is no number in its shape")
+    return found
