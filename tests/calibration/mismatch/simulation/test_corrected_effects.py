@@ -35,7 +35,7 @@ def test_an_effect_that_lacks_something_is_told_by_its_number(number: int) -> No
 def test_a_deviation_of_no_number_of_the_law_is_told(shape_std: object) -> None:
     """Misspelt, of a choice, or no number itself."""
     effect = {**EFFECT, "shape": {"power": 0.9, "fades": "quotient"}, "shape_std": shape_std}
-    with pytest.raises(SimulationError, match="^effect 1 needs"):
+    with pytest.raises(SimulationError, match=r"^effect 1 needs"):
         stated_effects({"effects": [effect]})
     (found,) = stated_effects({"effects": [{**effect, "shape_std": {"power": 0.1}}]})
     assert found.shape_std == {"power": 0.1}
