@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.regression.equations import equations_of, free_parameter_equations
-from regolithd.calibration.mismatch.selection.noise_estimation import noise_beside_terms
+from regolithd.calibration.mismatch.selection.noise_estimation import fit_of_significant_terms
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -39,7 +39,7 @@ def linearised_where_it_fits(pose: Callable[[Mapping[str, float] | None], Proble
             break
         problem = pose(values)
     equations, _ = equations_of(problem, ())
-    values = moved_values(equations, noise_beside_terms(equations)[1])
+    values = moved_values(equations, fit_of_significant_terms(equations))
     return pose(values) if bent(problem, values) else problem
 
 

@@ -221,9 +221,8 @@ def _merged(effects: Sequence[Contribution]) -> list[Contribution]:
 
 def corrected_problem(problem: Problem, stated: Sequence[Stated]) -> Problem:
     """Return the problem whose prediction has the effects, with how well the size of each is known."""
-    channel = problem.simulation.channel
-    late = [lateness(each.contribution.name, channel, each.contribution.shape) for each in stated]
-    problem = replace(problem, late=next((each for each in late if each), None))
+    known = [(each.contribution.name, each.contribution.shape) for each in stated]
+    problem = replace(problem, late=lateness(known, problem.simulation.channel))
     effects = tuple(
         StatedEffect(
             name=each.contribution.name,

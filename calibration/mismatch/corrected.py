@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import std_of_interval
+from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.empirical.written import summed, with_changed_sizes, with_curves
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.prior import own_name
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-ONSET = "onset_s"
 FURTHEST_STD = 3.0
 """Standard deviations of its prior that a parameter may move (a choice: one in 370 lies further)."""
 
@@ -143,7 +143,9 @@ def _with_stds(term: Contribution, effect: Effect) -> Contribution:
     """
     size = effect.parameters.get("relative_size")
     relative_std = 0.0 if size is None or size.value == 0 else std_of_interval(size.low, size.high) / size.value
-    told = {name: each for name, each in effect.parameters.items() if name in term.shape and name != ONSET}
+    told = {
+        name: each for name, each in effect.parameters.items() if name in term.shape and name != Candidate.change_point
+    }
     shape_std = {name: std_of_interval(each.low, each.high) for name, each in told.items()}
     return replace(term, relative_std=relative_std, shape_std=shape_std)
 

@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.problem.covariates import LONGEST_STEP
 from regolithd.calibration.mismatch.signal.recursion import recursion
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.problem import Problem
@@ -236,19 +236,25 @@ OF_CHANNEL: Mapping[str, Callable[[Recording, Array, float], Array]] = {
 def columns_of(problem: Problem, candidate: Candidate, shape: Shape) -> Array:
     """Return a candidate's columns as the predicted channel shows them: late where it is late."""
     columns = np.asarray(candidate.columns(problem, shape), np.float64)
-    return as_shown(problem, columns) if candidate.late_with_channel else columns
+    if problem.late is None or not candidate.late_with_channel:
+        return columns
+    return np.asarray(as_shown(problem, list(columns)), np.float64).reshape(columns.shape)
 
 
-def as_shown(problem: Problem, columns: Array) -> Array:
-    """Return what acts on the machine, shape (column, time, wheel), when the predicted channel shows it."""
-    if problem.late is None or not len(columns):
+def as_shown(problem: Problem, columns: Sequence[Array]) -> Sequence[Array]:
+    """Return what acts on the machine, columns of shape (time, wheel), when the predicted channel shows it."""
+    if problem.late is None:
         return columns
     kind, delay = problem.late
-    return np.stack([np.nan_to_num(OF_CHANNEL[kind](problem.recording, column, delay)) for column in columns])
+    return [np.nan_to_num(OF_CHANNEL[kind](problem.recording, column, delay)) for column in columns]
 
 
-def lateness(name: str, channel: str, shape: Shape) -> tuple[str, float] | None:
-    """Return how an effect makes a predicted channel late, and by how much [s]; None where it does not."""
-    if name != SensorDelay.name or shape.get("late") != channel:
-        return None
-    return next(((kind, float(shape[kind])) for kind in OF_CHANNEL if kind in shape), None)
+def lateness(effects: Iterable[tuple[str, Shape]], channel: str) -> tuple[str, float] | None:
+    """Return how the first of some effects, names and shapes, makes a predicted channel late, and by how much [s].
+
+    None where none does.
+    """
+    for name, shape in effects:
+        if name == SensorDelay.name and shape.get("late") == channel:
+            return next(((kind, float(shape[kind])) for kind in OF_CHANNEL if kind in shape), None)
+    return None

@@ -9,6 +9,7 @@ import numpy as np
 from regolithd.calibration.mismatch.inference.experiment import with_experiment
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
+from regolithd.calibration.mismatch.regression.nuisance import EXACT
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
 
 if TYPE_CHECKING:
@@ -19,9 +20,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.inference.alternatives import Alternative
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
-
-EXACT = 1e12
-"""Prior precision of a scaled coefficient that counts as known exactly."""
 
 
 def collinear_sets(
@@ -46,7 +44,7 @@ def collinear_sets(
             continue
         seen.add(frozenset(members))
         first = [terms[member][0] for member in members]
-        names = tuple(dict.fromkeys((*members, *parameters_like(equations, given.terms, first))))
+        names = (*members, *parameters_like(equations, given.terms, first))
         if len(names) > 1 and not taken & set(names):
             found.append(with_experiment(names, experimenter.on(equations), given.terms, first, others))
     return tuple(found)
@@ -119,13 +117,17 @@ def imitates(beside: Beside, one: list[Term], two: list[Term]) -> bool:
 
 
 def parameters_like(equations: NormalEquations, given: Sequence[Term], members: Sequence[Term]) -> list[str]:
-    """Return the free parameters, by their names as effects, that could stand for every member."""
-    names = equations.problem.simulation.parameter_effects
-    return [
+    """Return the free parameters, by their names as effects, that could stand for every member.
+
+    Each name once, and none of a member's own: two parameters may act alike, and one may act as a member does.
+    """
+    names, taken = equations.problem.simulation.parameter_effects, {member.name for member in members}
+    found = [
         names[name]
         for place, name in enumerate(equations.nuisance.names)
         if name in names and _parameter_like(equations, given, members, place)
     ]
+    return [name for name in dict.fromkeys(found) if name not in taken]
 
 
 def _parameter_like(equations: NormalEquations, given: Sequence[Term], members: Sequence[Term], place: int) -> bool:

@@ -52,8 +52,7 @@ def rivals(
         taken = {member.name for member in (*named.terms, *members)}
         equations, additions = _takes_over(equations, named, index)
         members += [more for more in additions if more.name not in taken]
-        told = (*(member.name for member in members), *parameters_like(equations, rest, members))
-        names = tuple(dict.fromkeys(told))  # a parameter may act as one of the members
+        names = (*(member.name for member in members), *parameters_like(equations, rest, members))
         if len(names) > 1:
             found.append(with_experiment(names, experimenter.on(equations), rest, members, others))
     return equations, tuple(found)

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+EXACT = 1e12
+"""Prior precision of a scaled coefficient that counts as known exactly."""
 LEAST_KNOWN = 0.5
 """Posterior variance of a parameter over its prior's, up to which the readings know it as well as its prior does."""
 
@@ -95,8 +97,8 @@ def tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
     """Return names, prior standard deviations and tangents, shape (time, wheel) each."""
     simulation, wheels = problem.simulation, problem.recording.wheels
     free = {name: prior.std for name, prior in simulation.parameters.items() if prior.std > 0}
-    shown = as_shown(problem, np.array([problem.tangent(name) for name in free]))
-    names, stds, found = list(free), list(free.values()), list(shown)
+    names, stds = list(free), list(free.values())
+    found = list(as_shown(problem, [problem.tangent(name) for name in free]))
     of_parameter = dict(zip(names, found, strict=True))
     for name in free if len(wheels) > 1 else ():
         if name in simulation.own_to_each_wheel:

@@ -106,7 +106,7 @@ def _with_group(
     selection_penalty: float = 0.0,
 ) -> DesignMatrix:
     """Add columns of either sign as one group."""
-    design, places = design.extended(list(as_shown(design.problem, np.asarray(columns, np.float64))))
+    design, places = design.extended(as_shown(design.problem, columns))
     if not places:
         return design
     group = Group(

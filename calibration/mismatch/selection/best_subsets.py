@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, relative_size
 from regolithd.calibration.mismatch.selection.law_misfit import explained
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape, shape_profile
@@ -44,7 +42,7 @@ def _that_one_wheel_shows_alone(equations: NormalEquations, found: Sequence[Scor
     On several wheels such a law gains a little more than on one, by chance: the others have to show it too.
     """
     alone: dict[int, float] = {}
-    shared: dict[int, tuple[float, Term]] = {}
+    shared: dict[int, tuple[float, int]] = {}  # with the number of coefficients of all but one wheel
     for gain, term in found:
         if term.group.acting is None or "one" not in term.group.sharing:
             continue
@@ -52,17 +50,13 @@ def _that_one_wheel_shows_alone(equations: NormalEquations, found: Sequence[Scor
         if len(term.wheels) == 1:
             alone[key] = max(gain, alone.get(key, 0.0))
         elif key not in shared or gain > shared[key][0]:
-            shared[key] = gain, term
+            own = term.group.acting[:, list(term.wheels)].sum(axis=0)
+            shared[key] = gain, int(own.sum() - own.max())
     return {
-        key for key, (gain, term) in shared.items() if key in alone and gain - alone[key] < _by_chance(equations, term)
+        key
+        for key, (gain, further) in shared.items()
+        if key in alone and gain - alone[key] < chi2_quantile(equations, further)
     }
-
-
-def _by_chance(equations: NormalEquations, term: Term) -> float:
-    """Return the Δχ² that the coefficients of all but one wheel gain by chance."""
-    acting = term.group.acting
-    own = acting[:, list(term.wheels)].sum(axis=0) if acting is not None else np.zeros(1)
-    return chi2_quantile(equations, int(own.sum() - own.max()))
 
 
 def best_of_each_smooth_term(equations: NormalEquations, given: Sequence[Term]) -> list[Scored]:

@@ -16,7 +16,11 @@ from regolithd.calibration.mismatch.regression.smooth_groups import with_periodi
 from regolithd.calibration.mismatch.selection.best_subsets import best_subsets, passes_entry_test
 from regolithd.calibration.mismatch.selection.cross_validation import drop_what_does_not_transfer
 from regolithd.calibration.mismatch.selection.implausible_effects import drop_what_the_implausible_explains
-from regolithd.calibration.mismatch.selection.noise_estimation import noise_beside_terms, noise_of_whitened, whitened
+from regolithd.calibration.mismatch.selection.noise_estimation import (
+    fit_of_significant_terms,
+    noise_of_whitened,
+    whitened,
+)
 from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what_pulls_parameters_out
 from regolithd.calibration.mismatch.selection.released_parameters import released
 from regolithd.calibration.mismatch.selection.sign_flip_test import entry_threshold
@@ -59,15 +63,14 @@ class Decision:
     @property
     def late(self) -> tuple[str, float] | None:
         """How the predicted channel is late by a named effect, and by how much [s]; None: it is not."""
-        channel = self.equations.problem.simulation.channel
-        told = (lateness(term.name, channel, term.group.shape) for term in self.named.terms)
-        return next((each for each in told if each), None)
+        named = [(term.name, term.group.shape) for term in self.named.terms]
+        return lateness(named, self.equations.problem.simulation.channel)
 
 
 def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decision:
     """Choose the named effects, and the smooth terms that nothing named explains."""
     problem, limits = equations.problem, equations.thresholds
-    left = residual_of(equations, noise_beside_terms(equations)[1])
+    left = residual_of(equations, fit_of_significant_terms(equations))
     equations = whitened(equations, left)
     threshold = entry_threshold(equations, left, blocks_of_time(problem, noise_of_whitened(equations.design, left)))
     equations = with_proposed_shapes(equations, candidates)

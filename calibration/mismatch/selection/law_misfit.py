@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from regolithd.calibration.mismatch.regression.nuisance import EXACT
+
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
-
-KNOWN = 1e12
-"""Prior precision of a scaled coefficient that is held where it was stated."""
 
 
 def law_misfit(equations: NormalEquations, names: Fit, with_curve: Fit) -> float:
@@ -29,7 +28,7 @@ def explained(equations: NormalEquations, fit: Fit) -> float:
         return fit.delta_chi2
     held = equations.nuisance
     for place, name in enumerate(held.names):
-        held = held.with_precision(place, KNOWN) if name in held.stated else held
+        held = held.with_precision(place, EXACT) if name in held.stated else held
     as_stated, total = equations.with_nuisance(held), fit.delta_chi2
     for index, (term, size) in enumerate(zip(fit.terms, sizes, strict=True)):
         if not size:

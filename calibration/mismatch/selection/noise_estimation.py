@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def noise_beside_terms(equations: NormalEquations) -> tuple[NoiseModel, Fit]:
-    """Return the noise when all that explains something is taken out, and the fit of that with the free parameters."""
+def fit_of_significant_terms(equations: NormalEquations) -> Fit:
+    """Return the fit of all that explains something, with the free parameters: what it leaves is the noise."""
     limits = equations.thresholds
     first = _noise_beside(equations, ())
     short = min(first.autocorrelation_time, limits.provisional_autocorrelation_time)
@@ -36,7 +36,7 @@ def noise_beside_terms(equations: NormalEquations) -> tuple[NoiseModel, Fit]:
     weighted = equations.weighted(second.weights)
     least_score = limits.noise_term_share * limits.smooth_term_entry
     terms = _most_significant(weighted, 2 * limits.provisional_terms, least_score)
-    return _noise_beside(weighted, terms), weighted.fit(terms)
+    return weighted.fit(terms)
 
 
 def whitened(equations: NormalEquations, residual: Array) -> NormalEquations:

@@ -7,7 +7,7 @@ import pytest
 from linear_machine import NOISE, equations_of, problem_of, table
 
 from regolithd.calibration.mismatch.regression.residuals import residual_of
-from regolithd.calibration.mismatch.selection.noise_estimation import noise_beside_terms
+from regolithd.calibration.mismatch.selection.noise_estimation import fit_of_significant_terms
 from regolithd.calibration.mismatch.signal.noise import estimate_noise
 
 
@@ -16,7 +16,8 @@ def test_an_effect_does_not_count_as_noise() -> None:
     equations = equations_of(problem_of(table(drag=0.6)))
     mask = equations.problem.mask
     naive = estimate_noise(residual_of(equations, equations.fit(())), mask)
-    noise, significant = noise_beside_terms(equations)
+    significant = fit_of_significant_terms(equations)
+    noise = estimate_noise(residual_of(equations, significant), equations.problem.mask)
     np.testing.assert_allclose(noise.deviation, NOISE, rtol=0.05)
     assert noise.autocorrelation_time == pytest.approx(1.0, abs=0.3)
     assert naive.autocorrelation_time > 5
@@ -26,7 +27,8 @@ def test_an_effect_does_not_count_as_noise() -> None:
 def test_without_candidates_it_is_the_noise_of_the_residual() -> None:
     """Nothing can be taken out."""
     equations = equations_of(problem_of(table()), ())
-    noise, significant = noise_beside_terms(equations)
+    significant = fit_of_significant_terms(equations)
+    noise = estimate_noise(residual_of(equations, significant), equations.problem.mask)
     direct = estimate_noise(residual_of(equations, equations.fit(())), equations.problem.mask)
     assert noise.autocorrelation_time == direct.autocorrelation_time
     np.testing.assert_allclose(noise.deviation, direct.deviation, rtol=1e-6)
