@@ -14,11 +14,29 @@ die() {
   exit 125
 }
 
+# With AMX the guest saves no AVX registers (without_xstate.py): neither the C library, also in the guest's init, nor numpy may
+# use them.
+glibc_without_avx=()
+without_avx=()
+xstate=()
+if grep -qw amx_tile /proc/cpuinfo; then
+  xstate=(python3 "$(dirname "${BASH_SOURCE[0]}")/without_xstate.py")
+  glibc_without_avx=(
+    GLIBC_TUNABLES=glibc.cpu.hwcaps=-AVX,-AVX2,-AVX512F,-AVX512VL,-AVX512BW,-AVX_Fast_Unaligned_Load,-XSAVE,-XSAVEC,-ERMS
+  )
+  without_avx=(
+    "${glibc_without_avx[@]}"
+    OPENBLAS_CORETYPE=Nehalem
+    "NPY_DISABLE_CPU_FEATURES=AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR AVX2 FMA3"
+  )
+fi
+
 uml_prepare() {
   local folder=$1
   shift
   # NUL-separated, so that any content arrives unchanged.
   env -0 >"$folder/environment"
+  [ "${#without_avx[@]}" = 0 ] || printf '%s\0' "${without_avx[@]}" >>"$folder/environment"
   printf '%s\0' "$@" >"$folder/arguments"
   printf '%s' "$PWD" >"$folder/directory"
   cat >"$folder/run" <<'RUN'
@@ -58,8 +76,8 @@ uml_boot() {
   trap 'exit 130' INT
   trap 'exit 143' TERM HUP
   # setpriv: the guest ends also if this script is killed.
-  setpriv --pdeathsig TERM timeout -k 5 "${GUEST_SECONDS:-0}" "$uml" umid=guest uml_dir="$folder" mem="${GUEST_MEMORY:-2048M}" \
-    root=/dev/root rootfstype=hostfs rootflags=/ rw init="$folder/init" quiet con=null con0=null,fd:1 ssl0=null,fd:3 ssl1=null,fd:4 "$@" \
+  setpriv --pdeathsig TERM timeout -k 5 "${GUEST_SECONDS:-0}" "${xstate[@]}" "$uml" umid=guest uml_dir="$folder" mem="${GUEST_MEMORY:-2048M}" \
+    root=/dev/root rootfstype=hostfs rootflags=/ rw init="$folder/init" quiet con=null con0=null,fd:1 ssl0=null,fd:3 ssl1=null,fd:4 "$@" "${glibc_without_avx[@]}" \
     3>&1 4>&2 </dev/null >"$folder/console" 2>&1 &
   guest=$!
   # shellcheck disable=SC2064 # expanded now: the number is known
