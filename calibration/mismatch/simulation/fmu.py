@@ -35,12 +35,13 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
 from regolithd.calibration.mismatch.problem.prior import Prior
+from regolithd.calibration.mismatch.simulation.fmu_inputs import ANY_INSTANT, INSTANT, continuous, follow_inputs
 from regolithd.calibration.mismatch.simulation.simulation import Simulation
 from regolithd.calibration.mismatch.simulation.stated_priors import SENSORS, finite_number
 from regolithd.calibration.mismatch.simulation.stated_sensors import stated_sensors
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
 Array = NDArray[np.float64]
 
@@ -75,7 +76,9 @@ class FmuSimulation(Simulation):
         self.wheel_column = str(tables.get("simulation", {}).get("wheel_column", "wheel"))  # type: ignore[misc]
         self.one_way = _stated_flag(tables.get("simulation", {}), "one_way")
         self._covariates = _covariates(tables.get("covariates", {}))
-        self.parameters = _parameters(tables.get("parameters", {}), known, path)
+        self._own = _parameters(tables.get("parameters", {}), known, path)
+        followed = any(continuous(known[name]) for name in self._inputs.values())
+        self.parameters = {**self._own, INSTANT: ANY_INSTANT} if followed else self._own
         self.sensors = stated_sensors(tables, self)
         self._unpacked = Path(tempfile.mkdtemp(prefix="fmu-"))
         weakref.finalize(self, shutil.rmtree, self._unpacked, ignore_errors=True)
@@ -113,10 +116,10 @@ class FmuSimulation(Simulation):
     def corrected_tables(self, values: Mapping[str, float]) -> dict[str, Any]:
         """Return `[parameters]` with the values that the recording gave them."""
         stated = self.stated.get("parameters", {})
-        return {"parameters": {name: {**stated[name], "value": float(values[name])} for name in self.parameters}}
+        return {"parameters": {name: {**stated[name], "value": float(values[name])} for name in self._own}}
 
     def _result(self, time_s: Array, columns: Mapping[str, Array], values: Mapping[str, float]) -> dict[str, Array]:
-        stated = [values[name] for name in self.parameters]
+        stated = [values.get(name, prior.value) for name, prior in self.parameters.items()]
         parts = (time_s, *columns.values(), np.array(stated, np.float64))
         key = hashlib.blake2b(b"".join(part.tobytes() for part in parts)).digest()
         if key not in self._results:
@@ -133,42 +136,33 @@ class FmuSimulation(Simulation):
         signal = np.zeros(int(known.sum()), [(name, np.float64) for name in names])
         for name, column in zip(names, (time_s, *columns.values()), strict=True):
             signal[name] = column[known]
+        fmpy, variables = _fmpy(), {each.name: each for each in self._description.modelVariables}
         try:
-            result = _fmpy().simulate_fmu(
-                str(self._unpacked),
-                model_description=self._description,
-                start_time=float(time_s[0]),
-                stop_time=float(time_s[-1]),
-                output_interval=float(np.median(np.diff(time_s))),
-                start_values={name: values[name] for name in self.parameters},
-                input=signal if columns else None,
-                output=list(self._outputs.values()),
-                step_finished=self._with_present_inputs(signal),
-            )
+            fmu = fmpy.instantiate_fmu(str(self._unpacked), self._description)
+            try:
+                if columns:
+                    follow_inputs(fmu, variables, signal, values.get(INSTANT, ANY_INSTANT.value))
+                result = fmpy.simulate_fmu(
+                    str(self._unpacked),
+                    model_description=self._description,
+                    start_time=float(time_s[0]),
+                    stop_time=float(time_s[-1]),
+                    output_interval=float(np.median(np.diff(time_s))),
+                    start_values={name: values[name] for name in self._own},
+                    input=signal if columns else None,
+                    output=list(self._outputs.values()),
+                    fmu_instance=fmu,
+                )
+            finally:
+                fmu.freeInstance()
         except Exception as error:  # FMPy raises plain Exception for whatever a model does
             raise SimulationError(f"the FMU could not be simulated: {error}") from error
-        return {column: np.interp(time_s, result["time"], result[name]) for column, name in self._outputs.items()}
-
-    def _with_present_inputs(self, signal: NDArray[Any]) -> Callable[[float, Any], bool] | None:
-        """Return what reads the outputs of a co-simulation again, with the inputs of the same instant.
-
-        A slave's step has the inputs of its beginning: an output that depends on an input directly would be late by it.
-        """
-        references = {each.name: each.valueReference for each in self._description.modelVariables}
-        names = [name for name in signal.dtype.names or () if name != "time"]
-        if self._description.coSimulation is None or not names:
-            return None
-
-        def read_again(time: float, recorder: Any) -> bool:  # noqa: ANN401  # FMPy has no types
-            values = [float(np.interp(time, signal["time"], signal[name])) for name in names]
-            fmu = recorder.fmu
-            put = fmu.setReal if hasattr(fmu, "setReal") else fmu.setFloat64
-            put([references[name] for name in names], values)
-            recorder.rows.pop()
-            recorder.sample(time, force=True)
-            return True
-
-        return read_again
+        # A model exchange is recorded before and after each event, of which the later reading counts.
+        last = np.append(np.diff(result["time"]) > 0, True)
+        return {
+            column: np.interp(time_s, result["time"][last], result[name][last])
+            for column, name in self._outputs.items()
+        }
 
 
 def _fmpy() -> Any:  # noqa: ANN401  # a module without types
@@ -199,6 +193,9 @@ def _mapped(tables: Mapping[str, Any], known: Mapping[str, Any], path: Path) -> 
         _check_variable(known, name, path, ("variables", name))
         if not isinstance(column, str):
             told = f"[variables] {name}: the name of a recorded column is needed, not {column!r}"
+            raise SimulationError(told, ("variables", name))
+        if known[name].dimensions:
+            told = f"[variables] {name} is an array: only variables that are one number can be compared with a column"
             raise SimulationError(told, ("variables", name))
         if (kind := known[name].causality) not in {"input", *PREDICTED}:
             told = f"[variables] {name} is neither input nor output of {path.name}, but of the kind {kind}"

@@ -16,7 +16,18 @@ STAMP = (1980, 1, 1, 0, 0, 0)
 
 
 def build_fmu(name: str, path: Path) -> Path:
-    """Compile `first_simulations/NAME.c` and write the FMU to `path`; the C compiler is $CC, or cc.
+    """Compile `first_simulations/NAME.c` and write the FMU with NAME.xml to `path`; the C compiler is $CC, or cc.
+
+    Raises
+    ------
+    OSError, subprocess.CalledProcessError
+        Where there is no C compiler, or it fails.
+    """
+    return compile_fmu(SOURCES / f"{name}.c", (SOURCES / f"{name}.xml").read_bytes(), path)
+
+
+def compile_fmu(source: Path, description: bytes, path: Path) -> Path:
+    """Compile a C file and write the FMU with a model description to `path`; the C compiler is $CC, or cc.
 
     Raises
     ------
@@ -25,22 +36,22 @@ def build_fmu(name: str, path: Path) -> Path:
     """
     folder, suffix = PLATFORM[sys.platform]
     with tempfile.TemporaryDirectory() as scratch:
-        library = Path(scratch) / f"{name}{suffix}"
+        library = Path(scratch) / f"{source.stem}{suffix}"
         command = [
             os.environ.get("CC", "cc"),
             "-shared",
             "-fPIC",
             "-O2",
-            str(SOURCES / f"{name}.c"),
+            str(source),
             "-o",
             str(library),
         ]
         subprocess.run([*command, "-lm"], check=True, capture_output=True)  # noqa: S603  # our own source
         with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-            _add(archive, "modelDescription.xml", SOURCES / f"{name}.xml")
-            _add(archive, f"binaries/{folder}/{library.name}", library)
+            _add(archive, "modelDescription.xml", description)
+            _add(archive, f"binaries/{folder}/{library.name}", library.read_bytes())
     return path
 
 
-def _add(archive: zipfile.ZipFile, name: str, path: Path) -> None:
-    archive.writestr(zipfile.ZipInfo(name, STAMP), path.read_bytes(), zipfile.ZIP_DEFLATED)
+def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> None:
+    archive.writestr(zipfile.ZipInfo(name, STAMP), content, zipfile.ZIP_DEFLATED)

@@ -13,6 +13,7 @@ from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.prior import Prior, SensorError
 from regolithd.calibration.mismatch.simulation import fmu
 from regolithd.calibration.mismatch.simulation.fmu import FmuSimulation
+from regolithd.calibration.mismatch.simulation.fmu_inputs import ANY_INSTANT, INSTANT, follow_inputs
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
 
 def variable(name: str, causality: str, unit: str | None, start: str | None = None, reference: int = 0) -> Any:
     """Return a variable as FMPy describes it."""
-    return SimpleNamespace(name=name, causality=causality, unit=unit, start=start, valueReference=reference)
+    kind = {"type": "Real", "variability": "continuous", "dimensions": []}
+    return SimpleNamespace(name=name, causality=causality, unit=unit, start=start, valueReference=reference, **kind)
 
 
 VARIABLES = [
@@ -50,17 +52,24 @@ class Tank:
         self.calls: list[dict[str, Any]] = []
         self.unpacked: list[tuple[str, str]] = []
         self.error: Exception | None = None
-        self.co_simulation: object | None = None
+        self.freed = 0
 
     def read_model_description(self, path: str) -> Any:
         """Describe it."""
         if "damaged" in path:
             raise RuntimeError("no modelDescription.xml")
-        return SimpleNamespace(modelVariables=VARIABLES, coSimulation=self.co_simulation)
+        return SimpleNamespace(modelVariables=VARIABLES)
 
     def extract(self, path: str, folder: str) -> None:
         """Note it."""
         self.unpacked.append((path, folder))
+
+    def instantiate_fmu(self, _folder: str, _description: object) -> Any:
+        """Return a slave, which is not stepped here."""
+        return SimpleNamespace(doStep=None, setReal=None, freeInstance=self._free)
+
+    def _free(self) -> None:
+        self.freed += 1
 
     def simulate_fmu(self, folder: str, **options: Any) -> dict[str, Array]:
         """Integrate by Euler's method at the output interval."""
@@ -101,7 +110,7 @@ def test_the_fmu_says_which_variables_are_inputs_and_outputs(tmp_path: Path) -> 
     """Names are those of the recorded columns, units the FMU's, a value that is not stated its own start value."""
     found = loaded(tmp_path)
     assert (found.channel, found.unit, found.channels, found.inputs) == ("level_m", "m", {}, ("pump_V",))
-    assert found.parameters == {"area": Prior(0.5, 0.01, "m2")}
+    assert found.parameters == {"area": Prior(0.5, 0.01, "m2"), INSTANT: ANY_INSTANT}
     assert (found.wheel_column, found.one_way) == ("wheel", None)
     pump = {"model": "tank.fmu", "one_way": True}
     assert loaded(tmp_path, simulation=pump).one_way
@@ -112,7 +121,7 @@ def test_the_fmu_says_which_variables_are_inputs_and_outputs(tmp_path: Path) -> 
     found = loaded(tmp_path, variables=several, simulation={"model": "tank.fmu", "wheel_column": "tank"})
     assert (found.channels, found.wheel_column) == ({"flow": "1", "level_m": "m"}, "tank")
     stated = {"area": {"value": 2, "unit": "ha"}}
-    assert loaded(tmp_path, parameters=stated).parameters == {"area": Prior(2.0, 0.0, "ha")}
+    assert loaded(tmp_path, parameters=stated).parameters["area"] == Prior(2.0, 0.0, "ha")
 
 
 @pytest.mark.usefixtures("tank")
@@ -182,10 +191,9 @@ def test_an_input_that_was_not_measured_is_bridged_by_the_fmu(tank: Tank, tmp_pa
 def test_an_fmu_without_inputs_runs_by_time_alone(tank: Tank, tmp_path: Path) -> None:
     """No signal is handed over."""
     simulation = loaded(tmp_path, variables={"level": "level_m"})
-    tank.co_simulation = object()
     np.testing.assert_allclose(simulation.predict(inputs(), {"area": 1.0})[:, 0], 0.5 * np.arange(6))
     assert tank.calls[0]["input"] is None
-    assert tank.calls[0]["step_finished"] is None
+    assert INSTANT not in simulation.parameters
 
 
 def test_the_same_run_is_simulated_once(tank: Tank, tmp_path: Path) -> None:
@@ -214,37 +222,31 @@ def test_a_run_that_fails_is_one_message(tank: Tank, tmp_path: Path) -> None:
     tank.error = RuntimeError("fmi2DoStep returned 3")
     with pytest.raises(SimulationError, match=r"^the FMU could not be simulated: fmi2DoStep returned 3$"):
         loaded(tmp_path).predict(inputs(), {"area": 0.5})
+    assert tank.freed == 1
 
 
-class Recorder:
-    """FMPy's recorder of a co-simulation."""
-
-    def __init__(self, **setters: Any) -> None:
-        self.fmu = SimpleNamespace(**setters)
-        self.rows, self.sampled = ["first", "late"], []  # type: ignore[var-annotated]
-
-    def sample(self, time: float, *, force: bool) -> None:
-        """Note it."""
-        self.sampled.append((time, force))
-
-
-@pytest.mark.parametrize("setter", ["setReal", "setFloat64"])
-@pytest.mark.usefixtures("tank")
-def test_outputs_of_a_co_simulation_are_read_again_with_present_inputs(setter: str, tmp_path: Path) -> None:
-    """The last row is replaced; FMI 2 and 3 name the function differently."""
-    simulation = loaded(tmp_path)
-    simulation._description.coSimulation = object()
-    signal = np.zeros(3, [("time", np.float64), ("voltage", np.float64)])
-    signal["time"], signal["voltage"] = [0.0, 1.0, 2.0], [0.0, 10.0, 30.0]
+@pytest.mark.parametrize(("kind", "setter"), [("Real", "setReal"), ("Float64", "setFloat64")])
+def test_a_step_has_the_inputs_of_its_instant_and_its_outputs_those_of_its_end(kind: str, setter: str) -> None:
+    """FMI 2 and 3 name the function differently; a discrete input is held during the step."""
     put: list[tuple[list[int], list[float]]] = []
-    recorder = Recorder(**{setter: lambda references, values: put.append((references, values))})
-    again = simulation._with_present_inputs(signal)
-    assert again is not None
-    assert again(1.5, recorder) is True
-    assert put == [([7], [20.0])]
-    assert (recorder.rows, recorder.sampled) == (["first"], [(1.5, True)])
-    simulation._description.coSimulation = None
-    assert simulation._with_present_inputs(signal) is None
+    steps: list[tuple[float, float]] = []
+
+    def step(*, currentCommunicationPoint: float, communicationStepSize: float) -> str:  # FMPy's names
+        steps.append((currentCommunicationPoint, communicationStepSize))
+        return "done"
+
+    fmu = SimpleNamespace(doStep=step, **{setter: lambda references, values: put.append((references, values))})
+    common = {"type": kind, "dimensions": []}
+    variables = {
+        "voltage": SimpleNamespace(name="voltage", valueReference=7, variability="continuous", **common),
+        "valve": SimpleNamespace(name="valve", valueReference=8, variability="discrete", **common),
+    }
+    signal = np.zeros(3, [("time", np.float64), ("voltage", np.float64), ("valve", np.float64)])
+    signal["time"], signal["voltage"], signal["valve"] = [0.0, 1.0, 2.0], [0.0, 10.0, 30.0], [0.0, 1.0, 1.0]
+    follow_inputs(fmu, variables, signal, 0.25)
+    assert fmu.doStep(currentCommunicationPoint=1.0, communicationStepSize=0.5) == "done"
+    assert steps == [(1.0, 0.5)]
+    assert put == [([7], [12.5]), ([7, 8], [20.0, 1.0])]
 
 
 @pytest.mark.usefixtures("tank")
