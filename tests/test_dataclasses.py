@@ -75,6 +75,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "RangeSums",
         "NormalEquations",
         "Decision",
+        "Intermittent",
         "ShapeProfile",
         "StatedEffect",
         "_Draws",

@@ -190,7 +190,14 @@ class CalibratedParameter:
 
 @dataclass(frozen=True)
 class Change:
-    """What differs from an effect that a corrected simulation brought, with a 90 % interval of what it is now."""
+    """What differs from an effect that a corrected simulation brought, with a 90 % interval of what it is now.
+
+    Attributes
+    ----------
+    parameter, unit: the coefficient that `corrected` and `now` are values of
+    channel, wheels: where the effect acts
+    statement: the change in one sentence
+    """
 
     name: str
     parameter: str
@@ -198,10 +205,19 @@ class Change:
     now: float
     low: float
     high: float
+    unit: str = "1"
+    channel: str = ""
+    wheels: tuple[int | str, ...] = ()
+    statement: str = ""
 
 
 LEAST_TOLD = 0.005
 """Probability below which another answer is not told in words: two decimals would show 0."""
+JSON_KEYS = (
+    *("version", "verdict", "effects", "unexplained", "indistinguishable", "sensitivity", "fit", "fits", "parameters"),
+    *("changes", "left_out", "probability", "alternatives", "notes"),
+)
+"""Keys of the answer's JSON object, in their order."""
 
 
 @dataclass(frozen=True)
@@ -246,23 +262,7 @@ class Answer:
         """Return the JSON object of answer.schema.json: tuples as lists, and null for numbers that are not finite."""
         plain: dict[str, Any] = _plain(asdict(self))
         plain["fits"] = plain["fits"] or [plain["fit"]]
-        names = (
-            "version",
-            "verdict",
-            "effects",
-            "unexplained",
-            "indistinguishable",
-            "sensitivity",
-            "fit",
-            "fits",
-            "parameters",
-            "changes",
-            "left_out",
-            "probability",
-            "alternatives",
-            "notes",
-        )
-        return {name: plain[name] for name in names}
+        return {name: plain[name] for name in JSON_KEYS}
 
 
 def answer_schema() -> dict[str, Any]:

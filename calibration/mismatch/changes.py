@@ -18,7 +18,9 @@ from regolithd.calibration.mismatch.candidates.motion import TRANSITION, transit
 from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of, lateness
 from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw
 from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
+from regolithd.calibration.mismatch.inference.statements import after_number, on_wheels
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
+from regolithd.calibration.mismatch.problem.words import in_units
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -132,8 +134,9 @@ class ChangedSize(Candidate):
     def __init__(self, stated: Stated, place: int) -> None:
         of = stated.candidate
         self.stated, self._place = stated, place
-        for name in ("name", "covariate", "equation", "signature", "experiment", "source", "label", "along_motion"):
+        for name in ("name", "covariate", "equation", "signature", "source", "label", "along_motion"):
             setattr(self, name, getattr(of, name))
+        self.experiment, self.experiment_one_way = of.experiment, of.experiment_one_way  # type: ignore[misc]
         self.vary, self.run_unloaded = of.vary, of.run_unloaded  # type: ignore[misc]
         self.imitated_over = of.imitated_over  # type: ignore[misc]
         self.words = f"a change of a corrected effect: {of.words}"  # type: ignore[misc]
@@ -256,10 +259,10 @@ def contribution_of_change(change: ChangedSize, relative_change: float) -> Contr
     return replace(of, coefficients=coefficients, relative_std=0.0)
 
 
-def changes_of(change: ChangedSize, parameters: Mapping[str, Parameter]) -> tuple[Change, ...]:
+def changes_of(change: ChangedSize, parameters: Mapping[str, Parameter], problem: Problem) -> tuple[Change, ...]:
     """Return, for each coefficient of the effect, what was corrected and what it is now."""
     of, candidate = change.stated.contribution, change.stated.candidate
-    relative = parameters[RELATIVE_CHANGE]
+    relative, simulation = parameters[RELATIVE_CHANGE], problem.simulation
     named = candidate.parameters(of.shape, list(of.coefficients))
     found = []
     for coefficient in candidate.coefficients[: len(of.coefficients)]:
@@ -267,7 +270,19 @@ def changes_of(change: ChangedSize, parameters: Mapping[str, Parameter]) -> tupl
             continue
         value = named[coefficient.name]
         low, high = sorted((value * (1 + relative.low), value * (1 + relative.high)))
-        found.append(Change(of.name, coefficient.name, value, value * (1 + relative.value), low, high))
+        told = Change(
+            name=of.name,
+            parameter=coefficient.name,
+            corrected=value,
+            now=value * (1 + relative.value),
+            low=low,
+            high=high,
+            unit=in_units(coefficient.unit, simulation.unit, problem.labels),
+            channel=simulation.channel,
+            wheels=of.wheels,
+        )
+        where = on_wheels(of.wheels, len(problem.recording.wheels), simulation.wheel_column)
+        found.append(replace(told, statement=change_in_words(told, where)))
     return tuple(found)
 
 
@@ -279,11 +294,11 @@ def direction_of(change: Change) -> Literal["gone", "larger", "smaller"]:
     return "larger" if abs(ratio) > 1 else "smaller"
 
 
-def change_in_words(change: Change) -> str:
-    """Return one sentence about a change."""
-    direction = direction_of(change)
+def change_in_words(change: Change, where: str = "") -> str:
+    """Return one sentence about a change; `where` is ', on ' and the wheels, empty where there is one alone."""
+    direction, unit = direction_of(change), after_number(change.unit)
     told = "gone" if direction == "gone" else f"{direction} than the corrected simulation has it"
     return (
-        f"{change.name} is {told}: {change.parameter} {change.now:.4g} "
-        f"(90 % sure: {change.low:.4g} to {change.high:.4g}), corrected {change.corrected:.4g}."
+        f"{change.name} is {told}{where}: {change.parameter} from {change.corrected:.4g} to {change.now:.4g}{unit} "
+        f"(90 % sure: {change.low:.4g} to {change.high:.4g})."
     )

@@ -190,7 +190,9 @@ def run_fleet(files: Sequence[RoverFile], simulation: Path, outputs: Outputs, op
         write_json(outputs.json, found.answer)
     if options.catalogue:
         found.write_catalogue(options.catalogue)
-    print_answer(Console(), found.answer, Labels(noun_of(simulated.wheel_column), simulated.covariate_labels))
+    corrected = frozenset(effect.name for effect in (*simulated.corrected_effects, *simulated.stated_effects()))
+    labels = Labels(noun_of(simulated.wheel_column), simulated.covariate_labels, corrected=corrected)
+    print_answer(Console(), found.answer, labels)
     return found.answer
 
 

@@ -51,9 +51,14 @@ def _effect(effect: Effect) -> EffectReport:
 
 
 def _change(change: Change) -> EffectReport:
-    statement = f"{change.parameter} was {change.corrected:.4g} in the corrected simulation"
     return EffectReport(
-        name=change.name, where="", statement=statement, size=change.now, unit="", low=change.low, high=change.high
+        name=change.name,
+        where=_where(change.wheels),
+        statement=change.statement,
+        size=change.now,
+        unit=change.unit,
+        low=change.low,
+        high=change.high,
     )
 
 

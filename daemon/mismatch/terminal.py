@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from regolithd.calibration.mismatch.inference.statements import (
+    NO_HELP,
     after_number,
     beyond_prior_in_words,
     notes_beside_priors,
@@ -33,7 +34,7 @@ NO_BREAK = "\u00a0"
 
 
 def print_answer(console: Console, answer: Answer, labels: Labels, wheels: Sequence[int | str] = ()) -> None:
-    """Print verdict, effects, what is unexplained or indistinguishable, the held-out error and the notes.
+    """Print verdict, effects, changes, what is unexplained or indistinguishable, the held-out error and the notes.
 
     `wheels` are all that the recording has; empty: not known. On a terminal, lines that continue are indented; a file
     or a pipe gets each on one line.
@@ -73,21 +74,23 @@ def _lines(answer: Answer, labels: Labels, wheels: Sequence[int | str]) -> list[
             f"{effect.name}{f' in {effect.channel}' if several else ''}: {effect.statement}"
             for effect in answer.effects
         ),
+        *(f"changed{f' in {change.channel}' if several else ''}: {change.statement}" for change in answer.changes),
         *(f"parameter {beyond_prior_in_words(each)}" for each in moved),
         *(line for rest in answer.unexplained for line in _unexplained(rest, labels, len(wheels), several=several)),
-        *(_not_distinguished(each, {effect.name for effect in answer.effects}) for each in answer.indistinguishable),
+        *(_not_distinguished(each, answer, labels) for each in answer.indistinguishable),
         sure_of(answer),
         *map(_error, answer.fits or (answer.fit,)),
         *(f"note: {note}" for note in notes_beside_priors(answer.notes, moved)),
     ]
 
 
-def _not_distinguished(found: Indistinguishable, named: set[str]) -> str:
-    """Return a set of effects with its experiment; one that has no named effect says what would be, were one there."""
-    names = " or ".join(found.effects)
-    if named.intersection(found.effects):
+def _not_distinguished(found: Indistinguishable, answer: Answer, labels: Labels) -> str:
+    """Return a set of effects with its experiment; of one that has no finding in it, that nothing was found."""
+    named = {effect.name for effect in answer.effects}
+    names = " or ".join(labels.if_changed(name, named, name) for name in found.effects)
+    if named.union(change.name for change in answer.changes).intersection(found.effects):
         return f"{names}: this recording does not distinguish them. {found.experiment}"
-    return f"{names}, were one of them there: this recording would not distinguish them. {found.experiment}"
+    return f"not found: {names}. If there were one, this recording would not tell which. {found.experiment}"
 
 
 def _unexplained(rest: Unexplained, labels: Labels, of: int, *, several: bool) -> list[str]:
@@ -112,6 +115,7 @@ def _curve_lines(rest: Unexplained, labels: Labels) -> list[str]:
     before = curve.held_out_rmse_before
     error = _compared(curve.held_out_rmse_after, before)
     lines = [f"empirical curve over {labels.the(rest.covariate)}, {reach}: held-out error {error} with it"]
+    lines += [] if curve.helps_held_out else [f"caution: {NO_HELP}"]
     for place, each in enumerate(rest.suggestions, 1):
         numbers = ", ".join(_value(name, one) for name, one in each.parameters.items())
         lines.append(f"suggestion {place}: {each.equation}; {numbers}; {_compared(each.held_out_rmse, before)}")
@@ -120,8 +124,8 @@ def _curve_lines(rest: Unexplained, labels: Labels) -> list[str]:
 
 def _compared(error: float, without: float) -> str:
     """Return how much smaller an error is than that without it."""
-    change = 100 * (1 - error / without) if without > 0 else 0.0
-    return f"{abs(change):.1f} % {'smaller' if change >= 0 else 'larger'}"
+    change = round(100 * (1 - error / without), 1) if without > 0 else 0.0
+    return f"{abs(change):.1f} % {'smaller' if change >= 0 else 'larger'}" if change else "the same"
 
 
 def _value(name: str, parameter: Parameter) -> str:

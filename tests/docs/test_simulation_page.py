@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch import Array
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs/how-to/simulation.md").read_text(encoding="utf-8")
+FOLDER = Path(__file__).resolve().parents[2] / "docs/how-to"
+PAGE, COVARIATES = ((FOLDER / name).read_text(encoding="utf-8") for name in ("simulation.md", "covariates.md"))
 
 
 def test_the_page_lists_every_attribute_and_method() -> None:
@@ -112,7 +113,9 @@ def test_the_whole_example_names_what_its_recording_conceals(fans: dict[str, Any
 
 def test_friction_in_a_predict_is_not_known_where_a_noisy_speed_stands() -> None:
     """The page's lines give the friction's whole size in motion, and NaN within the sensor's noise at rest."""
-    code = next(text for text in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL) if "direction_of(" in text)
+    code = next(
+        text for text in re.findall(r"```python\n(.*?)```", COVARIATES, flags=re.DOTALL) if "friction =" in text
+    )
     rng, count = np.random.default_rng(2), 2000
     moving = np.repeat([1.0, 0.0, -1.0, 0.0], count // 4)
     speed = (moving + rng.normal(0, 0.01, count))[:, None]
@@ -168,6 +171,29 @@ def test_friction_in_a_predict_is_written_as_the_page_says() -> None:
     assert compare(recording, without).answer.verdict == "consistent"
     for law in (np.sign, lambda speed: np.tanh(speed / 0.005)):
         assert compare(recording, Joint(law)).answer.verdict != "consistent"
+
+
+def test_rows_at_rest_of_a_joint_that_holds_its_friction_are_left_out_as_the_page_says() -> None:
+    """The controller keeps the friction of the last motion as long as the joint dwells; it is named all the same."""
+    code = next(text for text in re.findall(r"```python\n(.*?)```", COVARIATES, flags=re.DOTALL) if "moves =" in text)
+    recording = stop_and_go()
+    direction = direction_of(recording["speed_rad_s"][:, None])[:, 0]
+    last = np.maximum.accumulate(np.where(direction != 0, np.arange(len(direction)), 0))
+    recording["torque_Nm"] = recording["torque_Nm"] + np.where(direction == 0, 0.4 * direction[last], 0.0)
+
+    class Dwelling(Joint):
+        def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+            """Return the inertia's torque, in motion alone."""
+            names: dict[str, Any] = {"inputs": inputs, "torque": super().predict(inputs, values)}
+            exec(code, {"np": np}, names)
+            return np.asarray(names["torque"])
+
+    joint = Dwelling(lambda _: 0.0)
+    joint.parameters = {**Joint.parameters, "friction_Nm": Prior(0.0)}  # type: ignore[misc]
+    answer = compare(recording, joint).answer
+    assert (answer.verdict, [effect.name for effect in answer.effects]) == ("missing-physics", ["coulomb-friction"])
+    coulomb = answer.effects[0].parameters["coulomb_current"]
+    assert coulomb.low < 0.4 < coulomb.high
 
 
 class Winding(Simulation):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 from regolithd.calibration.mismatch.candidates.candidate import (
+    GROWTH_KEYS,
     GROWTHS,
     Array,
     Candidate,
@@ -15,7 +16,7 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     onset_grid,
     onset_range,
 )
-from regolithd.calibration.mismatch.candidates.motion import along_motion, transition_of
+from regolithd.calibration.mismatch.candidates.motion import TRANSITION_KEY, along_motion, transition_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -53,6 +54,7 @@ class BearingDrag(Candidate):
     forms = GROWTHS
     coefficients: ClassVar = (Coefficient("drag_current", "{unit}"),)
     sharing: ClassVar = ("one",)
+    shape_keys: ClassVar = {**GROWTH_KEYS, **TRANSITION_KEY}
     free: ClassVar = {"onset_s": (0.0, float("inf"))}
 
     def form_of(self, shape: Shape) -> str:

@@ -132,6 +132,8 @@ class Candidate:
     free: ClassVar[Mapping[str, tuple[float, float]]] = {}
     """Continuous shape parameters with their least and greatest value. The ending of the name is the unit: `_s`, `_K`,
     `_degC`, `_rad_s`; without one of these it has none."""
+    shape_keys: ClassVar[Mapping[str, str]] = {}
+    """What each key of its shapes means, for the documentation: `shape` of the answer and of `[[effects]]`."""
     shape_priors: ClassVar[Mapping[str, tuple[float, float]]] = {}
     """Mean and standard deviation of those of them that are known before the recording."""
     late_with_channel: ClassVar[bool] = True
@@ -146,6 +148,8 @@ class Candidate:
     loads: ClassVar[bool] = False
     """Whether the effect is a force or a torque on a drive. It is told in the predicted channel's unit, and is not
     looked for where that is no force, torque, or what a drive takes for one (current, voltage, power, pressure)."""
+    units: ClassVar[frozenset[str]] = frozenset()
+    """Units of the predicted columns in which it is looked for, where these are few; empty: any, or any of a load."""
     acts_unloaded: ClassVar[bool] = True
     """Whether the effect is there with the wheels lifted, where soil and load have no part in the channel."""
 
@@ -184,7 +188,11 @@ class Candidate:
 
     def applies(self, problem: Problem) -> bool:
         """Return whether this recording and simulation allow the effect at all."""
-        return problem.has(*self.requires) and not (self.loads and problem.simulation.unit in UNITS_OF_NO_LOAD)
+        return problem.has(*self.requires) and self.acts_in(problem.simulation.unit)
+
+    def acts_in(self, unit: str) -> bool:
+        """Return whether the effect can be in a predicted column with this unit."""
+        return (unit in self.units if self.units else True) and not (self.loads and unit in UNITS_OF_NO_LOAD)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002  # subclasses use it
         """Return the grid of shapes to search; empty where shapes come from `propose_shapes` alone."""
@@ -305,6 +313,13 @@ def onset_range(problem: Problem) -> tuple[float, float]:
     return FIRST_ONSET * problem.length_s, LAST_ONSET * problem.length_s
 
 
+GROWTH_KEYS = {
+    "onset_s": "when it begins",
+    "rise_s": "time constant of the exponential rise (0: a step)",
+    "full_at_s": "when the power of time is 1",
+    "power": "of the time since the onset",
+}
+"""What the keys of a shape with a `growth` mean."""
 GROWTHS = ("step", "exponential rise", "power of time")
 """Names of the forms that `growth` has."""
 

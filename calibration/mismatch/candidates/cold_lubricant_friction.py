@@ -14,7 +14,7 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     Shape,
 )
 from regolithd.calibration.mismatch.candidates.celsius import temperature_degC
-from regolithd.calibration.mismatch.candidates.motion import along_motion, transition_of
+from regolithd.calibration.mismatch.candidates.motion import TRANSITION_KEY, along_motion, transition_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -60,6 +60,14 @@ class ColdLubricantFriction(Candidate):
     forms = ("Vogel's law", "a line")
     parameter_labels: ClassVar = {"scale_K": "temperature scale"}
     coefficients: ClassVar = (Coefficient("cold_drag", "{unit} ({per_speed})^p"),)
+    shape_keys: ClassVar = {
+        "power": "of the speed",
+        "reference_degC": "T_r, where g is 1",
+        "pole_degC": "T_p of Vogel's law, g = exp((T_r − T_p)/s ((T_r − T_p)/(T − T_p) − 1))",
+        "scale_K": "s, the change of temperature for a factor e near T_r",
+        "no_drag_above_degC": "T_e of the line, g = (T_e − T)/(T_e − T_r), 0 above T_e",
+        **TRANSITION_KEY,
+    }
     free: ClassVar = {"power": POWERS, "scale_K": (STEEPEST_K, 80.0), "no_drag_above_degC": (-60.0, 80.0)}
 
     def form_of(self, shape: Shape) -> str:

@@ -11,8 +11,6 @@ from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
 
-CURRENT_UNITS = frozenset({"A", "mA", "µA", "kA"})
-
 
 class CurrentSensorBias(Candidate):
     """A constant on one wheel's reading."""
@@ -30,10 +28,7 @@ class CurrentSensorBias(Candidate):
     along_motion = False
     coefficients: ClassVar = (Coefficient("offset", "{unit}", 0),)
     sharing: ClassVar = ("one",)
-
-    def applies(self, problem: Problem) -> bool:
-        """Return whether the predicted channel is a current."""
-        return problem.simulation.unit in CURRENT_UNITS
+    units = frozenset({"A", "mA", "µA", "kA"})
 
     def columns(self, problem: Problem, shape: Shape) -> Array:  # noqa: ARG002
         """Return a constant 1."""

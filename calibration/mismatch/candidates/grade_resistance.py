@@ -30,6 +30,10 @@ class GradeResistance(Candidate):
     loads = True
     forms = ("shared evenly", "shared by load")
     along_motion = False
+    shape_keys: ClassVar = {
+        "shared": "by the wheels: `evenly`, or `by load`",
+        "reference_load": "W_ref, the mean load in the recording in which it was found",
+    }
     acts_unloaded = False
     parameter_labels: ClassVar = {"grade_current": "grade resistance"}
     coefficients: ClassVar = (Coefficient("grade_current", "{unit}"),)

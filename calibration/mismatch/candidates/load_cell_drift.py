@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import (
+    GROWTH_KEYS,
     GROWTHS,
     Array,
     Candidate,
@@ -67,6 +68,9 @@ class LoadCellDrift(Candidate):
     acts_unloaded = False
     coefficients: ClassVar = (Coefficient("drift_as_the_cell_shows_it", "1", 1),)
     sharing: ClassVar = ("one",)
+    shape_keys: ClassVar[Mapping[str, str]] = {
+        "relative_offset": "the drift's mean, which the cell does not show, in mean readings",
+    }
     free: ClassVar = {"relative_offset": (-3.0, 0.85)}
 
     def form_for(self, simulation: Predictor) -> Candidate:
@@ -144,6 +148,7 @@ class DriftOfPredictedLoad(LoadCellDrift):
     forms = GROWTHS[1:]
     wanders = True
     coefficients: ClassVar = (Coefficient("drift", "{unit}", 0),)
+    shape_keys = GROWTH_KEYS
     free: ClassVar = {"onset_s": (0.0, float("inf"))}
 
     def form_of(self, shape: Shape) -> str:

@@ -14,7 +14,7 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     Coefficient,
     Shape,
 )
-from regolithd.calibration.mismatch.candidates.motion import along_motion, transition_of
+from regolithd.calibration.mismatch.candidates.motion import TRANSITION_KEY, along_motion, transition_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,6 +56,13 @@ class LoadDependentEfficiency(Candidate):
     requires = ("torque",)
     loads = True
     forms = ("constant share", "power of the torque", "exponential decay with the torque", "linear efficiency")
+    shape_keys: ClassVar = {
+        "reference_size": "I_ref",
+        "power": "p (0: a constant share)",
+        "light": "l",
+        "bent": "a of the linear efficiency",
+        **TRANSITION_KEY,
+    }
     coefficients: ClassVar = (Coefficient("relative_loss", "1", 0),)
 
     def form_of(self, shape: Shape) -> str:

@@ -23,6 +23,10 @@ Array = NDArray[np.float64]
 
 TRANSITION = "transition_rad_s"
 """The shape parameter of a law that reverses: the speed at which the friction has turned round by three quarters."""
+TRANSITION_KEY = {
+    TRANSITION: "ω_t of a friction that turns round gradually: its law times tanh(|ω|/ω_t) (without the key: at once)"
+}
+"""What the key means, for the documentation."""
 TRANSITIONS = (0.0025, 0.005, 0.01, 0.02, 0.04)
 """Speeds at which the friction has turned round by three quarters, as shares of the highest usual speed (a choice: from
 where it is a step for most readings to where it would be taken for viscous friction); the best is refined between its

@@ -49,6 +49,11 @@ class MultiPassCompaction(Candidate):
     needs = "wheels one behind the other (row of the simulation)"
     acts_unloaded = False
     forms = tuple(FORMS.values())
+    shape_keys: ClassVar = {
+        "by": "what a pass changes: `current`, `stiffness` or `soil`",
+        "kept": "change by each further pass over that by the first",
+        "leads": "the end from which passes are counted: `front`, or that which leads in the direction of `travel`",
+    }
     coefficients: ClassVar = (
         Coefficient("relative_change_per_pass", "1", 0),
         Coefficient("relative_shear_modulus_per_pass", "1", 0),

@@ -42,6 +42,7 @@ class RotorInertia(Candidate):
     along_motion = False
     parameter_labels: ClassVar = {"inertia_current": "inertia"}
     coefficients: ClassVar = (Coefficient("inertia_current", "{unit} {per_acceleration}"),)
+    shape_keys: ClassVar = {"lag_s": "by which it follows the acceleration"}
     free: ClassVar = {"lag_s": (0.0, float("inf"))}
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:

@@ -66,6 +66,13 @@ class SensorDelay(Candidate):
     late_with_channel = False
     forms = ("dead time", "first-order filter")
     coefficients: ClassVar = (Coefficient("delay_s", "s", 1),)
+    shape_keys: ClassVar = {
+        "late": "the column that is late",
+        "secant_s": "dead time of the predicted channel",
+        "filter_s": "time constant of its first-order filter",
+        "input_secant_s": "dead time of an input",
+        PASSED: "share of the predicted change that was recorded (without the key: 1)",
+    }
     free: ClassVar = {"secant_s": (0.0, float("inf")), "filter_s": (0.0, float("inf"))}
 
     def words_for(self, shape: Shape) -> str:

@@ -27,6 +27,10 @@ class SlipSinkage(Candidate):
     requires = ("slip",)
     acts_unloaded = False
     forms = ("by the soil model", "in proportion to slip")
+    shape_keys: ClassVar = {
+        "step": "the strength for which the soil model is run",
+        "power": "of the slip, for machines without that model",
+    }
     coefficients: ClassVar = (Coefficient("strength", "1"),)
     sharing: ClassVar = ("all",)
 

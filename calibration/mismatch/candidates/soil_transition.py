@@ -38,6 +38,12 @@ class SoilTransition(Candidate):
     needs = "the parameters cohesion_Pa and friction_angle_deg"
     coefficients: ClassVar = (Coefficient("relative_strength_change", "1", 0),)
     sharing: ClassVar = ("all",)
+    shape_keys: ClassVar = {
+        "onset_s": "when the machine's centre comes to the other soil",
+        "along": "`time` (under all wheels at once) or `place` (under each when it comes there)",
+        "within_m": "length over which one soil turns into the other",
+        "of": "what changes: `strength` (both), `cohesion` or `friction`",
+    }
     free: ClassVar = {"onset_s": (0.0, float("inf"))}
 
     def form_of(self, shape: Shape) -> str:

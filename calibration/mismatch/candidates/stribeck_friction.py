@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
-from regolithd.calibration.mismatch.candidates.motion import along_motion, transition_of
+from regolithd.calibration.mismatch.candidates.motion import TRANSITION_KEY, along_motion, transition_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -53,6 +53,11 @@ class StribeckFriction(Candidate):
     label = "Stribeck friction"
     parameter_labels: ClassVar = {"stribeck_current": "Stribeck friction", "stribeck_speed_rad_s": "Stribeck speed"}
     coefficients: ClassVar = (Coefficient("stribeck_current", "{unit}"),)
+    shape_keys: ClassVar = {
+        "stribeck_speed_rad_s": "ω_s",
+        "fades": "`exponent 1` (δ = 1, exponential), `exponent 2` (δ = 2, Gaussian) or `quotient`",
+        **TRANSITION_KEY,
+    }
     free: ClassVar = {"stribeck_speed_rad_s": (0.0, np.inf)}
 
     def form_of(self, shape: Shape) -> str:

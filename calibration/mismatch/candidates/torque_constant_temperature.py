@@ -46,6 +46,10 @@ class TorqueConstantTemperature(Candidate):
     source = "magnet data sheets: NdFeB −0.1 %/K, ferrite −0.2 %/K, T_0 20 to 25 °C"
     requires = ("temperature", "torque")
     loads = True
+    shape_keys: ClassVar = {
+        "reference_degC": "T_0",
+        "bent_per_K": "α in the denominator: `temperature_coefficient`, to 2 %",
+    }
     coefficients: ClassVar = (Coefficient("temperature_coefficient", "1/K"),)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:

@@ -42,6 +42,13 @@ class TurningResistance(Candidate):
     loads = True
     forms = ("over the yaw rate", "over the slip angle")
     acts_unloaded = False
+    shape_keys: ClassVar = {
+        "by": "what g grows with: `rate`, or slip `angle`",
+        "half_at": "where g is half its limit, in reference turns",
+        "ends": "how far the wheels at both ends turn more than those in the middle: 0 alike, 1 with their distance",
+        "reference_turn": "mean rate (angle) in the recording in which it was found, where g is 1",
+        "creep_speed": "added to the speed in the slip angle",
+    }
     coefficients: ClassVar = (Coefficient("drag", "{unit}", 0), Coefficient("moment", "{unit}", 0))
     sharing: ClassVar = ("all",)
 

@@ -33,6 +33,7 @@ class ViscousFriction(Candidate):
     requires = ("wheel_speed",)
     loads = True
     coefficients: ClassVar = (Coefficient("viscous_coefficient", "{unit} ({per_speed})^p"),)
+    shape_keys: ClassVar = {"power": "p"}
     free: ClassVar = {"power": (0.7, 1.4)}
     shape_priors: ClassVar = {"power": POWER_PRIOR}
 

@@ -42,6 +42,10 @@ class WheelAngleRipple(Candidate):
 
     The angle is the integral of `wheel_speed` unless the simulation gives another. Where the speed is in m/s it is the
     travel in m, and a ripple of order n repeats every 2π/n m.
+
+    `amplitude` is that of the fundamental alone: half the distance from trough to crest, its root mean square over the
+    wheels that have it; of a ripple in proportion to the prediction, where that is `reference_size`. `relative_size`
+    has the overtone in it.
     """
 
     name = "wheel-angle-ripple"
@@ -56,6 +60,13 @@ class WheelAngleRipple(Candidate):
     coefficients: ClassVar = (Coefficient("amplitude", "{unit}", 0),)
     sharing: ClassVar = ("all", "one")
     forms = tuple(FORMS.values())
+    shape_keys: ClassVar = {
+        "order": "cycles per turn",
+        "kind": "factor of the sine: `drag` the direction, `torque` 1, `load` the prediction over `reference_size`",
+        "sines": "1 (the fundamental alone) or 2 (with its first overtone)",
+        "lag": "readings before each instant of which the angle counts: 0, 0.5 or −0.5",
+        "reference_size": "the predicted channel's mean magnitude in the recording in which it was found",
+    }
     free: ClassVar = {"order": (LOWEST_ORDER, HIGHEST_ORDER)}
 
     def form_of(self, shape: Shape) -> str:

@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     passes_entry_test,
 )
 from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
+from regolithd.calibration.mismatch.selection.decision import answer_names
 from regolithd.calibration.mismatch.selection.law_misfit import law_misfit
 from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what_pulls_parameters_out
 from regolithd.calibration.mismatch.selection.smooth_terms import covariate_of, drop_what_a_curve_explains
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.selection.decision import Decision
 
-UNEXPLAINED = "unexplained"
 NEVER: tuple[float, tuple[Term, ...]] = (-float("inf"), ())
 LARGEST_MARGIN = 40.0
 """Margin beyond which an answer is no alternative: it is e^20 times less probable."""
@@ -51,8 +51,11 @@ class Alternative:
     terms: tuple[Term, ...] = ()
 
 
-def alternatives(decision: Decision) -> tuple[Alternative, ...]:
-    """Return the other answers of one step's difference, the best of each set of names, best first."""
+def alternatives(decision: Decision, *, refused: bool = False) -> tuple[Alternative, ...]:
+    """Return the other answers of one step's difference, the best of each set of names, best first.
+
+    With `refused` also those that held-out readings refused: no answers, but evidence that something is there.
+    """
     chosen = decision.whole
     best: dict[tuple[str, ...], tuple[float, tuple[Term, ...]]] = {}
     ahead = _evidence(decision, chosen)
@@ -60,7 +63,8 @@ def alternatives(decision: Decision) -> tuple[Alternative, ...]:
         fit = decision.equations.fit(terms)
         names, evidence = _names(fit.terms), _evidence(decision, fit)
         plausible = ahead - evidence < LARGEST_MARGIN and evidence > best.get(names, NEVER)[0]
-        if names != _names(chosen.terms) and plausible and _admissible(decision, fit):
+        told = names != _names(chosen.terms) and (refused or frozenset(names) not in decision.refused)
+        if told and plausible and _admissible(decision, fit):
             best[names] = evidence, fit.terms
     found = [Alternative(names, ahead - evidence, of) for names, (evidence, of) in best.items()]
     found = [other for other in found if other.margin >= 0 or _stands_optimised(decision, other)]
@@ -133,4 +137,4 @@ def _further(decision: Decision, given: tuple[Term, ...]) -> Iterator[Term]:
 
 
 def _names(terms: tuple[Term, ...]) -> tuple[str, ...]:
-    return tuple(sorted({term.name if term.group.named else UNEXPLAINED for term in terms}))
+    return tuple(sorted(answer_names(terms)))

@@ -16,7 +16,7 @@ from regolithd.calibration.mismatch.answer import (
     Parameter,
     Unexplained,
 )
-from regolithd.calibration.mismatch.changes import ChangedSize, change_in_words, changes_of
+from regolithd.calibration.mismatch.changes import ChangedSize, changes_of
 from regolithd.calibration.mismatch.experiments.drives import DIRECTION
 from regolithd.calibration.mismatch.inference.alternatives import alternatives
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values, wheel_names
@@ -73,7 +73,6 @@ def findings_of(
         left_out=problem.left_out,
         notes=(
             *map(beyond_prior_in_words, moved),
-            *map(change_in_words, changes),
             *problem.recording.notes,
             *_about_the_mask(problem),
             *not_looked_for(problem, candidates, {candidate.name for candidate in applicable}),
@@ -131,7 +130,7 @@ def named_effects(decision: Decision, held_out: HeldOutErrors) -> tuple[tuple[Ef
     changes: list[Change] = []
     for index, (term, of_term) in enumerate(zip(named.terms, parameters, strict=True)):
         if isinstance(term.group.candidate, ChangedSize):
-            changes += changes_of(term.group.candidate, of_term)
+            changes += changes_of(term.group.candidate, of_term, equations.problem)
         else:
             errors = held_out.without[index], held_out.with_it[index]
             effects.append(_effect(equations.problem, term, of_term, errors))
@@ -146,6 +145,8 @@ def calibrated_parameters(decision: Decision) -> tuple[CalibratedParameter, ...]
     places = {name: place for place, name in enumerate(nuisance.names)}
     found = []
     for name, prior in problem.simulation.parameters.items():
+        if not prior.told:
+            continue
         std = 0.0
         if name in places:
             place = places[name]
@@ -190,14 +191,15 @@ def unexplained(decision: Decision) -> tuple[Unexplained, ...]:
 
 def _unexplained(decision: Decision, read: AsRead, term: Term) -> Unexplained:
     equations, problem = decision.equations, decision.equations.problem
-    first_s, last_s = spell_of(equations, read, term)
+    spells = next((each for each in decision.intermittent if each.term is term), None)
+    first_s, last_s = (spells.from_s, spells.to_s) if spells else spell_of(equations, read, term)
     return Unexplained(
         channel=problem.simulation.channel,
         wheels=wheel_names(problem, term.wheels),
         covariate=term.name,
         from_s=first_s,
         to_s=last_s,
-        share_of_residual=share_of_residual(equations, read, term),
+        share_of_residual=spells.share_of_residual if spells else share_of_residual(equations, read, term),
         range=range_of(decision, term),
     )
 

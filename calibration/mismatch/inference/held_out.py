@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.inference.improbable import unexplained_if_improbable
 from regolithd.calibration.mismatch.inference.intermittent import unexplained_if_intermittent
+from regolithd.calibration.mismatch.inference.likelier_names import likelier_names
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_candidate,
     passes_entry_test,
 )
 from regolithd.calibration.mismatch.selection.cross_validation import squares_left, training_equations
-from regolithd.calibration.mismatch.selection.decision import without_name
+from regolithd.calibration.mismatch.selection.decision import names_of, without_name
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
 
 if TYPE_CHECKING:
@@ -157,8 +158,9 @@ def chosen_effects(train: NormalEquations, entry_threshold: float) -> tuple[Term
 def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOutErrors]:
     """Return the decision without names that lower no held-out error, the worst dropped first; and those errors.
 
-    Without any name left, what is more probably there than not is unexplained; so is what comes and goes. `grid` are
-    the groups before any data optimised their shapes.
+    An answer that has more evidence takes its place where its names lower it further, or are fewer. What comes and goes
+    is unexplained; so is, without any name left, what is more probably there than not. `grid` are the groups before
+    any data optimised their shapes.
     """
     equations, threshold = decision.equations, decision.entry_threshold
     problem, kept = equations.problem, set(map(id, grid))
@@ -167,11 +169,19 @@ def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOut
     while (idle := held_out.without_gain()) is not None:
         decision = without_name(replace(decision, equations=equations), idle)
         equations, held_out = held_out_errors(equations, decision.named, choice, threshold)
-    decision = unexplained_if_improbable(replace(decision, equations=equations))
+    decision = replace(decision, equations=equations)
+    while (other := likelier_names(decision)) is not None:
+        equations, errors = held_out_errors(other.equations, other.named, choice, threshold)
+        lower = errors.after < held_out.after or names_of(other) < names_of(decision)
+        if errors.without_gain() is None and lower:
+            decision, held_out = replace(other, equations=equations), errors
+        else:
+            decision = replace(decision, equations=equations, refused=decision.refused | {names_of(other)})
     intermittent = unexplained_if_intermittent(decision)
     if len(intermittent.named.terms) < len(decision.named.terms):
         equations, held_out = held_out_errors(intermittent.equations, intermittent.named, choice, threshold)
-    return replace(intermittent, equations=equations), held_out
+        intermittent = replace(intermittent, equations=equations)
+    return unexplained_if_improbable(intermittent), held_out
 
 
 def _only_proposed(problem: Problem, group: Group) -> bool:

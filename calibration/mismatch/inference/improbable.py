@@ -30,7 +30,7 @@ def unexplained_if_improbable(decision: Decision) -> Decision:
     # A parameter that left its prior is the answer then, and no effect that acts as it does.
     if decision.whole.terms or equations.nuisance.leaving_their_priors(named, equations.problem).size:
         return decision
-    others = alternatives(decision)
+    others = alternatives(decision, refused=True)
     if probability(others, equations.thresholds) >= EVEN:
         return decision
     curve = _curve_like(decision, others[0])

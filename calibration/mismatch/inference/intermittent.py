@@ -15,18 +15,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
-from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
-from regolithd.calibration.mismatch.signal.noise import significant_autocorrelation
-from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
+from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
+from regolithd.calibration.mismatch.selection.decision import Intermittent
+from regolithd.calibration.mismatch.signal.skewness import of_usual_noise, skewed_lengths
+from regolithd.calibration.mismatch.signal.spells import spells_in
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
+    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 Array = NDArray[np.float64]
 
+TimedSpells = tuple[float, float, float]
+"""When the first spell begins and the last ends [s], and their share of the power."""
 CONSTANT = frozenset({"direction", "none"})
 """Covariates of effects of constant size."""
 
@@ -38,87 +40,66 @@ def unexplained_if_intermittent(decision: Decision) -> Decision:
     """
     equations = decision.equations
     explained = {wheel for term in decision.unnamed for wheel in term.wheels}
-    wheels = [wheel for wheel in skewed_wheels(decision) if wheel not in explained]
-    curves = _curves_over_time(decision, wheels) if wheels else ()
-    if not curves:
+    skewed = {wheels: spells for wheels, spells in skewed_wheels(decision).items() if explained.isdisjoint(wheels)}
+    found = _with_curves(decision, skewed) if skewed else ()
+    if not found:
         return decision
+    curves = tuple(each.term for each in found)
     told = {wheel for term in curves for wheel in term.wheels}
     named = equations.fit([term for term in decision.named.terms if not _constant_on(term, told)])
     unnamed = (*decision.unnamed, *curves)
     whole = equations.fit((*named.terms, *unnamed))
-    return replace(decision, named=named, unnamed=unnamed, whole=whole, intermittent=tuple(curves))
+    return replace(decision, named=named, unnamed=unnamed, whole=whole, intermittent=found)
 
 
-def skewed_wheels(decision: Decision) -> list[int]:
-    """Return the wheels on which what is left, as read or along the motion, has more skewness than noise by chance."""
+def skewed_wheels(decision: Decision) -> dict[tuple[int, ...], TimedSpells]:
+    """Return the wheels on which what is left, as read or along the motion, is skewed by more than chance, and when.
+
+    Each wheel is asked alone; where none shows it, all together: what acts on all adds up, and their noise does not.
+    """
     equations, problem = decision.equations, decision.equations.problem
     left = residual_of(equations, decision.whole)
     explained = np.zeros(left.shape)
     for index in range(len(decision.named.terms)):
         explained += contribution(equations, decision.named, index)
-    along = np.nan_to_num(problem.covariates.get("direction", np.ones(left.shape)))
-    found = []
-    for wheel in range(left.shape[1]):
-        here = problem.mask[:, wheel]
-        moving = here & (along[:, wheel] != 0)
-        for course, by in ((here, 1.0), (moving, along[moving, wheel])):
-            if is_skewed(left[course, wheel] * by, explained[course, wheel] * by, equations.thresholds):
-                found.append(wheel)
-                break
+    every = tuple(range(left.shape[1]))
+    found: dict[tuple[int, ...], TimedSpells] = {}
+    for wheels in ((wheel,) for wheel in every):
+        if spells := _skewed(problem, left, explained, wheels):
+            found[wheels] = spells
+    if len(every) > 1 and not found and (spells := _skewed(problem, left, explained, every)):
+        found[every] = spells
     return found
 
 
-def is_skewed(left: Array, explained: Array, thresholds: Thresholds = THRESHOLDS) -> bool:
-    """Return whether running means of what is left (time,), of any length, are skewed by more than chance.
+def _skewed(problem: Problem, left: Array, explained: Array, wheels: tuple[int, ...]) -> TimedSpells | None:
+    """Return the spells in what is left of these wheels, if it is skewed as read or along the motion.
 
-    Means that are small against those of what the named effects explain are the misfit of laws, of any distribution.
+    Where it is both, they are told as they act: so that more of the power is on one side.
     """
-    fewest = thresholds.fewest_means
-    courses = (_running_means(course, fewest) for course in (_without_single(left), explained))
-    for means, beside in zip(*courses, strict=False):
-        skewness, error = skewness_of(means, thresholds)
-        large = np.sum(means**2) > thresholds.form_misfit * np.sum(beside**2)
-        if large and abs(skewness) > max(thresholds.least_skewness, thresholds.most_skewness_errors * error):
-            return True
-    return False
+    on, limits, found = list(wheels), problem.thresholds, []
+    direction = np.nan_to_num(problem.covariates.get("direction", np.ones(left.shape)))
+    for along in (np.ones(left.shape), direction):
+        read = (problem.mask & (along != 0))[:, on]
+        course, beside = of_usual_noise(left[:, on], explained[:, on], read, along[:, on], limits)
+        if lengths := skewed_lengths(course, beside, limits):
+            spells, time_s = spells_in(course, lengths), problem.time_s[read.any(axis=1), 0]
+            found.append((float(time_s[spells.first]), float(time_s[spells.last]), spells.share))
+    return max(found, key=lambda spells: spells[2], default=None)
 
 
-def _running_means(values: Array, fewest: int) -> Iterator[Array]:
-    """Yield a course's running means over 1, 2, 4, … readings, as long as so many of them do not overlap."""
-    total, length = np.concatenate(([0.0], np.cumsum(values))), 1
-    while fewest * length <= len(values):
-        yield (total[length:] - total[:-length]) / length
-        length *= 2
-
-
-def skewness_of(values: Array, thresholds: Thresholds = THRESHOLDS) -> tuple[float, float]:
-    """Return the skewness of a course (time,), and its standard error where it is normal and autocorrelated.
-
-    The variance is 6/n (1 + 2 Σ ρ³) (Lomnicki, 1961); the sum is over the lags that are significant.
-    """
-    count = len(values)
-    deviations = values - values.mean() if count else values
-    std = float(np.std(deviations)) if count else 0.0
-    if std == 0.0:
-        return 0.0, float("inf")
-    scaled = (deviations / std)[:, None]
-    correlation = significant_autocorrelation(scaled, np.ones(scaled.shape, bool), thresholds)
-    variance = 6 / count * (1 + 2 * float(np.sum(correlation**3)))
-    return float(np.mean(deviations**3)) / std**3, variance**0.5
-
-
-def _without_single(values: Array) -> Array:
-    """Return the running median of three: a single reading that is off is a fault of its sensor."""
-    if len(values) < 3:
-        return values
-    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(values, 3), axis=-1))
-
-
-def _curves_over_time(decision: Decision, wheels: list[int]) -> tuple[Term, ...]:
-    """Return the best curve over time on each of these wheels alone, where it has one."""
-    best = best_of_each_smooth_term(decision.equations, decision.named.terms)
-    curves = {term.wheels: term for _, term in reversed(best) if term.name == "time"}
-    return tuple(curves[(wheel,)] for wheel in wheels if (wheel,) in curves)
+def _with_curves(decision: Decision, skewed: dict[tuple[int, ...], TimedSpells]) -> tuple[Intermittent, ...]:
+    """Return the best curve over time on each of these sets of wheels, where it has one; a sine is no spells."""
+    equations = decision.equations
+    over_time = [
+        group
+        for group in equations.design.groups
+        if group.name == "time" and not group.named and group.coupling != PERIODIC
+    ]
+    found = equations.further(decision.named.terms, over_time)
+    found.sort(key=lambda gain_and_term: gain_and_term[0] - equations.penalty(gain_and_term[1]))
+    curves = {term.wheels: term for _, term in found}
+    return tuple(Intermittent(curves[wheels], *spells) for wheels, spells in skewed.items() if wheels in curves)
 
 
 def _constant_on(term: Term, wheels: set[int]) -> bool:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import OtherAnswer
-from regolithd.calibration.mismatch.inference.alternatives import LARGEST_MARGIN, UNEXPLAINED
+from regolithd.calibration.mismatch.inference.alternatives import LARGEST_MARGIN
+from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,10 +39,9 @@ def decided_by_evidence(decision: Decision) -> bool:
     def gain(curve: Term) -> float:
         return told - equations.score(equations.fit([term for term in whole.terms if term is not curve]))
 
-    on_its_own = equations.thresholds.smooth_term_entry
+    on_its_own, spells = equations.thresholds.smooth_term_entry, [each.term for each in decision.intermittent]
     return all(
-        gain(curve) > (on_its_own if curve in decision.intermittent else decision.entry_threshold)
-        for curve in decision.unnamed
+        gain(curve) > (on_its_own if curve in spells else decision.entry_threshold) for curve in decision.unnamed
     )
 
 

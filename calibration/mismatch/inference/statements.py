@@ -26,6 +26,12 @@ truck tube turbine unit valve vehicle wagon wheel winch wing zone
 """What machines have several of, in English; a plural of any other word (`achse`) would be a guess."""
 
 
+NO_HELP = (
+    "the curve does not lower the error of readings that it was not fitted to, so that they do not confirm its shape."
+)
+"""What is said of an empirical curve that does not help on held-out readings."""
+
+
 def listed(items: Sequence[str]) -> str:
     """Return 'a', 'a and b', or 'a, b and c'."""
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+LEAST_TOLD = 0.0005
+"""Relative change of an error below which it is told as none: percent have one decimal."""
+
 
 @dataclass(frozen=True)
 class EmpiricalCurve:
@@ -35,6 +38,11 @@ class EmpiricalCurve:
     high: tuple[float, ...]
     held_out_rmse_before: float
     held_out_rmse_after: float
+
+    @property
+    def helps_held_out(self) -> bool:
+        """Whether the held-out error is lower with it, by at least `LEAST_TOLD`."""
+        return self.held_out_rmse_after < (1 - LEAST_TOLD) * self.held_out_rmse_before
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Prior:
-    """A parameter's normal prior density; a `std` of 0 means that the value is exact."""
+    """A parameter's normal prior density; a `std` of 0 means that the value is exact.
+
+    One that is not `told` is fitted like any other, but is no part of the answer: nobody can act on its value.
+    """
 
     value: float
     std: float = 0.0
     unit: str = "1"
+    told: bool = True
 
 
 @dataclass(frozen=True)

@@ -46,13 +46,17 @@ def effects_as_text(candidates: Sequence[Candidate], labels: Mapping[str, str], 
 
 
 def effects_of(simulation: Simulation | None) -> tuple[Sequence[Candidate], Mapping[str, str], str]:
-    """Return the candidates of a simulation in its forms, its labels of covariates, and its channel's unit."""
+    """Return the candidates of a simulation in its forms, its labels of covariates, and its channel's unit.
+
+    Those that can be in none of its predicted columns, by their units, are left out.
+    """
     if simulation is None:
         return library(), {}, CHANNEL_UNIT
+    units = tuple(simulation.channels.values()) or (simulation.unit,)
+    found = [each for each in simulation.candidates(library()) if any(map(each.acts_in, units))]
     if simulation.channels:
-        return simulation.candidates(library()), simulation.covariate_labels, CHANNEL_UNIT
-    found = [each.form_for(simulation) for each in simulation.candidates(library())]
-    return found, simulation.covariate_labels, simulation.unit
+        return found, simulation.covariate_labels, CHANNEL_UNIT
+    return [each.form_for(simulation) for each in found], simulation.covariate_labels, simulation.unit
 
 
 def _overview(candidates: Sequence[Candidate]) -> Iterator[str]:
@@ -97,6 +101,8 @@ def _rows(candidate: Candidate, labels: Mapping[str, str], unit: str) -> Iterato
     yield "parameters", ", ".join(_parameters(candidate, labels, unit))
     if candidate.forms:
         yield "forms", "; ".join(f"`{form}`" for form in candidate.forms)
+    if candidate.shape_keys:
+        yield "`shape`", "; ".join(f"`{key}`: {_plain(words)}" for key, words in candidate.shape_keys.items())
     yield "in a residual", candidate.signature
     yield "experiment", in_words(candidate.experiment, labels)
     if candidate.experiment_one_way:
@@ -122,6 +128,12 @@ def _told(candidate: Candidate, names: Collection[str]) -> Collection[str]:
         return candidate.parameters(dict.fromkeys(candidate.free, 1.0), [1.0] * len(candidate.coefficients))
     except KeyError:  # it asks for more of a shape than what is free
         return names
+
+
+def _plain(words: str) -> str:
+    """Return words whose underscores outside of code are no Markdown."""
+    parts = words.split("`")
+    return "`".join(part if place % 2 else part.replace("_", "\\_") for place, part in enumerate(parts))
 
 
 def _cell(text: str) -> str:

@@ -70,7 +70,8 @@ class Nuisance:
         return self._own_beyond(self.prior_stds_away(fit), problem)
 
     def _own_beyond(self, away: Array, problem: Problem) -> NDArray[np.int64]:
-        own = [name in problem.simulation.parameters for name in self.names]
+        parameters = problem.simulation.parameters
+        own = [name in parameters and parameters[name].told for name in self.names]
         return np.flatnonzero((away > problem.thresholds.furthest_prior_stds) & np.array(own, bool))
 
 

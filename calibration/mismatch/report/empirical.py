@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
+from regolithd.calibration.mismatch.inference.statements import NO_HELP, capital
 from regolithd.calibration.mismatch.report.axes import Panel, axes, box, line, number, svg, text
 
 if TYPE_CHECKING:
@@ -38,13 +39,14 @@ class SuggestedRow:
 
 @dataclass(frozen=True)
 class EmpiricalSection:
-    """A curve: its drawing, how it acts, the held-out errors without and with it, and the suggestions."""
+    """A curve: its drawing, how it acts, the held-out errors without and with it, a caution, and the suggestions."""
 
     svg: Markup
     acts: str
     before: str
     after: str
     unit: str
+    caution: str
     forms: tuple[SuggestedRow, ...]
 
 
@@ -61,6 +63,7 @@ def empirical_section(place: Unexplained, evidence: Evidence, labels: Labels) ->
         before=number(factor * curve.held_out_rmse_before),
         after=number(factor * curve.held_out_rmse_after),
         unit=unit,
+        caution="" if curve.helps_held_out else capital(NO_HELP),
         forms=tuple(_row(each, factor) for each in place.suggestions),
     )
 

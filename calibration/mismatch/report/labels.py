@@ -20,7 +20,7 @@ from regolithd.calibration.mismatch.inference.statements import (
 from regolithd.calibration.mismatch.problem.words import COVARIATES
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
     from regolithd.calibration.mismatch.answer import Answer, Change, Evidence
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
@@ -46,6 +46,7 @@ class Labels:
     candidates: by name
     in_minutes: whether times are in minutes, or in seconds
     in_milli: whether values of the channel are in thousandths of its unit
+    corrected: names of the effects that the simulation was corrected by
     """
 
     wheel: str = "wheel"
@@ -53,6 +54,7 @@ class Labels:
     candidates: Mapping[str, Candidate] = field(default_factory=lambda: {c.name: c for c in library()})
     in_minutes: bool = True
     in_milli: bool = False
+    corrected: frozenset[str] = frozenset()
 
     @classmethod
     def of(cls, evidence: Evidence) -> Labels:
@@ -60,7 +62,10 @@ class Labels:
         in_minutes = float(evidence.time_s[-1] - evidence.time_s[0]) > LONGEST_IN_SECONDS
         candidates = {candidate.name: candidate for candidate in evidence.candidates or library()}
         in_milli = evidence.unit in WITH_MILLI and float(np.nanmean(np.abs(evidence.measured))) < 1
-        return cls(noun_of(evidence.wheel_column), evidence.covariate_labels, candidates, in_minutes, in_milli)
+        problems = [each.problem for each in (evidence, *evidence.others)]
+        corrected = frozenset(effect.name for problem in problems if problem for effect in problem.stated)
+        kind = noun_of(evidence.wheel_column)
+        return cls(kind, evidence.covariate_labels, candidates, in_minutes, in_milli, corrected)
 
     @property
     def time_unit(self) -> str:
@@ -82,6 +87,13 @@ class Labels:
         """Return an effect's label; of a parameter's effect the name with spaces."""
         candidate = self.candidates.get(name)
         return candidate.label if candidate else name.replace("-", " ").replace("_", " ")
+
+    def if_changed(self, name: str, found: Collection[str], told: str) -> str:
+        """Return how an effect is told among those that could be there: as changed, where the simulation has it.
+
+        `found` are the names of effects found beside the corrected ones.
+        """
+        return f"{told} (changed)" if name in self.corrected and name not in found else told
 
     def axis(self, covariate: str) -> str:
         """Return a covariate's axis label, with its unit where that is known."""

@@ -64,7 +64,7 @@ def render_report(answer: Answer, evidence: Evidence, provenance: Provenance) ->
             parts=channel_parts(answer, evidence),
             confusions=sections.confusions(answer, labels),
             calibrated=tables.calibrated(answer),
-            changes=tables.changes(answer, labels),
+            changes=tables.changes(answer, labels, evidence.wheels),
             left_out=tables.left_out(answer),
             channels=tables.channels(answer, {each.channel: each.unit for each in (evidence, *evidence.others)}),
             versions=_versions(),

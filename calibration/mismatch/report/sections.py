@@ -81,9 +81,10 @@ class FitSection:
 
 @dataclass(frozen=True)
 class ConfusionRow:
-    """Effects that predict the same here, and the experiment that tells them apart."""
+    """Effects that predict the same here, whether one of them was found, and the experiment that tells them apart."""
 
     effects: str
+    found: bool
     experiment: str
 
 
@@ -243,8 +244,14 @@ def fit(answer: Answer, evidence: Evidence, labels: Labels) -> FitSection:
 
 def confusions(answer: Answer, labels: Labels) -> tuple[ConfusionRow, ...]:
     """Return what this recording cannot tell apart."""
+    named = {effect.name for effect in answer.effects}
+    found = named | {change.name for change in answer.changes}
     return tuple(
-        ConfusionRow(capital(listed([labels.effect(name) for name in one.effects])), one.experiment)
+        ConfusionRow(
+            capital(listed([labels.if_changed(name, named, labels.effect(name)) for name in one.effects])),
+            not found.isdisjoint(one.effects),
+            one.experiment,
+        )
         for one in answer.indistinguishable
     )
 

@@ -11,7 +11,9 @@ from regolithd.calibration.mismatch.report.axes import number
 from regolithd.calibration.mismatch.report.labels import UNITS
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.answer import Answer
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.answer import Answer, Change
     from regolithd.calibration.mismatch.report.labels import Labels
 
 
@@ -33,12 +35,14 @@ class ChangeRow:
     """What became of a corrected effect."""
 
     label: str
+    where: str
     direction: str
     parameter: str
     corrected: str
     now: str
     low: str
     high: str
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -74,19 +78,25 @@ def calibrated(answer: Answer) -> tuple[CalibratedRow, ...]:
     return tuple(rows)
 
 
-def changes(answer: Answer, labels: Labels) -> tuple[ChangeRow, ...]:
-    """Return what differs from the effects that a corrected simulation brought."""
-    return tuple(
-        ChangeRow(
-            capital(labels.effect(one.name)),
-            direction_of(one),
-            labels.parameter(one.name, one.parameter),
-            number(one.corrected),
-            number(one.now),
-            number(one.low),
-            number(one.high),
-        )
-        for one in answer.changes
+def changes(answer: Answer, labels: Labels, wheels: Sequence[int | str] = ()) -> tuple[ChangeRow, ...]:
+    """Return what differs from the effects that a corrected simulation brought; `wheels` are all of the recording."""
+    return tuple(_change(one, labels, wheels, several=len(answer.fits) > 1) for one in answer.changes)
+
+
+def _change(one: Change, labels: Labels, wheels: Sequence[int | str], *, several: bool) -> ChangeRow:
+    """Return one change; of several channels it names its own."""
+    factor, unit = labels.scaled(one.unit)
+    corrected, now, low, high = (number(factor * each) for each in (one.corrected, one.now, one.low, one.high))
+    return ChangeRow(
+        label=capital(labels.effect(one.name)),
+        where=", ".join(filter(None, [one.channel if several else "", labels.wheels(one.wheels, wheels)])),
+        direction=direction_of(one),
+        parameter=labels.parameter(one.name, one.parameter),
+        corrected=corrected,
+        now=now,
+        low=low,
+        high=high,
+        unit=unit,
     )
 
 

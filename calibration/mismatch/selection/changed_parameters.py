@@ -56,9 +56,8 @@ def _is_changed_parameter(equations: NormalEquations, named: Fit, index: int, te
     others, shape = named.without(index), term.group.shape
     gain = named.delta_chi2 - equations.fit(others).delta_chi2
     beside = shape_profile(equations, others, candidate, equations.all_wheels)
-    changes = [
-        _ChangedParameter(name) for name, prior in equations.problem.simulation.parameters.items() if prior.std > 0
-    ]
+    parameters = equations.problem.simulation.parameters
+    changes = [_ChangedParameter(name) for name, prior in parameters.items() if prior.told and prior.std > 0]
     rivals = [change for change in changes if not _is_the_effect(equations.problem, change, term)]
     limits = equations.thresholds
     least = gain + limits.lead_margin + limits.further_share * gain

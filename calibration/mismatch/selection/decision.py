@@ -36,6 +36,26 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+UNEXPLAINED = "unexplained"
+"""What stands for a curve among the names of an answer."""
+
+
+@dataclass(frozen=True, eq=False)
+class Intermittent:
+    """A curve over time that stands for what comes and goes, which no curve describes.
+
+    Attributes
+    ----------
+    term: the curve
+    from_s, to_s: begin of the first and end of the last spell
+    share_of_residual: the spells' share of the power of what is left without them
+    """
+
+    term: Term
+    from_s: float
+    to_s: float
+    share_of_residual: float
+
 
 @dataclass(frozen=True, eq=False)
 class Decision:
@@ -49,7 +69,8 @@ class Decision:
     named: fit of the named effects
     unnamed: smooth terms that nothing named explains
     whole: fit of both together
-    intermittent: those of the smooth terms that stand for what comes and goes, which no curve describes
+    intermittent: of those of the smooth terms that stand for what comes and goes, when and how much
+    refused: answers, by their names, of which one name lowered no held-out error
     """
 
     equations: NormalEquations
@@ -58,7 +79,8 @@ class Decision:
     named: Fit
     unnamed: tuple[Term, ...]
     whole: Fit
-    intermittent: tuple[Term, ...] = ()
+    intermittent: tuple[Intermittent, ...] = ()
+    refused: frozenset[frozenset[str]] = frozenset()
 
     @property
     def late(self) -> tuple[str, float] | None:
@@ -100,13 +122,27 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
     )
 
 
+def names_of(decision: Decision) -> frozenset[str]:
+    """Return the names of a decision, and `UNEXPLAINED` for its curves."""
+    return answer_names(decision.whole.terms)
+
+
+def answer_names(terms: Sequence[Term]) -> frozenset[str]:
+    """Return the names of terms, and `UNEXPLAINED` for curves."""
+    return frozenset(term.name if term.group.named else UNEXPLAINED for term in terms)
+
+
 def without_name(decision: Decision, index: int) -> Decision:
-    """Return the decision without one of its named effects; what it leaves is held against the smooth terms again."""
+    """Return the decision without one of its named effects, which held-out readings refused.
+
+    What it leaves is held against the smooth terms again.
+    """
     equations, threshold = decision.equations, decision.entry_threshold
+    refused = decision.refused | {names_of(decision)}
     kept = equations.fit(decision.named.without(index))
     named, unnamed = weigh_against_smooth_terms(equations, kept, (), threshold)
     whole = equations.fit((*named.terms, *unnamed))
-    return replace(decision, named=named, unnamed=unnamed, whole=whole)
+    return replace(decision, named=named, unnamed=unnamed, whole=whole, refused=refused)
 
 
 def _largest_that_passes(equations: NormalEquations, subsets: Sequence[Fit], threshold: float) -> Fit:

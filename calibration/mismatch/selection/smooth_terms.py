@@ -50,7 +50,7 @@ def weigh_against_smooth_terms(
     named = drop_what_a_changed_parameter_explains(equations, drop_transients(equations, named))
     refuted = [term for term in passed.terms if term not in named.terms]
     curve = alone[0][1]
-    imitated = _imitates_a_curve(equations, named, curve, entry_threshold)
+    imitated = _imitates_a_curve(equations, named, curve)
     for fit in simpler if imitated else ():
         if unexplained_beside(equations, fit) is None:
             return fit, ()
@@ -76,11 +76,14 @@ def _rest_of_refuted(
     return found[0][1] if found and found[0][0] > entry_threshold else None
 
 
-def _imitates_a_curve(equations: NormalEquations, named: Fit, curve: Term, entry_threshold: float) -> bool:
-    """Return whether one curve scores clearly more than several effects, of which some have other covariates."""
+def _imitates_a_curve(equations: NormalEquations, named: Fit, curve: Term) -> bool:
+    """Return whether one curve scores more than several effects, of which some have other covariates.
+
+    The curve has not to be likelier by chance, as it would be by a name's entry, but significant beyond the effects.
+    """
     if len(named.terms) < 2 or all(covariate_of(term) == curve.name for term in named.terms):
         return False
-    return equations.score(equations.fit((curve,))) > equations.score(named) + entry_threshold
+    return equations.score(equations.fit((curve,))) > equations.score(named) + equations.thresholds.smooth_term_entry
 
 
 def _explains_more(equations: NormalEquations, curve: Fit, named: Fit, entry_threshold: float) -> bool:

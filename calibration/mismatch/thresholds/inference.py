@@ -41,16 +41,21 @@ class InferenceThresholds:
     )
     # What comes and goes
     most_skewness_errors: float = threshold(
-        5.0,
+        4.0,
         "Standard errors of the skewness of running means beyond which a residual is skewed.",
-        f"{TRIALS}: in 94 recordings of twelve machines with nothing, or what was found, left out, it was at most 4.0 "
-        "at any length of the mean",
+        "standard: 6e-5 on both sides of a normal distribution, thus about one in a thousand sound recordings at some "
+        "of their lengths, axes and directions",
     )
     least_skewness: float = threshold(
         0.8,
         "Skewness below which it is no finding: laws and sensors are not quite linear.",
-        f"{TRIALS}: in the same 94 recordings it was at most 0.6 where it was beyond 2.5 standard errors; with drag in "
-        "spells, a sticking valve or slipstream 0.9 to 1.7",
+        f"{TRIALS}: in 94 recordings of twelve machines with nothing, or what was found, left out, it was at most 0.6 "
+        "where it was beyond 2.5 standard errors; with drag in spells, a sticking valve or slipstream 0.9 to 1.7",
+    )
+    noise_size_readings: int = threshold(
+        32,
+        "Differences from one reading to the next that show how large the noise is about an instant.",
+        f"{CHOICE}: their root mean square is then known to about 15 %, and noise grows and fades over more readings",
     )
     fewest_means: int = threshold(
         40,

@@ -93,10 +93,11 @@ def test_effects_are_listed_with_law_needs_and_parameters() -> None:
 
 
 def test_the_effects_of_a_simulation_have_its_units(start: Path) -> None:
-    """A coefficient is in the predicted column's unit, and its own effects are listed beside the library's."""
+    """A coefficient is in the predicted column's unit; what cannot be in a column with that unit is not listed."""
     done = call("--effects", "--simulation", start / "SIM.toml")
     assert done.exit_code == 0
     assert "  parameters  quadratic_coefficient [N·m s²/rad²]\n" in done.output
+    assert "current-sensor-bias" not in done.output
 
 
 def test_recordings_are_compared_together(start: Path, tmp_path: Path) -> None:

@@ -17,7 +17,18 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Answer
     from regolithd.daemon.messages.mismatch import ComparisonResult
 
-CHANGED = Change("viscous-friction", "size", corrected=0.5, now=0.25, low=0.2, high=0.3)
+CHANGED = Change(
+    "viscous-friction",
+    "size",
+    corrected=0.5,
+    now=0.25,
+    low=0.2,
+    high=0.3,
+    unit="A s/rad",
+    channel="motor_current_A",
+    wheels=(2, 4),
+    statement="viscous-friction is smaller than the corrected simulation has it.",
+)
 FILES: Any = SimpleNamespace(recording=Path("a/drive.mcap"), report=Path("a/report.html"))
 
 
@@ -57,6 +68,7 @@ def test_a_change_is_told_with_what_it_was() -> None:
     """And the files by their names; the report by its path."""
     told = result_of(replace(CONSISTENT, changes=(CHANGED,)))
     (change,) = told.changes
-    assert change.statement == "size was 0.5 in the corrected simulation"
-    assert (change.size, change.low, change.high) == (0.25, 0.2, 0.3)
+    assert change.statement == CHANGED.statement
+    assert (change.size, change.low, change.high, change.unit) == (0.25, 0.2, 0.3, "A s/rad")
+    assert change.where == "wheels 2, 4"
     assert (told.recording, told.simulation, told.report) == ("drive.mcap", "SIM.toml", "a/report.html")

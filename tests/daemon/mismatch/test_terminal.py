@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from io import StringIO
 from types import SimpleNamespace
 
 from rich.console import Console
 
 from regolithd.calibration.mismatch.answer import CalibratedParameter, Parameter, Suggestion, Unexplained
+from regolithd.calibration.mismatch.inference.statements import NO_HELP
 from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.report.labels import Labels
 from regolithd.daemon.mismatch.terminal import print_answer
@@ -15,10 +17,28 @@ from regolithd.daemon.mismatch.terminal import print_answer
 CURVE = EmpiricalCurve("offset", False, "A", "m", (0.1, 0.7), (0.0, 1.5), (-0.1, 1.4), (0.1, 1.6), 0.004, 0.002)
 SUGGESTIONS = (Suggestion("power", "Δcurrent = c height", {"c": Parameter(2.5, 2.0, 3.0, "A/m")}, 0.0021, 0.0),)
 
+GROWN = SimpleNamespace(
+    name="viscous-friction",
+    channel="current",
+    statement="viscous-friction is larger than the corrected simulation has it.",
+)
+WERE_THERE = "If there were one, this recording would not tell which."
 LEFT = (
     "4.97 W/K instead of 4 ± 0.16, 6.1 standard deviations away. Check the stated value and its standard "
     "deviation, or look for physics that acts as this parameter does."
 )
+
+
+def answer_with(**parts: object) -> SimpleNamespace:
+    """Return an answer that has these parts alone."""
+    empty: dict[str, object] = {
+        **dict.fromkeys(("effects", "changes", "unexplained", "indistinguishable", "parameters", "notes"), ()),
+        "fit": SimpleNamespace(channel="a", held_out_rmse_before=1.0, held_out_rmse_after=1.0, noise_floor_rmse=1.0),
+        "fits": (),
+        "probability": None,
+        "next_best": None,
+    }
+    return SimpleNamespace(**{**empty, **parts})
 
 
 def test_mismatch_prints_the_answer() -> None:
@@ -30,9 +50,11 @@ def test_mismatch_prints_the_answer() -> None:
             Unexplained("current", (1, 4), "time", 3.4, 99.6, 0.123),
             Unexplained("current", (1,), "height", 0.0, 9.0, 0.4, curve=CURVE, suggestions=SUGGESTIONS),
         ],
+        changes=[GROWN],
         indistinguishable=[
             SimpleNamespace(effects=("coulomb-friction", "other"), experiment="Drive backwards."),
-            SimpleNamespace(effects=("one", "other"), experiment="Drive fast."),
+            SimpleNamespace(effects=("quadratic-drag", "viscous-friction"), experiment="Drive up."),
+            SimpleNamespace(effects=("one", "stribeck-friction"), experiment="Drive fast."),
         ],
         fit=SimpleNamespace(
             channel="current", held_out_rmse_before=0.00412345, held_out_rmse_after=0.001, noise_floor_rmse=0.0009
@@ -47,17 +69,21 @@ def test_mismatch_prints_the_answer() -> None:
         notes=["short", "in b: loss had to leave its prior: 4.97 W/K."],
     )
     console = Console(record=True, width=200, quiet=False)
-    print_answer(console, answer, Labels("zone", {"height": "height of the bale (m)"}), (1, 2, 3, 4))
+    corrected = frozenset({"viscous-friction", "stribeck-friction"})
+    labels = Labels("zone", {"height": "height of the bale (m)"}, corrected=corrected)
+    print_answer(console, answer, labels, (1, 2, 3, 4))
     assert console.export_text().splitlines() == [
         "effects",
         "  coulomb-friction: 37 mA",
+        "  changed: viscous-friction is larger than the corrected simulation has it.",
         f"  parameter loss had to leave its prior: {LEFT}",
         "  unexplained: 12 % of the residual follows time periodically, on zones 1 and 4, 3 to 100 s",
         "  unexplained: 40 % of the residual follows the height of the bale, on zone 1, 0 to 9 s",
         "    empirical curve over the height of the bale, 0.1 to 0.7 m: held-out error 50.0 % smaller with it",
         "    suggestion 1: Δcurrent = c height; c = 2.5 A/m; 47.5 % smaller",
         "  coulomb-friction or other: this recording does not distinguish them. Drive backwards.",
-        "  one or other, were one of them there: this recording would not distinguish them. Drive fast.",
+        "  quadratic-drag or viscous-friction (changed): this recording does not distinguish them. Drive up.",
+        f"  not found: one or stribeck-friction (changed). {WERE_THERE} Drive fast.",
         "  probability of this answer: 0.91; next: other + something unexplained (0.05)",
         "  held-out error of current: 0.0041234 before, 0.001 after, noise floor 0.0009",
         "  note: short",
@@ -70,23 +96,20 @@ def test_of_several_channels_each_finding_and_each_error_names_its_own() -> None
         SimpleNamespace(channel=name, held_out_rmse_before=1.5, held_out_rmse_after=after, noise_floor_rmse=1.0)
         for name, after in (("pressure", 1.5), ("current", 1.25))
     ]
-    answer = SimpleNamespace(
+    answer = answer_with(
         verdict="unexplained",
         effects=[SimpleNamespace(name="sensor-delay", channel="current", statement="A delay of pressure.")],
+        changes=[GROWN],
         unexplained=[Unexplained("pressure", (1,), "flow", 0.0, 9.0, 0.4)],
-        indistinguishable=[],
         fit=fits[1],
         fits=fits,
-        parameters=[],
-        probability=None,
-        next_best=None,
-        notes=[],
     )
     console = Console(record=True, width=200, quiet=False)
     print_answer(console, answer, Labels(), (1,))
     assert console.export_text().splitlines() == [
         "unexplained",
         "  sensor-delay in current: A delay of pressure.",
+        "  changed in current: viscous-friction is larger than the corrected simulation has it.",
         "  unexplained in pressure: 40 % of the residual follows the flow, 0 to 9 s",
         "  probability of this answer: not known",
         "  held-out error of pressure: 1.5, noise floor 1",
@@ -94,20 +117,23 @@ def test_of_several_channels_each_finding_and_each_error_names_its_own() -> None
     ]
 
 
+def test_a_curve_that_does_not_help_where_it_was_not_fitted_is_told_with_a_caution() -> None:
+    """Under the curve; an error that changes by less than is told is the same."""
+    useless = replace(CURVE, held_out_rmse_after=0.0039999)
+    unexplained = [Unexplained("current", (1,), "height", 0.0, 9.0, 0.4, curve=useless)]
+    answer = answer_with(verdict="unexplained", unexplained=unexplained)
+    console = Console(record=True, width=200, quiet=False)
+    print_answer(console, answer, Labels(), (1,))
+    assert console.export_text().splitlines()[2:4] == [
+        "    empirical curve over the height, 0.1 to 0.7 m: held-out error the same with it",
+        f"    caution: {NO_HELP}",
+    ]
+
+
 def test_a_terminal_gets_continued_lines_indented() -> None:
     """A line is broken at its width, never between a number and its percent sign, and goes on under its beginning."""
-    answer = SimpleNamespace(
-        verdict="missing-physics",
-        effects=[SimpleNamespace(name="viscous-friction", statement="Drag that grows with speed: 37 % of the mean.")],
-        unexplained=[],
-        indistinguishable=[],
-        fit=SimpleNamespace(channel="a", held_out_rmse_before=1.0, held_out_rmse_after=1.0, noise_floor_rmse=1.0),
-        fits=(),
-        parameters=[],
-        probability=None,
-        next_best=None,
-        notes=[],
-    )
+    drag = SimpleNamespace(name="viscous-friction", statement="Drag that grows with speed: 37 % of the mean.")
+    answer = answer_with(verdict="missing-physics", effects=[drag])
     console = Console(record=True, width=51, force_terminal=True, file=StringIO())
     print_answer(console, answer, Labels(), (1,))
     assert console.export_text().splitlines()[1:3] == [

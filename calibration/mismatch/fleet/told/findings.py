@@ -244,6 +244,8 @@ def _parameters(chosen: Chosen) -> tuple[FleetParameter, ...]:
     found = []
     for place, rovers in enumerate(owners[equations.level]):
         for name, prior in chosen.simulation.parameters.items():
+            if not prior.told:
+                continue
             value, std = prior.value, 0.0
             if name in equations.tangents:
                 at = place * len(equations.tangents) + equations.tangents.index(name)

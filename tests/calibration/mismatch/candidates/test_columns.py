@@ -293,6 +293,15 @@ def test_shapes_lie_within_their_bounds_and_bounds_within_the_law(candidate: Can
                 assert candidate.free[name][0] <= candidate.free[name][1]
 
 
+@pytest.mark.parametrize("candidate", [*library(), DriftOfPredictedLoad()], ids=lambda c: f"{c.name}-{c.channel}")
+def test_every_key_of_a_shape_is_told_in_the_documentation(candidate: Candidate) -> None:
+    """What stands in `[[effects]]` can be looked up, and nothing else is told."""
+    shapes = [*candidate.shapes(P), *candidate.propose_shapes(P, P.filled), *candidate.onset_profiles(P)]
+    keys = {key for shape in shapes for key in shape}
+    assert keys <= set(candidate.shape_keys)
+    assert set(candidate.free) <= set(candidate.shape_keys)
+
+
 @pytest.mark.parametrize("candidate", library(), ids=lambda c: c.name)
 def test_a_candidate_needs_what_it_requires(candidate: Candidate) -> None:
     """Without one of its covariates it is not looked for; with all of them it is."""

@@ -123,7 +123,9 @@ def test_a_simulation_with_a_state_is_not_predicted() -> None:
     assert not predicts_row_by_row(problem)
     experimenter = experimenter_of(equations_of(problem, (Drag(),)), THRESHOLD)
     assert experimenter.drives is None
-    assert experimenter.unpredictable == "the simulation has a state, which depends on what was before"
+    assert experimenter.unpredictable == (
+        "a prediction depends on other rows too, by a state or a rate of change in `predict`"
+    )
 
 
 def test_a_direction_of_a_noisy_speed_is_no_state() -> None:

@@ -85,11 +85,13 @@ def test_more_or_less_of_a_corrected_effect_is_told_with_its_size(now_N: float) 
 
 
 def test_a_corrected_effect_that_is_gone_is_called_gone() -> None:
-    """Its interval holds zero, and the note says it in words."""
+    """Its interval holds zero, and its sentence says so; no note repeats it."""
     answer = compare(moving(3, 0.0), Axis(), effects=[COULOMB]).answer
     (change,) = answer.changes
     assert change.low < 0 < change.high
-    assert any("coulomb-friction is gone" in note for note in answer.notes)
+    assert change.statement.startswith("coulomb-friction is gone: coulomb_current from 0.5 to ")
+    assert (change.unit, change.channel, change.wheels) == ("N", "force_N", (1,))
+    assert not any("coulomb-friction is gone" in note for note in answer.notes)
 
 
 @pytest.mark.parametrize(("fitted", "secant"), [(0.4, 0.4), (-0.7, -0.7), (-1.6, -1.0)])
@@ -209,11 +211,12 @@ def test_an_effect_is_gone_where_it_is_small_and_may_be_zero(
 
 def test_a_change_is_told_with_both_sizes_and_the_interval() -> None:
     """In one sentence; an effect of size 0 can only have become larger."""
-    assert change_in_words(Change("drag", "drag_current", 0.62, 0.9137, 0.88, 0.94)) == (
-        "drag is larger than the corrected simulation has it: drag_current 0.9137 (90 % sure: 0.88 to 0.94), "
-        "corrected 0.62."
+    assert change_in_words(Change("drag", "drag_current", 0.62, 0.9137, 0.88, 0.94, "A"), ", on both axes") == (
+        "drag is larger than the corrected simulation has it, on both axes: drag_current from 0.62 to 0.9137 A "
+        "(90 % sure: 0.88 to 0.94)."
     )
-    assert change_in_words(Change("drag", "d", 1.0, 0.01, -0.02, 0.04)).startswith("drag is gone: d 0.01 (90 % sure")
+    gone = change_in_words(Change("drag", "d", 1.0, 0.01, -0.02, 0.04))
+    assert gone.startswith("drag is gone: d from 1 to 0.01 (90 % sure")
     assert direction_of(Change("drag", "d", 0.0, 0.5, 0.4, 0.6)) == "larger"
 
 
@@ -277,3 +280,19 @@ def test_a_law_s_misfit_is_of_the_whole_effect() -> None:
     gained = held.fit([Term(group, (0,))]).delta_chi2
     beyond = explained(equations, fit) - fit.delta_chi2
     assert beyond == pytest.approx(gained * ((1 + size) ** 2 - size**2) / size**2, rel=0.1)
+
+
+@pytest.mark.parametrize("one_way", [True, False])
+def test_a_change_has_the_experiment_of_its_effect_also_on_a_machine_that_runs_one_way(one_way: bool) -> None:
+    """No reversal is asked for where the machine cannot reverse."""
+
+    class Pump(Axis):
+        pass
+
+    Pump.one_way = one_way
+    problem = build_problem(moving(1, 0.0), Pump())
+    stated = stated_in(library(), [VISCOUS], [])
+    *_, change = with_changes(corrected_problem(problem, stated), library(), stated)
+    (viscous,) = (each for each in library() if each.name == "viscous-friction")
+    assert change.instruction(problem.simulation) == viscous.instruction(problem.simulation)
+    assert ("both ways" in change.instruction(problem.simulation)) == (not one_way)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from linear_machine import AXES, CANDIDATES, INSTANTS, equations_of, problem_of, table
+from linear_machine import AXES, CANDIDATES, INSTANTS, NOISE, STEP_S, equations_of, problem_of, table
 
-from regolithd.calibration.mismatch.inference.intermittent import is_skewed, skewness_of, unexplained_if_intermittent
+from regolithd.calibration.mismatch.inference.intermittent import unexplained_if_intermittent
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence
-from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
+from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, with_smooth_terms
 from regolithd.calibration.mismatch.selection.decision import Decision, decide
 
 
@@ -50,16 +50,33 @@ def test_three_long_spells_are_unexplained_whatever_their_sign(sign: float) -> N
         spells[begin : begin + 20, 0] = 0.5 * sign
     decision = unexplained_if_intermittent(decided(spells))
     assert [(term.name, term.wheels) for term in decision.unnamed] == [("time", (0,))]
+    (spells,) = decision.intermittent
+    assert spells.term is decision.unnamed[0]
+    assert (spells.from_s, spells.to_s) == pytest.approx((120 * STEP_S, 630 * STEP_S), abs=8 * STEP_S)
+    assert spells.share_of_residual == pytest.approx(0.075 * 0.5**2 / (0.075 * 0.5**2 + NOISE**2), abs=0.1)
 
 
-def test_slow_noise_is_not_intermittent() -> None:
-    """Noise with a memory of a hundredth of the recording wanders to both sides."""
-    skewed = 0
-    for seed in range(40):
-        random = np.random.default_rng(seed)
-        slow = np.convolve(random.normal(size=4000 + 400), np.exp(-np.arange(401) / 40), "valid")
-        skewed += is_skewed(slow + random.normal(size=4000), np.zeros(4000))
-    assert skewed == 0
+def test_spells_that_recur_regularly_are_no_sine() -> None:
+    """The strongest sine over time explains a part of them, and would tell a part of them."""
+    spells = np.zeros((INSTANTS, AXES))
+    spells[np.arange(INSTANTS) % 100 < 15, 0] = 0.5
+    decision = unexplained_if_intermittent(decided(spells))
+    assert [term.group.coupling == PERIODIC for term in decision.unnamed] == [False]
+
+
+def test_spells_of_each_axis_are_told_of_each() -> None:
+    """At different times, either has a curve of its own."""
+    spells = in_spells(0.8) + 1.2 * in_spells(0.8)[::-1, ::-1]
+    decision = unexplained_if_intermittent(decided(spells))
+    assert [(term.name, term.wheels) for term in decision.unnamed] == [("time", (0,)), ("time", (1,))]
+
+
+def test_spells_on_both_axes_are_unexplained_on_both() -> None:
+    """Too weak for one axis to show them, they are told of both."""
+    acting = np.random.default_rng(4).random(INSTANTS // 5) < 0.15
+    spells = np.repeat(0.35 * acting, 5)[:, None] * np.ones(AXES)
+    decision = unexplained_if_intermittent(decided(spells))
+    assert [(term.name, term.wheels) for term in decision.unnamed] == [("time", (0, 1))]
 
 
 @pytest.mark.parametrize("drag", [0.0, 0.3])
@@ -75,15 +92,3 @@ def test_single_readings_that_are_off_are_no_finding() -> None:
     spikes[10::40, 1] = 2.0
     decision = decided(spikes)
     assert unexplained_if_intermittent(decision) is decision
-
-
-def test_the_standard_error_is_that_of_autocorrelated_noise() -> None:
-    """Over many draws the skewness spreads as its standard error says."""
-    random = np.random.default_rng(1)
-    found = []
-    for _ in range(200):
-        noise = np.convolve(random.normal(size=2000), 0.8 ** np.arange(20))[:2000]
-        found.append(skewness_of(noise))
-    skewness, errors = np.array(found).T
-    assert np.std(skewness) == pytest.approx(errors.mean(), rel=0.15)
-    assert skewness_of(np.zeros(50)) == (0.0, float("inf"))

@@ -75,3 +75,12 @@ def test_the_alternatives_are_one_name_away() -> None:
     margins = [each.margin for each in found]
     assert margins == sorted(margins)
     assert min(margins) > 0
+
+
+def test_what_held_out_readings_refused_is_no_alternative() -> None:
+    """However much evidence it has: it could not have been the answer."""
+    decision = decided(drag=0.035)
+    refused = alternatives(decision)[0].effects
+    left = alternatives(replace(decision, refused=frozenset({frozenset(refused)})))
+    assert refused not in {each.effects for each in left}
+    assert len(left) >= 1

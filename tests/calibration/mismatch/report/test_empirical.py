@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from regolithd.calibration.mismatch.answer import EmpiricalFit, Parameter, Suggestion, Unexplained
 from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve, StatedCurve
@@ -42,5 +44,14 @@ def test_the_texts_say_how_it_acts_and_what_it_brings() -> None:
     told = empirical_section(PLACE, SimpleNamespace(unit="A", empirical=()), Labels())  # type: ignore[arg-type]
     assert (told.before, told.after, told.unit) == ("0.4", "0.2", "A")
     assert re.match(r"It acts against the motion", told.acts)
+    assert told.caution == ""
     assert told.forms[0].parameters == "c = 0.25 (0.2 … 0.3) A/(m/s)"
     assert 'class="after line suggested"' not in told.svg
+
+
+@pytest.mark.parametrize("after", [0.4, 0.39999, 0.41])
+def test_a_curve_that_does_not_help_where_it_was_not_fitted_has_a_caution(after: float) -> None:
+    """Also one whose gain is less than percent with one decimal show."""
+    place = replace(PLACE, curve=replace(CURVE, held_out_rmse_after=after))
+    told = empirical_section(place, SimpleNamespace(unit="A", empirical=()), Labels())  # type: ignore[arg-type]
+    assert told.caution.startswith("The curve does not lower the error of readings that it was not fitted to")

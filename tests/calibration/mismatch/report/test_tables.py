@@ -7,15 +7,16 @@ from dataclasses import replace
 import pytest
 from sample_answer import ANSWER, CONSISTENT, FROM, VISCOUS, evidence
 
-from regolithd.calibration.mismatch.answer import CalibratedParameter, Change, FitImprovement
+from regolithd.calibration.mismatch.answer import CalibratedParameter, Change, FitImprovement, Indistinguishable
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 from regolithd.calibration.mismatch.report import tables
 from regolithd.calibration.mismatch.report.labels import Labels, verdict_sentence
 from regolithd.calibration.mismatch.report.page import render_report
+from regolithd.calibration.mismatch.report.sections import confusions
 
 MASS = CalibratedParameter("mass_kg", "kg", 50.0, 2.0, 90.5, 89.0, 92.0)
 EXACT = CalibratedParameter("radius_m", "m", 0.075, 0.0, 0.075, 0.075, 0.075)
-MORE = Change("coulomb-friction", "coulomb_current", 0.62, 0.91, 0.88, 0.94)
+MORE = Change("coulomb-friction", "coulomb_current", 0.62, 0.91, 0.88, 0.94, "A", "motor_current_A", (2, 4))
 GONE = Change("coulomb-friction", "coulomb_current", 0.62, 0.01, -0.01, 0.03)
 CHANGED = replace(CONSISTENT, verdict="missing-physics", changes=(MORE,), parameters=(MASS, EXACT))
 
@@ -41,6 +42,28 @@ def test_a_change_s_row_has_both_sizes(change: Change, direction: str) -> None:
     """What was corrected, and what it is now with its interval."""
     (row,) = tables.changes(replace(CHANGED, changes=(change,)), Labels())
     assert (row.label, row.direction, row.corrected) == ("Coulomb friction", direction, "0.62")
+
+
+def test_a_change_s_row_has_its_wheels_and_unit() -> None:
+    """Of several channels the channel too; small currents are in mA."""
+    of_channels = replace(CHANGED, fits=(CHANGED.fit, CHANGED.fit))
+    (alone,), (several,) = (tables.changes(each, Labels(in_milli=True), range(1, 7)) for each in (CHANGED, of_channels))
+    assert (alone.where, alone.corrected, alone.now, alone.unit) == ("wheels 2, 4", "620", "910", "mA")
+    assert several.where == "motor_current_A, wheels 2, 4"
+
+
+def test_what_cannot_be_told_apart_is_told_as_found_or_not() -> None:
+    """An effect that the simulation has already could only change."""
+    sets = (
+        Indistinguishable(("coulomb-friction", "viscous-friction"), "Drive."),
+        Indistinguishable(("quadratic-drag", "rotor-inertia"), "Start."),
+    )
+    answer = replace(CHANGED, indistinguishable=sets)
+    rows = confusions(answer, Labels(corrected=frozenset({"coulomb-friction", "quadratic-drag"})))
+    assert [(row.effects, row.found) for row in rows] == [
+        ("Coulomb friction (changed) and viscous friction", True),
+        ("Quadratic drag (changed) and rotor inertia", False),
+    ]
 
 
 def test_the_page_shows_parameters_changes_and_what_is_left_out() -> None:
