@@ -14,8 +14,8 @@ die() {
   exit 125
 }
 
-# With AMX the guest saves no AVX registers (without_xstate.py): neither the C library, also in the guest's init, nor numpy may
-# use them.
+# With AMX the guest saves no AVX registers (without_xstate.py): neither the C library, also in the guest's init, nor OpenSSL nor
+# numpy may use them.
 glibc_without_avx=()
 without_avx=()
 xstate=()
@@ -26,6 +26,7 @@ if grep -qw amx_tile /proc/cpuinfo; then
   )
   without_avx=(
     "${glibc_without_avx[@]}"
+    OPENSSL_ia32cap=~0x1000000000000000:~0x600d0230020
     OPENBLAS_CORETYPE=Nehalem
     "NPY_DISABLE_CPU_FEATURES=AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR AVX2 FMA3"
   )
