@@ -183,10 +183,7 @@ def _without_blanks(problem: Problem, delay_s: float) -> Array:
             recorded = problem.measured[standing.start + late : standing.stop, k]
             if standing.stop - standing.start >= 2 * late and np.isfinite(recorded).any():
                 found[standing, k] = np.nanmedian(recorded)
-        known = np.flatnonzero(np.isfinite(found[:, k]))
-        if known.size:
-            found[:, k] = np.interp(np.arange(len(found)), known, found[known, k])
-    return found
+    return _bridged(found)
 
 
 def _standing(direction: Array, first: int, end: int) -> slice:
@@ -253,7 +250,17 @@ def as_shown(problem: Problem, columns: Sequence[Array]) -> Sequence[Array]:
     if problem.late is None:
         return columns
     kind, delay = problem.late
-    return [np.nan_to_num(OF_CHANNEL[kind](problem.recording, column, delay)) for column in columns]
+    return [np.nan_to_num(OF_CHANNEL[kind](problem.recording, _bridged(column), delay)) for column in columns]
+
+
+def _bridged(values: Array) -> Array:
+    """Return values (time, wheel) with straight lines across what is not known; as they are where nothing is known."""
+    found, rows = np.array(values, np.float64), np.arange(len(values))
+    for column in found.T:
+        known = np.isfinite(column)
+        if known.any() and not known.all():
+            column[:] = np.interp(rows, rows[known], column[known])
+    return found
 
 
 def lateness(effects: Iterable[tuple[str, Shape]], channel: str) -> tuple[str, float] | None:

@@ -115,8 +115,8 @@ class Problem:
 
     @cached_property
     def filled(self) -> Array:
-        """The prediction, 0 where there is none."""
-        return np.where(self.mask, self.prediction, 0.0)
+        """The prediction, 0 where there is none; what is late is computed from rows that are not compared, too."""
+        return np.where(np.isfinite(self.prediction), self.prediction, 0.0)
 
     @cached_property
     def added(self) -> Array:
@@ -149,10 +149,10 @@ class Problem:
         return float(np.mean(np.nanvar(kept, axis=0)))
 
     def changed(self, **changes: float) -> Array:
-        """Return the prediction with parameters (or variants) set otherwise, 0 outside the mask."""
+        """Return the prediction with parameters (or variants) set otherwise, 0 where `filled` has no prediction."""
         values = {**self._all_values, **changes}
         predicted = self.simulation.predict(complete_inputs(self.recording), values) + self.added
-        return np.where(self.mask, predicted, 0.0)
+        return self._where_predicted(predicted)
 
     def secant(self, name: str, step: float) -> Array:
         """Return the prediction's change per unit of a parameter, over a step from its value."""
@@ -178,7 +178,11 @@ class Problem:
         """Return the prediction for another reading of one input, 0 where there is none."""
         inputs = {**complete_inputs(self.recording), column: values}
         moved = self.simulation.predict(inputs, self._all_values) + self.added
-        return np.where(self.mask & np.isfinite(moved), moved, 0.0)
+        return np.where(np.isfinite(moved), self._where_predicted(moved), 0.0)
+
+    def _where_predicted(self, values: Array) -> Array:
+        """Return a prediction, 0 where there is none, and NaN where it is compared and has no value."""
+        return np.where(np.isfinite(self.prediction) & (self.mask | np.isfinite(values)), values, 0.0)
 
     @property
     def _all_values(self) -> dict[str, float]:

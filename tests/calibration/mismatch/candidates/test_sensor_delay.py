@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
-from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay, filtered, shifted
+from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay, as_shown, filtered, shifted
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
 
@@ -184,3 +184,31 @@ def test_a_blank_without_a_change_of_direction_is_no_standstill() -> None:
     (column,) = DELAY.columns(problem, {"late": "current_A", "secant_s": 0.5})
     behind = np.where(problem.mask, problem.prediction + 0.5 * column, problem.measured)
     np.testing.assert_allclose(behind[5:], problem.measured[5:], atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["secant_s", "filter_s"])
+@pytest.mark.parametrize("every", [10, None])
+def test_what_a_late_channel_shows_does_not_depend_on_which_of_its_readings_are_blank(
+    kind: str, every: int | None
+) -> None:
+    """A channel that is read in every tenth row, or has a third of its readings blank: tangents are late as without."""
+    load, _ = loads()
+    moving = np.ones(COUNT)
+    recorded = late(load, kind, 0.75)
+    seen = np.arange(COUNT) % every == 0 if every else np.random.default_rng(3).random(COUNT) > 0.3
+    whole = replace(problem_of(recorded, load, moving), late=(kind, 0.75))
+    part = replace(problem_of(np.where(seen, recorded, np.nan), load, moving), late=(kind, 0.75))
+    (expected,), (found,) = (as_shown(problem, [problem.tangent("gain")]) for problem in (whole, part))
+    assert part.mask.sum() < whole.mask.sum()
+    np.testing.assert_allclose(found[part.mask], expected[part.mask], rtol=1e-9)
+
+
+def test_a_column_that_is_unknown_in_a_few_rows_is_late_beside_them() -> None:
+    """A filter would carry what is not known on to the end of the run."""
+    load, _ = loads()
+    problem = replace(problem_of(load, load, np.ones(COUNT)), late=("filter_s", 0.75))
+    column = np.sin(TIME_S)[:, None]
+    (expected,) = as_shown(problem, [column])
+    column[100:103] = np.nan
+    (found,) = as_shown(problem, [column])
+    np.testing.assert_allclose(found, expected, atol=0.02)
