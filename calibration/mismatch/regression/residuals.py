@@ -62,9 +62,14 @@ def contribution(equations: NormalEquations, fit: Fit, index: int) -> Array:
 
 
 def where_it_acts(equations: NormalEquations, fit: Fit, index: int) -> Array:
-    """Return a term's contribution to each reading of its wheels, shape (reading,)."""
-    on = list(fit.terms[index].wheels)
-    return contribution(equations, fit, index)[:, on][equations.problem.mask[:, on]]
+    """Return a term's contribution to each reading of its wheels, shape (reading,).
+
+    A change of an effect that was corrected on one wheel is asked for on all, and acts on that one.
+    """
+    course = contribution(equations, fit, index)
+    wheels = fit.terms[index].wheels
+    on = [wheel for wheel in wheels if course[:, wheel].any()] or list(wheels)
+    return course[:, on][equations.problem.mask[:, on]]
 
 
 def relative_size(equations: NormalEquations, fit: Fit, index: int) -> float:

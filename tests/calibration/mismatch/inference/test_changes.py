@@ -296,3 +296,21 @@ def test_a_change_has_the_experiment_of_its_effect_also_on_a_machine_that_runs_o
     (viscous,) = (each for each in library() if each.name == "viscous-friction")
     assert change.instruction(problem.simulation) == viscous.instruction(problem.simulation)
     assert ("both ways" in change.instruction(problem.simulation)) == (not one_way)
+
+
+def test_a_change_on_one_of_six_axes_is_as_large_as_it_is_there() -> None:
+    """Of the mean over all six it would be less than the smallest effect."""
+    parts = [moving(seed, 0.62 if seed == 2 else 0.0) for seed in range(6)]
+    columns = {
+        name: np.concatenate([part.channels[name] for part in parts], axis=1).ravel()
+        for name in ("force_N", "acceleration_m_s2", "speed_m_s")
+    }
+    axes = {"t_s": np.repeat(parts[0].time_s, 6), "axis": np.tile(np.arange(6), len(parts[0].time_s))}
+    recording = from_columns({**axes, **columns}, unit="axis")
+    corrected = Contribution("coulomb-friction", {}, (0.5,), (2,), relative_std=0.04)
+    answer = compare(recording, Axis(), effects=[corrected]).answer
+    (change,) = answer.changes
+    assert change.low < 0.62 < change.high
+    assert change.wheels == (2,)
+    assert not answer.effects
+    assert not answer.unexplained
