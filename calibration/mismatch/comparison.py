@@ -18,6 +18,7 @@ from regolithd.calibration.mismatch.empirical.stated import beyond_the_range
 from regolithd.calibration.mismatch.inference.evidence import empirical_fits, evidence_of
 from regolithd.calibration.mismatch.inference.findings import Findings, answer_of, findings_of
 from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, earned
+from regolithd.calibration.mismatch.inference.improbable import without_improbable_curves
 from regolithd.calibration.mismatch.inference.several_channels import merged_answers, priors_from_others
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.equations import equations_of
@@ -182,7 +183,8 @@ def decided(
     search = _search(problem, candidates, pose, progress)
     progress("measuring on held-out blocks and comparing with rivals")
     decision, held_out = earned(search.decision, search.grid)
-    return Decided(in_regions(decision), held_out, tuple(candidates), search.applicable)
+    decision = without_improbable_curves(in_regions(decision))
+    return Decided(decision, held_out, tuple(candidates), search.applicable)
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,7 +22,11 @@ from regolithd.calibration.mismatch.selection.changed_parameters import drop_wha
 from regolithd.calibration.mismatch.selection.decision import answer_names
 from regolithd.calibration.mismatch.selection.law_misfit import law_misfit
 from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what_pulls_parameters_out
-from regolithd.calibration.mismatch.selection.smooth_terms import covariate_of, drop_what_a_curve_explains
+from regolithd.calibration.mismatch.selection.smooth_terms import (
+    covariate_of,
+    drop_what_a_curve_explains,
+    power_share,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -86,6 +90,7 @@ def _admissible(decision: Decision, fit: Fit) -> bool:
         acceptable(equations, fit)
         and _enough_for_more_names(decision, fit)
         and (not curves or not _is_a_laws_misfit(decision, fit, named, curves[-1]))
+        and (not curves or _is_large(decision, named, curves[-1]))
         and all(len(drop_what_a_curve_explains(equations, named, curve).terms) == len(named.terms) for curve in curves)
         and len(drop_what_a_changed_parameter_explains(equations, named).terms) == len(named.terms)
         and len(drop_what_pulls_parameters_out(equations, named).terms) == len(named.terms)
@@ -97,6 +102,13 @@ def _enough_for_more_names(decision: Decision, fit: Fit) -> bool:
     extra = len(fit.terms) - len(decision.whole.terms)
     more = extra > 0 and all(term.group.named for term in fit.terms)
     return not more or passes_entry_test(decision.equations, fit, decision.whole, decision.entry_threshold)
+
+
+def _is_large(decision: Decision, named: Fit, curve: Term) -> bool:
+    """Return whether a curve holds a share of what names leave that is worth a finding."""
+    equations = decision.equations
+    beside = equations.fit((*named.terms, curve))
+    return power_share(equations, beside, named) >= equations.thresholds.smooth_term_power
 
 
 def _is_a_laws_misfit(decision: Decision, fit: Fit, named: Fit, curve: Term) -> bool:

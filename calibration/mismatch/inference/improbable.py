@@ -1,6 +1,8 @@
-"""A "consistent" that other answers outweigh: what is more probably there than not is said to be unexplained.
+"""Answers that others outweigh: a "consistent" beside much evidence for something, and a curve with little.
 
-The tests of names are conditions, and an effect may fail one of them narrowly while the evidence for it is large.
+The tests of names are conditions, and an effect may fail one of them narrowly while the evidence for it is large: what
+is more probably there than not is said to be unexplained. And regions in the place of a curve, which are chosen among
+many, may be less probable than nothing.
 """
 
 from __future__ import annotations
@@ -9,8 +11,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.inference.alternatives import alternatives
-from regolithd.calibration.mismatch.inference.probability import probability
+from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, probability
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
+from regolithd.calibration.mismatch.selection.decision import names_of
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.inference.alternatives import Alternative
@@ -35,6 +38,21 @@ def unexplained_if_improbable(decision: Decision) -> Decision:
         return decision
     curve = _curve_like(decision, others[0])
     return decision if curve is None else replace(decision, unnamed=(curve,), whole=equations.fit((curve,)))
+
+
+def without_improbable_curves(decision: Decision) -> Decision:
+    """Return the decision without its curves, where the answer without them is more probable than all others together.
+
+    What stands for another finding, or comes and goes, is not decided by evidence, and stays.
+    """
+    if not decision.unnamed or decision.intermittent or not decided_by_evidence(decision):
+        return decision
+    others = alternatives(decision)
+    without = names_of(replace(decision, whole=decision.named))
+    if probability(others, decision.equations.thresholds) >= EVEN or frozenset(others[0].effects) != without:
+        return decision
+    refused = decision.refused | {names_of(decision)}
+    return replace(decision, unnamed=(), whole=decision.named, refused=refused)
 
 
 def _curve_like(decision: Decision, other: Alternative) -> Term | None:

@@ -30,8 +30,11 @@ if TYPE_CHECKING:
 
 
 def in_regions(decision: Decision) -> Decision:
-    """Return the decision with regions in the place of the smooth term, where the evidence favours them."""
-    if not decision.unnamed or decision.unnamed[0].group.coupling == PERIODIC:
+    """Return the decision with regions in the place of the smooth term, where the evidence favours them.
+
+    What recurs, or comes and goes, is in no region.
+    """
+    if not decision.unnamed or decision.intermittent or decision.unnamed[0].group.coupling == PERIODIC:
         return decision
     named, curve = decision.named, decision.unnamed[0]
     needed = _curve_score(decision.equations, named, curve)

@@ -126,14 +126,19 @@ def unexplained_beside(equations: NormalEquations, named: Fit, *, tolerated: flo
         return None
     curve = left[0][1]
     beside = equations.fit((*named.terms, curve))
-    on = list(curve.wheels)
-    power = np.sum(contribution(equations, beside, len(named.terms))[:, on] ** 2)
-    if power < limits.smooth_term_power * np.sum(residual_of(equations, named)[:, on] ** 2):
+    if power_share(equations, beside, named) < limits.smooth_term_power:
         return None
     if tolerated is None:
         leaving = equations.nuisance.leaving_their_priors(named, equations.problem)
         tolerated = 0.0 if leaving.size else limits.form_misfit
     return None if named.terms and law_misfit(equations, named, beside) < tolerated else curve
+
+
+def power_share(equations: NormalEquations, beside: Fit, named: Fit) -> float:
+    """Return the share of what is left on its wheels that the last term of a fit holds, of what it leaves without."""
+    on = list(beside.terms[-1].wheels)
+    power = np.sum(contribution(equations, beside, len(beside.terms) - 1)[:, on] ** 2)
+    return float(power / max(float(np.sum(residual_of(equations, named)[:, on] ** 2)), 1e-300))
 
 
 def covariate_of(term: Term) -> str:

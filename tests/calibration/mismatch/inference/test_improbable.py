@@ -1,14 +1,21 @@
-"""A "consistent" that other answers outweigh is unexplained."""
+"""Answers that others outweigh: a "consistent", and a curve."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from linear_machine import CANDIDATES, equations_of, problem_of, table
 
-from regolithd.calibration.mismatch.inference.improbable import unexplained_if_improbable
+from regolithd.calibration.mismatch.inference import improbable
+from regolithd.calibration.mismatch.inference.alternatives import alternatives
+from regolithd.calibration.mismatch.inference.improbable import unexplained_if_improbable, without_improbable_curves
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
+from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.decision import Decision, decide
+
+if TYPE_CHECKING:
+    import pytest
 
 
 def decided(drag: float) -> Decision:
@@ -44,3 +51,27 @@ def test_nothing_is_unexplained_where_an_effect_is_more_probable() -> None:
     assert not decision.named.terms
     assert curve.wheels == term.wheels
     assert decision.whole.terms == (curve,)
+
+
+def with_curve(decision: Decision) -> Decision:
+    """Return the decision with the best curve in the place of its names."""
+    equations = decision.equations
+    curve = best_of_each_smooth_term(equations, ())[0][1]
+    return replace(decision, named=equations.fit(()), unnamed=(curve,), whole=equations.fit((curve,)))
+
+
+def test_a_curve_that_is_more_probable_than_nothing_stays() -> None:
+    """It has much evidence."""
+    decision = with_curve(decided(0.3))
+    assert without_improbable_curves(decision) is decision
+
+
+def test_a_curve_that_is_less_probable_than_nothing_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is told of a sound recording is nothing, and that curve is no alternative any more."""
+    decision = with_curve(decided(0.0))
+    assert without_improbable_curves(decision) is decision  # it gains too little to be decided by evidence
+    monkeypatch.setattr(improbable, "decided_by_evidence", lambda _: True)
+    found = without_improbable_curves(decision)
+    assert not found.unnamed
+    assert not found.whole.terms
+    assert all(other.effects != ("unexplained",) for other in alternatives(found))
