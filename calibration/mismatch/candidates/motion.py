@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.problem.covariates import USUAL_SPEED_QUANTILE
-from regolithd.calibration.mismatch.signal.noise import estimate_noise
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Shape
@@ -69,7 +68,7 @@ def _best_transition(problem: Problem) -> float:
     if not widths:
         return 0.0
     step = _left_beside_friction(problem, {})
-    noise = estimate_noise(step, problem.mask, problem.thresholds)
+    noise = problem.noise_of(step)
     count = float(problem.mask.sum()) / noise.autocorrelation_time
     best, left = _refined(problem, min(widths, key=lambda width: _squares_left(problem, width)))
     gain = count * (1 - left / max(_squares(step), 1e-300))

@@ -118,7 +118,7 @@ def _standardised_block_means(problem: Problem, noise: NoiseModel, residual: Arr
     signed, wheels = np.nan_to_num(residual * along), range(residual.shape[1])
     sums = np.stack([np.bincount(blocks, signed[:, w], count) for w in wheels], axis=1)
     counts = np.stack([np.bincount(blocks, problem.mask[:, w], count) for w in wheels], axis=1)
-    errors = noise.deviation * np.sqrt(noise.autocorrelation_time * np.maximum(counts, 1))
+    errors = np.sqrt(np.maximum(counts, 1) / noise.weights)
     return np.where(counts > 0, sums / errors, np.nan)
 
 
@@ -152,7 +152,7 @@ def _curve(
     if len(edges) < 3:
         return None
     binned = binned_means(values[kept], edges, *(residual[kept] for residual in residuals))
-    variance = np.mean(noise.deviation[wheels] ** 2) * noise.autocorrelation_time
+    variance = np.mean(1 / noise.weights[wheels])
     return Curve(
         covariate=name,
         coupling=coupling,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
+from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
@@ -123,6 +124,12 @@ class Problem:
         """What stated effects add on the output of the simulation, shape (time, wheel)."""
         columns = [effect.column for effect in self.stated if not effect.in_simulation]
         return sum(columns, np.zeros(self.mask.shape))
+
+    def noise_of(self, residual: Array) -> NoiseModel:
+        """Return the noise that a residual (time, wheel) shows."""
+        direction = self.covariates.get("direction")
+        moving = None if direction is None else np.nan_to_num(direction) != 0
+        return estimate_noise(residual, self.mask, self.thresholds, moving)
 
     @property
     def wheel_sets(self) -> tuple[tuple[int, ...], ...]:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR, membership
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
-from regolithd.calibration.mismatch.signal.noise import estimate_noise
 from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED
 
 if TYPE_CHECKING:
@@ -55,8 +54,7 @@ def long_run_weights(equations: NormalEquations, fit: Fit) -> Array:
     """Return one over the long-run variance of what a fit leaves, shape (wheel,); the weights, where not whitened."""
     if equations.design.whitening is NOT_WHITENED:
         return equations.weights
-    problem = equations.problem
-    return estimate_noise(residual_of(equations, fit), problem.mask, problem.thresholds).weights
+    return equations.problem.noise_of(residual_of(equations, fit)).weights
 
 
 def as_read(equations: NormalEquations, fit: Fit) -> AsRead:

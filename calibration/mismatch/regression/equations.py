@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time, folds_of_blocks
 from regolithd.calibration.mismatch.regression.candidate_groups import with_candidates
 from regolithd.calibration.mismatch.regression.design_matrix import empty_design
@@ -16,7 +14,7 @@ from regolithd.calibration.mismatch.regression.normal_equations import normal_eq
 from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
-from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
+from regolithd.calibration.mismatch.signal.noise import NoiseModel
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,10 +49,10 @@ def _free_parameters(problem: Problem) -> tuple[DesignMatrix, Nuisance, NoiseMod
     So the noise is that of what the parameters leave when they are fitted under a short autocorrelation time.
     """
     limits = problem.thresholds
-    noise = estimate_noise(np.where(problem.mask, problem.measured - problem.filled, 0.0), problem.mask, limits)
+    noise = problem.noise_of(problem.measured - problem.filled)
     folds = folds_of_blocks(problem, blocks_of_time(problem, noise))
     design, nuisance = with_nuisance(empty_design(problem, folds))
     short = min(noise.autocorrelation_time, limits.provisional_autocorrelation_time)
     provisional = normal_equations(design, nuisance, NoiseModel(noise.deviation, short).weights)
     left = residual_of(provisional, provisional.fit(()))
-    return design, nuisance, estimate_noise(left, problem.mask, limits)
+    return design, nuisance, problem.noise_of(left)

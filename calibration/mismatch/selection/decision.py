@@ -25,7 +25,6 @@ from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what
 from regolithd.calibration.mismatch.selection.released_parameters import released
 from regolithd.calibration.mismatch.selection.sign_flip_test import entry_threshold
 from regolithd.calibration.mismatch.selection.smooth_terms import weigh_against_smooth_terms
-from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+    from regolithd.calibration.mismatch.signal.noise import NoiseModel
 
 Array = NDArray[np.float64]
 
@@ -91,7 +91,7 @@ class Decision:
 
 def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decision:
     """Choose the named effects, and the smooth terms that nothing named explains."""
-    problem, limits = equations.problem, equations.thresholds
+    problem = equations.problem
     left = residual_of(equations, fit_of_significant_terms(equations))
     equations = whitened(equations, left)
     threshold = entry_threshold(equations, left, blocks_of_time(problem, noise_of_whitened(equations.design, left)))
@@ -110,7 +110,7 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
         (equations, named), unnamed = freed, ()
         whole = named
     left = residual_of(equations, whole)
-    noise = estimate_noise(left, problem.mask, limits)
+    noise = problem.noise_of(left)
     equations = equations.weighted(noise_of_whitened(equations.design, left).weights)
     return Decision(
         equations=equations,

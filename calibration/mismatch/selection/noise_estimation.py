@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.residuals import residual_of
-from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
+from regolithd.calibration.mismatch.signal.noise import NoiseModel
 from regolithd.calibration.mismatch.signal.whitening import estimate_whitening
 
 if TYPE_CHECKING:
@@ -33,7 +33,8 @@ def fit_of_significant_terms(equations: NormalEquations) -> Fit:
     short = min(first.autocorrelation_time, limits.provisional_autocorrelation_time)
     provisional = equations.weighted(NoiseModel(first.deviation, short).weights)
     second = _noise_beside(provisional, _most_significant(provisional, limits.provisional_terms, -np.inf))
-    weighted = equations.weighted(second.weights)
+    # Of all wheels together: an effect that is still in one wheel's residual would hide in that wheel's own time.
+    weighted = equations.weighted(NoiseModel(second.deviation, second.autocorrelation_time).weights)
     least_score = limits.noise_term_share * limits.smooth_term_entry
     terms = _most_significant(weighted, 2 * limits.provisional_terms, least_score)
     return weighted.fit(terms)
@@ -52,13 +53,12 @@ def whitened(equations: NormalEquations, residual: Array) -> NormalEquations:
 
 def noise_of_whitened(design: DesignMatrix, residual: Array) -> NoiseModel:
     """Return the noise of a residual [time, wheel] once it is whitened."""
-    return estimate_noise(design.whitened_in_time(residual), design.problem.mask, design.problem.thresholds)
+    return design.problem.noise_of(design.whitened_in_time(residual))
 
 
 def _noise_beside(equations: NormalEquations, terms: Sequence[Term]) -> NoiseModel:
     """Return the noise of what these terms leave."""
-    left = residual_of(equations, equations.fit(terms))
-    return estimate_noise(left, equations.problem.mask, equations.thresholds)
+    return equations.problem.noise_of(residual_of(equations, equations.fit(terms)))
 
 
 def _most_significant(equations: NormalEquations, most: int, least_score: float) -> list[Term]:

@@ -66,7 +66,7 @@ class Found:
     ----------
     findings: as `regolithd mismatch` has them for this recording alone
     values: the parameters at which the simulation was linearised
-    deviation, autocorrelation_time: of the noise beside all that was found, shape (wheel,); and in readings
+    deviation, autocorrelation_times: of the noise beside all that was found, shape (wheel,)
     entry_threshold: score above which an effect was named
     terms: named effects, then smooth terms
     shapes: the grid of each candidate that this recording allows, by name
@@ -76,7 +76,7 @@ class Found:
     findings: Findings
     values: dict[str, float]
     deviation: Array
-    autocorrelation_time: float
+    autocorrelation_times: Array | float
     entry_threshold: float
     terms: tuple[FoundTerm, ...]
     shapes: dict[str, Shapes]
@@ -108,7 +108,7 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
         findings=of_recording.findings(),
         values=values,
         deviation=decision.noise.deviation,
-        autocorrelation_time=decision.noise.autocorrelation_time,
+        autocorrelation_times=decision.noise.autocorrelation_times,
         entry_threshold=decision.entry_threshold,
         terms=tuple(_found_term(decision, term) for term in whole.terms),
         shapes=shapes_in(problem, of_recording.candidates),

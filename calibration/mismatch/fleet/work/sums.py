@@ -107,7 +107,7 @@ def sums_of(
     residual = np.where(problem.mask, problem.measured - problem.filled, 0.0)
     # Measured from the stated values, not from where this recording's own comparison linearised the simulation.
     residual += np.einsum("c,ctw->tw", columns.shifts, columns.values[: len(columns.shifts)])
-    noise = NoiseModel(found.deviation, found.autocorrelation_time)
+    noise = NoiseModel(found.deviation, found.autocorrelation_times)
     gram, moment, fourth = _products(columns.values, residual)
     return Sums(
         wheels=problem.recording.wheels,

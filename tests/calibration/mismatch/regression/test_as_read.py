@@ -12,7 +12,6 @@ from scipy.signal import lfilter
 from regolithd.calibration.mismatch.regression.as_read import as_read, long_run_weights
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, contribution, residual_of
 from regolithd.calibration.mismatch.selection.noise_estimation import whitened
-from regolithd.calibration.mismatch.signal.noise import estimate_noise
 from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED
 
 if TYPE_CHECKING:
@@ -88,7 +87,7 @@ def test_a_fit_as_read_is_that_of_equations_which_are_not_whitened() -> None:
     white = equations_under_slow_noise(3, 0.3)
     fit = white.fit([term_of(white, "drag", (1,))])
     read = as_read(white, fit)
-    noise = estimate_noise(residual_of(white, fit), white.problem.mask)
+    noise = white.problem.noise_of(residual_of(white, fit))
     np.testing.assert_allclose(read.weights, noise.weights)
     plain = white.whitened(NOT_WHITENED, read.weights)
     expected = plain.fit([term_of(plain, "drag", (1,))])

@@ -60,6 +60,7 @@ def test_a_full_disk_is_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_the_file_is_gone_with_its_object() -> None:
     """It has no name, and its descriptor is closed."""
+    gc.collect()  # files of tests before this one
     open_before = len(list(Path("/proc/self/fd").iterdir()))
     file = written()
     assert len(list(Path("/proc/self/fd").iterdir())) == open_before + 1

@@ -77,3 +77,43 @@ def test_lags_end_at_the_threshold() -> None:
 def test_weights_are_one_over_the_long_run_variance() -> None:
     """A deviation of 2 and 5 readings for one make 1 / 20."""
     np.testing.assert_allclose(NoiseModel(np.array([2.0]), 5.0).weights, [0.05])
+
+
+def test_wheels_have_autocorrelation_times_of_their_own_where_they_differ_beyond_chance() -> None:
+    """One wheel with memory and two without; and four that are alike, which have the pooled one."""
+    unlike = np.concatenate((autoregressive(0.9, (1.0,)), autoregressive(0.0, (1.0, 1.0))), axis=1)
+    times = estimate_noise(unlike, np.ones(unlike.shape, bool)).autocorrelation_times
+    np.testing.assert_allclose(times, [19.0, 1.0, 1.0], rtol=0.2)
+    alike = autoregressive(0.5, (1.0, 1.0, 2.0, 0.5), 3000)
+    times = estimate_noise(alike, np.ones(alike.shape, bool)).autocorrelation_times
+    np.testing.assert_allclose(times, 3.0, rtol=0.15)
+    assert np.ptp(times) < 0.1 * np.mean(times)
+
+
+def test_a_wheel_without_readings_has_the_pooled_autocorrelation_time() -> None:
+    """Nothing is known of its own."""
+    residual = autoregressive(0.5, (1.0, 1.0, 1.0), 6000)
+    mask = np.ones(residual.shape, bool)
+    mask[:, 2] = False
+    assert estimate_noise(residual, mask).autocorrelation_times[2] == pytest.approx(3.0, rel=0.15)
+
+
+def test_quiet_readings_at_rest_do_not_make_those_in_motion_more_certain() -> None:
+    """Half of the readings are at rest, with a tenth of the noise; a wheel that hardly moves has that of all."""
+    moving = np.repeat([[True, True], [False, False]], 500, axis=0)
+    moving = np.tile(moving, (6, 1))
+    moving[:, 1] &= np.arange(len(moving)) < 100
+    residual = autoregressive(0.0, (1.0, 1.0), len(moving)) * np.where(moving, 1.0, 0.1)
+    mask = np.ones(residual.shape, bool)
+    of_all, in_motion = estimate_noise(residual, mask), estimate_noise(residual, mask, moving=moving)
+    assert of_all.deviation[0] == pytest.approx(0.71, rel=0.05)
+    assert in_motion.deviation[0] == pytest.approx(1.0, rel=0.05)
+    assert in_motion.deviation[1] == of_all.deviation[1]
+
+
+def test_readings_that_are_louder_at_rest_count_as_well() -> None:
+    """A controller that hunts at rest: the deviation is not less than that of all."""
+    moving = np.arange(4000)[:, None] % 1000 < 500
+    residual = autoregressive(0.0, (1.0,), 4000) * np.where(moving, 0.1, 1.0)
+    mask = np.ones(residual.shape, bool)
+    assert estimate_noise(residual, mask, moving=moving).deviation == estimate_noise(residual, mask).deviation
