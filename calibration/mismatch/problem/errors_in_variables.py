@@ -6,22 +6,30 @@ removes this; the error that remains is of Berkson's kind, uncorrelated with wha
 2006, chapter 4). The truth is modelled as first-order autoregressive about its mean, with the correlation of the
 recording, so that a signal that jumps is hardly smoothed. With a stated error of 0 nothing changes.
 
+A normal density is wrong for a truth that is 0 for half of the time, or has few levels, and shrinks it wrongly. So the
+density of the truth's values is estimated too, and used in two more models: in the place of the autoregression's normal
+density, and for a truth that keeps its value for a while and then takes another. The readings tell how far each is from
+the truth, and how to combine them (`signal/stein.py`); where that is no clear gain, the autoregression stays alone. It
+also stays for what the speed is computed from: a speed is differentiated, and its sign is the direction of friction.
+
 A sensor with noise does not read exactly 0 twice: where it does, it is at rest or within its dead band, and stays 0. A
 simulation may have a step there, as friction has.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.problem.true_values import NormalTruth, refined_by_density
 from regolithd.calibration.mismatch.signal.recursion import recursion
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.prior import SensorError
@@ -32,22 +40,54 @@ SETTLED = 1e-15
 """Relative change of a variance from one instant to the next, up to which it is settled: a few roundings."""
 
 
-def expected_inputs(recording: Recording, sensors: Mapping[str, SensorError]) -> Recording:
-    """Return the recording with each input that has an error replaced by its conditional expectation."""
+@dataclass(frozen=True, eq=False)
+class NormalTruths:
+    """What a first-order autoregressive normal model says of columns of true values.
+
+    Attributes
+    ----------
+    mean, variance: given all readings, shape (time, column); the mean is NaN where nothing was read
+    prior_mean, prior_variance, persistence: of the model, shape (column,)
+    """
+
+    mean: Array
+    variance: Array
+    prior_mean: Array
+    prior_variance: Array
+    persistence: Array
+
+    def column(self, number: int) -> NormalTruth:
+        """Return one column's."""
+        prior = (self.prior_mean, self.prior_variance, self.persistence)
+        return NormalTruth(self.mean[:, number], self.variance[:, number], *(float(each[number]) for each in prior))
+
+
+def expected_inputs(
+    recording: Recording, sensors: Mapping[str, SensorError], normal: Collection[str] = ()
+) -> Recording:
+    """Return the recording with each input that has an error replaced by its conditional expectation.
+
+    `normal` names inputs of which no density of values is estimated.
+    """
     names = [
         name for name, error in sensors.items() if name in recording.channels and (error.relative or error.absolute)
     ]
     if not names:
         return recording
     values = np.concatenate([recording.channels[name] for name in names], axis=1)
+    owners = [name for name in names for _ in recording.wheels]
     scale = [
         sensors[name].absolute + sensors[name].relative * float(known_mean(np.abs(column)))
-        for name in names
-        for column in recording.channels[name].T
+        for name, column in zip(owners, values.T, strict=True)
     ]
     starts = np.flatnonzero(np.diff(recording.run, prepend=recording.run[0] - 1))
-    smooth = np.where(_at_rest(values), 0.0, conditional_expectation(values, np.array(scale) ** 2, starts))
-    parts = np.split(smooth, len(names), axis=1)
+    rest, truths = _at_rest(values), normal_truths(values, np.array(scale) ** 2, starts)
+    smooth = truths.mean.copy()
+    for k, name in enumerate(owners):
+        if name not in normal:
+            moving = np.where(rest[:, k], np.nan, values[:, k])
+            smooth[:, k] = refined_by_density(moving, scale[k], starts, truths.column(k))
+    parts = np.split(np.where(rest, 0.0, smooth), len(names), axis=1)
     return recording.with_channels(**dict(zip(names, parts, strict=True)))
 
 
@@ -64,6 +104,11 @@ def known_mean(values: Array, axis: int = 0) -> Array:
 
 
 def conditional_expectation(values: Array, error_variance: Array, starts: NDArray[np.int64]) -> Array:
+    """Return the mean of `normal_truths`: columns of noisy readings, shape (time, column), smoothed."""
+    return normal_truths(values, error_variance, starts).mean
+
+
+def normal_truths(values: Array, error_variance: Array, starts: NDArray[np.int64]) -> NormalTruths:
     """Smooth columns of noisy readings, shape (time, column), by a Kalman filter run forwards and backwards.
 
     `error_variance` [per column] is the readings' error; `starts` are the instants where a run begins anew.
@@ -78,11 +123,13 @@ def conditional_expectation(values: Array, error_variance: Array, starts: NDArra
     kept = (1 - gain) * persistence
     kept[starts] = 0.0
     estimate = recursion(kept, gain * centred)
-    back = np.zeros_like(spread)
-    back[:-1] = spread[:-1] * persistence / predicted[1:]
+    back, after = np.zeros_like(spread), np.zeros_like(spread)
+    back[:-1], after[:-1] = spread[:-1] * persistence / predicted[1:], predicted[1:]
     back[starts[starts > 0] - 1] = 0.0
     smooth = recursion(back[::-1], ((1 - back * persistence) * estimate)[::-1])[::-1]
-    return np.where(known, smooth + mean, np.nan)
+    # P(t | all) = P(t | t) + back² (P(t + 1 | all) − P(t + 1 | t))
+    doubt = recursion(back[::-1] ** 2, (spread - back**2 * after)[::-1])[::-1]
+    return NormalTruths(np.where(known, smooth + mean, np.nan), doubt, mean, variance, persistence)
 
 
 def _autoregression(centred: Array, known: NDArray[np.bool_], error_variance: Array) -> tuple[Array, Array]:

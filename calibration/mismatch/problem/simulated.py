@@ -30,6 +30,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+NUDGE = 1.01
+"""Factor of an input that shows whether the speed changes with it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
@@ -68,12 +71,13 @@ def simulated(
         When the predicted channel or an input is missing.
     """
     as_read, blanks = _prepared(recording, simulation)
-    prepared = expected_inputs(as_read, simulation.sensors)
+    normal = _inputs_of_speed(as_read, simulation)
+    prepared = expected_inputs(as_read, simulation.sensors, normal)
     prediction = simulation.predict(complete_inputs(prepared), values)
     carried = np.zeros(prediction.shape, np.bool_)
     if blanks:
         other, _ = _prepared(recording, simulation, other_way=True)
-        other = expected_inputs(other, simulation.sensors)
+        other = expected_inputs(other, simulation.sensors, normal)
         apart = np.abs(simulation.predict(complete_inputs(other), values) - prediction)
         blank = np.any(list(blanks.values()), axis=0)
         residual = (prepared.channel(simulation.channel) - prediction)[~blank]
@@ -101,3 +105,14 @@ def _prepared(
         raise RecordingError(f"the simulation needs {', '.join(missing)}, which the recording does not have")
     derived, more = bridged(derived, simulation.inputs, between, other_way=other_way)
     return derived, {**more, **recorded}
+
+
+def _inputs_of_speed(recording: Recording, simulation: Predictor) -> frozenset[str]:
+    """Return the inputs with an error that `wheel_speed` changes with."""
+    inputs = complete_inputs(recording)
+    noisy = [name for name in simulation.sensors if name in inputs]
+    speed = simulation.covariates(inputs).get("wheel_speed") if noisy else None
+    if speed is None:
+        return frozenset()
+    changed = {name: simulation.covariates({**inputs, name: NUDGE * inputs[name]})["wheel_speed"] for name in noisy}
+    return frozenset(name for name in noisy if not np.array_equal(changed[name], speed, equal_nan=True))

@@ -6,9 +6,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch import Prior, SensorError, Simulation, compare
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.problem.errors_in_variables import conditional_expectation
+from regolithd.calibration.mismatch.problem.simulated import simulated
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -116,3 +119,25 @@ def test_a_stateful_simulation_with_blanks_is_consistent() -> None:
     scattered = np.random.default_rng(2).uniform(size=ROWS) < 0.1
     answer = compare(recorded(Lagging(), scattered | rows(slice(600, 650))), Lagging()).answer
     assert answer.verdict == "consistent"
+
+
+class Winch(Static):
+    """The same, with a speed that one of two noisy inputs is read as."""
+
+    sensors: ClassVar = {"power_W": SensorError(absolute=2.0), "motor_rpm": SensorError(absolute=2.0)}
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the drum's speed, which stands while the motor is slow."""
+        turns = np.where(inputs["motor_rpm"] > 10, inputs["motor_rpm"] / 20, 0.0)
+        return {"wheel_speed": turns, "power": inputs["power_W"]}
+
+
+def test_what_the_speed_is_computed_from_is_smoothed_as_a_normal_signal() -> None:
+    """Both columns have few levels: densities are used for the one that is no speed."""
+    random = np.random.default_rng(2)
+    power, rpm = (random.choice([0.0, 50.0, 90.0], ROWS // 20).repeat(20) + random.normal(0, 2, ROWS) for _ in "ab")
+    recording = from_columns({"t_s": TIME_S, "reading_V": 0.05 * power, "power_W": power, "motor_rpm": rpm})
+    found = simulated(recording, Winch(), {"gain_V_W": 0.05}, THRESHOLDS).recording
+    normal = conditional_expectation(np.column_stack((power, rpm)), np.full(2, 4.0), np.array([0]))
+    np.testing.assert_allclose(found.channels["motor_rpm"][:, 0], normal[:, 1])
+    assert np.std(found.channels["power_W"][:, 0] - normal[:, 0]) > 1.0

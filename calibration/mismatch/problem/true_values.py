@@ -1,0 +1,76 @@
+"""One noisy input's true values, by the density of its values beside the autoregression's normal one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.signal.jump_chain import JumpChain, Windows, windows_of
+from regolithd.calibration.mismatch.signal.mixing_density import MixingDensity, mixing_density
+from regolithd.calibration.mismatch.signal.stein import (
+    BATCH,
+    FEWEST_BATCHES,
+    Estimate,
+    best_combination,
+    clearly_better,
+    consistent,
+)
+
+Array = NDArray[np.float64]
+
+MOST_FITTED = 32
+"""Windows (of 256 instants each) in which the models are fitted and compared: longer recordings cost no more."""
+
+
+@dataclass(frozen=True, eq=False)
+class NormalTruth:
+    """What a first-order autoregressive normal model says of one column's true values.
+
+    Attributes
+    ----------
+    mean, variance: given all readings, shape (time,)
+    prior_mean, prior_variance, persistence: of the model
+    """
+
+    mean: Array
+    variance: Array
+    prior_mean: float
+    prior_variance: float
+    persistence: float
+
+
+def refined_by_density(readings: Array, deviation: float, starts: NDArray[np.int64], normal: NormalTruth) -> Array:
+    """Return the truth's conditional expectation, shape (time,); `normal.mean` where a density is no clear gain.
+
+    `readings` (time,), NaN where there are none, have normal errors of this deviation; runs begin at `starts`.
+    """
+    fitted = windows_of(readings, starts, MOST_FITTED)
+    known = np.isfinite(readings[fitted.rows])
+    if deviation <= 0 or known.sum() < BATCH * FEWEST_BATCHES:
+        return normal.mean
+    density = mixing_density(readings[np.isfinite(readings)], deviation)
+    chain = JumpChain(density, normal.persistence, deviation).fitted(fitted)
+    estimates = [_at(each, known) for each in _estimates(fitted, normal, density, chain)]
+    read, variance = readings[fitted.rows][known], deviation**2
+    combination = best_combination(read, estimates)
+    new = combination.of(estimates)
+    better = clearly_better(read, variance, new, estimates[0], density.effective_count)
+    if not (better and consistent(read, variance, new)):
+        return normal.mean
+    everywhere = windows_of(readings, starts, len(readings))
+    found = combination.of(_estimates(everywhere, normal, density, chain)).mean
+    return np.where(np.isfinite(normal.mean), found, np.nan)
+
+
+def _estimates(windows: Windows, normal: NormalTruth, density: MixingDensity, chain: JumpChain) -> list[Estimate]:
+    """Return what the autoregression, the same with the density, and the chain say at the windows' rows."""
+    mean, variance = np.nan_to_num(normal.mean[windows.rows], nan=normal.prior_mean), normal.variance[windows.rows]
+    exchanged = density.reweighted(mean, variance, normal.prior_mean, normal.prior_variance)
+    return [Estimate(mean, variance), Estimate(*exchanged), Estimate(*chain.posterior(windows))]
+
+
+def _at(estimate: Estimate, known: NDArray[np.bool_]) -> Estimate:
+    """Return an estimate at some of its instants."""
+    return Estimate(estimate.mean[known], estimate.variance[known])
