@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,11 @@ Array = NDArray[np.float64]
 
 MOST_FITTED = 32
 """Windows (of 256 instants each) in which the models are fitted and compared: longer recordings cost no more."""
+LEAST_VARIANCE = 1e-4
+"""The truth's variance in error variances, below which it is a constant: there is nothing to be told of its density."""
+
+LEAST_POSTERIOR = 1e-6
+"""A posterior's variance in error variances is at least this, that of a million readings: less is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,27 +51,36 @@ def refined_by_density(readings: Array, deviation: float, starts: NDArray[np.int
 
     `readings` (time,), NaN where there are none, have normal errors of this deviation; runs begin at `starts`.
     """
-    fitted = windows_of(readings, starts, MOST_FITTED)
-    known = np.isfinite(readings[fitted.rows])
-    if deviation <= 0 or known.sum() < BATCH * FEWEST_BATCHES:
+    variance, known = deviation**2, np.isfinite(readings)
+    if normal.prior_variance <= LEAST_VARIANCE * variance or known.sum() < BATCH * FEWEST_BATCHES or not variance:
         return normal.mean
+    # About its mean, a column far from 0 has all its digits in its squares.
+    centred = replace(normal, mean=normal.mean - normal.prior_mean, prior_mean=0.0)
+    found = _refined(readings - normal.prior_mean, deviation, starts, centred)
+    return normal.mean if found is None else np.where(np.isfinite(normal.mean), found + normal.prior_mean, np.nan)
+
+
+def _refined(readings: Array, deviation: float, starts: NDArray[np.int64], normal: NormalTruth) -> Array | None:
+    """Return the best combination everywhere, None where it is no clear gain."""
+    fitted = windows_of(readings, starts, MOST_FITTED)
     density = mixing_density(readings[np.isfinite(readings)], deviation)
     chain = JumpChain(density, normal.persistence, deviation).fitted(fitted)
+    known = np.isfinite(readings[fitted.rows])
     estimates = [_at(each, known) for each in _estimates(fitted, normal, density, chain)]
     read, variance = readings[fitted.rows][known], deviation**2
     combination = best_combination(read, estimates)
     new = combination.of(estimates)
     better = clearly_better(read, variance, new, estimates[0], density.effective_count)
     if not (better and consistent(read, variance, new)):
-        return normal.mean
+        return None
     everywhere = windows_of(readings, starts, len(readings))
-    found = combination.of(_estimates(everywhere, normal, density, chain)).mean
-    return np.where(np.isfinite(normal.mean), found, np.nan)
+    return combination.of(_estimates(everywhere, normal, density, chain)).mean
 
 
 def _estimates(windows: Windows, normal: NormalTruth, density: MixingDensity, chain: JumpChain) -> list[Estimate]:
     """Return what the autoregression, the same with the density, and the chain say at the windows' rows."""
-    mean, variance = np.nan_to_num(normal.mean[windows.rows], nan=normal.prior_mean), normal.variance[windows.rows]
+    mean = np.nan_to_num(normal.mean[windows.rows], nan=normal.prior_mean)
+    variance = np.maximum(normal.variance[windows.rows], LEAST_POSTERIOR * chain.deviation**2)
     exchanged = density.reweighted(mean, variance, normal.prior_mean, normal.prior_variance)
     return [Estimate(mean, variance), Estimate(*exchanged), Estimate(*chain.posterior(windows))]
 

@@ -123,6 +123,19 @@ def test_few_readings_and_constant_ones_stay_with_the_autoregression() -> None:
     np.testing.assert_allclose(refined_by_density(np.full(COUNT, 2.0), 0.1, START, constant), 2.0)
 
 
+def test_far_offsets_and_outliers_change_nothing() -> None:
+    """A column about a million is that about 0; one reading that is a code for "not measured" leaves numbers."""
+    random = np.random.default_rng(15)
+    readings = ramps_and_dwells() + random.normal(0, 0.2, COUNT)
+
+    def estimate(values: Array) -> Array:
+        return refined_by_density(values, 0.2, START, normal_truths(values[:, None], np.array([0.04]), START).column(0))
+
+    np.testing.assert_allclose(estimate(readings + 1e6) - 1e6, estimate(readings), atol=1e-6)
+    readings[100] = 1e15
+    assert np.all(np.isfinite(estimate(readings)))
+
+
 def test_unknown_readings_stay_unknown_and_exact_zeros_stay_zero() -> None:
     """A brake that reads exactly 0, and a blank, in a signal for which densities are used."""
     truth = ramps_and_dwells()
