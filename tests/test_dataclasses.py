@@ -94,6 +94,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         ),
         *("Decided", "_Search"),
         "AsRead",
+        *("NormalTruths", "NormalTruth", "MixingDensity", "Windows", "JumpChain", "Estimate", "Combination"),
         *("Batch", "Left"),
         "Whitening",
         *("Setting", "Drive", "Hypothesis", "Expected", "Choice", "Experimenter"),

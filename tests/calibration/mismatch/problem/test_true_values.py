@@ -73,7 +73,7 @@ def slope(truth: Array, estimate: Array, law: Callable[[Array], Array]) -> float
 @pytest.mark.parametrize("share", [0.05, 0.2, 0.5])
 @pytest.mark.parametrize("truth", [ramps_and_dwells(), smooth_ramps(), levels()], ids=["ramps", "smooth", "levels"])
 def test_laws_of_an_input_that_is_not_normal_keep_their_coefficients(truth: Array, share: float) -> None:
-    """The truth, its square and its magnitude within 3 %; the normal density has up to 12 %. The error falls, too."""
+    """The truth, its square and its magnitude within 3 %, where the normal density has up to 12 %."""
     normal, found = refined(truth, share * float(np.std(truth)))
     for law in (np.asarray, np.square, np.abs):
         assert slope(truth, found, law) == pytest.approx(1, abs=0.03)
