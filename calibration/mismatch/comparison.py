@@ -21,6 +21,7 @@ from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, ear
 from regolithd.calibration.mismatch.inference.improbable import without_improbable_curves
 from regolithd.calibration.mismatch.inference.several_channels import merged_answers, priors_from_others
 from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.equations import equations_of
 from regolithd.calibration.mismatch.report.notebook import notebook_html
 from regolithd.calibration.mismatch.selection.decision import decide
@@ -175,8 +176,11 @@ def decided(
     candidates: Sequence[Candidate] = [each.form_for(simulation) for each in simulation.candidates(library())]
     stated = stated_in(candidates, effects, simulation.stated_effects(), simulation.empirical_curves)
 
+    inputs = inputs_of(recorded, simulation)
+
     def pose(values: Mapping[str, float] | None) -> Problem:
-        return corrected_problem(build_problem(recorded, simulation, values, thresholds=thresholds), stated)
+        problem = build_problem(recorded, simulation, values, inputs=inputs, thresholds=thresholds)
+        return corrected_problem(problem, stated)
 
     problem = linearised_where_it_fits(pose)
     candidates = with_changes(problem, candidates, stated)

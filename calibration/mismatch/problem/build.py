@@ -11,7 +11,7 @@ from regolithd.calibration.mismatch.problem.compared import blanks_of, isolated_
 from regolithd.calibration.mismatch.problem.covariates import covariates_of
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.problem import Problem
-from regolithd.calibration.mismatch.problem.simulated import simulated
+from regolithd.calibration.mismatch.problem.simulated import Inputs, inputs_of, simulated
 from regolithd.calibration.mismatch.problem.words import labels_of
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
@@ -27,9 +27,12 @@ def build_problem(
     simulation: Predictor,
     values: Mapping[str, float] | None = None,
     *,
+    inputs: Inputs | None = None,
     thresholds: Thresholds = THRESHOLDS,
 ) -> Problem:
     """Simulate the recording, with `values` for the parameters or as the simulation states them.
+
+    `inputs` are those of the recording, where they have been prepared for other values before.
 
     Raises
     ------
@@ -37,7 +40,8 @@ def build_problem(
         When the predicted channel or an input is missing, or too little can be compared.
     """
     chosen = dict(values or {name: prior.value for name, prior in simulation.parameters.items()})
-    run = simulated(recording, simulation, {**simulation.variants(), **chosen}, thresholds)
+    inputs = inputs or inputs_of(recording, simulation)
+    run = simulated(inputs, simulation, {**simulation.variants(), **chosen}, thresholds)
     prepared, prediction = run.recording, run.prediction
     measured = prepared.channel(simulation.channel)
     compared = run.known & np.isfinite(measured)

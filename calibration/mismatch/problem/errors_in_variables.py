@@ -84,9 +84,13 @@ def expected_inputs(
     rest, truths = _at_rest(values), normal_truths(values, np.array(scale) ** 2, starts)
     smooth = truths.mean.copy()
     for k, name in enumerate(owners):
-        if name not in normal:
-            moving = np.where(rest[:, k], np.nan, values[:, k])
-            smooth[:, k] = refined_by_density(moving, scale[k], starts, truths.column(k))
+        if name in normal:
+            continue
+        if k and owners[k - 1] == name and np.array_equal(values[:, k - 1], values[:, k], equal_nan=True):
+            smooth[:, k] = smooth[:, k - 1]  # a sensor of the whole machine
+            continue
+        moving = np.where(rest[:, k], np.nan, values[:, k])
+        smooth[:, k] = refined_by_density(moving, scale[k], starts, truths.column(k))
     parts = np.split(np.where(rest, 0.0, smooth), len(names), axis=1)
     return recording.with_channels(**dict(zip(names, parts, strict=True)))
 

@@ -35,6 +35,24 @@ NUDGE = 1.01
 
 
 @dataclass(frozen=True, eq=False)
+class Inputs:
+    """A recording as a simulation needs it, whatever its parameters are.
+
+    Attributes
+    ----------
+    as_read: with derived channels, and inputs bridged where they are blank
+    expected: the same with inputs replaced by their conditional expectation
+    bridged_otherwise: the same with blanks bridged in another way; None where there are none
+    blanks: where each input was not measured
+    """
+
+    as_read: Recording
+    expected: Recording
+    bridged_otherwise: Recording | None
+    blanks: Mapping[str, Mask]
+
+
+@dataclass(frozen=True, eq=False)
 class Simulated:
     """A prediction and what it was made from.
 
@@ -60,10 +78,8 @@ class Simulated:
         return np.asarray(np.isfinite(self.prediction) & ~unknown)
 
 
-def simulated(
-    recording: Recording, simulation: Predictor, values: Mapping[str, float], thresholds: Thresholds
-) -> Simulated:
-    """Run the simulation with these parameters; twice where an input has blanks.
+def inputs_of(recording: Recording, simulation: Predictor) -> Inputs:
+    """Return what the simulation is run on.
 
     Raises
     ------
@@ -72,12 +88,19 @@ def simulated(
     """
     as_read, blanks = _prepared(recording, simulation)
     normal = _inputs_of_speed(as_read, simulation)
-    prepared = expected_inputs(as_read, simulation.sensors, normal)
+    expected, otherwise = expected_inputs(as_read, simulation.sensors, normal), None
+    if blanks:
+        otherwise, _ = _prepared(recording, simulation, other_way=True)
+        otherwise = expected_inputs(otherwise, simulation.sensors, normal)
+    return Inputs(as_read, expected, otherwise, blanks)
+
+
+def simulated(inputs: Inputs, simulation: Predictor, values: Mapping[str, float], thresholds: Thresholds) -> Simulated:
+    """Run the simulation with these parameters; twice where an input has blanks."""
+    prepared, other, blanks = inputs.expected, inputs.bridged_otherwise, inputs.blanks
     prediction = simulation.predict(complete_inputs(prepared), values)
     carried = np.zeros(prediction.shape, np.bool_)
-    if blanks:
-        other, _ = _prepared(recording, simulation, other_way=True)
-        other = expected_inputs(other, simulation.sensors, normal)
+    if other is not None:
         apart = np.abs(simulation.predict(complete_inputs(other), values) - prediction)
         blank = np.any(list(blanks.values()), axis=0)
         residual = (prepared.channel(simulation.channel) - prediction)[~blank]
@@ -86,7 +109,7 @@ def simulated(
             thresholds.carried_share * robust_std(residual), 1e-9 * float(np.max(np.abs(residual), initial=0.0))
         )
         carried = np.isfinite(prediction) & ~blank & ~(apart <= least)
-    return Simulated(prepared, as_read, prediction, blanks, carried)
+    return Simulated(prepared, inputs.as_read, prediction, blanks, carried)
 
 
 def _prepared(

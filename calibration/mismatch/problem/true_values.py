@@ -20,7 +20,7 @@ from regolithd.calibration.mismatch.signal.stein import (
 
 Array = NDArray[np.float64]
 
-MOST_FITTED = 32
+MOST_FITTED = 16
 """Windows (of 256 instants each) in which the models are fitted and compared: longer recordings cost no more."""
 LEAST_VARIANCE = 1e-4
 """The truth's variance in error variances, below which it is a constant: there is nothing to be told of its density."""

@@ -10,7 +10,7 @@ from regolithd.calibration.mismatch import Prior, SensorError, Simulation, compa
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.errors_in_variables import conditional_expectation
-from regolithd.calibration.mismatch.problem.simulated import simulated
+from regolithd.calibration.mismatch.problem.simulated import inputs_of, simulated
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ def test_what_the_speed_is_computed_from_is_smoothed_as_a_normal_signal() -> Non
     random = np.random.default_rng(2)
     power, rpm = (random.choice([0.0, 50.0, 90.0], ROWS // 20).repeat(20) + random.normal(0, 2, ROWS) for _ in "ab")
     recording = from_columns({"t_s": TIME_S, "reading_V": 0.05 * power, "power_W": power, "motor_rpm": rpm})
-    found = simulated(recording, Winch(), {"gain_V_W": 0.05}, THRESHOLDS).recording
+    found = simulated(inputs_of(recording, Winch()), Winch(), {"gain_V_W": 0.05}, THRESHOLDS).recording
     normal = conditional_expectation(np.column_stack((power, rpm)), np.full(2, 4.0), np.array([0]))
     np.testing.assert_allclose(found.channels["motor_rpm"][:, 0], normal[:, 1])
     assert np.std(found.channels["power_W"][:, 0] - normal[:, 0]) > 1.0
