@@ -52,7 +52,8 @@ def sure_of(answer: Answer) -> str:
     if (other := answer.next_best) is None:
         return text
     names = (*other.effects, *(("something unexplained",) if other.unexplained else ()))
-    return f"{text}; next: {' + '.join(names) or 'nothing'} ({other.probability:.2f})"
+    order = "next" if other.probability <= answer.probability else "by evidence alone more probable"
+    return f"{text}; {order}: {' + '.join(names) or 'nothing'} ({other.probability:.2f})"
 
 
 def _wrapped(line: str, width: int) -> str:

@@ -30,6 +30,7 @@ from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
 from regolithd.calibration.mismatch.inference.statements import beyond_prior_in_words, statement, words_of
 from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
+from regolithd.calibration.mismatch.regression.residuals import residual_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -115,9 +116,9 @@ def verdict_of(decision: Decision, moved: Sequence[CalibratedParameter]) -> Verd
 
 
 def noise_floor(decision: Decision) -> float:
-    """Return the noise's root mean square over all readings."""
-    counts = decision.equations.design.counts.sum(axis=0)
-    return float(np.sqrt(np.sum(decision.noise.deviation**2 * counts) / counts.sum()))
+    """Return the root mean square of what all that was found leaves, over all readings."""
+    left = residual_of(decision.equations, decision.whole)
+    return float(np.sqrt(np.mean(left[decision.equations.problem.mask] ** 2)))
 
 
 def named_effects(decision: Decision, held_out: HeldOutErrors) -> tuple[tuple[Effect, ...], tuple[Change, ...]]:

@@ -260,7 +260,8 @@ def _parameters(chosen: Chosen) -> tuple[FleetParameter, ...]:
 
 def _noise_floor(chosen: Chosen) -> float:
     squares = sum(
-        float(found.deviation**2 @ sums.counts) for found, sums in zip(chosen.found, chosen.equations.sums, strict=True)
+        found.noise_floor**2 * float(sums.counts.sum())
+        for found, sums in zip(chosen.found, chosen.equations.sums, strict=True)
     )
     return float(np.sqrt(squares / max(float(chosen.equations.counts.sum()), 1.0)))
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.comparison import decided
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values
+from regolithd.calibration.mismatch.inference.findings import noise_floor
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
@@ -67,6 +68,7 @@ class Found:
     findings: as `regolithd mismatch` has them for this recording alone
     values: the parameters at which the simulation was linearised
     deviation, autocorrelation_times: of the noise beside all that was found, shape (wheel,)
+    noise_floor: root mean square of what all that was found leaves
     entry_threshold: score above which an effect was named
     terms: named effects, then smooth terms
     shapes: the grid of each candidate that this recording allows, by name
@@ -77,6 +79,7 @@ class Found:
     values: dict[str, float]
     deviation: Array
     autocorrelation_times: Array | float
+    noise_floor: float
     entry_threshold: float
     terms: tuple[FoundTerm, ...]
     shapes: dict[str, Shapes]
@@ -109,6 +112,7 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
         values=values,
         deviation=decision.noise.deviation,
         autocorrelation_times=decision.noise.autocorrelation_times,
+        noise_floor=noise_floor(decision),
         entry_threshold=decision.entry_threshold,
         terms=tuple(_found_term(decision, term) for term in whole.terms),
         shapes=shapes_in(problem, of_recording.candidates),

@@ -48,7 +48,7 @@ class Machine(Simulation):
 
 def found(findings: Findings = SILENT, *terms: FoundTerm) -> Found:
     """Return what one recording was found to show."""
-    return Found(findings, {}, DEVIATION, 1.0, 8.0, terms, {})
+    return Found(findings, {}, DEVIATION, 1.0, float(np.sqrt(np.mean(DEVIATION**2))), 8.0, terms, {})
 
 
 def chosen(

@@ -32,7 +32,7 @@ def with_own(each: Drive, count: int = 1, last: Drive | None = None) -> FleetEqu
 
 def found(*terms: FoundTerm) -> Found:
     """Return what a recording was found to show."""
-    return Found(FINDINGS, {}, DEVIATION, 1.0, 10.0, terms, {})
+    return Found(FINDINGS, {}, DEVIATION, 1.0, 0.1, 10.0, terms, {})
 
 
 def shown(name: str, *, named: bool, penalty: float = 2.0) -> FoundTerm:

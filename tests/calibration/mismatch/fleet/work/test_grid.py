@@ -24,7 +24,7 @@ def powers(count: int, first: float = 0.0) -> tuple[dict[str, float | str], ...]
 def found(terms: tuple[FoundTerm, ...] = (), **shapes: Shapes) -> Found:
     """Return what a recording shows, with the grids of candidates; `_` in a name stands for a hyphen."""
     return Found(
-        FINDINGS, {}, DEVIATION, 1.0, 8.0, terms, {name.replace("_", "-"): each for name, each in shapes.items()}
+        FINDINGS, {}, DEVIATION, 1.0, 0.1, 8.0, terms, {name.replace("_", "-"): each for name, each in shapes.items()}
     )
 
 

@@ -48,7 +48,7 @@ def made() -> tuple[Sums, Array, Array]:
     own = np.random.default_rng(1).normal(size=(2, READINGS, 2)).astype(np.float32)
     terms = tuple(FoundTerm("time", False, {}, (0, 1), 3.0, column[None]) for column in own)
     # The recording's own comparison linearised the simulation at another inertia than the stated 0.5.
-    found = Found(FINDINGS, {"inertia_kg_m2": 0.53}, DEVIATION, AUTOCORRELATION_TIME, 8.0, terms, {})
+    found = Found(FINDINGS, {"inertia_kg_m2": 0.53}, DEVIATION, AUTOCORRELATION_TIME, 0.1, 8.0, terms, {})
     recording = as_recording(columns, unit="axis")
     speed, acceleration, torque = (
         by_joint(columns[name]) for name in ("speed_rad_s", "acceleration_rad_s2", "torque_Nm")
