@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.answer import (
         Answer,
+        Effect,
         FitImprovement,
         Indistinguishable,
         Parameter,
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 
 NO_BREAK = "\u00a0"
 """A space at which a line is not broken."""
+TOLD_IN_THE_STATEMENT = ("relative_size", "onset_s")
+"""Parameters of an effect that its statement has in words."""
 
 
 def print_answer(console: Console, answer: Answer, labels: Labels, wheels: Sequence[int | str] = ()) -> None:
@@ -71,18 +74,26 @@ def _lines(answer: Answer, labels: Labels, wheels: Sequence[int | str]) -> list[
     several = len(answer.fits) > 1
     moved = [each for each in answer.parameters if each.beyond_prior()]
     return [
-        *(
-            f"{effect.name}{f' in {effect.channel}' if several else ''}: {effect.statement}"
-            for effect in answer.effects
-        ),
+        *(line for effect in answer.effects for line in _effect(effect, several=several)),
         *(f"changed{f' in {change.channel}' if several else ''}: {change.statement}" for change in answer.changes),
         *(f"parameter {beyond_prior_in_words(each)}" for each in moved),
-        *(line for rest in answer.unexplained for line in _unexplained(rest, labels, len(wheels), several=several)),
+        *_all_unexplained(answer.unexplained, labels, len(wheels), several=several),
         *(_not_distinguished(each, answer, labels) for each in answer.indistinguishable),
         sure_of(answer),
         *map(_error, answer.fits or (answer.fit,)),
         *(f"note: {note}" for note in notes_beside_priors(answer.notes, moved)),
     ]
+
+
+def _effect(effect: Effect, *, several: bool) -> list[str]:
+    """Return the line about an effect, and those with its parameters that the line does not tell, indented."""
+    line = f"{effect.name}{f' in {effect.channel}' if several else ''}: {effect.statement}"
+    numbers = {name: each for name, each in effect.parameters.items() if name not in TOLD_IN_THE_STATEMENT}
+    return [line, *(f"  {_value(name, each)} (90 % sure: {_interval(each)})" for name, each in numbers.items())]
+
+
+def _interval(parameter: Parameter) -> str:
+    return f"{parameter.low:.4g} to {parameter.high:.4g}"
 
 
 def _not_distinguished(found: Indistinguishable, answer: Answer, labels: Labels) -> str:
@@ -92,6 +103,16 @@ def _not_distinguished(found: Indistinguishable, answer: Answer, labels: Labels)
     if named.union(change.name for change in answer.changes).intersection(found.effects):
         return f"{names}: this recording does not distinguish them. {found.experiment}"
     return f"not found: {names}. If there were one, this recording would not tell which. {found.experiment}"
+
+
+def _all_unexplained(found: Sequence[Unexplained], labels: Labels, of: int, *, several: bool) -> list[str]:
+    """Return the lines about all that is unexplained; a curve that several regions have is told once."""
+    told: list[str] = []
+    for place, rest in enumerate(found):
+        before = any(rest.curve is not None and rest.curve == other.curve for other in found[:place])
+        lines = _unexplained(rest, labels, of, several=several)
+        told += lines[:1] if before else lines
+    return told
 
 
 def _unexplained(rest: Unexplained, labels: Labels, of: int, *, several: bool) -> list[str]:

@@ -29,6 +29,13 @@ LEFT = (
 )
 
 
+FRICTION = {
+    "coulomb_current": Parameter(0.03712, 0.03, 0.044, "A"),
+    "onset_s": Parameter(3.0, 1.0, 9.0, "s"),
+    "relative_size": Parameter(0.2, 0.1, 0.3, "1"),
+}
+
+
 def answer_with(**parts: object) -> SimpleNamespace:
     """Return an answer that has these parts alone."""
     empty: dict[str, object] = {
@@ -45,7 +52,7 @@ def test_mismatch_prints_the_answer() -> None:
     """Verdict, effects, what is unexplained or not distinguished, how sure it is, held-out error and notes."""
     answer = SimpleNamespace(
         verdict="effects",
-        effects=[SimpleNamespace(name="coulomb-friction", statement="37 mA")],
+        effects=[SimpleNamespace(name="coulomb-friction", statement="37 mA", parameters=FRICTION)],
         unexplained=[
             Unexplained("current", (1, 4), "time", 3.4, 99.6, 0.123),
             Unexplained("current", (1,), "height", 0.0, 9.0, 0.4, curve=CURVE, suggestions=SUGGESTIONS),
@@ -75,6 +82,7 @@ def test_mismatch_prints_the_answer() -> None:
     assert console.export_text().splitlines() == [
         "effects",
         "  coulomb-friction: 37 mA",
+        "    coulomb_current = 0.03712 A (90 % sure: 0.03 to 0.044)",
         "  changed: viscous-friction is larger than the corrected simulation has it.",
         f"  parameter loss had to leave its prior: {LEFT}",
         "  unexplained: 12 % of the residual follows time periodically, on zones 1 and 4, 3 to 100 s",
@@ -98,7 +106,9 @@ def test_of_several_channels_each_finding_and_each_error_names_its_own() -> None
     ]
     answer = answer_with(
         verdict="unexplained",
-        effects=[SimpleNamespace(name="sensor-delay", channel="current", statement="A delay of pressure.")],
+        effects=[
+            SimpleNamespace(name="sensor-delay", channel="current", statement="A delay of pressure.", parameters={})
+        ],
         changes=[GROWN],
         unexplained=[Unexplained("pressure", (1,), "flow", 0.0, 9.0, 0.4)],
         fit=fits[1],
@@ -132,7 +142,9 @@ def test_a_curve_that_does_not_help_where_it_was_not_fitted_is_told_with_a_cauti
 
 def test_a_terminal_gets_continued_lines_indented() -> None:
     """A line is broken at its width, never between a number and its percent sign, and goes on under its beginning."""
-    drag = SimpleNamespace(name="viscous-friction", statement="Drag that grows with speed: 37 % of the mean.")
+    drag = SimpleNamespace(
+        name="viscous-friction", statement="Drag that grows with speed: 37 % of the mean.", parameters={}
+    )
     answer = answer_with(verdict="missing-physics", effects=[drag])
     console = Console(record=True, width=51, force_terminal=True, file=StringIO())
     print_answer(console, answer, Labels(), (1,))
@@ -140,3 +152,24 @@ def test_a_terminal_gets_continued_lines_indented() -> None:
         "  viscous-friction: Drag that grows with speed:",
         "    37 % of the mean.",
     ]
+
+
+def test_a_curve_of_several_regions_is_told_once() -> None:
+    """Each region has its line."""
+    regions = [
+        Unexplained("current", (1,), "height", 0.0, 9.0, share, curve=CURVE, suggestions=SUGGESTIONS)
+        for share in (0.4, 0.1)
+    ]
+    console = Console(record=True, width=200, quiet=False)
+    print_answer(console, answer_with(verdict="unexplained", unexplained=regions), Labels(), (1,))
+    text = console.export_text()
+    assert text.count("unexplained: ") == 2
+    assert text.count("empirical curve") == text.count("suggestion 1") == 1
+
+
+def test_an_answer_that_evidence_alone_disfavours_says_so() -> None:
+    """A test of its own refused the other one."""
+    console = Console(record=True, width=200, quiet=False)
+    other = SimpleNamespace(effects=(), unexplained=False, probability=0.91)
+    print_answer(console, answer_with(verdict="unexplained", probability=0.07, next_best=other), Labels(), (1,))
+    assert "probability of this answer: 0.07; by evidence alone more probable: nothing (0.91)" in console.export_text()
