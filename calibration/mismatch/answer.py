@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
     from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve, StatedCurve
+    from regolithd.calibration.mismatch.problem.onset_clock import FoundIn
     from regolithd.calibration.mismatch.problem.problem import LeftOut, Problem
 
 Array = NDArray[np.float64]
@@ -294,6 +295,7 @@ class Contribution:
     relative_std: relative standard deviation of its size
     shape_std: standard deviations of shape parameters, by name
     channel: the predicted channel that it acts on; empty where there is one alone
+    found_in: the recording whose clock its onset is on; None: each recording's own
     """
 
     name: str
@@ -303,6 +305,7 @@ class Contribution:
     relative_std: float = 0.0
     channel: str = ""
     shape_std: Mapping[str, float] = field(default_factory=dict)
+    found_in: FoundIn | None = None
 
 
 @dataclass(frozen=True, eq=False)

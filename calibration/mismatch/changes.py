@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of, l
 from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw
 from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
 from regolithd.calibration.mismatch.inference.statements import after_number, on_wheels
+from regolithd.calibration.mismatch.problem.onset_clock import is_later, on_the_clock_of
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
 from regolithd.calibration.mismatch.problem.words import in_units
 
@@ -117,6 +118,7 @@ class Stated:
                 "record it, or take the effect out of the file"
             )
         try:
+            known = on_the_clock_of(known, self.contribution.found_in)
             return columns_of(known, self.candidate, self.candidate.self_consistent_shape(known, shape, coefficients))
         except KeyError as error:
             raise SimulationError(
@@ -131,16 +133,19 @@ class ChangedSize(Candidate):
     stated_size = 1.0
     late_with_channel = False  # its columns are made as shown
 
-    def __init__(self, stated: Stated, place: int) -> None:
-        of = stated.candidate
+    def __init__(self, stated: Stated, place: int, acts_as: Candidate | None) -> None:
+        """Make a change of the effect in this place of `problem.stated`; `acts_as` None: it depends on nothing here."""
+        of, like = stated.candidate, acts_as or stated.candidate
         self.stated, self._place = stated, place
-        for name in ("name", "covariate", "equation", "signature", "source", "label", "along_motion"):
+        for name in ("name", "equation", "source", "label", "along_motion"):
             setattr(self, name, getattr(of, name))
-        self.experiment, self.experiment_one_way = of.experiment, of.experiment_one_way  # type: ignore[misc]
-        self.vary, self.run_unloaded = of.vary, of.run_unloaded  # type: ignore[misc]
-        self.imitated_over = of.imitated_over  # type: ignore[misc]
+        self.covariate, self.imitated_over = (like.covariate, like.imitated_over) if acts_as else ("none", "none")  # type: ignore[misc]
+        self.signature = like.signature  # type: ignore[misc]
+        self.experiment, self.experiment_one_way = like.experiment, like.experiment_one_way  # type: ignore[misc]
+        self.vary, self.run_unloaded = like.vary, like.run_unloaded  # type: ignore[misc]
         self.words = f"a change of a corrected effect: {of.words}"  # type: ignore[misc]
-        self.sharing, self.channel = of.sharing, of.channel  # type: ignore[misc]
+        self.sharing = ("one",) if len(stated.contribution.wheels) == 1 else of.sharing  # type: ignore[misc]
+        self.channel = of.channel  # type: ignore[misc]
         self.acts_unloaded = of.acts_unloaded  # type: ignore[misc]
 
     def applies(self, problem: Problem) -> bool:
@@ -149,7 +154,8 @@ class ChangedSize(Candidate):
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the shape that was corrected; of a law that is not linear in its size, over several changes of it."""
-        shape = dict(self.stated.contribution.shape)
+        # A change of size has no onset of its own.
+        shape = {name: value for name, value in self.stated.contribution.shape.items() if name != self.change_point}
         if self.stated.in_simulation or not self.stated.bent(problem):
             return [shape]
         return [{**shape, SECANT_CHANGE: change} for change in SECANT_CHANGES]
@@ -209,7 +215,7 @@ def _merged(effects: Sequence[Contribution]) -> list[Contribution]:
     """Return the effects with those of one name, shape and wheels summed: a correction of a correction."""
     found: dict[tuple[str, str, tuple[int | str, ...]], Contribution] = {}
     for effect in effects:
-        key = (effect.name, repr(sorted(effect.shape.items(), key=str)), effect.wheels)
+        key = (effect.name, repr((sorted(effect.shape.items(), key=str), effect.found_in)), effect.wheels)
         if key not in found:
             found[key] = effect
             continue
@@ -244,12 +250,19 @@ def corrected_problem(problem: Problem, stated: Sequence[Stated]) -> Problem:
 def with_changes(problem: Problem, candidates: Sequence[Candidate], stated: Sequence[Stated]) -> tuple[Candidate, ...]:
     """Return the candidates, with a change of each stated effect in the place of the effect itself.
 
-    Where an effect is on some wheels alone, it is still looked for on the others.
+    Where an effect is on some wheels alone, it is still looked for on the others. One that had begun before this
+    recording acts as what it is `once_begun`, and may begin another time.
     """
     measured = {name for k, name in enumerate(problem.recording.wheels) if problem.mask[:, k].any()}
-    covered = {each.candidate.name for each in stated if measured <= set(each.contribution.wheels)}
-    kept = [candidate for candidate in candidates if candidate.name not in covered]
-    return (*kept, *(ChangedSize(each, place) for place, each in enumerate(stated)))
+    covered, changes = set(), []
+    for place, each in enumerate(stated):
+        acts_as: Candidate | None = each.candidate
+        if is_later(problem, each.contribution.found_in):
+            acts_as = next((other for other in candidates if other.name == each.candidate.once_begun), None)
+        if acts_as and measured <= set(each.contribution.wheels):
+            covered.add(acts_as.name)
+        changes.append(ChangedSize(each, place, acts_as))
+    return (*(candidate for candidate in candidates if candidate.name not in covered), *changes)
 
 
 def contribution_of_change(change: ChangedSize, relative_change: float) -> Contribution:

@@ -110,7 +110,7 @@ def corrected_tables(
 def _entry(effect: Contribution) -> dict[str, Any]:
     """Return an entry of `[[effects]]`; it names its channel where the simulation predicts several."""
     entry: dict[str, Any] = _plain(asdict(effect))
-    for name in ("channel", "shape_std"):
+    for name in ("channel", "shape_std", "found_in"):
         if not entry[name]:
             del entry[name]
     return entry

@@ -49,6 +49,7 @@ class BearingDrag(Candidate):
     run_unloaded = True
     source = "reports of seal and bearing failures: from some percent of rated current up to stalling"
     requires = ("direction",)
+    once_begun = "coulomb-friction"
     parameter_labels: ClassVar = {"drag_current": "drag"}
     loads = True
     forms = GROWTHS

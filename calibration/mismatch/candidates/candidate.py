@@ -143,6 +143,8 @@ class Candidate:
     change_point: ClassVar[str] = "onset_s"
     """The shape parameter, where a candidate has it, that is the time at which the effect begins. Its Δχ² is no smooth
     function of it, so that it has an interval of its own."""
+    once_begun: ClassVar[str] = ""
+    """Name of the effect in the library that this one is after its onset, where there is one: a drag is a friction."""
     wanders: ClassVar[bool] = False
     """Whether the effect takes a random course after its onset, so that no shape is ever exact."""
     loads: ClassVar[bool] = False

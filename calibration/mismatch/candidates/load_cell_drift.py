@@ -147,6 +147,7 @@ class DriftOfPredictedLoad(LoadCellDrift):
     along_motion = False
     forms = GROWTHS[1:]
     wanders = True
+    once_begun = "current-sensor-bias"
     coefficients: ClassVar = (Coefficient("drift", "{unit}", 0),)
     shape_keys = GROWTH_KEYS
     free: ClassVar = {"onset_s": (0.0, float("inf"))}

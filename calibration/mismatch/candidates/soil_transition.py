@@ -83,7 +83,7 @@ class SoilTransition(Candidate):
 def _beyond(problem: Problem, shape: Shape) -> Array:
     """Return the share of the other soil, shape (time, wheel); the rover's centre crosses the border at the onset."""
     onset_s = float(shape["onset_s"])
-    if shape["along"] == "time":
+    if shape["along"] == "time" or problem.time_s[0, 0] > onset_s:  # all of the recording is beyond the onset
         return np.broadcast_to(problem.time_s >= onset_s, problem.mask.shape).astype(np.float64)
     place = problem.covariates["place"]
     beyond_m = place - np.interp(onset_s, problem.time_s[:, 0], np.mean(place, axis=1))

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Contribution, Curve, EmpiricalFit, Evidence
+from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.changes import ChangedSize, contribution_of_change
 from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
+from regolithd.calibration.mismatch.problem.onset_clock import found_here
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import has_smooth_term
@@ -102,7 +105,9 @@ def _contributions(equations: NormalEquations, fit: Fit) -> tuple[Contribution, 
             changed.append(contribution_of_change(term.group.candidate, coefficients[0]))
         else:
             wheels = wheel_names(equations.problem, term.wheels)
-            named.append(Contribution(term.name, term.group.shape, tuple(coefficients), wheels))
+            contribution = Contribution(term.name, term.group.shape, tuple(coefficients), wheels)
+            begins = Candidate.change_point in term.group.shape
+            named.append(replace(contribution, found_in=found_here(equations.problem)) if begins else contribution)
     return (*named, *changed)
 
 

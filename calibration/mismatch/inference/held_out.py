@@ -117,7 +117,7 @@ def _or_as_named(
     """
     terms: tuple[Term, ...] = ()
     for one in named.terms:
-        family = [group for group in groups if group.named and group.name == one.name]
+        family = [group for group in groups if group.named and group.law == one.group.law]
         found = [(gain, term) for gain, term in train.further(terms, family) if term.wheels == one.wheels]
         if not found:
             return train, chosen

@@ -26,7 +26,8 @@ def sensitivities(
     channel, unit = equations.problem.simulation.channel, equations.problem.simulation.unit
     found = []
     for candidate in candidates:
-        groups = [group for group in equations.design.groups if group.name == candidate.name and group.named]
+        law = candidate.name, candidate.stated_size > 0
+        groups = [group for group in equations.design.groups if group.law == law and group.named]
         if not groups:
             found.append(Sensitivity(candidate.name, channel, float("inf"), unit))
             continue
@@ -39,7 +40,9 @@ def sensitivities(
         # What was found already is looked for anew, not beside itself.
         others = [term for term in given.terms if term.name != candidate.name]
         sizes = [smallest_detectable(equations, others, Term(group, on), entry_threshold) for on in patterns]
-        found.append(Sensitivity(candidate.name, channel, float(np.median(sizes)), unit))
+        # A change is seen on the wheels that have the effect, and on no other.
+        size = min(sizes) if group.is_change else float(np.median(sizes))
+        found.append(Sensitivity(candidate.name, channel, size, unit))
     return tuple(sorted(found, key=lambda one: one.name))
 
 

@@ -63,7 +63,7 @@ def _over_kinds_of_shape(equations: NormalEquations, fit: Fit, index: int, sizes
 
 def _best_of_each_kind(equations: NormalEquations, term: Term, others: tuple[Term, ...]) -> list[tuple[float, Term]]:
     """Return the best shape, with its Δχ², of each kind: of each combination of parameters that are not continuous."""
-    family = [group for group in equations.design.groups if group.named and group.name == term.name]
+    family = [group for group in equations.design.groups if group.named and group.law == term.group.law]
     free = term.group.candidate.free if term.group.candidate else {}
     found: dict[str, tuple[float, Term]] = {}
     for gain, other in equations.further(others, family):

@@ -65,15 +65,15 @@ class Linearised:
         """
         pieces = [each for each in (before, piece) if each is not None]
         recording, elapsed = together(pieces, self.wheels)
-        return self._of(self.pose(recording), elapsed, piece.start_s, piece.end_s)
+        return self._of(self.pose(recording, elapsed), elapsed, piece.start_s, piece.end_s)
 
     def intervals(self, problem: Problem, elapsed: Array, pieces: Sequence[Piece]) -> list[Interval]:
         """Return what is compared in each of the pieces that a problem was posed of together."""
         return [self._of(problem, elapsed, piece.start_s, piece.end_s) for piece in pieces]
 
-    def pose(self, recording: Recording) -> Problem:
+    def pose(self, recording: Recording, elapsed: Array) -> Problem:
         """Return the problem at the values, with the covariates that are constant in this piece."""
-        return _posed(recording, self.simulation, self.values, self.stated)
+        return _posed(recording, elapsed, self.simulation, self.values, self.stated)
 
     def _of(self, problem: Problem, elapsed: Array, start_s: float, end_s: float) -> Interval:
         here = (elapsed >= start_s) & (elapsed < end_s)
@@ -96,9 +96,16 @@ class Linearised:
 
 
 def _posed(
-    recording: Recording, simulation: Simulation, values: Mapping[str, float] | None, stated: Sequence[Stated]
+    recording: Recording,
+    elapsed: Array,
+    simulation: Simulation,
+    values: Mapping[str, float] | None,
+    stated: Sequence[Stated],
 ) -> Problem:
-    problem = corrected_problem(build_problem(recording, simulation, values), stated)
+    """Return the problem of some pieces; `elapsed` is the time since the start, on whose clock an onset is [s]."""
+    problem = build_problem(recording, simulation, values)
+    since_start = {**problem.covariates, "time": problem.covariates["time"] + elapsed[0]}
+    problem = corrected_problem(replace(problem, covariates=since_start), stated)
     return replace(problem, covariates={**problem.constants, **problem.covariates}, constants={})
 
 
@@ -127,7 +134,7 @@ def learned(pieces: Sequence[Piece], simulation: Simulation) -> tuple[Linearised
     recording, elapsed = together(pieces)
     candidates = tuple(each.form_for(simulation) for each in simulation.candidates(library()))
     stated = stated_in(candidates, simulation.corrected_effects, simulation.stated_effects())
-    problem = linearised_where_it_fits(lambda values: _posed(recording, simulation, values, stated))
+    problem = linearised_where_it_fits(lambda values: _posed(recording, elapsed, simulation, values, stated))
     candidates = with_changes(problem, candidates, stated)
     laws = laws_of(problem, candidates)
     sets, wheels = wheel_sets_of(problem), problem.recording.wheels
@@ -152,7 +159,7 @@ def learned(pieces: Sequence[Piece], simulation: Simulation) -> tuple[Linearised
 def _check_memory(found: Linearised, problem: Problem, pieces: Sequence[Piece]) -> None:
     """Compare the last piece as posed with all before it, and with one piece before it alone."""
     recording, elapsed = together(pieces[-2:], found.wheels)
-    short = found.pose(recording)
+    short = found.pose(recording, elapsed)
     here = elapsed >= pieces[-1].start_s
     whole, alone = problem.filled[-len(elapsed) :][here], short.filled[here]
     both = (problem.mask[-len(elapsed) :] & short.mask)[here]

@@ -53,6 +53,16 @@ class Group:
         return slice(self.columns[0], self.columns[-1] + 1)
 
     @property
+    def is_change(self) -> bool:
+        """Whether it is a change of an effect that the simulation was corrected by."""
+        return self.candidate is not None and self.candidate.stated_size > 0
+
+    @property
+    def law(self) -> tuple[str, bool]:
+        """What tells candidates apart: a change of a corrected effect has the name of the effect itself."""
+        return self.name, self.is_change
+
+    @property
     def named(self) -> bool:
         """Whether it is a candidate, not a smooth term."""
         return self.candidate is not None

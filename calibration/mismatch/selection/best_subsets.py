@@ -28,7 +28,7 @@ def best_of_each_candidate(equations: NormalEquations, given: Sequence[Term]) ->
     found = equations.further(given, groups)
     hardly_shared = _that_one_wheel_shows_alone(equations, found)
     scored = [
-        (gain - equations.penalty(term), term.group.name, term)
+        (gain - equations.penalty(term), str(term.group.law), term)
         for gain, term in found
         if all(term.group.name != name or wheels.isdisjoint(term.wheels) for name, wheels in taken)
         and (len(term.wheels) == 1 or id(term.group) not in hardly_shared)
@@ -136,7 +136,7 @@ def optimised_shapes(equations: NormalEquations, terms: Sequence[Term]) -> tuple
     for _ in range(2 if len(terms) > 1 else 1):
         for index, term in enumerate(terms):
             others = terms[:index] + terms[index + 1 :]
-            family = [group for group in equations.design.groups if group.named and group.name == term.name]
+            family = [group for group in equations.design.groups if group.named and group.law == term.group.law]
             found = [(gain, t) for gain, t in equations.further(others, family) if t.wheels == term.wheels]
             best = _largest_of_worthwhile_kind(equations, others, found) if found else term
             equations, terms[index] = optimised_shape(equations, others, best)

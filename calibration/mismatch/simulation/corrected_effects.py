@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.problem.onset_clock import FoundIn
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,6 +32,7 @@ def stated_effects(tables: Mapping[str, Any]) -> tuple[Contribution, ...]:
                     float(effect.get("relative_std", 0.0)),
                     str(effect.get("channel", "")),
                     _shape_std(effect),
+                    _found_in(effect),
                 )
             )
         except (KeyError, TypeError, ValueError) as error:
@@ -51,3 +53,21 @@ def _shape_std(effect: Mapping[str, Any]) -> dict[str, float]:
     if unknown := sorted(set(found) - numbers):
         raise ValueError(f"shape_std has {', '.join(unknown)}, which is no number in its shape")
     return found
+
+
+def _found_in(effect: Mapping[str, Any]) -> FoundIn | None:
+    """Return the recording whose clock an effect's onset is on.
+
+    Raises
+    ------
+    ValueError
+        When it is not as `--corrected` writes it.
+    """
+    if "found_in" not in effect:
+        return None
+    try:
+        of = dict(effect["found_in"])
+        return FoundIn(str(of["digest"]), int(of["instants"]), float(of["end_s"]))
+    except (KeyError, TypeError, ValueError) as error:
+        told = f"found_in has digest, instants and end_s, as --corrected writes it, not {effect['found_in']!r}"
+        raise ValueError(told) from error

@@ -99,7 +99,7 @@ def test_a_law_that_is_not_linear_is_linearised_over_its_change_down_to_nothing(
     """Less than nothing of an effect is not asked of its law."""
     delay = Contribution("sensor-delay", {"delay_s": 0.5}, (1.0,), (1,))
     (stated,) = stated_in(library(), [delay], [])
-    changed = ChangedSize(stated, 0)
+    changed = ChangedSize(stated, 0, stated.candidate)
     problem: Any = None  # of no account
     assert changed.self_consistent_shape(problem, {SECANT_CHANGE: -0.3}, [fitted]) == {SECANT_CHANGE: secant}
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.regression.group import Group, Term
 from regolithd.calibration.mismatch.regression.penalties import (
     full_penalty,
@@ -63,3 +64,12 @@ def test_smooth_terms_are_shared_as_they_say_and_candidates_by_some_too() -> Non
     assert not GROUP.may_be_shared("some"), "a smooth term"
     assert not replace(GROUP, sharing=("all",)).may_be_shared("one")
     assert GROUP.span == slice(0, 3)
+
+
+def test_the_wheels_of_a_change_were_known_before() -> None:
+    """A corrected effect says which wheels have it: its change costs no choice of them."""
+    changed = Candidate()
+    changed.stated_size = 1.0  # type: ignore[misc]
+    group = replace(GROUP, candidate=changed, sharing=("one",))
+    assert full_penalty(Term(group, (4,)), 6, THRESHOLDS) == pytest.approx(7.5)
+    assert group.law == ("x", True)

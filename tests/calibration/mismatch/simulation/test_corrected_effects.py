@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.problem.onset_clock import FoundIn
 from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects
 
 EFFECT: dict[str, Any] = {"name": "viscous-friction", "shape": {}, "coefficients": [1], "wheels": [1, "left"]}
@@ -39,3 +40,16 @@ def test_a_deviation_of_no_number_of_the_law_is_told(shape_std: object) -> None:
         stated_effects({"effects": [effect]})
     (found,) = stated_effects({"effects": [{**effect, "shape_std": {"power": 0.1}}]})
     assert found.shape_std == {"power": 0.1}
+
+
+@pytest.mark.parametrize(
+    "found_in", [{"digest": "8d", "instants": 9}, "yesterday", {"digest": "8d", "instants": "", "end_s": 1}]
+)
+def test_the_recording_that_an_onset_is_of_is_read_whole(found_in: object) -> None:
+    """By its digest, its length and its end; without it the onset is on each recording's own clock."""
+    with pytest.raises(SimulationError, match=r"^effect 1 needs .*: found_in has digest, instants and end_s"):
+        stated_effects({"effects": [{**EFFECT, "found_in": found_in}]})
+    whole = {"digest": "8d", "instants": 9, "end_s": 4}
+    (found,) = stated_effects({"effects": [{**EFFECT, "found_in": whole}]})
+    assert found.found_in == FoundIn("8d", 9, 4.0)
+    assert stated_effects({"effects": [EFFECT]})[0].found_in is None
