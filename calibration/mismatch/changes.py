@@ -40,8 +40,6 @@ SECANT_CHANGES = (-1.0, 0.5, 2.0)
 """The grid of it: gone, half as large again and three times as large (a choice: the fitted change is iterated)."""
 SMALLEST_CHANGE, LARGEST_CHANGE = 0.05, 10.0
 """Range of its size (a choice: a smaller change is linear, and an effect eleven times as large is another one)."""
-GONE_WITHIN = 0.1
-"""Share of its size below which an effect whose interval holds 0 is called gone in words (a choice)."""
 
 
 @dataclass(frozen=True)
@@ -300,11 +298,10 @@ def changes_of(change: ChangedSize, parameters: Mapping[str, Parameter], problem
 
 
 def direction_of(change: Change) -> Literal["gone", "larger", "smaller"]:
-    """Return what became of a corrected effect."""
-    ratio = change.now / change.corrected if change.corrected else float("inf")
-    if min(change.low, change.high) <= 0 <= max(change.low, change.high) and abs(ratio) < GONE_WITHIN:
-        return "gone"
-    return "larger" if abs(ratio) > 1 else "smaller"
+    """Return what became of a corrected effect: what is smaller, and may be nothing by its interval, is gone."""
+    if not abs(change.now) < abs(change.corrected):
+        return "larger"
+    return "gone" if min(change.low, change.high) <= 0 <= max(change.low, change.high) else "smaller"
 
 
 def change_in_words(change: Change, where: str = "") -> str:

@@ -18,6 +18,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
 )
 from regolithd.calibration.mismatch.selection.cross_validation import squares_left, training_equations
 from regolithd.calibration.mismatch.selection.decision import names_of, without_name
+from regolithd.calibration.mismatch.selection.law_misfit import without_term
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
 
 if TYPE_CHECKING:
@@ -83,7 +84,7 @@ def held_out_errors(
         after += squares_left(train, train.fit(chosen), fold)
         for index, term in enumerate(named.terms):
             rest = tuple(other for other in chosen if other.name != term.name)
-            without[index] += squares_left(train, train.fit(rest), fold)
+            without[index] += squares_left(train, without_term(train, term, rest), fold)
     counts = equations.design.counts.sum(axis=0)
     on = [list(term.wheels) for term in named.terms]
     return equations, HeldOutErrors(

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 from regolithd.calibration.mismatch.regression.nuisance import EXACT
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.regression.group import Fit
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 
@@ -21,20 +23,34 @@ def law_misfit(equations: NormalEquations, names: Fit, with_curve: Fit) -> float
     return gain / max(explained(equations, names) + gain, 1e-9)
 
 
+def as_stated(equations: NormalEquations) -> NormalEquations:
+    """Return the equations in which corrected effects are as the simulation has them, as if they were known exactly."""
+    held = equations.nuisance
+    for place, name in enumerate(held.names):
+        held = held.with_precision(place, EXACT) if name in held.stated else held
+    return equations.with_nuisance(held)
+
+
+def without_term(equations: NormalEquations, term: Term, rest: Sequence[Term]) -> Fit:
+    """Return the fit of the others that a term's gain on held-out readings is measured against.
+
+    That of a change is measured against the corrected effect as it was: what is uncertain of that would take the change
+    up, and be as good on any reading.
+    """
+    return (as_stated(equations) if term.group.is_change else equations).fit(rest)
+
+
 def explained(equations: NormalEquations, fit: Fit) -> float:
     """Return the Δχ² of a fit, with what is in the prediction already of corrected effects that it changes."""
     sizes = [term.group.candidate.stated_size if term.group.candidate else 0.0 for term in fit.terms]
     if not any(sizes):
         return fit.delta_chi2
-    held = equations.nuisance
-    for place, name in enumerate(held.names):
-        held = held.with_precision(place, EXACT) if name in held.stated else held
-    as_stated, total = equations.with_nuisance(held), fit.delta_chi2
+    held, total = as_stated(equations), fit.delta_chi2
     for index, (term, size) in enumerate(zip(fit.terms, sizes, strict=True)):
         if not size:
             continue
         change = fit.coefficients[fit.of_term(index)]
         now = change + size * equations.design.scale[list(term.group.columns)]
-        _, energy = as_stated.own_and_complement(fit.without(index), term)
+        _, energy = held.own_and_complement(fit.without(index), term)
         total += max(float(now @ energy @ now - change @ energy @ change), 0.0)
     return total

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -25,12 +26,17 @@ from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.candidate_groups import implausibility
 from regolithd.calibration.mismatch.regression.equations import equations_of
 from regolithd.calibration.mismatch.regression.group import Term
-from regolithd.calibration.mismatch.selection.law_misfit import explained
+from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.selection.cross_validation import transfer_margin
+from regolithd.calibration.mismatch.selection.law_misfit import explained, without_term
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
+
+    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
     Array = NDArray[np.float64]
 
@@ -194,17 +200,17 @@ def test_a_corrected_effect_whose_covariate_was_never_measured_is_one_message() 
         (-0.05, -0.1, 0.0, "gone"),
         (0.05, 0.1, 0.0, "gone"),
         (0.05, 0.02, 0.08, "smaller"),
-        (0.3, -0.1, 0.7, "smaller"),
+        (0.3, -0.1, 0.7, "gone"),
         (0.8, 0.7, 0.9, "smaller"),
         (-0.8, -0.9, -0.7, "smaller"),
         (1.2, 1.1, 1.3, "larger"),
         (-1.2, -1.3, -1.1, "larger"),
     ],
 )
-def test_an_effect_is_gone_where_it_is_small_and_may_be_zero(
+def test_an_effect_is_gone_where_it_is_smaller_and_may_be_zero(
     now: float, low: float, high: float, direction: str
 ) -> None:
-    """Below a tenth of what was corrected with 0 in its interval; else its size decides, whatever its sign."""
+    """With 0 in its interval; else its size decides, whatever its sign."""
     assert direction_of(Change("drag", "drag", 1.0, now, low, high)) == direction
     assert direction_of(Change("drag", "drag", -2.0, -2 * now, -2 * low, -2 * high)) == direction
 
@@ -265,6 +271,11 @@ def test_beside_a_corrected_effect_what_is_new_is_charged() -> None:
     assert implausibility(build_problem(recording, Axis()), other, {}) == 0
 
 
+def residual_power(equations: NormalEquations, fit: Fit) -> float:
+    """Return the sum of squares that a fit leaves."""
+    return float(np.sum(residual_of(equations, fit) ** 2))
+
+
 def test_a_law_s_misfit_is_of_the_whole_effect() -> None:
     """A corrected effect that is half as large again explains (1 + 1/2)² of its energy, not a quarter of it."""
     recording = moving(1, 0.75)
@@ -280,6 +291,19 @@ def test_a_law_s_misfit_is_of_the_whole_effect() -> None:
     gained = held.fit([Term(group, (0,))]).delta_chi2
     beyond = explained(equations, fit) - fit.delta_chi2
     assert beyond == pytest.approx(gained * ((1 + size) ** 2 - size**2) / size**2, rel=0.1)
+
+
+def test_a_change_gains_beyond_the_corrected_effect_as_it_was() -> None:
+    """A size that is known badly could take the change up itself, on other readings too: nothing would be gained."""
+    stated = stated_in(library(), [replace(COULOMB, relative_std=5.0)], [])
+    problem = corrected_problem(build_problem(moving(1, 1.5), Axis()), stated)
+    equations, _ = equations_of(problem, with_changes(problem, (), stated))
+    (group,) = [each for each in equations.design.groups if each.named]
+    terms = [Term(group, (0,))]
+    fit = equations.fit(terms)
+    assert residual_power(equations, equations.fit(())) < 1.01 * residual_power(equations, fit)
+    assert residual_power(equations, without_term(equations, terms[0], ())) > 2 * residual_power(equations, fit)
+    assert transfer_margin(equations, terms, 0, 8.0) > 0
 
 
 @pytest.mark.parametrize("one_way", [True, False])
