@@ -316,7 +316,7 @@ def onset_range(problem: Problem) -> tuple[float, float]:
 
 
 GROWTH_KEYS = {
-    "onset_s": "when it begins",
+    "onset_s": "when it begins in the course that fits best; `parameters.onset_s` is the median of all courses",
     "rise_s": "time constant of the exponential rise (0: a step)",
     "full_at_s": "when the power of time is 1",
     "power": "of the time since the onset",

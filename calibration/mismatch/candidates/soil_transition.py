@@ -39,7 +39,8 @@ class SoilTransition(Candidate):
     coefficients: ClassVar = (Coefficient("relative_strength_change", "1", 0),)
     sharing: ClassVar = ("all",)
     shape_keys: ClassVar = {
-        "onset_s": "when the machine's centre comes to the other soil",
+        "onset_s": "when the machine's centre comes to the other soil in the course that fits best; "
+        "`parameters.onset_s` is the median of all courses",
         "along": "`time` (under all wheels at once) or `place` (under each when it comes there)",
         "within_m": "length over which one soil turns into the other",
         "of": "what changes: `strength` (both), `cohesion` or `friction`",

@@ -39,7 +39,7 @@ BISECTIONS = 6
 
 
 def onset_interval(equations: NormalEquations, fit: Fit, index: int) -> tuple[float, float, float]:
-    """Return a term's onset [s] and the bounds that hold it nine times in ten.
+    """Return a term's onset [s] and the bounds that hold it nine times in ten, within those of the candidate.
 
     Of an effect that wanders the bounds are quantiles of the same likelihood as the estimate: where none of the
     developments is the true one, the best of them is no measure of what chance allows.
@@ -58,14 +58,15 @@ def onset_interval(equations: NormalEquations, fit: Fit, index: int) -> tuple[fl
     def within(onset_s: float) -> bool:
         return max(gains(onset_s)) > least
 
-    grid = np.linspace(*candidate.bounds(problem, shape)[onset], GRID)
+    first, last = candidate.bounds(problem, shape)[onset]
+    grid = np.linspace(first, last, GRID)
     density = _density(np.array([gains(float(onset_s)) for onset_s in grid]))
     low, value, high = quantiles(grid, density, (NINE_TENTHS[0], 0.5, NINE_TENTHS[1]))
     if candidate.wanders:
         return value, low, high
     least = max(profile(shape), *gains(at)) - equations.thresholds.onset_fall
-    low = max(at - _distance(lambda far: within(at - far), length_s), 0.0)
-    high = min(at + _distance(lambda far: within(at + far), length_s), length_s)
+    low = max(at - _distance(lambda far: within(at - far), length_s), first)
+    high = min(at + _distance(lambda far: within(at + far), length_s), last)
     inside = low + MARGIN * (high - low), high - MARGIN * (high - low)
     return float(np.clip(value, *inside)), low, high
 

@@ -45,8 +45,8 @@ def test_drag_from_the_start_on_one_wheel_is_its_friction(seed: int) -> None:
 
 @pytest.mark.parametrize("onset_s", [100.0, 500.0])
 def test_drag_that_begins_later_is_bearing_drag_with_its_onset(onset_s: float) -> None:
-    """Its interval holds the true onset, and does not reach the start."""
+    """Its interval holds the true onset, and stays where an onset is looked for."""
     effect = found_with(3, onset_s)
     assert effect.name == "bearing-drag"
     onset = effect.parameters["onset_s"]
-    assert 0 < onset.low < onset_s < onset.high
+    assert 0.05 * ROWS * STEP_S - STEP_S <= onset.low < onset_s < onset.high
