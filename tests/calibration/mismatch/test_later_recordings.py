@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -16,9 +17,14 @@ from regolithd.calibration.mismatch.changes import corrected_problem, stated_in,
 from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.data.joined import joined
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.online.linearised import learned
+from regolithd.calibration.mismatch.online.pieces import Cutter, together
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.onset_clock import FoundIn, found_here
 from regolithd.calibration.mismatch.simulation.load import load_simulation
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.problem.problem import Problem
 
 ROWS, STEP_S, ONSET_S, DRAG_A, ON = 2400, 0.5, 500.0, 0.3, np.array([0.0, 1.0])
 STEP = {"onset_s": ONSET_S, "rise_s": 0.0}
@@ -93,9 +99,12 @@ def test_what_is_new_is_named_beside_what_stays(new: Path) -> None:
 def _added(recording: Recording, found_in: FoundIn | None, shape: dict[str, float]) -> np.ndarray:
     """Return what a corrected drag adds on drum 2, without the sign of the motion; NaN where nothing is compared."""
     drag = Contribution("bearing-drag", shape, (1.0,), (2,), found_in=found_in)
-    problem = build_problem(recording, Winch())
-    added = np.abs(corrected_problem(problem, stated_in(library(), [drag], [])).added)
-    return np.where(problem.mask & (problem.covariates["direction"] != 0), added, np.nan)[:, 1]
+    return _moving(corrected_problem(build_problem(recording, Winch()), stated_in(library(), [drag], [])))
+
+
+def _moving(problem: Problem) -> np.ndarray:
+    """Return what is added on drum 2 while it moves."""
+    return np.where(problem.mask & (problem.covariates["direction"] != 0), np.abs(problem.added), np.nan)[:, 1]
 
 
 def _agree(one: np.ndarray, other: np.ndarray | float) -> bool:
@@ -147,3 +156,15 @@ def test_a_drag_that_had_begun_is_the_friction_of_a_later_recording() -> None:
     assert "coulomb-friction" not in names
     assert "bearing-drag" in names
     assert (change.covariate, change.imitated_over) == ("direction", "wheel_speed")
+
+
+@pytest.mark.parametrize(("found_in", "at_first"), [(None, 0.0), (FoundIn("of another", 9, 600.0), 1.0)])
+def test_a_monitor_counts_an_onset_from_the_start_of_the_drive(found_in: FoundIn | None, at_first: float) -> None:
+    """Not from the start of each piece; one of another recording has passed."""
+    simulation, drive = Winch(), _recording(4, DRAG_A)
+    simulation.corrected_effects = (Contribution("bearing-drag", STEP, (1.0,), (2,), found_in=found_in),)
+    columns = {"t_s": np.repeat(drive.time_s, 2), "drum": np.tile([1.0, 2.0], ROWS)}
+    pieces = list(Cutter(100.0, "drum").add({**columns, **{k: v.ravel() for k, v in drive.channels.items()}}))
+    linearised, _ = learned(pieces[:3], simulation)
+    for piece, added in ((pieces[2], at_first), (pieces[7], 1.0)):
+        assert _agree(_moving(linearised.pose(*together([piece]))), added)
