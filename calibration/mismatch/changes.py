@@ -152,8 +152,7 @@ class ChangedSize(Candidate):
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the shape that was corrected; of a law that is not linear in its size, over several changes of it."""
-        # A change of size has no onset of its own.
-        shape = {name: value for name, value in self.stated.contribution.shape.items() if name != self.change_point}
+        shape = dict(self.stated.contribution.shape)
         if self.stated.in_simulation or not self.stated.bent(problem):
             return [shape]
         return [{**shape, SECANT_CHANGE: change} for change in SECANT_CHANGES]

@@ -53,6 +53,8 @@ def _is_changed_parameter(equations: NormalEquations, named: Fit, index: int, te
     candidate = term.group.candidate
     if candidate is None or tuple(candidate.sharing) != ("one",) or candidate.change_point not in term.group.shape:
         return False
+    if term.group.is_change:  # its onset is the corrected effect's: it has none of its own
+        return False
     others, shape = named.without(index), term.group.shape
     gain = named.delta_chi2 - equations.fit(others).delta_chi2
     beside = shape_profile(equations, others, candidate, equations.all_wheels)

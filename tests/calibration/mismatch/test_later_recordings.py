@@ -17,6 +17,7 @@ from regolithd.calibration.mismatch.changes import corrected_problem, stated_in,
 from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.data.joined import joined
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.fleet.comparison import compare as compare_fleet
 from regolithd.calibration.mismatch.online.linearised import learned
 from regolithd.calibration.mismatch.online.pieces import Cutter, together
 from regolithd.calibration.mismatch.problem.build import build_problem
@@ -168,3 +169,9 @@ def test_a_monitor_counts_an_onset_from_the_start_of_the_drive(found_in: FoundIn
     linearised, _ = learned(pieces[:3], simulation)
     for piece, added in ((pieces[2], at_first), (pieces[7], 1.0)):
         assert _agree(_moving(linearised.pose(*together([piece]))), added)
+
+
+def test_a_fleet_knows_each_of_its_recordings(new: Path) -> None:
+    """The one in which the drag began has it from its onset on, a later one from the beginning."""
+    agreeing = compare_fleet([FIRST, _recording(5, DRAG_A)], load_simulation(new)).answer
+    assert (agreeing.verdict, agreeing.effects) == ("consistent", ())
