@@ -24,7 +24,9 @@ MOST_FITTED = 16
 """Windows (of 256 instants each) in which the models are fitted and compared: longer recordings cost no more."""
 LEAST_VARIANCE = 1e-4
 """The truth's variance in error variances, below which it is a constant: there is nothing to be told of its density."""
-
+LEAST_ERROR = 0.05
+"""Error in standard deviations of the truth below which it biases a coefficient by less than a quarter of a percent: a
+density is not worth what it would add where the error is not quite as stated, such as one with a memory."""
 LEAST_POSTERIOR = 1e-6
 """A posterior's variance in error variances is at least this, that of a million readings: less is rounding."""
 
@@ -52,7 +54,8 @@ def refined_by_density(readings: Array, deviation: float, starts: NDArray[np.int
     `readings` (time,), NaN where there are none, have normal errors of this deviation; runs begin at `starts`.
     """
     variance, known = deviation**2, np.isfinite(readings)
-    if normal.prior_variance <= LEAST_VARIANCE * variance or known.sum() < BATCH * FEWEST_BATCHES or not variance:
+    told_apart = LEAST_VARIANCE * variance < normal.prior_variance < variance / LEAST_ERROR**2
+    if not told_apart or known.sum() < BATCH * FEWEST_BATCHES:
         return normal.mean
     # About its mean, a column far from 0 has all its digits in its squares.
     centred = replace(normal, mean=normal.mean - normal.prior_mean, prior_mean=0.0)

@@ -30,6 +30,10 @@ DEVIATIONS = 2.5
 GREATEST_SURPLUS = 0.25
 """Share of the error variance by which what a model leaves may differ from what it should leave: an error stated a
 quarter too large is tolerated where the model smooths well (a choice: models that are not quite right have 0.2)."""
+LEAST_GAIN = 0.25
+"""Share of the mean square error that has to be gained (a choice: jumps and levels gain half of it and more, smooth
+motions a tenth; there other inputs follow the same motion, and would take up what an estimate that is not linear in the
+readings leaves of it)."""
 FEWEST_BATCHES = 4
 """Batches below which nothing is judged."""
 
@@ -94,14 +98,16 @@ def best_combination(readings: Array, estimates: Sequence[Estimate]) -> Combinat
 
 
 def clearly_better(readings: Array, error_variance: float, new: Estimate, old: Estimate, fitted: float) -> bool:
-    """Return whether an estimate's error is below another's by more than chance.
+    """Return whether an estimate's error is below another's by more than chance, and by a share of it.
 
     `fitted` is how many numbers of its model were fitted to the same readings: each makes its error look smaller by
     about two error variances over the number of readings.
     """
-    gain = squared_error(readings, error_variance, old) - squared_error(readings, error_variance, new)
+    before = squared_error(readings, error_variance, old)
+    gain = before - squared_error(readings, error_variance, new)
     batches = gain[: len(gain) // BATCH * BATCH].reshape(-1, BATCH).mean(axis=1)
     if len(batches) < FEWEST_BATCHES:
         return False
     chance = float(batches.std(ddof=1)) / np.sqrt(len(batches))
-    return bool(gain.mean() > DEVIATIONS * chance + 2 * fitted * error_variance / len(gain))
+    by_chance = DEVIATIONS * chance + 2 * fitted * error_variance / len(gain)
+    return bool(gain.mean() > max(by_chance, LEAST_GAIN * float(before.mean())))
