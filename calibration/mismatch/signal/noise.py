@@ -63,7 +63,8 @@ def _autocorrelation_times(scaled: Array, mask: Mask, thresholds: Thresholds) ->
     """Return each wheel's autocorrelation time, shape (wheel,).
 
     The times of the wheels differ from the one that is pooled over them by as much as they scatter beyond chance (James
-    and Stein, 1961). The relative variance of a sum over M lags is 2 (2 M + 1) / n (Madras and Sokal, 1988).
+    and Stein, 1961), and upwards alone: no wheel is believed more than all of them are. The relative variance of a sum
+    over M lags is 2 (2 M + 1) / n (Madras and Sokal, 1988).
     """
     lags = int(thresholds.longest_lag_share * len(scaled))
     squares, pairs = _sums_over_lags(scaled, lags), _pairs(mask, lags)
@@ -78,7 +79,7 @@ def _autocorrelation_times(scaled: Array, mask: Mask, thresholds: Thresholds) ->
         error[wheel] = 2 * (2 * last + 1) / float(pairs[0, wheel])
     scatter = float(np.var(np.log(times[read]), ddof=1)) if len(read) > 1 else 0.0
     beyond_chance = max(1 - float(np.mean(error[read])) / scatter, 0.0) if scatter > 0 else 0.0
-    return pooled * (times / pooled) ** beyond_chance
+    return pooled * np.maximum(times / pooled, 1.0) ** beyond_chance
 
 
 def significant_autocorrelation(scaled: Array, mask: NDArray[np.bool_], thresholds: Thresholds = THRESHOLDS) -> Array:
