@@ -78,6 +78,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "Decision",
         "Inputs",
         "Intermittent",
+        "Course",
         "ShapeProfile",
         "StatedEffect",
         "_Draws",

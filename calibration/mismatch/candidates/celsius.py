@@ -18,6 +18,11 @@ LOWEST_IN_KELVIN = 150.0
 """Reading that no motor or gearbox stays above in °C, and none below in K (a choice: −123 °C)."""
 
 
+def known_temperature_degC(problem: Problem) -> NDArray[np.float64]:
+    """Return the temperature [°C], 0 where it is not known, shape (time, wheel)."""
+    return problem.once("known temperature", lambda: np.nan_to_num(temperature_degC(problem)))
+
+
 def temperature_degC(problem: Problem) -> NDArray[np.float64]:
     """Return the temperature [°C], shape (time, wheel).
 

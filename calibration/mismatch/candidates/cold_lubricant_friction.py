@@ -13,7 +13,7 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     Coefficient,
     Shape,
 )
-from regolithd.calibration.mismatch.candidates.celsius import temperature_degC
+from regolithd.calibration.mismatch.candidates.celsius import known_temperature_degC, temperature_degC
 from regolithd.calibration.mismatch.candidates.motion import TRANSITION_KEY, along_motion, transition_of
 
 if TYPE_CHECKING:
@@ -40,6 +40,8 @@ LOWEST_END_QUANTILE, FURTHEST_END_K = 0.2, 40.0
 """Range of the end of a linear drag: from this quantile to so far above the warmest reading [K] (a choice)."""
 BEYOND_K = 20.0
 """A linear drag may end this far above the warmest reading too [K] (a choice)."""
+OF_TEMPERATURE = ("reference_degC", "pole_degC", "scale_K", "no_drag_above_degC")
+"""The shape parameters of how the drag depends on temperature."""
 
 
 class ColdLubricantFriction(Candidate):
@@ -90,7 +92,11 @@ class ColdLubricantFriction(Candidate):
 
     def prior_penalty(self, problem: Problem, shape: Shape) -> float:
         """Charge a drag that does not change on any wheel: there Coulomb or viscous friction is the simpler model."""
-        return 0.0 if problem.changes_within(self._growth(problem, shape)) else UNLIKELY_SHAPE_PENALTY
+        law = [shape[name] for name in OF_TEMPERATURE if name in shape]
+        changes = problem.once(
+            f"the lubricant's drag changes {law}", lambda: np.array(problem.changes_within(self._growth(problem, shape)))
+        )
+        return 0.0 if changes else UNLIKELY_SHAPE_PENALTY
 
     def without_covariate(self, shape: Shape) -> Shape:
         """Return the same drag at any temperature, which would gain by its power of the speed alone."""
@@ -106,12 +112,12 @@ class ColdLubricantFriction(Candidate):
 
     def _growth(self, problem: Problem, shape: Shape) -> Array:
         """Return g(T), shape (time, wheel)."""
-        temperature = np.nan_to_num(temperature_degC(problem))
+        temperature = known_temperature_degC(problem)
         coldest = float(shape["reference_degC"])
         if "scale_K" in shape:
             # Vogel: ln η = A + B/(T − T_0); near the reference the viscosity falls by a factor e over the scale.
             pole = float(shape["pole_degC"])
-            above, coldest_above = (np.maximum(each - pole, ABOVE_POLE_K) for each in (temperature, coldest))
+            above, coldest_above = np.maximum(temperature - pole, ABOVE_POLE_K), max(coldest - pole, ABOVE_POLE_K)
             return np.asarray(np.exp(coldest_above / float(shape["scale_K"]) * (coldest_above / above - 1)))
         end = float(shape["no_drag_above_degC"])
         return np.maximum(end - temperature, 0.0) / max(end - coldest, STEEPEST_K)

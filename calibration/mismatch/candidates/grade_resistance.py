@@ -53,7 +53,7 @@ class GradeResistance(Candidate):
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return sin(pitch), times each wheel's share of the load relative to the reference."""
-        along = np.sin(np.nan_to_num(problem.covariates["pitch"]))
+        along = np.sin(problem.known("pitch"))
         if shape["shared"] == "by load":
-            along = along * np.nan_to_num(problem.covariates["load"]) / float(shape["reference_load"])
+            along = along * problem.known("load") / float(shape["reference_load"])
         return along[None]

@@ -99,40 +99,36 @@ class LoadCellDrift(Candidate):
 
     def own_channel_evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array] | None:  # noqa: ARG002
         """Return Δχ² of the drift in each cell's own reading, and its coefficient there, which is 1."""
-        key = ("drift seen by the cell", 0.0)
-        if key not in problem.made:
-            reading, drift = self._unexplained_load(problem), self._drift(problem)
-            noise = estimate_noise(np.nan_to_num(reading - drift), np.isfinite(reading))
-            seen = np.nansum(np.where(np.isfinite(reading), drift**2, 0.0), axis=0) * noise.weights
-            # Each knot gains 1 by chance; what half of the cells show is the ground, not a fault.
-            usual = float(np.median(seen)) if len(seen) > 2 else 0.0
-            problem.made[key] = np.maximum(seen - max(usual, WANDER_KNOTS), 0.0)
-        return problem.made[key], np.ones(problem.mask.shape[1])
+        gain = problem.once("drift seen by the cell", lambda: self._own_channel_gain(problem))
+        return gain, np.ones(problem.mask.shape[1])
+
+    def _own_channel_gain(self, problem: Problem) -> Array:
+        reading, drift = self._unexplained_load(problem), self._drift(problem)
+        noise = estimate_noise(np.nan_to_num(reading - drift), np.isfinite(reading))
+        seen = np.nansum(np.where(np.isfinite(reading), drift**2, 0.0), axis=0) * noise.weights
+        # Each knot gains 1 by chance; what half of the cells show is the ground, not a fault.
+        usual = float(np.median(seen)) if len(seen) > 2 else 0.0
+        return np.maximum(seen - max(usual, WANDER_KNOTS), 0.0)
 
     def _simulated(self, problem: Problem, offset: float) -> Array:
-        key = ("drift with offset", offset)
-        if key not in problem.made:
-            load = problem.covariates["load"]
+        load = problem.covariates["load"]
+
+        def change() -> Array:
             wrong = known_mean(load) * (self._drift(problem) + offset)
-            problem.made[key] = (
-                problem.with_input("load_N", np.maximum(load - wrong, LEAST_SHARE * load)) - problem.filled
-            )
-        return problem.made[key]
+            return problem.with_input("load_N", np.maximum(load - wrong, LEAST_SHARE * load)) - problem.filled
+
+        return problem.run_once("drift with offset", offset, change)
 
     def _drift(self, problem: Problem) -> Array:
-        key = ("drift", 0.0)
-        if key not in problem.made:
-            reading = self._unexplained_load(problem)
-            problem.made[key] = np.stack([_wander(problem, reading[:, k]) for k in range(reading.shape[1])], axis=1)
-        return problem.made[key]
+        return problem.once(
+            "drift", lambda: np.stack([_wander(problem, reading) for reading in self._unexplained_load(problem).T], axis=1)
+        )
 
     def _unexplained_load(self, problem: Problem) -> Array:
         """Return the cells' readings less what pitch and roll explain, over the mean reading; NaN where unknown."""
-        key = ("unexplained load", 0.0)
-        if key not in problem.made:
-            load = problem.covariates["load"]
-            problem.made[key] = _without_posture(problem, load / np.where(known_mean(load) > 0, known_mean(load), 1.0))
-        return problem.made[key]
+        load = problem.covariates["load"]
+        usual = np.where(known_mean(load) > 0, known_mean(load), 1.0)
+        return problem.once("unexplained load", lambda: _without_posture(problem, load / usual))
 
 
 class DriftOfPredictedLoad(LoadCellDrift):

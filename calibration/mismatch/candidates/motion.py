@@ -40,19 +40,16 @@ LEAST_GAIN = 10.8
 
 def transition_of(problem: Problem) -> Shape:
     """Return the transition that explains this recording's friction better than a step does, empty where none does."""
-    key = ("transition of the direction", 0.0)
-    if key not in problem.made:
-        problem.made[key] = np.array(_best_transition(problem))
-    speed = float(problem.made[key])
+    speed = float(problem.once("transition of the direction", lambda: np.array(_best_transition(problem))))
     return {TRANSITION: speed} if speed else {}
 
 
 def along_motion(problem: Problem, shape: Shape) -> Array:
     """Return sign(ω), or tanh(ω/ω_t) where the shape has a transition, 0 at standstill, shape (time, wheel)."""
-    direction = np.nan_to_num(problem.covariates["direction"])
+    direction = problem.known("direction")
     if TRANSITION not in shape:
         return np.asarray(direction)
-    speed = np.nan_to_num(np.abs(problem.covariates["wheel_speed"]))
+    speed = np.abs(problem.known("wheel_speed"))
     return np.asarray(direction * np.tanh(speed / float(shape[TRANSITION])))
 
 
@@ -94,7 +91,7 @@ def _squares_left(problem: Problem, width: float) -> float:
 
 def _left_beside_friction(problem: Problem, shape: Shape) -> Array:
     """Return what the free parameters and friction of any usual law leave of the residual, shape (time, wheel)."""
-    direction, speed = along_motion(problem, shape), np.nan_to_num(np.abs(problem.covariates["wheel_speed"]))
+    direction, speed = along_motion(problem, shape), np.abs(problem.known("wheel_speed"))
     laws = [direction, direction * np.sqrt(speed), direction * speed, direction * np.abs(problem.filled)]
     free = [problem.tangent(name) for name, prior in problem.simulation.parameters.items() if prior.std > 0]
     here = problem.mask

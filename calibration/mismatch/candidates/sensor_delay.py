@@ -107,11 +107,12 @@ class SensorDelay(Candidate):
                 behind = delayed(problem.recording, _without_blanks(problem, delay), delay)
                 return (float(shape.get(PASSED, 1.0)) * (behind - problem.prediction) / delay)[None]
         late, delay = str(shape["late"]), float(shape["input_secant_s"])
-        key = (f"{late} late", delay)
-        if key not in problem.made:
+
+        def change() -> Array:
             moved = problem.with_input(late, shifted(problem.recording, problem.recording.channels[late], delay))
-            problem.made[key] = (moved - problem.filled) / delay
-        return problem.made[key][None]
+            return (moved - problem.filled) / delay
+
+        return problem.run_once(f"{late} late", delay, change)[None]
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Return delays from a fraction of a reading to the longest."""

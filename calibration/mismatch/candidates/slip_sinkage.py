@@ -49,5 +49,5 @@ class SlipSinkage(Candidate):
         """Return the change of the prediction for more sinkage per unit of strength, or prediction × slip."""
         if "step" in shape:
             return problem.secant("slip_sinkage", float(shape["step"]))[None]
-        slip = np.maximum(np.nan_to_num(problem.covariates["slip"]), 0.0)
+        slip = np.maximum(problem.known("slip"), 0.0)
         return (problem.filled * slip ** float(shape["power"]))[None]

@@ -14,7 +14,7 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     Coefficient,
     Shape,
 )
-from regolithd.calibration.mismatch.candidates.celsius import temperature_degC
+from regolithd.calibration.mismatch.candidates.celsius import known_temperature_degC, temperature_degC
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -78,4 +78,4 @@ class TorqueConstantTemperature(Candidate):
         return (warmer / left * problem.filled)[None]
 
     def _warmer(self, problem: Problem, shape: Shape) -> Array:
-        return np.nan_to_num(temperature_degC(problem)) - float(shape["reference_degC"])
+        return known_temperature_degC(problem) - float(shape["reference_degC"])

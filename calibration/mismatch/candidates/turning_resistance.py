@@ -95,7 +95,7 @@ class TurningResistance(Candidate):
         if shape["by"] == "rate":
             return np.asarray(np.broadcast_to(turned, problem.mask.shape))
         # The slip angle is yaw rate × lever over the speed.
-        speed = np.abs(np.nan_to_num(problem.covariates["wheel_speed"]))
+        speed = np.abs(problem.known("wheel_speed"))
         return np.asarray(turned / (speed + float(shape["creep_speed"])))
 
     def _lever(self, problem: Problem, ends: float) -> Array | float:
@@ -108,6 +108,6 @@ class TurningResistance(Candidate):
 
 def _turning(problem: Problem) -> Array:
     """Return the yaw rate, 0 where it is no more than the sensor's noise, shape (time, wheel)."""
-    yaw = np.nan_to_num(problem.covariates["yaw_rate"])
+    yaw = problem.known("yaw_rate")
     noise = problem.simulation.sensors.get("yaw_rate_rad_s")
     return np.where(np.abs(yaw) > NO_TURN_STD * noise.absolute, yaw, 0.0) if noise else yaw

@@ -214,10 +214,10 @@ def _resolved(problem: Problem) -> float:
 
 def _cycles_per_reading(problem: Problem) -> Array:
     """Return the turns between two readings, the cycles of order 1, shape (time, wheel)."""
-    return np.abs(np.nan_to_num(problem.covariates["wheel_speed"])) * problem.recording.step_s / (2 * np.pi)
+    return np.abs(problem.known("wheel_speed")) * problem.recording.step_s / (2 * np.pi)
 
 
 def _angle(problem: Problem, lag: float) -> Array:
     """Return the turned angle [rad] `lag` readings before each instant, shape (time, wheel)."""
-    speed = np.nan_to_num(problem.covariates["wheel_speed"])
+    speed = problem.known("wheel_speed")
     return problem.covariates["wheel_angle"] - lag * problem.recording.step_s * speed

@@ -297,7 +297,13 @@ def _as_numbers(column: Any) -> Column | None:  # noqa: ANN401
     if pa.types.is_integer(column.type):
         # Not checked for exactness: an integer above 2^53 is rounded.
         column = column.cast(pa.float64(), safe=False)
-    return np.asarray(column.cast(pa.float64()).to_numpy(zero_copy_only=False), np.float64)
+    # Not pyarrow's `to_numpy` or `fill_null`, which load pandas: that takes longer than reading the file.
+    whole = column.cast(pa.float64()).combine_chunks()
+    if not len(whole):
+        return np.zeros(0)
+    blank = np.from_dlpack(whole.is_null().cast(pa.uint8())).astype(bool)
+    values = np.frombuffer(whole.buffers()[1], np.float64)[whole.offset : whole.offset + len(whole)]
+    return np.where(blank, np.nan, values)
 
 
 def _as_names(column: Any) -> Column | None:  # noqa: ANN401

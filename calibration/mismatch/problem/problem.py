@@ -14,7 +14,7 @@ from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noi
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.predictor import Predictor
@@ -72,7 +72,7 @@ class Problem:
     labels: what the covariates are called on this machine, with their units
     side, row: each wheel's place on the machine, or None
     thresholds: the numbers that decide
-    made: what candidates have computed, for use again: a cache, by name and step
+    made: what runs of the simulation gave, by name and step: a cache, which copies of the problem share
     late: how the predicted channel is late, by `sensor_delay.OF_CHANNEL`, and by how much [s]: what acts on the machine
         shows so much later; None: it is not, or it is not known yet
     """
@@ -93,6 +93,8 @@ class Problem:
     thresholds: Thresholds = THRESHOLDS
     made: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)
     late: tuple[str, float] | None = None
+    _derived: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
+    """What was computed from covariates and readings, by name: a cache, which a copy begins anew."""
 
     @property
     def time_s(self) -> Array:
@@ -128,7 +130,7 @@ class Problem:
     def noise_of(self, residual: Array) -> NoiseModel:
         """Return the noise that a residual (time, wheel) shows."""
         direction = self.covariates.get("direction")
-        moving = None if direction is None else np.nan_to_num(direction) != 0
+        moving = None if direction is None else self.known("direction") != 0
         return estimate_noise(residual, self.mask, self.thresholds, moving)
 
     @property
@@ -144,6 +146,22 @@ class Problem:
         """Return whether all these covariates were measured and vary."""
         return all(name in self.covariates for name in names)
 
+    def known(self, covariate: str) -> Array:
+        """Return a covariate, 0 where it is not known, shape (time, wheel)."""
+        return self.once(f"known {covariate}", lambda: np.nan_to_num(self.covariates[covariate]))
+
+    def once(self, name: str, derive: Callable[[], Array]) -> Array:
+        """Return what is derived from covariates and readings, the first time that this name is asked for."""
+        if name not in self._derived:
+            self._derived[name] = derive()
+        return self._derived[name]
+
+    def run_once(self, name: str, step: float, run: Callable[[], Array]) -> Array:
+        """Return what a run of the simulation gives, the first time that this name and step are asked for."""
+        if (name, step) not in self.made:
+            self.made[name, step] = run()
+        return self.made[name, step]
+
     def changes_within(self, values: Array) -> bool:
         """Return whether a factor (time, wheel) varies on a wheel as it moves, not only from wheel to wheel."""
         least = self.thresholds.least_change_within**2 * float(np.mean(values[self.mask] ** 2))
@@ -152,8 +170,9 @@ class Problem:
     def variance_within(self, values: Array) -> float:
         """Return a quantity's (time, wheel) variance on each wheel, averaged over the wheels where it is known."""
         known = self.mask & np.isfinite(values)
-        kept = np.where(known, values, np.nan)[:, known.any(axis=0)]
-        return float(np.mean(np.nanvar(kept, axis=0)))
+        counts = np.maximum(known.sum(axis=0), 1)
+        away = np.where(known, values - np.where(known, values, 0.0).sum(axis=0) / counts, 0.0)
+        return float(np.mean(((away**2).sum(axis=0) / counts)[known.any(axis=0)]))
 
     def changed(self, **changes: float) -> Array:
         """Return the prediction with parameters (or variants) set otherwise, 0 where `filled` has no prediction."""
@@ -163,10 +182,8 @@ class Problem:
 
     def secant(self, name: str, step: float) -> Array:
         """Return the prediction's change per unit of a parameter, over a step from its value."""
-        key = (name, step)
-        if key not in self.made:
-            self.made[key] = (self.changed(**{name: self._all_values[name] + step}) - self.filled) / step
-        return self.made[key]
+        value = self._all_values[name]
+        return self.run_once(name, step, lambda: (self.changed(**{name: value + step}) - self.filled) / step)
 
     def tangent(self, name: str) -> Array:
         """Return ∂prediction/∂parameter, shape (time, wheel)."""
@@ -175,11 +192,8 @@ class Problem:
     def input_tangent(self, column: str) -> Array:
         """Return ∂prediction/∂ln(input), shape (time, wheel)."""
         step = self.thresholds.tangent_step
-        key = ("input " + column, step)
-        if key not in self.made:
-            moved = self.with_input(column, self.recording.channels[column] * (1 + step))
-            self.made[key] = (moved - self.filled) / step
-        return self.made[key]
+        moved = self.recording.channels[column] * (1 + step)
+        return self.run_once("input " + column, step, lambda: (self.with_input(column, moved) - self.filled) / step)
 
     def with_input(self, column: str, values: Array) -> Array:
         """Return the prediction for another reading of one input, 0 where there is none."""

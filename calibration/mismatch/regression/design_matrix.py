@@ -35,6 +35,36 @@ LONGEST_BRIDGE = 4
 
 
 @dataclass(frozen=True, eq=False)
+class Course:
+    """The compared readings of some wheels in one course: one wheel after the other, each in the order of time.
+
+    Attributes
+    ----------
+    wheel: of each reading, shape (reading,)
+    place: of each reading in the order of folds
+    in_time, in_folds: of each reading in an array (time, wheel), and in one (wheel, time in the order of folds)
+    runs: which readings followed each other
+    whitening: of the noise
+    """
+
+    wheel: Index
+    place: Index
+    in_time: Index
+    in_folds: Index
+    runs: tuple[slice, ...]
+    whitening: Whitening
+
+    def whitened(self, columns: Array) -> Single:
+        """Return columns (column, time, wheel), whitened, shape (column, reading)."""
+        values = np.take(columns.reshape(len(columns), -1), self.in_time, axis=1).astype(np.float32)
+        return values if self.whitening is NOT_WHITENED else self.whitening.apply(values, self.runs)
+
+    def arranged(self, values: Single) -> Single:
+        """Return what is in the order of folds (…, wheel, time) as (…, reading)."""
+        return np.take(values.reshape(*values.shape[:-2], -1), self.in_folds, axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
 class DesignMatrix:
     """Columns, scaled to a root mean square of 1 over the mask, as read and whitened; and their sums of products.
 
@@ -121,17 +151,17 @@ class DesignMatrix:
             found[..., row, places] = self.whitening.apply(values[..., row, places], runs)
         return found
 
-    def whitened_readings(self, columns: Array, wheels: Sequence[int]) -> Single:
-        """Return columns (column, time, wheel), whitened, of some wheels, as (column, wheel, time in order of folds).
-
-        They are 0 where nothing is compared, whatever the columns are there.
-        """
-        found = np.zeros((len(columns), len(wheels), len(self.order)), np.float32)
-        for row, wheel in enumerate(wheels):
-            places, runs = self.readings[wheel]
-            values = columns[:, self.order[places], wheel].astype(np.float32)
-            found[:, row, places] = values if self.whitening is NOT_WHITENED else self.whitening.apply(values, runs)
-        return found
+    def course_of(self, wheels: Sequence[int]) -> Course:
+        """Return the compared readings of some wheels in one course."""
+        wheel_count, instants, runs, before = len(self.readings), len(self.order), [], 0
+        for places, of_wheel in (self.readings[wheel] for wheel in wheels):
+            runs += [slice(run.start + before, run.stop + before) for run in of_wheel]
+            before += len(places)
+        places = [self.readings[wheel][0] for wheel in wheels]
+        counted = np.repeat(np.asarray(wheels, np.int64), [len(each) for each in places])
+        place = np.concatenate(places) if places else np.zeros(0, np.int64)
+        in_time = self.order[place] * wheel_count + counted
+        return Course(counted, place, in_time, counted * instants + place, tuple(runs), self.whitening)
 
     def in_folds(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return (…, time, wheel) in the order of time as (…, wheel, time in the order of folds)."""

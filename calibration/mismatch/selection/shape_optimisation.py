@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.regression.design_matrix import Course
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
@@ -35,15 +36,18 @@ class ShapeProfile:
 
     Attributes
     ----------
-    equations, candidate, wheels: what is asked
+    equations, candidate: what is asked
+    course: the readings of the wheels that are asked for
+    weights: the square root of each reading's weight, 0 in folds that the equations leave out, shape (reading,)
     inverse: of the other terms' normal equations
-    fitted: the other terms' columns, weighted, shape (column, wheels × time)
-    left: what they leave of the residual, weighted, shape (wheels × time,)
+    fitted: the other terms' columns, weighted, shape (column, reading)
+    left: what they leave of the residual, weighted, shape (reading,)
     """
 
     equations: NormalEquations
     candidate: Candidate
-    wheels: tuple[int, ...]
+    course: Course
+    weights: Single
     inverse: Array
     fitted: Single
     left: Single
@@ -86,41 +90,28 @@ class ShapeProfile:
         return (rows @ self.left).astype(np.float64), schur_complement(own, cross.T, self.inverse), own
 
     def _weighted_rows(self, shape: Shape) -> Single:
-        columns = columns_of(self.equations.problem, self.candidate, shape)
-        fresh = _fitted(self.equations, self.equations.design.whitened_readings(columns, self.wheels))
-        return (fresh * _root_weights(self.equations, self.wheels)).reshape(len(fresh), -1)
+        return self.course.whitened(columns_of(self.equations.problem, self.candidate, shape)) * self.weights
 
 
 def shape_profile(
     equations: NormalEquations, others: Sequence[Term], candidate: Candidate, wheels: tuple[int, ...]
 ) -> ShapeProfile:
     """Fit the other terms and return the candidate's profile beside them."""
-    design, fitted, on = equations.design, equations.fit(others), list(wheels)
-    residual = _fitted(equations, design.residual[on]).astype(np.float64)
-    columns = _fitted(equations, design.columns([column for column, _ in fitted.columns])[:, on])
-    columns *= membership(fitted.columns, len(equations.weights))[:, on, None].astype(np.float32)
-    weights = _root_weights(equations, wheels)
-    residual -= np.einsum("r,rwt->wt", fitted.coefficients, columns, optimize=True)
+    design, fitted, course = equations.design, equations.fit(others), equations.design.course_of(wheels)
+    columns = course.arranged(design.columns([column for column, _ in fitted.columns]))
+    columns *= membership(fitted.columns, len(equations.weights)).astype(np.float32)[:, course.wheel]
+    residual = course.arranged(design.residual) - fitted.coefficients @ columns
+    in_fit = np.isin(np.searchsorted(design.cuts, course.place, side="right") - 1, equations.folds)
+    weights = np.where(in_fit, np.sqrt(equations.weights)[course.wheel], 0.0).astype(np.float32)
     return ShapeProfile(
         equations=equations,
         candidate=candidate,
-        wheels=wheels,
+        course=course,
+        weights=weights,
         inverse=fitted.covariance,
-        fitted=(columns * weights).reshape(len(columns), -1),
-        left=(residual * weights).astype(np.float32).ravel(),
+        fitted=columns * weights,
+        left=(residual * weights).astype(np.float32),
     )
-
-
-def _fitted(equations: NormalEquations, values: Single) -> Single:
-    """Return the instants of values (…, time in the order of folds) that the equations are summed over."""
-    cuts = equations.design.cuts
-    if len(equations.folds) == equations.design.folds:
-        return values
-    return np.concatenate([values[..., cuts[fold] : cuts[fold + 1]] for fold in equations.folds], axis=-1)
-
-
-def _root_weights(equations: NormalEquations, wheels: tuple[int, ...]) -> Single:
-    return np.sqrt(equations.weights[list(wheels)])[:, None].astype(np.float32)
 
 
 def optimised_shape(equations: NormalEquations, others: Sequence[Term], term: Term) -> tuple[NormalEquations, Term]:
