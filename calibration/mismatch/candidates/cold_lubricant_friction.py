@@ -94,7 +94,8 @@ class ColdLubricantFriction(Candidate):
         """Charge a drag that does not change on any wheel: there Coulomb or viscous friction is the simpler model."""
         law = [shape[name] for name in OF_TEMPERATURE if name in shape]
         changes = problem.once(
-            f"the lubricant's drag changes {law}", lambda: np.array(problem.changes_within(self._growth(problem, shape)))
+            f"the lubricant's drag changes {law}",
+            lambda: np.array(problem.changes_within(self._growth(problem, shape))),
         )
         return 0.0 if changes else UNLIKELY_SHAPE_PENALTY
 

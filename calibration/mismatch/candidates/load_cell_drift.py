@@ -121,7 +121,8 @@ class LoadCellDrift(Candidate):
 
     def _drift(self, problem: Problem) -> Array:
         return problem.once(
-            "drift", lambda: np.stack([_wander(problem, reading) for reading in self._unexplained_load(problem).T], axis=1)
+            "drift",
+            lambda: np.stack([_wander(problem, reading) for reading in self._unexplained_load(problem).T], axis=1),
         )
 
     def _unexplained_load(self, problem: Problem) -> Array:

@@ -17,13 +17,13 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import regolithd
 from regolithd.calibration.mismatch.data.stretches import LONGEST_AT_ONCE
 from regolithd.calibration.mismatch.report.axes import Panel, axes, box, line, svg, text
-from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel
 from regolithd.calibration.validation.blind_trials.errors import ProofError
+from regolithd.calibration.validation.blind_trials.figures.limited_libraries import SIMULATIONS
 from regolithd.calibration.validation.blind_trials.recordings.files import (
     COLUMNS,
     recording_columns,
@@ -33,9 +33,6 @@ from regolithd.calibration.validation.blind_trials.recordings.files import (
 from regolithd.calibration.validation.blind_trials.recordings.generator import Plan, make_trial
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.validation.blind_trials.recordings.generator import Trial
 
 DURATIONS_S = (300.0, 600.0, 1200.0, 1800.0, 3600.0)
@@ -54,41 +51,6 @@ GOALS = {
 STYLE = """<style>text{font:12px sans-serif;fill:#5c6570}.ground{fill:#f5f6f8}.axis{stroke:#d9dde2;fill:none}
 .after{fill:none;stroke:#23679b;stroke-width:1.6}.dot{fill:#23679b}.zero{stroke:#b5482a;stroke-dasharray:3 3;fill:none}
 .paper{fill:#fff}</style><rect class="paper" width="1130" height="220"/>"""
-
-
-class LimitedLibrary(RoverWheel):
-    """The rover's simulation with the first `count` candidates of the library."""
-
-    count: ClassVar[int] = 16
-
-    def candidates(self, library: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return the first `count`."""
-        return library[: self.count]
-
-
-class TwoCandidates(LimitedLibrary):
-    """Two candidates."""
-
-    count = 2
-
-
-class FourCandidates(LimitedLibrary):
-    """Four candidates."""
-
-    count = 4
-
-
-class EightCandidates(LimitedLibrary):
-    """Eight candidates."""
-
-    count = 8
-
-
-class SixteenCandidates(LimitedLibrary):
-    """All sixteen."""
-
-
-SIMULATIONS = {2: TwoCandidates, 4: FourCandidates, 8: EightCandidates, 16: SixteenCandidates}
 
 
 @dataclass(frozen=True)
@@ -136,7 +98,7 @@ def costs(scratch: Path, most_rows: int = MOST_ROWS) -> list[Cost]:
         trial = make_trial(Plan(1, 3, "single", ("viscous-friction",)), duration_s=duration_s)
         write_trial(trial, scratch)
         for count in counts:
-            model = f"regolithd.calibration.validation.blind_trials.figures.cost_scaling:{SIMULATIONS[count].__name__}"
+            model = f"{SIMULATIONS[count].__module__}:{SIMULATIONS[count].__name__}"
             tables = {**trial.tables, "simulation": {**trial.tables["simulation"], "model": model}}
             (scratch / "SIM.toml").write_text(toml_text(tables))
             found.append(measure(scratch, "recording.csv.gz", trial.load_N.size, count))
