@@ -97,8 +97,11 @@ class Beside:
         if other is not None:
             at = [self._place[column] for column in other.group.columns]
             at = [place for place in at if self._left[place, place] > SINGULAR * self._energy[place]]
-            inverse = pseudo_inverse(self._left[np.ix_(at, at)], SINGULAR)
-            left -= float(self._left[of, at] @ inverse @ self._left[at, of])
+            if len(at) == 1:
+                left -= float(self._left[of, at[0]] ** 2 / self._left[at[0], at[0]])
+            else:
+                inverse = pseudo_inverse(self._left[np.ix_(at, at)], SINGULAR)
+                left -= float(self._left[of, at] @ inverse @ self._left[at, of])
         return left * self._size
 
 

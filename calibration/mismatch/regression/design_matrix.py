@@ -153,15 +153,14 @@ class DesignMatrix:
 
     def course_of(self, wheels: Sequence[int]) -> Course:
         """Return the compared readings of some wheels in one course."""
-        wheel_count, instants, runs, before = len(self.readings), len(self.order), [], 0
-        for places, of_wheel in (self.readings[wheel] for wheel in wheels):
+        on, runs, before = [self.readings[wheel] for wheel in wheels], [], 0
+        for places, of_wheel in on:
             runs += [slice(run.start + before, run.stop + before) for run in of_wheel]
             before += len(places)
-        places = [self.readings[wheel][0] for wheel in wheels]
-        counted = np.repeat(np.asarray(wheels, np.int64), [len(each) for each in places])
-        place = np.concatenate(places) if places else np.zeros(0, np.int64)
-        in_time = self.order[place] * wheel_count + counted
-        return Course(counted, place, in_time, counted * instants + place, tuple(runs), self.whitening)
+        place = np.concatenate([places for places, _ in on])
+        wheel = np.repeat(np.asarray(wheels, np.int64), [len(places) for places, _ in on])
+        in_time = self.order[place] * len(self.readings) + wheel
+        return Course(wheel, place, in_time, wheel * len(self.order) + place, tuple(runs), self.whitening)
 
     def in_folds(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return (…, time, wheel) in the order of time as (…, wheel, time in the order of folds)."""

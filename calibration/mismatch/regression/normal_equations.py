@@ -140,6 +140,10 @@ class NormalEquations:
         """Return what a term has to gain beyond chance, in Δχ²."""
         return penalty(term, len(self.weights), self.thresholds)
 
+    def largest_credit(self, term: Term) -> float:
+        """Return what a term's own channel could credit to it at most, in Δχ²."""
+        return 0.0 if term.group.own_channel is None else self.thresholds.largest_own_channel_credit
+
     def score(self, fit: Fit) -> float:
         """Return Δχ² less the penalties; a term at frequencies of little noise counts by so much more."""
         total = fit.delta_chi2

@@ -27,13 +27,13 @@ def best_of_each_candidate(equations: NormalEquations, given: Sequence[Term]) ->
     groups = [group for group in equations.design.groups if group.named]
     found = equations.further(given, groups)
     hardly_shared = _that_one_wheel_shows_alone(equations, found)
-    scored = [
-        (gain - equations.penalty(term), str(term.group.law), term)
+    families = [
+        (gain, str(term.group.law), term)
         for gain, term in found
         if all(term.group.name != name or wheels.isdisjoint(term.wheels) for name, wheels in taken)
         and (len(term.wheels) == 1 or id(term.group) not in hardly_shared)
     ]
-    return _best_of_each(scored)
+    return _best_of_each(equations, families)
 
 
 def _that_one_wheel_shows_alone(equations: NormalEquations, found: Sequence[Scored]) -> set[int]:
@@ -63,21 +63,27 @@ def best_of_each_smooth_term(equations: NormalEquations, given: Sequence[Term]) 
     """Return the best smooth term of each covariate, coupling and number of wheels, likewise."""
     taken = {(term.name, term.wheels) for term in given}
     groups = [group for group in equations.design.groups if not group.named]
-    scored = [
-        (gain - equations.penalty(term), f"{term.name} {term.group.coupling} {len(term.wheels)}", term)
+    families = [
+        (gain, f"{term.name} {term.group.coupling} {len(term.wheels)}", term)
         for gain, term in equations.further(given, groups)
         if (term.name, term.wheels) not in taken
     ]
-    return _best_of_each(scored)
+    return _best_of_each(equations, families)
 
 
-def _best_of_each(scored: Sequence[tuple[float, str, Term]]) -> list[Scored]:
-    """Return the best term of each family, best first; the first of equals."""
+def _best_of_each(equations: NormalEquations, found: Sequence[tuple[float, str, Term]]) -> list[Scored]:
+    """Return the best term of each family by Δχ² less penalty, best first, of terms with their Δχ² and family.
+
+    No penalty is computed where even without one the term would not be the best.
+    """
     best: dict[str, Scored] = {}
-    for score, family, term in scored:
-        if family not in best or score > best[family][0]:
-            best[family] = (score, term)
-    return sorted(best.values(), key=lambda found: -found[0])
+    for gain, family, term in sorted(found, key=lambda each: -each[0]):
+        leader = best.get(family)
+        if leader is None or gain + equations.largest_credit(term) > leader[0]:
+            score = gain - equations.penalty(term)
+            if leader is None or score > leader[0]:
+                best[family] = (score, term)
+    return sorted(best.values(), key=lambda scored: -scored[0])
 
 
 def acceptable(equations: NormalEquations, fit: Fit) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,11 +133,20 @@ def _deviation(clean: Array, mask: NDArray[np.bool_]) -> Array:
 
 def _sums_over_lags(values: Array, lags: int) -> Array:
     """Return the sums of products of values (time, wheel) that are so many instants apart, shape (lag, wheel)."""
-    size = 2 ** int(np.ceil(np.log2(2 * len(values))))
+    size = 2 ** int(np.ceil(np.log2(len(values) + lags)))
     spectrum = np.fft.rfft(values, size, axis=0)
     return np.asarray(np.fft.irfft(np.abs(spectrum) ** 2, size, axis=0)[:lags])
 
 
 def _pairs(mask: Mask, lags: int) -> Array:
     """Return how many pairs of readings are so many instants apart, shape (lag, wheel)."""
-    return np.rint(_sums_over_lags(mask.astype(np.float64), lags))
+    return _pairs_of(mask.tobytes(), len(mask), lags)
+
+
+@lru_cache(maxsize=4)
+def _pairs_of(mask: bytes, instants: int, lags: int) -> Array:
+    """Return the same of a mask's bytes: one recording asks for them again and again."""
+    read = np.frombuffer(mask, np.bool_).reshape(instants, -1)
+    pairs = np.rint(_sums_over_lags(read.astype(np.float64), lags))
+    pairs.setflags(write=False)
+    return pairs
