@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.regression.equations import equations_of, free_parameter_equations
+from regolithd.calibration.mismatch.regression.equations import free_parameter_equations, smooth_equations
 from regolithd.calibration.mismatch.selection.noise_estimation import fit_of_significant_terms
 
 if TYPE_CHECKING:
@@ -25,8 +25,10 @@ STEPS = 6
 """Linearisations at most (a choice: a smooth simulation needs two or three)."""
 
 
-def linearised_where_it_fits(pose: Callable[[Mapping[str, float] | None], Problem]) -> Problem:
-    """Return the problem, linearised where its parameters fit the recording best: alone, then beside smooth curves.
+def linearised_where_it_fits(pose: Callable[[Mapping[str, float] | None], Problem]) -> NormalEquations:
+    """Return the equations of parameters and smooth curves, linearised where they fit the recording best.
+
+    The parameters are fitted alone first, then beside the curves.
 
     An effect that is left out moves the parameters. Curves over the covariates hold most of it, whatever it is, so that
     the search for its name begins where it will end. `pose` builds the problem at given values, or at the stated ones.
@@ -38,9 +40,9 @@ def linearised_where_it_fits(pose: Callable[[Mapping[str, float] | None], Proble
         if not bent(problem, values):
             break
         problem = pose(values)
-    equations, _ = equations_of(problem, ())
+    equations = smooth_equations(problem)
     values = moved_values(equations, fit_of_significant_terms(equations))
-    return pose(values) if bent(problem, values) else problem
+    return smooth_equations(pose(values)) if bent(problem, values) else equations
 
 
 def moved_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:

@@ -22,7 +22,7 @@ from regolithd.calibration.mismatch.inference.improbable import without_improbab
 from regolithd.calibration.mismatch.inference.several_channels import merged_answers, priors_from_others
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
-from regolithd.calibration.mismatch.regression.equations import equations_of
+from regolithd.calibration.mismatch.regression.equations import smooth_equations, with_library
 from regolithd.calibration.mismatch.report.notebook import notebook_html
 from regolithd.calibration.mismatch.selection.decision import decide
 from regolithd.calibration.mismatch.selection.regions import in_regions
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Group
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.selection.decision import Decision
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
@@ -182,9 +183,9 @@ def decided(
         problem = build_problem(recorded, simulation, values, inputs=inputs, thresholds=thresholds)
         return corrected_problem(problem, stated)
 
-    problem = linearised_where_it_fits(pose)
-    candidates = with_changes(problem, candidates, stated)
-    search = _search(problem, candidates, pose, progress)
+    equations = linearised_where_it_fits(pose)
+    candidates = with_changes(equations.problem, candidates, stated)
+    search = _search(equations, candidates, pose, progress)
     progress("measuring on held-out blocks and comparing with rivals")
     decision, held_out = earned(search.decision, search.grid)
     decision = without_improbable_curves(in_regions(decision))
@@ -201,28 +202,28 @@ class _Search:
 
 
 def _search(
-    problem: Problem,
+    equations: NormalEquations,
     candidates: Sequence[Candidate],
     pose: Callable[[Mapping[str, float] | None], Problem],
     progress: Callable[[str], None],
 ) -> _Search:
     """Search, and once more where what was found moves the parameters far, or makes all else late with the channel."""
-    found = _search_at(problem, candidates, progress)
-    values = moved_values(found.decision.equations, found.decision.whole)
+    found = _search_at(equations, candidates, progress)
+    problem, values = equations.problem, moved_values(found.decision.equations, found.decision.whole)
     if bent(problem, values):
         del found  # memory holds the matrix of one search at a time
         problem = pose(values)
-        found = _search_at(problem, candidates, progress)
+        found = _search_at(smooth_equations(problem), candidates, progress)
     late = found.decision.late
     if late is None or late == problem.late:
         return found
-    again = _search_at(replace(problem, late=late), candidates, progress)
+    again = _search_at(smooth_equations(replace(problem, late=late)), candidates, progress)
     return again if again.decision.late else found
 
 
-def _search_at(problem: Problem, candidates: Sequence[Candidate], progress: Callable[[str], None]) -> _Search:
+def _search_at(equations: NormalEquations, candidates: Sequence[Candidate], progress: Callable[[str], None]) -> _Search:
     progress("computing the columns of all candidates")
-    equations, applicable = equations_of(problem, candidates)
+    equations, applicable = with_library(equations, candidates)
     progress("searching")
     return _Search(decide(equations, applicable), equations.design.groups, applicable)
 

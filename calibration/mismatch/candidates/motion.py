@@ -40,7 +40,7 @@ LEAST_GAIN = 10.8
 
 def transition_of(problem: Problem) -> Shape:
     """Return the transition that explains this recording's friction better than a step does, empty where none does."""
-    speed = float(problem.once("transition of the direction", lambda: np.array(_best_transition(problem))))
+    speed = float(problem.run_once("transition of the direction", 0.0, lambda: np.array(_best_transition(problem))))
     return {TRANSITION: speed} if speed else {}
 
 

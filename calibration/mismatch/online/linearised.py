@@ -134,7 +134,7 @@ def learned(pieces: Sequence[Piece], simulation: Simulation) -> tuple[Linearised
     recording, elapsed = together(pieces)
     candidates = tuple(each.form_for(simulation) for each in simulation.candidates(library()))
     stated = stated_in(candidates, simulation.corrected_effects, simulation.stated_effects())
-    problem = linearised_where_it_fits(lambda values: _posed(recording, elapsed, simulation, values, stated))
+    problem = linearised_where_it_fits(lambda values: _posed(recording, elapsed, simulation, values, stated)).problem
     candidates = with_changes(problem, candidates, stated)
     laws = laws_of(problem, candidates)
     sets, wheels = wheel_sets_of(problem), problem.recording.wheels

@@ -72,7 +72,7 @@ class Problem:
     labels: what the covariates are called on this machine, with their units
     side, row: each wheel's place on the machine, or None
     thresholds: the numbers that decide
-    made: what runs of the simulation gave, by name and step: a cache, which copies of the problem share
+    made: what takes runs of the simulation, or long, by name and step: a cache, which copies of the problem share
     late: how the predicted channel is late, by `sensor_delay.OF_CHANNEL`, and by how much [s]: what acts on the machine
         shows so much later; None: it is not, or it is not known yet
     """
@@ -157,7 +157,7 @@ class Problem:
         return self._derived[name]
 
     def run_once(self, name: str, step: float, run: Callable[[], Array]) -> Array:
-        """Return what a run of the simulation gives, the first time that this name and step are asked for."""
+        """Return what takes a run of the simulation, or long, the first time that this name and step are asked for."""
         if (name, step) not in self.made:
             self.made[name, step] = run()
         return self.made[name, step]

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.schur import delta_chi2_of_each, delta_chi2_of_groups
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -19,18 +15,22 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Left:
-    """What a fit leaves on some wheels.
+    """What a fit leaves on several sets of wheels.
 
     Attributes
     ----------
-    moment: sums of products of other columns with what is left of the residual, shape (other,)
-    cross: sums of products of the fit's columns with others, shape (fitted, other)
-    solved: the fit's covariance times `cross`, shape (fitted, other)
+    on: 1 where a wheel is in a set, else 0, shape (set, wheel)
+    moment: sums of products of other columns with what is left of the residual, shape (set, other)
+    cross: sums of products of the fit's columns with others, shape (set, fitted, other)
+    solved: the fit's covariance times `cross`, shape (set, fitted, other)
+    energy: sums of squares of the other columns, shape (set, other)
     """
 
+    on: Array
     moment: Array
     cross: Array
     solved: Array
+    energy: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,19 +51,19 @@ class Batch:
     signs: Array
     own: Array
 
-    def of(self, wanted: NDArray[np.bool_]) -> Batch:
-        """Return those groups that are wanted, of which each has a place in `wanted`."""
-        kept = wanted[self.which]
-        own = self.own[:, kept] if self.own.shape[1] else self.own
-        return Batch(self.which[kept], self.at[kept], self.signs[kept], own)
-
-    def gains(self, left: Left, energy: Array, wheels: Sequence[int], least_tolerance: float) -> Array:
-        """Return the Δχ² of each group on some wheels, shape (group,); `energy` is each column's there."""
+    def gains(self, left: Left, sets: Index, groups: Index, least_tolerance: float) -> Array:
+        """Return the Δχ² of groups on sets of wheels, of which pairs are given, shape (pair,)."""
         if self.at.shape[1] == 1:
             at = self.at[:, 0]
-            complement = energy[at] - np.einsum("fc,fc->c", left.cross[:, at], left.solved[:, at])
-            return delta_chi2_of_each(left.moment[at], complement, energy[at], self.signs[:, 0], least_tolerance)
-        own = self.own[wheels].sum(axis=0)
-        explained = np.moveaxis(left.cross[:, self.at], 0, 2) @ np.moveaxis(left.solved[:, self.at], 0, 1)
+            energy = left.energy[:, at]
+            complement = energy - np.einsum("sfg,sfg->sg", left.cross[:, :, at], left.solved[:, :, at])
+            gains = delta_chi2_of_each(left.moment[:, at], complement, energy, self.signs[:, 0], least_tolerance)
+            return np.asarray(gains[sets, groups])
+        at = self.at[groups]
+        own = np.tensordot(left.on, self.own, axes=1)[sets, groups]
+        # The indices of sets and columns are together, the fit's columns last: shape (pair, column, fitted).
+        cross, solved = (each[sets[:, None], :, at] for each in (left.cross, left.solved))
+        complement = own - cross @ np.swapaxes(solved, 1, 2)
         largest = np.max(np.diagonal(own, axis1=1, axis2=2), axis=1)
-        return delta_chi2_of_groups(left.moment[self.at], own - explained, largest, self.signs, least_tolerance)
+        moment = left.moment[sets[:, None], at]
+        return delta_chi2_of_groups(moment, complement, largest, self.signs[groups], least_tolerance)

@@ -26,14 +26,21 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.nuisance import Nuisance
 
 
-def equations_of(problem: Problem, candidates: Sequence[Candidate]) -> tuple[NormalEquations, tuple[Candidate, ...]]:
-    """Return the normal equations of free parameters, candidates and smooth terms, and the applicable candidates.
+def smooth_equations(problem: Problem) -> NormalEquations:
+    """Return the normal equations of the simulation's free parameters and of smooth terms.
 
     The weights are those of the whole residual; the decision estimates better ones.
     """
     design, nuisance, noise = _free_parameters(problem)
-    design, applicable = with_candidates(design, candidates)
-    return normal_equations(with_smooth_terms(design), nuisance, noise.weights), applicable
+    return normal_equations(with_smooth_terms(design), nuisance, noise.weights)
+
+
+def with_library(
+    equations: NormalEquations, candidates: Sequence[Candidate]
+) -> tuple[NormalEquations, tuple[Candidate, ...]]:
+    """Return the equations with every candidate that this recording allows, and those candidates."""
+    design, applicable = with_candidates(equations.design, candidates)
+    return equations.over(design), applicable
 
 
 def free_parameter_equations(problem: Problem) -> NormalEquations:

@@ -140,9 +140,19 @@ class NormalEquations:
         """Return what a term has to gain beyond chance, in Δχ²."""
         return penalty(term, len(self.weights), self.thresholds)
 
-    def largest_credit(self, term: Term) -> float:
-        """Return what a term's own channel could credit to it at most, in Δχ²."""
-        return 0.0 if term.group.own_channel is None else self.thresholds.largest_own_channel_credit
+    def largest_score(self, found: Iterable[tuple[float, Term]]) -> tuple[float, Term] | None:
+        """Return the term with the largest Δχ² less penalty, of terms with their Δχ²; None where there is none.
+
+        No penalty is computed of what would not be the best without one; only its own channel's credit is negative.
+        """
+        best: tuple[float, Term] | None = None
+        for gain, term in sorted(found, key=lambda pair: -pair[0]):
+            credit = 0.0 if term.group.own_channel is None else self.thresholds.largest_own_channel_credit
+            if best is None or gain + credit > best[0]:
+                score = gain - self.penalty(term)
+                if best is None or score > best[0]:
+                    best = score, term
+        return best
 
     def score(self, fit: Fit) -> float:
         """Return Δχ² less the penalties; a term at frequencies of little noise counts by so much more."""
@@ -158,30 +168,30 @@ class NormalEquations:
     def further(self, given: Iterable[Term], groups: Sequence[Group] | None = None) -> list[tuple[float, Term]]:
         """Return the further Δχ² of every group beside `given`, on each set of wheels that may share it."""
         wanted = tuple(self.design.groups if groups is None else groups)
-        fitted = self.fit(given)
+        fitted, sets = self.fit(given), list(self.wheel_sets)
         at = np.array(sorted({column for group in wanted for column in group.columns}), np.int64)
-        energies, moment = self.energies(at), self.moment[:, at]
-        crosses, batches = self._crosses(fitted.columns, at), self._batches(wanted, at)
-        alone, least = len(self.weights) == 1, self.thresholds.least_tolerance
-        may_share = {kind: np.array([alone or group.may_be_shared(kind) for group in wanted]) for kind in KINDS}
-        found: list[tuple[float, Term]] = []
-        for wheels, kind in self.wheel_sets.items():
-            chosen = list(wheels)
-            cross = _over(crosses, wheels)
-            solved = fitted.covariance @ cross
-            left = Left(moment[chosen].sum(axis=0) - fitted.coefficients @ cross, cross, solved)
-            energy = energies[chosen].sum(axis=0)
-            gains = np.zeros(len(wanted))
-            for batch in batches:
-                asked = batch.of(may_share[kind])
-                gains[asked.which] = asked.gains(left, energy, chosen, least)
-            gaining = [(float(gains[place]), Term(wanted[place], wheels)) for place in np.flatnonzero(gains > 0)]
-            found += [
-                (gain * term.group.noise_reduction, term)
-                for gain, term in gaining
-                if visible_in_own_channel(term, self.thresholds)
-            ]
-        return found
+        on = np.array([[float(wheel in wheels) for wheel in self.all_wheels] for wheels in sets])
+        cross = np.tensordot(on, self._crosses(fitted.columns, at), axes=1)
+        moment = on @ self.moment[:, at] - fitted.coefficients @ cross
+        left = Left(on, moment, cross, fitted.covariance @ cross, on @ self.energies(at))
+        may_share = self._may_share(wanted)
+        gains = np.zeros(may_share.shape)
+        for batch in self._batches(wanted, at):
+            of_sets, of_groups = np.nonzero(may_share[:, batch.which])
+            asked = batch.gains(left, of_sets, of_groups, self.thresholds.least_tolerance)
+            gains[of_sets, batch.which[of_groups]] = asked
+        found = [(float(gains[of, k]), Term(wanted[k], sets[of])) for of, k in zip(*np.nonzero(gains > 0), strict=True)]
+        return [
+            (gain * term.group.noise_reduction, term)
+            for gain, term in found
+            if visible_in_own_channel(term, self.thresholds)
+        ]
+
+    def _may_share(self, groups: Sequence[Group]) -> NDArray[np.bool_]:
+        """Return which sets of wheels may share which groups, shape (set, group)."""
+        alone = len(self.weights) == 1
+        kinds = {kind: [alone or group.may_be_shared(kind) for group in groups] for kind in KINDS}
+        return np.array([kinds[kind] for kind in self.wheel_sets.values()])
 
     def _batches(self, groups: Sequence[Group], at: Index) -> list[Batch]:
         """Return the groups in batches of equally many columns, which are among those at `at`."""
@@ -199,7 +209,7 @@ class NormalEquations:
 
     def cross(self, fitted: Columns, at: Index, wheels: tuple[int, ...]) -> Array:
         """Return sums of products of fitted columns and others that act on `wheels`, shape (fitted, other)."""
-        return _over(self._crosses(fitted, at), wheels)
+        return np.asarray(self._crosses(fitted, at)[list(wheels)].sum(axis=0))
 
     def _crosses(self, fitted: Columns, at: Index) -> Array:
         """Return sums of products of fitted columns, where they act, and others, shape (wheel, fitted, other)."""
@@ -244,14 +254,6 @@ def normal_equations(
 ) -> NormalEquations:
     """Return the equations on some folds; on all of them where none are given."""
     return NormalEquations(design, nuisance, weights, tuple(range(design.folds) if folds is None else folds))
-
-
-def _over(of_wheels: Array, wheels: Sequence[int]) -> Array:
-    """Return the sum over some wheels of what is given of each, shape (wheel, …)."""
-    total = np.zeros(of_wheels.shape[1:])
-    for wheel in wheels:
-        total += of_wheels[wheel]
-    return total
 
 
 def membership(columns: Columns, wheel_count: int) -> Array:

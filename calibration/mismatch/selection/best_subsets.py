@@ -72,18 +72,12 @@ def best_of_each_smooth_term(equations: NormalEquations, given: Sequence[Term]) 
 
 
 def _best_of_each(equations: NormalEquations, found: Sequence[tuple[float, str, Term]]) -> list[Scored]:
-    """Return the best term of each family by Δχ² less penalty, best first, of terms with their Δχ² and family.
-
-    No penalty is computed where even without one the term would not be the best.
-    """
-    best: dict[str, Scored] = {}
-    for gain, family, term in sorted(found, key=lambda each: -each[0]):
-        leader = best.get(family)
-        if leader is None or gain + equations.largest_credit(term) > leader[0]:
-            score = gain - equations.penalty(term)
-            if leader is None or score > leader[0]:
-                best[family] = (score, term)
-    return sorted(best.values(), key=lambda scored: -scored[0])
+    """Return the best term of each family by Δχ² less penalty, best first, of terms with their Δχ² and family."""
+    families: dict[str, list[Scored]] = {}
+    for gain, family, term in found:
+        families.setdefault(family, []).append((gain, term))
+    best = [equations.largest_score(terms) for terms in families.values()]
+    return sorted((each for each in best if each is not None), key=lambda scored: -scored[0])
 
 
 def acceptable(equations: NormalEquations, fit: Fit) -> bool:

@@ -71,11 +71,8 @@ def _most_significant(equations: NormalEquations, most: int, least_score: float)
     ]
     terms: list[Term] = []
     for _ in range(most):
-        scored = [(gain - equations.penalty(term), term) for gain, term in equations.further(terms, limited)]
-        if not scored:
+        found = equations.largest_score(equations.further(terms, limited))
+        if found is None or found[0] <= least_score:
             break
-        score, best = max(scored, key=lambda pair: pair[0])
-        if score <= least_score:
-            break
-        terms.append(best)
+        terms.append(found[1])
     return terms

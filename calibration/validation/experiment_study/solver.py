@@ -18,7 +18,7 @@ from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.comparison import decided
 from regolithd.calibration.mismatch.data.recording import read_recording
 from regolithd.calibration.mismatch.problem.build import build_problem
-from regolithd.calibration.mismatch.regression.equations import equations_of
+from regolithd.calibration.mismatch.regression.equations import with_library
 from regolithd.calibration.mismatch.selection.best_subsets import acceptable, best_of_each_candidate
 from regolithd.calibration.mismatch.selection.decision import Decision, decide
 from regolithd.calibration.mismatch.simulation.load import load_simulation
@@ -43,8 +43,8 @@ def answered(recording: Recording, simulation: Simulation) -> dict[str, Any]:
 def named(recording: Recording, simulation: Simulation) -> dict[str, Any]:
     """Return the names that the search decides on, and the scores."""
     candidates = [each.form_for(simulation) for each in simulation.candidates(library())]
-    problem = linearised_where_it_fits(lambda values: build_problem(recording, simulation, values))
-    decision = decide(*equations_of(problem, candidates))
+    equations = linearised_where_it_fits(lambda values: build_problem(recording, simulation, values))
+    decision = decide(*with_library(equations, candidates))
     effects = [{"name": term.name} for term in decision.named.terms]
     return {"answer": {"effects": effects}, "scores": scores_of(decision)}
 

@@ -26,7 +26,6 @@ from regolithd.calibration.mismatch.empirical.found import curves_of
 from regolithd.calibration.mismatch.fleet.work.found import one_channel
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
-from regolithd.calibration.mismatch.regression.equations import equations_of
 from regolithd.calibration.mismatch.selection.decision import decide
 from regolithd.calibration.validation.unnamed_effects.picture import draw
 from regolithd.calibration.validation.unnamed_effects.recordings import (
@@ -97,8 +96,8 @@ def with_library(concealed: Concealed) -> Found | None:
 def without_library(concealed: Concealed) -> Found | None:
     """Decide without any candidate, and return the curve; None where nothing is significant."""
     simulation = one_channel(concealed.simulation, concealed.channel)
-    problem = linearised_where_it_fits(lambda values: build_problem(concealed.recording, simulation, values))
-    decision = decide(*equations_of(problem, ()))
+    equations = linearised_where_it_fits(lambda values: build_problem(concealed.recording, simulation, values))
+    decision = decide(equations, ())
     for found in curves_of(decision):
         return found.terms[0].name, found.curve, found.suggestions
     return None

@@ -26,7 +26,7 @@ from regolithd.calibration.mismatch.experiments.margins import (
 from regolithd.calibration.mismatch.experiments.settings import Setting, predicts_row_by_row, settings_of
 from regolithd.calibration.mismatch.inference.experiment import range_in_words, with_experiment
 from regolithd.calibration.mismatch.problem.build import build_problem
-from regolithd.calibration.mismatch.regression.equations import equations_of as candidates_and_equations
+from regolithd.calibration.mismatch.regression.equations import smooth_equations, with_library
 from regolithd.calibration.mismatch.regression.group import Term
 
 if TYPE_CHECKING:
@@ -155,7 +155,7 @@ def test_a_simulation_that_refuses_a_drive_has_no_predicted_experiment() -> None
 def test_every_law_of_the_library_that_follows_from_a_drive_is_predicted() -> None:
     """On a drive of the rover that varies everything it is finite, and other than zero."""
     problem = build_problem(from_columns(rover_drives.columns(3, length_s=60.0)), rover_drives.simulation())
-    equations, _ = candidates_and_equations(problem, library())
+    equations, _ = with_library(smooth_equations(problem), library())
     experimenter = experimenter_of(equations, THRESHOLD)
     assert experimenter.drives is not None
     assert {"wheel_speed", "temperature", "pitch", "slip", "torque"} <= set(experimenter.drives.settings)
@@ -259,7 +259,7 @@ def test_a_machine_that_runs_one_way_is_never_asked_to_reverse() -> None:
     drives = Drives(problem, ["wheel_speed", "temperature"])
     assert drives.elements == ("wheel_speed", "temperature", "wheel_acceleration")
     assert drives(frozenset(drives.elements)).problem.covariates["wheel_speed"].min() > 0
-    equations, applicable = candidates_and_equations(problem, library())
+    equations, applicable = with_library(smooth_equations(problem), library())
     names = ("coulomb-friction", "bearing-drag", "rotor-inertia")
     terms = [term_of(equations, name) for name in names]
     found = with_experiment(names, experimenter_of(equations, THRESHOLD), (), terms)

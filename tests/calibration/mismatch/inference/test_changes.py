@@ -24,7 +24,7 @@ from regolithd.calibration.mismatch.data.recording import Recording, from_column
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.candidate_groups import implausibility
-from regolithd.calibration.mismatch.regression.equations import equations_of
+from regolithd.calibration.mismatch.regression.equations import smooth_equations, with_library
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.selection.cross_validation import transfer_margin
@@ -281,7 +281,7 @@ def test_a_law_s_misfit_is_of_the_whole_effect() -> None:
     recording = moving(1, 0.75)
     stated = stated_in(library(), [COULOMB], [])
     problem = corrected_problem(build_problem(recording, Axis()), stated)
-    equations, _ = equations_of(problem, with_changes(problem, (), stated))
+    equations, _ = with_library(smooth_equations(problem), with_changes(problem, (), stated))
     (group,) = [each for each in equations.design.groups if each.named]
     fit = equations.fit([Term(group, (0,))])
     size = fit.coefficients[-1] / equations.design.scale[group.columns[0]]
@@ -297,7 +297,7 @@ def test_a_change_gains_beyond_the_corrected_effect_as_it_was() -> None:
     """A size that is known badly could take the change up itself, on other readings too: nothing would be gained."""
     stated = stated_in(library(), [replace(COULOMB, relative_std=5.0)], [])
     problem = corrected_problem(build_problem(moving(1, 1.5), Axis()), stated)
-    equations, _ = equations_of(problem, with_changes(problem, (), stated))
+    equations, _ = with_library(smooth_equations(problem), with_changes(problem, (), stated))
     (group,) = [each for each in equations.design.groups if each.named]
     terms = [Term(group, (0,))]
     fit = equations.fit(terms)

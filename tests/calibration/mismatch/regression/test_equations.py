@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 from linear_machine import CANDIDATES, NOISE, Constant, problem_of, table
 
-from regolithd.calibration.mismatch.regression.equations import equations_of, free_parameter_equations
+from regolithd.calibration.mismatch.regression.equations import (
+    free_parameter_equations,
+    smooth_equations,
+    with_library,
+)
 
 
 class Inapplicable(Constant):
@@ -21,7 +25,7 @@ class Inapplicable(Constant):
 
 def test_the_columns_are_those_of_parameters_candidates_and_smooth_terms() -> None:
     """Candidates that the recording does not allow have none; what applies is returned."""
-    equations, applicable = equations_of(problem_of(table()), (*CANDIDATES, Inapplicable()))
+    equations, applicable = with_library(smooth_equations(problem_of(table())), (*CANDIDATES, Inapplicable()))
     named = [group.name for group in equations.design.groups if group.candidate is not None]
     assert applicable == CANDIDATES
     assert set(named) == {candidate.name for candidate in CANDIDATES}
@@ -31,14 +35,14 @@ def test_the_columns_are_those_of_parameters_candidates_and_smooth_terms() -> No
 
 def test_the_weights_are_those_of_the_noise() -> None:
     """White noise has a weight of one over its variance on each axis."""
-    equations, _ = equations_of(problem_of(table()), ())
+    equations = smooth_equations(problem_of(table()))
     np.testing.assert_allclose(equations.weights, NOISE**-2, rtol=0.5)
 
 
 def test_the_free_parameters_alone_have_no_group() -> None:
     """Noise, folds and the parameters' columns are those of all equations."""
     problem = problem_of(table())
-    alone, (every, _) = free_parameter_equations(problem), equations_of(problem, ())
+    alone, every = free_parameter_equations(problem), smooth_equations(problem)
     assert alone.design.groups == ()
     assert alone.design.size == len(alone.nuisance.columns) == 1
     assert alone.weights == pytest.approx(every.weights)
