@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.signal.skewness import running_mean
 from regolithd.calibration.mismatch.signal.spectrum import padded_length, power_of_sums
 
 if TYPE_CHECKING:
@@ -35,13 +36,25 @@ READINGS_PER_CYCLE = 2.5
 RESOLVED_SHARE = 0.25
 """Share of the readings in motion that must resolve an order so (a choice). An alias has another order at each speed:
 what a quarter of the readings resolves is no alias, and the others may tell of it too."""
+MOST_CYCLES = 4.0
+"""Most cycles between two readings, on average, up to which orders are looked at (a choice: the spectrum's length is in
+proportion, and an angle is seldom known better)."""
+SLOW_READINGS = 9
+"""Readings whose mean is slow, and no part of a ripple that turns on between readings (a choice)."""
+ALIAS_SHARE = 0.7
+"""Share of a line's power from which another line may be the true one of which it is an alias (a choice: at one speed
+both are equal, and of noise the largest of thousands are nearly so)."""
+ALIAS_DISTANCE = 0.5
+"""Distance in orders from which a line is another one (a choice: above a line's width, below one cycle a turn)."""
 
 
 class WheelAngleRipple(Candidate):
     """A sine of the wheel's angle, with or without its first overtone, each wheel with a phase of its own.
 
     The angle is the integral of `wheel_speed` unless the simulation gives another. Where the speed is in m/s it is the
-    travel in m, and a ripple of order n repeats every 2π/n m.
+    travel in m, and a ripple of order n repeats every 2π/n m. A ripple may turn on by more than a cycle between two
+    readings: the angle tells its phase at each, and as the speed changes no other order, nor any slow effect, has the
+    same phases.
 
     `amplitude` is that of the fundamental alone: half the distance from trough to crest, its root mean square over the
     wheels that have it; of a ripple in proportion to the prediction, where that is `reference_size`. `relative_size`
@@ -85,18 +98,22 @@ class WheelAngleRipple(Candidate):
     def propose_shapes(self, problem: Problem, residual: Array) -> Sequence[Shape]:
         """Return the strongest order of each kind, with and without its overtone.
 
-        The order is where the spectrum of the residual over angle has its maximum.
+        The order is where the spectrum of the residual over angle has its maximum: among those that the readings
+        resolve, and among those beyond if one stands out there.
         """
         kinds = ("drag", "torque", "load") if "direction" in problem.covariates else ("torque",)
         found: list[Shape] = []
-        if _lowest(problem) >= _resolved(problem):
-            return found
+        fast = _less_slow(problem, residual)
         for kind in kinds:
             base: Shape = {"kind": kind, "reference_size": problem.mean_size} if kind == "load" else {"kind": kind}
-            weighted = residual * self._base(problem, base)
-            order = self._strongest(problem, weighted)
-            line: Shape = {"order": order, **base, "lag": self._lag(problem, weighted, order)}
-            found += [{**line, "sines": sines} for sines in (1.0, 2.0)]
+            factor = self._base(problem, base)
+            for weighted, order in (
+                (residual * factor, self._strongest(problem, residual * factor)),
+                (fast * factor, self._beyond_resolved(problem, fast * factor)),
+            ):
+                if order is not None:
+                    line: Shape = {"order": order, **base, "lag": self._lag(problem, weighted, order)}
+                    found += [{**line, "sines": sines} for sines in (1.0, 2.0)]
         return found
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
@@ -144,7 +161,7 @@ class WheelAngleRipple(Candidate):
         )
 
     def _autocorrelation_time(self, problem: Problem, weighted: Array, at: float) -> float:
-        order, power = self._spectrum(problem, weighted)
+        order, power = self._spectrum(problem, weighted, _resolved(problem))
         above = order - at
         # Noise has more power at lower orders: the side with more counts.
         sides = [power[(side * above > SIDE_BAND[0]) & (side * above < SIDE_BAND[1])] for side in (-1, 1)]
@@ -153,18 +170,21 @@ class WheelAngleRipple(Candidate):
         usual = max((float(np.median(side)) for side in sides if side.size), default=float("inf"))
         return usual / (wheels * (1 - 1 / (9 * wheels)) ** 3)
 
-    def _strongest(self, problem: Problem, weighted: Array) -> float:
+    def _strongest(self, problem: Problem, weighted: Array) -> float | None:
         """Return the order of the strongest line, each octave of orders looked at in the readings that resolve it.
 
-        What does not resolve an order makes aliases of it: a constant drag at a constant speed is a line then.
+        What does not resolve an order makes aliases of it: a constant drag at a constant speed is a line then. None
+        where no order is resolved.
         """
         lowest, highest, best = _lowest(problem), _resolved(problem), (-1.0, 0.0)
+        if lowest >= highest:
+            return None
         cycles = _cycles_per_reading(problem)
         while highest > lowest:
             resolving = cycles * highest * READINGS_PER_CYCLE <= 1
             # At rest, the readings of one angle are coherent at every order.
             used = weighted if resolving.all() else np.where(resolving & (cycles > 0), weighted, 0.0)
-            order, power = self._spectrum(problem, used)
+            order, power = self._spectrum(problem, used, _resolved(problem))
             least = lowest if resolving.all() else max(lowest, highest / 2)
             sought = (order >= least) & (order <= highest)
             if sought.any():
@@ -173,14 +193,30 @@ class WheelAngleRipple(Candidate):
             highest = least
         return best[1]
 
+    def _beyond_resolved(self, problem: Problem, weighted: Array) -> float | None:
+        """Return the order of the strongest line if it is beyond those that the readings resolve, and is no alias.
+
+        An alias has the same phases at one speed. At several, the true order has more power than any of its aliases.
+        """
+        lowest, resolved = _lowest(problem), _resolved(problem)
+        highest = min(HIGHEST_ORDER, MOST_CYCLES / max(float(np.mean(_in_motion(problem))), 1e-9))
+        if max(lowest, resolved) >= highest:
+            return None
+        order, power = self._spectrum(problem, np.where(_cycles_per_reading(problem) > 0, weighted, 0.0), highest)
+        power[(order < lowest) | (order > highest)] = 0.0
+        top = float(order[np.argmax(power)])
+        others = power[np.abs(order - top) > ALIAS_DISTANCE]
+        alone = others.size > 0 and float(others.max()) < ALIAS_SHARE * float(power.max())
+        return top if top > resolved and alone else None
+
     def _lag(self, problem: Problem, weighted: Array, order: float) -> float:
         """Return the lag of the angle [readings] at which the line is strongest."""
         waves = {lag: np.exp(1j * order * _angle(problem, lag)) for lag in LAGS}
         return max(waves, key=lambda lag: float(np.sum(np.abs(np.sum(weighted * waves[lag], axis=0)) ** 2)))
 
-    def _spectrum(self, problem: Problem, weighted: Array) -> tuple[Array, Array]:
+    def _spectrum(self, problem: Problem, weighted: Array, highest: float) -> tuple[Array, Array]:
         """Return orders and the residual's power at each, summed over the wheels; white noise has 1 on each wheel."""
-        angle, per_turn = problem.covariates["wheel_angle"], _bins_per_turn(problem)
+        angle, per_turn = problem.covariates["wheel_angle"], _bins_per_turn(highest)
         low = np.min(angle, axis=0)
         bins = np.rint((angle - low) * per_turn / (2 * np.pi)).astype(np.int64)
         length = padded_length(int(np.max(bins)))
@@ -193,10 +229,19 @@ class WheelAngleRipple(Candidate):
         return order, power
 
 
-def _bins_per_turn(problem: Problem) -> int:
-    """Return the angle bins in a turn, a power of two: of what turns fast, the readings resolve few orders."""
-    highest = _resolved(problem) + SIDE_BAND[1]
-    return int(2 ** np.ceil(np.log2(BINS_PER_CYCLE * min(highest, HIGHEST_ORDER))))
+def _less_slow(problem: Problem, residual: Array) -> Array:
+    """Return a residual (time, wheel) less its running mean over the readings of each wheel."""
+    found = np.zeros_like(residual)
+    for k, here in enumerate(problem.mask.T):
+        values, half = residual[here, k], SLOW_READINGS // 2
+        if len(values) > SLOW_READINGS:
+            found[here, k] = values - running_mean(np.pad(values, half, mode="edge"), SLOW_READINGS)
+    return found
+
+
+def _bins_per_turn(highest: float) -> int:
+    """Return the angle bins in a turn, a power of two: of what turns fast, few orders are looked at."""
+    return int(2 ** np.ceil(np.log2(BINS_PER_CYCLE * min(highest + SIDE_BAND[1], HIGHEST_ORDER))))
 
 
 def _lowest(problem: Problem) -> float:
@@ -207,9 +252,14 @@ def _lowest(problem: Problem) -> float:
 
 def _resolved(problem: Problem) -> float:
     """Return the highest order with enough readings in a cycle, in the slow part of the motion."""
-    cycles = _cycles_per_reading(problem)[problem.mask]
-    slow = float(np.quantile(cycles[cycles > 0], RESOLVED_SHARE)) if np.any(cycles > 0) else 0.0
+    slow = float(np.quantile(_in_motion(problem), RESOLVED_SHARE))
     return min(HIGHEST_ORDER, 1 / (READINGS_PER_CYCLE * max(slow, 1e-9)))
+
+
+def _in_motion(problem: Problem) -> Array:
+    """Return the turns between two readings in motion, shape (reading,); 0 where there is no motion."""
+    cycles = _cycles_per_reading(problem)[problem.mask]
+    return cycles[cycles > 0] if np.any(cycles > 0) else np.zeros(1)
 
 
 def _cycles_per_reading(problem: Problem) -> Array:

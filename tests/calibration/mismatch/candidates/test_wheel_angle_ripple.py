@@ -85,11 +85,47 @@ def test_a_constant_at_a_speed_too_high_for_the_readings_is_no_ripple() -> None:
     assert 7.0 in {round(float(shape["order"]), 1) for shape in found}
 
 
+def turning(speed: Array) -> Problem:
+    """Return the problem of a propeller whose speed is read five times a second."""
+    time_s = 0.2 * np.arange(len(speed))
+    columns = {"t_s": time_s, "thrust_N": np.ones(len(time_s)), "speed_rad_s": speed}
+    return build_problem(from_columns(columns), Propeller())
+
+
+def orders_in(problem: Problem, residual: Array) -> set[float]:
+    """Return the orders that the search proposes, to a tenth."""
+    noise = 0.5 * np.random.default_rng(5).standard_normal(len(residual))
+    found = WheelAngleRipple().propose_shapes(problem, (residual + noise)[:, None])
+    return {round(float(shape["order"]), 1) for shape in found}
+
+
+def test_a_ripple_that_turns_on_by_more_than_a_cycle_between_readings_is_found_at_several_speeds() -> None:
+    """The angle tells its phase at each reading; no other order has the same phases at every speed."""
+    time_s = 0.2 * np.arange(6000)
+    problem = turning(7.0 + 1.5 * np.sin(2 * np.pi * time_s / 300))
+    assert 5.0 in orders_in(problem, np.cos(5.0 * problem.covariates["wheel_angle"][:, 0]))
+
+
+def test_at_one_speed_its_order_is_not_known() -> None:
+    """Orders 5 and 5 − 2π/1.4 have the same phases at each reading of 7 rad/s."""
+    problem = turning(np.full(6000, 7.0))
+    assert 5.0 not in orders_in(problem, np.cos(5.0 * problem.covariates["wheel_angle"][:, 0]))
+
+
+def test_what_is_slow_is_no_ripple_that_turns_on_between_readings() -> None:
+    """At 7 rad/s a constant and a drift have the phases of order 2π/1.4 = 4.5, as noise has of any."""
+    time_s = 0.2 * np.arange(6000)
+    problem = turning(np.where(time_s < 900, 7.0, 6.0))
+    resolved = 1 / (2.5 * 7.0 * 0.2 / (2 * np.pi))
+    assert all(order <= resolved + 0.2 for order in orders_in(problem, 2.0 + time_s / 300))
+
+
 @pytest.mark.parametrize("wheels", [1, 4])
 def test_white_noise_has_an_autocorrelation_time_of_one(wheels: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """The power of white noise, summed over the wheels, has the median of χ² with two degrees of freedom a wheel."""
     candidate, order = WheelAngleRipple(), np.linspace(0.0, 20.0, 2001)
     power = np.full(order.shape, 0.5 * chi2.median(2 * wheels))
     monkeypatch.setattr(candidate, "_spectrum", lambda *_: (order, power))
-    problem = SimpleNamespace(mask=np.ones((10, wheels), np.bool_))
+    speed = np.ones((10, wheels))
+    problem = SimpleNamespace(mask=speed > 0, known=lambda _: speed, recording=SimpleNamespace(step_s=0.01))
     assert candidate._autocorrelation_time(problem, power, 10.0) == pytest.approx(1.0, rel=0.02)
