@@ -164,6 +164,10 @@ class DriftOfPredictedLoad(LoadCellDrift):
         further: list[Shape] = [{"full_at_s": problem.length_s, "power": power} for power in FURTHER_POWERS]
         return [*super().onset_profiles(problem), *further]
 
+    def without_covariate(self, shape: Shape) -> Shape:  # noqa: ARG002
+        """Return an offset that was there from the first reading on, which is no drift."""
+        return {"onset_s": 0.0, "rise_s": 0.0}
+
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return g(t − t_0), 0 before the onset."""
         return np.broadcast_to(growth(problem, shape), problem.mask.shape)[None]

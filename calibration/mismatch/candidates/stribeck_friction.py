@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
-from regolithd.calibration.mismatch.candidates.motion import TRANSITION_KEY, along_motion, transition_of
+from regolithd.calibration.mismatch.candidates.motion import TRANSITION, TRANSITION_KEY, along_motion, transition_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -68,7 +68,8 @@ class StribeckFriction(Candidate):
         """Return Stribeck speeds between the slowest and half of the highest speed, in three forms.
 
         Extra drag near standstill looks like a friction that turns round gradually, and the other way about: where the
-        recording shows such a transition, both a step and the transition are tried.
+        recording shows such a transition, both a step and the transition are tried. What decays before the friction
+        has turned round is no Stribeck effect: it is a transition of another form.
         """
         transition = transition_of(problem)
         ways_to_turn: list[Shape] = [{}, transition] if transition else [{}]
@@ -76,7 +77,8 @@ class StribeckFriction(Candidate):
             {**turn, "stribeck_speed_rad_s": float(speed), "fades": fades}
             for turn in ways_to_turn
             for fades in FADES
-            for speed in np.geomspace(*self._range(problem), SPEED_COUNT)
+            for low, high in [self._range(problem, turn)]
+            for speed in (np.geomspace(low, high, SPEED_COUNT) if low < high else ())
         ]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
@@ -85,12 +87,12 @@ class StribeckFriction(Candidate):
         ratio = np.abs(speed) / float(shape["stribeck_speed_rad_s"])
         return (along_motion(problem, shape) * FADES[str(shape["fades"])](ratio))[None]
 
-    def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
-        """Return the range in which it can be told from nothing and from a constant."""
-        return {"stribeck_speed_rad_s": self._range(problem)}
+    def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
+        """Return the range in which it can be told from nothing, from a transition, and from a constant."""
+        return {"stribeck_speed_rad_s": self._range(problem, shape)}
 
-    def _range(self, problem: Problem) -> tuple[float, float]:
+    def _range(self, problem: Problem, shape: Shape) -> tuple[float, float]:
         speed = np.abs(problem.covariates["wheel_speed"][problem.mask])
         speed = speed[speed > 0]
         low, high = (factor * float(np.quantile(speed, quantile)) for factor, quantile in (SLOWEST, FASTEST))
-        return low, high
+        return max(low, float(shape.get(TRANSITION, 0.0))), high
