@@ -41,6 +41,8 @@ MOST_CYCLES = 4.0
 proportion, and an angle is seldom known better)."""
 SLOW_READINGS = 9
 """Readings whose mean is slow, and no part of a ripple that turns on between readings (a choice)."""
+ROUNDING = 1e-9
+"""Share of the largest residual below which a difference is rounding."""
 ALIAS_SHARE = 0.7
 """Share of a line's power from which another line may be the true one of which it is an alias (a choice: at one speed
 both are equal, and of noise the largest of thousands are nearly so)."""
@@ -236,7 +238,7 @@ def _less_slow(problem: Problem, residual: Array) -> Array:
         values, half = residual[here, k], SLOW_READINGS // 2
         if len(values) > SLOW_READINGS:
             found[here, k] = values - running_mean(np.pad(values, half, mode="edge"), SLOW_READINGS)
-    return found
+    return np.where(np.abs(found) > ROUNDING * np.max(np.abs(residual)), found, 0.0)
 
 
 def _bins_per_turn(highest: float) -> int:
