@@ -240,7 +240,11 @@ OF_CHANNEL: Mapping[str, Callable[[Recording, Array, float], Array]] = {
 
 def columns_of(problem: Problem, candidate: Candidate, shape: Shape) -> Array:
     """Return a candidate's columns as the predicted channel shows them: late where it is late."""
-    columns = np.asarray(candidate.columns(problem, shape), np.float64)
+    return late_with(problem, candidate, np.asarray(candidate.columns(problem, shape), np.float64))
+
+
+def late_with(problem: Problem, candidate: Candidate, columns: Array) -> Array:
+    """Return columns (column, time, wheel) that act as a candidate does, as the predicted channel shows them."""
     if problem.late is None or not candidate.late_with_channel:
         return columns
     return np.asarray(as_shown(problem, list(columns)), np.float64).reshape(columns.shape)

@@ -2,7 +2,8 @@
 
 How the effect developed after its onset is unknown too. The best onset of all developments is a poor estimate where a
 slow beginning before and a quick one after explain a recording almost equally well: the estimate is the median of the
-likelihood over onsets and developments, which has the least expected distance.
+likelihood over onsets and developments, which has the least expected distance. Of an effect that wanders the likelihood
+has a Brownian motion in it as well (`inference.wandering_onset`).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.inference.parameter_interval import NINE_TENTHS
+from regolithd.calibration.mismatch.inference.wandering_onset import likelihood
 from regolithd.calibration.mismatch.selection.shape_optimisation import shape_profile
 from regolithd.calibration.mismatch.signal.density import quantiles
 
@@ -24,12 +26,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+SHARES = (NINE_TENTHS[0], 0.5, NINE_TENTHS[1])
+"""Of the likelihood that lie below an interval's lower bound, the estimate and the upper bound."""
 GRID = 48
 """Onsets of the likelihood's grid (a choice: one in each 2 % of the recording; the tolerance is a tenth)."""
 OVERCONFIDENCE = 4.0
 """Factor by which Δχ² between onsets is too large: no development is exactly the true one. In 16 blind trials of drifts
-that wander by 15 % the true onset lay 5.5 below the best in the mean, and should have lain about 1 below; 4 and 8 place
-it equally well."""
+that were taken for steady and wandered by 15 % the true onset lay 5.5 below the best in the mean, and should have lain
+about 1 below; 4 and 8 place it equally well."""
 FIRST_STEP, LONGEST_STEP = 0.002, 0.3
 """Distance from the best onset at which the search begins and ends, as shares of the recording."""
 MARGIN = 0.01
@@ -41,8 +45,8 @@ BISECTIONS = 6
 def onset_interval(equations: NormalEquations, fit: Fit, index: int) -> tuple[float, float, float]:
     """Return a term's onset [s] and the bounds that hold it nine times in ten, within those of the candidate.
 
-    Of an effect that wanders the bounds are quantiles of the same likelihood as the estimate: where none of the
-    developments is the true one, the best of them is no measure of what chance allows.
+    Of an effect that wanders the bounds are quantiles of the same likelihood as the estimate, which needs no factor: it
+    has the effect's random course in it.
     """
     term, problem = fit.terms[index], equations.problem
     candidate, shape = term.group.candidate, term.group.shape
@@ -60,15 +64,22 @@ def onset_interval(equations: NormalEquations, fit: Fit, index: int) -> tuple[fl
 
     first, last = candidate.bounds(problem, shape)[onset]
     grid = np.linspace(first, last, GRID)
-    density = _density(np.array([gains(float(onset_s)) for onset_s in grid]))
-    low, value, high = quantiles(grid, density, (NINE_TENTHS[0], 0.5, NINE_TENTHS[1]))
     if candidate.wanders:
+        density = likelihood(profile, grid, developments, _size(equations, fit, index))
+        low, value, high = quantiles(grid, density, SHARES)
         return value, low, high
+    (value,) = quantiles(grid, _density(np.array([gains(float(onset_s)) for onset_s in grid])), (0.5,))
     least = max(profile(shape), *gains(at)) - equations.thresholds.onset_fall
     low = max(at - _distance(lambda far: within(at - far), length_s), first)
     high = min(at + _distance(lambda far: within(at + far), length_s), last)
     inside = low + MARGIN * (high - low), high - MARGIN * (high - low)
     return float(np.clip(value, *inside)), low, high
+
+
+def _size(equations: NormalEquations, fit: Fit, index: int) -> float:
+    """Return the largest of a term's coefficients, with the unit of the channel."""
+    coefficients = fit.coefficients[fit.of_term(index)] / equations.design.scale[list(fit.terms[index].group.columns)]
+    return float(np.max(np.abs(coefficients)))
 
 
 def _density(gains: Array) -> Array:

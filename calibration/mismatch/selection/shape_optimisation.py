@@ -82,15 +82,18 @@ class ShapeProfile:
         share = min((along + prior) / (energy + prior), 1.0)
         return float(2 * share * along - share**2 * energy - prior * (share - 1) ** 2)
 
-    def _sums(self, shape: Shape) -> tuple[Array, Array, Array]:
-        """Return moments, the products beside the other terms, and all products of the shape's columns."""
-        rows = self._weighted_rows(shape)
+    def rows(self, columns: Array) -> Single:
+        """Return columns (column, time, wheel), whitened and weighted, shape (column, reading)."""
+        return self.course.whitened(columns) * self.weights
+
+    def sums(self, rows: Single) -> tuple[Array, Array, Array]:
+        """Return moments of `rows`, their products beside the other terms, and all their products."""
         cross = (rows @ self.fitted.T).astype(np.float64)
         own = (rows @ rows.T).astype(np.float64)
         return (rows @ self.left).astype(np.float64), schur_complement(own, cross.T, self.inverse), own
 
-    def _weighted_rows(self, shape: Shape) -> Single:
-        return self.course.whitened(columns_of(self.equations.problem, self.candidate, shape)) * self.weights
+    def _sums(self, shape: Shape) -> tuple[Array, Array, Array]:
+        return self.sums(self.rows(columns_of(self.equations.problem, self.candidate, shape)))
 
 
 def shape_profile(
