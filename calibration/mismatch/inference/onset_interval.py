@@ -45,8 +45,8 @@ BISECTIONS = 6
 def onset_interval(equations: NormalEquations, fit: Fit, index: int) -> tuple[float, float, float]:
     """Return a term's onset [s] and the bounds that hold it nine times in ten, within those of the candidate.
 
-    Of an effect that wanders the bounds are quantiles of the same likelihood as the estimate, which needs no factor: it
-    has the effect's random course in it.
+    Of an effect that wanders the bounds are quantiles of the same likelihood as the estimate: where none of the
+    developments is the true one, the best of them is no measure of what chance allows.
     """
     term, problem = fit.terms[index], equations.problem
     candidate, shape = term.group.candidate, term.group.shape
