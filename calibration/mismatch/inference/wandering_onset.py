@@ -33,8 +33,8 @@ Array = NDArray[np.float64]
 
 OVERCONFIDENCE = 2.0
 """Factor by which m and C are too large: the noise and its memory are estimated from the same readings. Found in 424
-recordings with six kinds of drift, under noise with and without memory, and 42 of a tank with a drift: with 1 and 1.5
-random walks are placed best, but steady drifts under noise with memory worse than by developments alone; not with 2."""
+recordings with six kinds of drift, under noise with and without memory: 1 and 1.5 place random walks best, but ramps
+under noise with memory worse in the mean than developments alone do; 2 does not."""
 WANDERED = (0.1, 0.3, 1.0)
 """What the effect has wandered by the end of the recording, as shares of its size: r (a choice: from hardly to wholly;
 0.3 alone places onsets equally well)."""
