@@ -148,7 +148,13 @@ class Problem:
 
     def known(self, covariate: str) -> Array:
         """Return a covariate, 0 where it is not known, shape (time, wheel)."""
-        return self.once(f"known {covariate}", lambda: np.nan_to_num(self.covariates[covariate]))
+
+        def without_blanks() -> Array:
+            values = np.nan_to_num(self.covariates[covariate])
+            values.setflags(write=False)  # whoever asks for it gets the same array
+            return values
+
+        return self.once(f"known {covariate}", without_blanks)
 
     def once(self, name: str, derive: Callable[[], Array]) -> Array:
         """Return what is derived from covariates and readings, the first time that this name is asked for."""
