@@ -39,6 +39,19 @@ def test_extra_drag_near_standstill_is_tried_as_a_step_as_well() -> None:
     assert turns == {False, True}
 
 
+def test_a_stribeck_effect_fades_after_the_friction_has_turned_round() -> None:
+    """What fades sooner is another form of the transition; without one, any speed is tried."""
+    turn = TRANSITIONS[-1] * FASTEST
+    problem, candidate = problem_of(with_friction(turn)), StribeckFriction()
+    speeds = {"with": [], "without": []}
+    for shape in candidate.shapes(problem):
+        kind = "with" if "transition_rad_s" in shape else "without"
+        speeds[kind].append(float(shape["stribeck_speed_rad_s"]))
+    (found,) = {float(shape["transition_rad_s"]) for shape in candidate.shapes(problem) if "transition_rad_s" in shape}
+    assert min(speeds["with"]) >= found > min(speeds["without"])
+    assert candidate.bounds(problem, {"transition_rad_s": found})["stribeck_speed_rad_s"][0] == found
+
+
 def test_without_friction_there_is_no_transition() -> None:
     """Noise alone prefers no transition."""
     assert transition_of(problem_of(table())) == {}

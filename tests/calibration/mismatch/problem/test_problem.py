@@ -101,6 +101,18 @@ def test_tangents_and_secants_are_difference_quotients() -> None:
     np.testing.assert_allclose(problem.with_input("speed_rad_s", np.full((INSTANTS, AXES), np.nan)), 0.0)
 
 
+def test_a_covariate_without_blanks_is_made_once_for_each_set_of_covariates() -> None:
+    """0 where it is not known, and not to be written to; a copy of the problem with others has its own."""
+    problem = problem_of(table())
+    speed = np.where(problem.time_s > 10, problem.covariates["wheel_speed"], np.nan)
+    other = replace(problem, covariates={**problem.covariates, "wheel_speed": speed})
+    assert problem.known("wheel_speed") is problem.known("wheel_speed")
+    np.testing.assert_array_equal(problem.known("wheel_speed"), problem.covariates["wheel_speed"])
+    np.testing.assert_array_equal(other.known("wheel_speed"), np.nan_to_num(speed))
+    with pytest.raises(ValueError, match="read-only"):
+        other.known("wheel_speed")[0] = 1.0
+
+
 def test_variance_within_wheels_leaves_out_what_differs_between_them() -> None:
     """A factor that is 1 on one axis and 3 on the other does not change on any."""
     problem = problem_of(table())

@@ -90,6 +90,14 @@ def test_a_further_gain_is_the_difference_of_two_fits(equations: NormalEquations
         assert gain == pytest.approx(equations.fit([*given, term]).delta_chi2 - base, rel=1e-3, abs=1e-3)
 
 
+def test_the_largest_score_is_that_of_all_terms(equations: NormalEquations) -> None:
+    """Of terms in any order, and none of none."""
+    found = equations.further(())
+    gain, term = max(found, key=lambda pair: pair[0] - equations.penalty(pair[1]))
+    assert equations.largest_score(reversed(found)) == (pytest.approx(gain - equations.penalty(term)), term)
+    assert equations.largest_score(()) is None
+
+
 def test_a_wrong_sign_gains_nothing() -> None:
     """A drag that drives is none; an offset may have either sign."""
     equations = equations_of(problem_of(table(drag=-0.3)))
