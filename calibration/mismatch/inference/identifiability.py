@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+from math import erfc, sqrt
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from regolithd.calibration.mismatch.experiments.choice import experimenter_of
 from regolithd.calibration.mismatch.inference.collinearity import collinear_sets, parameters_like
@@ -114,6 +113,4 @@ def wrong_choice_rate(lead: float, apart: float) -> float:
     The true one's lead is normal about μ with variance 4 μ, where μ is the energy of its term, `apart`, outside the
     span of the other.
     """
-    from scipy.special import ndtr  # noqa: PLC0415  # the laptop's; reading a recording must not load SciPy
-
-    return float(ndtr(-(lead + apart) / (2 * np.sqrt(apart))))
+    return 0.5 * erfc((lead + apart) / (2 * sqrt(2 * apart)))
