@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.signal.skewness import running_mean
 from regolithd.calibration.mismatch.signal.spectrum import padded_length, power_of_sums
 
@@ -72,6 +73,7 @@ class WheelAngleRipple(Candidate):
     vary: ClassVar = ("wheel_speed",)
     source = "grousers: as many cycles per turn as there are; harmonic drive: two per turn of its wave generator"
     requires = ("wheel_angle", "wheel_speed")
+    late_with_channel = False  # its columns are made as shown
     coefficients: ClassVar = (Coefficient("amplitude", "{unit}", 0),)
     sharing: ClassVar = ("all", "one")
     forms = tuple(FORMS.values())
@@ -119,9 +121,13 @@ class WheelAngleRipple(Candidate):
         return found
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
-        """Return cosine and sine for each wheel, then those of the overtone, shape (2 sines wheels, time, wheel)."""
+        """Return cosine and sine for each wheel, then those of the overtone, shape (2 sines wheels, time, wheel).
+
+        Where the predicted channel is late, angle and factor are late, and not the waves: these may turn on by more
+        than a cycle between two readings.
+        """
         phase = float(shape["order"]) * _angle(problem, float(shape.get("lag", 0.0)))
-        base = self._base(problem, shape)
+        (base,) = as_shown(problem, [self._base(problem, shape)])
         wheels, sines = problem.mask.shape[1], int(float(shape["sines"]))
         found = np.zeros((sines, wheels, 2, *problem.mask.shape))
         for sine in range(sines):
@@ -218,7 +224,7 @@ class WheelAngleRipple(Candidate):
 
     def _spectrum(self, problem: Problem, weighted: Array, highest: float) -> tuple[Array, Array]:
         """Return orders and the residual's power at each, summed over the wheels; white noise has 1 on each wheel."""
-        angle, per_turn = problem.covariates["wheel_angle"], _bins_per_turn(highest)
+        angle, per_turn = _angle(problem, 0.0), _bins_per_turn(highest)
         low = np.min(angle, axis=0)
         bins = np.rint((angle - low) * per_turn / (2 * np.pi)).astype(np.int64)
         length = padded_length(int(np.max(bins)))
@@ -270,6 +276,7 @@ def _cycles_per_reading(problem: Problem) -> Array:
 
 
 def _angle(problem: Problem, lag: float) -> Array:
-    """Return the turned angle [rad] `lag` readings before each instant, shape (time, wheel)."""
-    speed = problem.known("wheel_speed")
-    return problem.covariates["wheel_angle"] - lag * problem.recording.step_s * speed
+    """Return the turned angle [rad] `lag` readings before what the predicted channel shows, shape (time, wheel)."""
+    angle = problem.covariates["wheel_angle"] - lag * problem.recording.step_s * problem.known("wheel_speed")
+    (shown,) = as_shown(problem, [angle])
+    return shown

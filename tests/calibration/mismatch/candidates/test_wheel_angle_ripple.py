@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, ClassVar
 
@@ -11,6 +12,7 @@ import pytest
 from scipy.stats import chi2
 
 from regolithd.calibration.mismatch import Simulation
+from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import WheelAngleRipple
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
@@ -104,6 +106,18 @@ def test_a_ripple_that_turns_on_by_more_than_a_cycle_between_readings_is_found_a
     time_s = 0.2 * np.arange(6000)
     problem = turning(7.0 + 1.5 * np.sin(2 * np.pi * time_s / 300))
     assert 5.0 in orders_in(problem, np.cos(5.0 * problem.covariates["wheel_angle"][:, 0]))
+
+
+def test_a_late_channel_shows_an_earlier_angle_and_not_a_smaller_ripple() -> None:
+    """A straight line between waves that are more than a cycle apart is no wave."""
+    time_s, delay_s = 0.2 * np.arange(6000), 0.27
+    problem = turning(7.0 + 1.5 * np.sin(2 * np.pi * time_s / 300))
+    angle = problem.covariates["wheel_angle"][:, 0]
+    expected = np.cos(5.0 * np.interp(time_s - delay_s, time_s, angle))
+    late = replace(problem, late=("secant_s", delay_s))
+    shape = {"order": 5.0, "kind": "torque", "sines": 1.0}
+    np.testing.assert_allclose(columns_of(late, WheelAngleRipple(), shape)[0, :, 0], expected, atol=1e-6)
+    assert 5.0 in orders_in(late, expected)
 
 
 def test_at_one_speed_its_order_is_not_known() -> None:
