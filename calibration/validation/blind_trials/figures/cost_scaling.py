@@ -127,6 +127,11 @@ def write_long(trial: Trial, folder: Path) -> None:
     pq.write_table(table, folder / "recording.parquet")
 
 
+def counted(rows: int) -> str:
+    """Return a number of rows to the thousand, in groups of three digits."""
+    return f"{1000 * (rows // 1000):,}".replace(",", " ")
+
+
 def picture(found: list[Cost]) -> str:
     """Draw seconds and MiB over rows, seconds over candidates, and over workers where these were measured."""
     most = max(cost.candidates for cost in found)
@@ -139,10 +144,10 @@ def picture(found: list[Cost]) -> str:
     panels = [
         ("rows (thousands)", "processor time (s)", [(x, y) for x, y, _ in by_rows], GOAL_CPU_S),
         ("rows (thousands)", "memory of a process (MiB)", [(x, y) for x, _, y in by_rows], GOAL_MIB),
-        (f"candidates, at {full // 1000} 000 rows", "processor time (s)", by_count, GOAL_CPU_S),
+        (f"candidates, at {counted(full)} rows", "processor time (s)", by_count, GOAL_CPU_S),
     ]
     if by_workers:
-        panels.append((f"workers, at {min(several) // 1000} 000 rows", "time (s)", by_workers, GOAL_LONG_S))
+        panels.append((f"workers, at {counted(min(several))} rows", "time (s)", by_workers, GOAL_LONG_S))
     parts = [STYLE]
     for at, (across, up, points, limit) in enumerate(panels):
         wide = 1.1 * max(x for x, _ in points)
