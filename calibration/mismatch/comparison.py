@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.answer import Answer, Contribution, Evidence
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
+    from regolithd.calibration.mismatch.changes import Stated
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Group
@@ -183,35 +184,37 @@ def decided(
         problem = build_problem(recorded, simulation, values, inputs=inputs, thresholds=thresholds)
         return corrected_problem(problem, stated)
 
-    equations = linearised_where_it_fits(pose)
-    candidates = with_changes(equations.problem, candidates, stated)
-    search = _search(equations, candidates, pose, progress)
+    search = _search(candidates, stated, pose, progress)
     progress("measuring on held-out blocks and comparing with rivals")
     decision, held_out = earned(search.decision, search.grid)
     decision = without_improbable_curves(in_regions(decision))
-    return Decided(decision, held_out, tuple(candidates), search.applicable)
+    return Decided(decision, held_out, search.candidates, search.applicable)
 
 
 @dataclass(frozen=True, eq=False)
 class _Search:
-    """A decision, the groups before any data optimised their shapes, and the applicable candidates."""
+    """A decision, the groups before any data optimised their shapes, the candidates, and those that apply."""
 
     decision: Decision
     grid: tuple[Group, ...]
+    candidates: tuple[Candidate, ...]
     applicable: tuple[Candidate, ...]
 
 
 def _search(
-    equations: NormalEquations,
     candidates: Sequence[Candidate],
+    stated: Sequence[Stated],
     pose: Callable[[Mapping[str, float] | None], Problem],
     progress: Callable[[str], None],
 ) -> _Search:
     """Search, and once more where what was found moves the parameters far, or makes all else late with the channel."""
+    equations = linearised_where_it_fits(pose)
+    problem = equations.problem
+    candidates = with_changes(problem, candidates, stated)
     found = _search_at(equations, candidates, progress)
-    problem, values = equations.problem, moved_values(found.decision.equations, found.decision.whole)
+    values = moved_values(found.decision.equations, found.decision.whole)
     if bent(problem, values):
-        del found  # memory holds the matrix of one search at a time
+        del found, equations  # memory holds the matrix of one search at a time, and TMPDIR its columns
         problem = pose(values)
         found = _search_at(smooth_equations(problem), candidates, progress)
     late = found.decision.late
@@ -225,7 +228,7 @@ def _search_at(equations: NormalEquations, candidates: Sequence[Candidate], prog
     progress("computing the columns of all candidates")
     equations, applicable = with_library(equations, candidates)
     progress("searching")
-    return _Search(decide(equations, applicable), equations.design.groups, applicable)
+    return _Search(decide(equations, applicable), equations.design.groups, tuple(candidates), applicable)
 
 
 def _labelled(comparison: Comparison, channel: str) -> Comparison:

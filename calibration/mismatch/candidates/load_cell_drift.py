@@ -111,9 +111,8 @@ class LoadCellDrift(Candidate):
         return np.maximum(seen - max(usual, WANDER_KNOTS), 0.0)
 
     def _simulated(self, problem: Problem, offset: float) -> Array:
-        load = problem.covariates["load"]
-
         def change() -> Array:
+            load = problem.covariates["load"]
             wrong = known_mean(load) * (self._drift(problem) + offset)
             return problem.with_input("load_N", np.maximum(load - wrong, LEAST_SHARE * load)) - problem.filled
 
@@ -127,9 +126,13 @@ class LoadCellDrift(Candidate):
 
     def _unexplained_load(self, problem: Problem) -> Array:
         """Return the cells' readings less what pitch and roll explain, over the mean reading; NaN where unknown."""
-        load = problem.covariates["load"]
-        usual = np.where(known_mean(load) > 0, known_mean(load), 1.0)
-        return problem.once("unexplained load", lambda: _without_posture(problem, load / usual))
+
+        def unexplained() -> Array:
+            load = problem.covariates["load"]
+            usual = known_mean(load)
+            return _without_posture(problem, load / np.where(usual > 0, usual, 1.0))
+
+        return problem.once("unexplained load", unexplained)
 
 
 class DriftOfPredictedLoad(LoadCellDrift):

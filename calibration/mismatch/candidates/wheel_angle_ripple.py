@@ -111,11 +111,9 @@ class WheelAngleRipple(Candidate):
         for kind in kinds:
             base: Shape = {"kind": kind, "reference_size": problem.mean_size} if kind == "load" else {"kind": kind}
             factor = self._base(problem, base)
-            for weighted, order in (
-                (residual * factor, self._strongest(problem, residual * factor)),
-                (fast * factor, self._beyond_resolved(problem, fast * factor)),
-            ):
-                if order is not None:
+            for values, strongest in ((residual, self._strongest), (fast, self._beyond_resolved)):
+                weighted = values * factor
+                if (order := strongest(problem, weighted)) is not None:
                     line: Shape = {"order": order, **base, "lag": self._lag(problem, weighted, order)}
                     found += [{**line, "sines": sines} for sines in (1.0, 2.0)]
         return found
@@ -184,15 +182,15 @@ class WheelAngleRipple(Candidate):
         What does not resolve an order makes aliases of it: a constant drag at a constant speed is a line then. None
         where no order is resolved.
         """
-        lowest, highest, best = _lowest(problem), _resolved(problem), (-1.0, 0.0)
-        if lowest >= highest:
+        lowest, resolved, best = _lowest(problem), _resolved(problem), (-1.0, 0.0)
+        if lowest >= resolved:
             return None
-        cycles = _cycles_per_reading(problem)
+        highest, cycles = resolved, _cycles_per_reading(problem)
         while highest > lowest:
             resolving = cycles * highest * READINGS_PER_CYCLE <= 1
             # At rest, the readings of one angle are coherent at every order.
             used = weighted if resolving.all() else np.where(resolving & (cycles > 0), weighted, 0.0)
-            order, power = self._spectrum(problem, used, _resolved(problem))
+            order, power = self._spectrum(problem, used, resolved)
             least = lowest if resolving.all() else max(lowest, highest / 2)
             sought = (order >= least) & (order <= highest)
             if sought.any():

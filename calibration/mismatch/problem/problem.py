@@ -148,18 +148,13 @@ class Problem:
 
     def known(self, covariate: str) -> Array:
         """Return a covariate, 0 where it is not known, shape (time, wheel)."""
-
-        def without_blanks() -> Array:
-            values = np.nan_to_num(self.covariates[covariate])
-            values.setflags(write=False)  # whoever asks for it gets the same array
-            return values
-
-        return self.once(f"known {covariate}", without_blanks)
+        return self.once(f"known {covariate}", lambda: np.nan_to_num(self.covariates[covariate]))
 
     def once(self, name: str, derive: Callable[[], Array]) -> Array:
         """Return what is derived from covariates and readings, the first time that this name is asked for."""
         if name not in self._derived:
-            self._derived[name] = derive()
+            values = self._derived[name] = derive()
+            values.setflags(write=False)  # whoever asks for it gets the same array
         return self._derived[name]
 
     def run_once(self, name: str, step: float, run: Callable[[], Array]) -> Array:
@@ -198,8 +193,12 @@ class Problem:
     def input_tangent(self, column: str) -> Array:
         """Return ∂prediction/∂ln(input), shape (time, wheel)."""
         step = self.thresholds.tangent_step
-        moved = self.recording.channels[column] * (1 + step)
-        return self.run_once("input " + column, step, lambda: (self.with_input(column, moved) - self.filled) / step)
+
+        def change() -> Array:
+            moved = self.with_input(column, self.recording.channels[column] * (1 + step))
+            return (moved - self.filled) / step
+
+        return self.run_once("input " + column, step, change)
 
     def with_input(self, column: str, values: Array) -> Array:
         """Return the prediction for another reading of one input, 0 where there is none."""
