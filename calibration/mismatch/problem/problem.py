@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,11 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.predictor import Predictor
 
 Array = NDArray[np.float64]
+Readings = tuple[NDArray[np.int64], tuple[slice, ...]]
+"""Rows in the order of time, and which of them followed each other."""
+
+LONGEST_BRIDGE = 4
+"""Usual steps between readings that may be left out before a new run begins (a choice: blanks are short)."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +132,19 @@ class Problem:
         """What stated effects add on the output of the simulation, shape (time, wheel)."""
         columns = [effect.column for effect in self.stated if not effect.in_simulation]
         return sum(columns, np.zeros(self.mask.shape))
+
+    @cached_property
+    def courses(self) -> tuple[Readings, ...]:
+        """Each wheel's compared readings, runs and gaps apart."""
+        found = []
+        for known in self.mask.T:
+            rows = np.flatnonzero(known)
+            steps = np.diff(rows)
+            usual = float(np.median(steps)) if len(steps) else 1.0
+            apart = (np.diff(self.recording.run[rows]) != 0) | (steps > LONGEST_BRIDGE * usual)
+            starts = np.concatenate(([0], 1 + np.flatnonzero(apart), [len(rows)]))
+            found.append((rows, tuple(slice(int(a), int(b)) for a, b in pairwise(starts) if b > a)))
+        return tuple(found)
 
     def noise_of(self, residual: Array) -> NoiseModel:
         """Return the noise that a residual (time, wheel) shows."""

@@ -20,18 +20,15 @@ from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED, Whiten
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.problem.problem import Problem, Readings
     from regolithd.calibration.mismatch.regression.group import Group
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 Index = NDArray[np.int64]
-Readings = tuple[Index, tuple[slice, ...]]
 
 LEAST_SCALE = float(np.finfo(np.float32).tiny)
 """Root mean square below which a column is one of zeros: it cannot be divided by in single precision."""
-LONGEST_BRIDGE = 4
-"""Usual steps between readings that may be left out before a new run begins (a choice: blanks are short)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,15 +243,8 @@ def _energy(residual: Single, cuts: Index) -> Array:
 
 def _readings(problem: Problem, order: Index) -> tuple[Readings, ...]:
     """Return each wheel's readings: their places in the order of folds, in the order of time, and their runs."""
-    place, found = np.argsort(order), []
-    for known in problem.mask.T:
-        rows = np.flatnonzero(known)
-        steps = np.diff(rows)
-        usual = float(np.median(steps)) if len(steps) else 1.0
-        apart = (np.diff(problem.recording.run[rows]) != 0) | (steps > LONGEST_BRIDGE * usual)
-        starts = np.concatenate(([0], 1 + np.flatnonzero(apart), [len(rows)]))
-        found.append((place[rows], tuple(slice(int(a), int(b)) for a, b in pairwise(starts) if b > a)))
-    return tuple(found)
+    place = np.argsort(order)
+    return tuple((place[rows], runs) for rows, runs in problem.courses)
 
 
 def _arranged(problem: Problem, order: Index, columns: Sequence[Array]) -> Single:

@@ -70,6 +70,15 @@ def test_a_transition_between_those_that_are_tried_is_refined(between: float) ->
     assert float(found["transition_rad_s"]) == pytest.approx(between * FASTEST, rel=0.15)
 
 
+def test_noise_with_a_memory_does_not_hide_a_transition() -> None:
+    """A slow wander of the reading holds far more power than the few readings of each reversal."""
+    columns = with_friction(0.03 * FASTEST, noise=0.02)
+    of_axes = np.random.default_rng(3).normal(0, 0.02, (len(columns["reading_V"]) // 2, 2))
+    wander = np.cumsum(of_axes, axis=0).ravel()
+    found = transition_of(problem_of({**columns, "reading_V": columns["reading_V"] + wander}))
+    assert float(found["transition_rad_s"]) == pytest.approx(0.03 * FASTEST, rel=0.15)
+
+
 def test_every_law_that_reverses_has_it_in_its_shape() -> None:
     """So that a corrected simulation gives the same on another recording, whatever that one shows."""
     problem = problem_of(with_friction(TRANSITIONS[-1] * FASTEST))
