@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.regression.equations import free_parameter_equations, smooth_equations
 from regolithd.calibration.mismatch.selection.noise_estimation import fit_of_significant_terms
 
@@ -71,6 +72,17 @@ def bent(problem: Problem, values: Mapping[str, float]) -> bool:
     if not np.isfinite(apart).all():
         return False
     return float(np.mean(apart**2)) > problem.thresholds.linearisation_share**2 * float(np.mean(residual**2))
+
+
+def late_otherwise(problem: Problem, values: Mapping[str, float]) -> bool:
+    """Return whether a late channel changes by more, or less, than at the problem's values: its size would be wrong."""
+    if problem.late is None:
+        return False
+    here, there = problem.filled, problem.changed(**values)
+    shown = as_shown(problem, [here, there])
+    now, then = ((late - at)[problem.mask] for late, at in zip(shown, (here, there), strict=True))
+    share = problem.thresholds.size_discrepancy_std
+    return float(np.mean((then - now) ** 2)) > share**2 * float(np.mean(now**2))
 
 
 def shifts_to_values(problem: Problem, shifts: Mapping[str, float]) -> dict[str, float]:

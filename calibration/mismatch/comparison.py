@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from regolithd.calibration.mismatch.calibration import bent, linearised_where_it_fits, moved_values
+from regolithd.calibration.mismatch.calibration import bent, late_otherwise, linearised_where_it_fits, moved_values
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, with_changes
 from regolithd.calibration.mismatch.corrected import write_corrected
@@ -42,6 +42,10 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.selection.decision import Decision
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
+
+
+LATE_SEARCHES = 2
+"""Searches beside a late channel, at most (a choice: parameters that move far as the delay is found move once)."""
 
 
 @dataclass(frozen=True)
@@ -207,21 +211,29 @@ def _search(
     pose: Callable[[Mapping[str, float] | None], Problem],
     progress: Callable[[str], None],
 ) -> _Search:
-    """Search, and once more where what was found moves the parameters far, or makes all else late with the channel."""
+    """Search, and once more where what was found moves the parameters far, or makes all else late with the channel.
+
+    What a delay changes depends on the prediction, so that the simulation is linearised anew beside it, too.
+    """
     equations = linearised_where_it_fits(pose)
     problem = equations.problem
     candidates = with_changes(problem, candidates, stated)
     found = _search_at(equations, candidates, progress)
     values = moved_values(found.decision.equations, found.decision.whole)
-    if bent(problem, values):
+    if found.decision.late is None and bent(problem, values):
         del found, equations  # memory holds the matrix of one search at a time, and TMPDIR its columns
-        problem = pose(values)
-        found = _search_at(smooth_equations(problem), candidates, progress)
-    late = found.decision.late
-    if late is None or late == problem.late:
-        return found
-    again = _search_at(smooth_equations(replace(problem, late=late)), candidates, progress)
-    return again if again.decision.late else found
+        found = _search_at(smooth_equations(pose(values)), candidates, progress)
+        values = moved_values(found.decision.equations, found.decision.whole)
+    for _ in range(LATE_SEARCHES):
+        late = found.decision.late
+        if late is None or (problem.late and not late_otherwise(problem, values)):
+            break
+        problem = replace(pose(values), late=late)
+        again = _search_at(smooth_equations(problem), candidates, progress)
+        if again.decision.late is None:
+            break
+        found, values = again, moved_values(again.decision.equations, again.decision.whole)
+    return found
 
 
 def _search_at(equations: NormalEquations, candidates: Sequence[Candidate], progress: Callable[[str], None]) -> _Search:

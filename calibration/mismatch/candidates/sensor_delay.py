@@ -126,9 +126,9 @@ class SensorDelay(Candidate):
         at = float(shape[name])
         return max(bounds[0], at / RATIO_OF_CHANNEL), min(bounds[1], at * RATIO_OF_CHANNEL)
 
-    def parameters(self, shape: Shape, values: Sequence[float]) -> dict[str, float]:  # noqa: ARG002
-        """Return the delay."""
-        return {"delay_s": float(values[0])}
+    def parameters(self, shape: Shape, values: Sequence[float]) -> dict[str, float]:
+        """Return the delay: of the predicted channel that of the shape, since its coefficient has the share passed."""
+        return {"delay_s": next((float(shape[kind]) for kind in OF_CHANNEL if kind in shape), float(values[0]))}
 
     def plausible(self, problem: Problem, shape: Shape, values: Sequence[float]) -> bool:
         """Return whether the delay is more than sampling itself leaves open, and about that of its shape.

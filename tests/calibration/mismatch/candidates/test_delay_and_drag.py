@@ -71,6 +71,24 @@ def test_a_late_current_is_named_with_its_delay(delay_s: float) -> None:
     assert found.effects[0].parameters["delay_s"].value == pytest.approx(delay_s, abs=STEP_S)
 
 
+class RoughlyStated(Axis):
+    """The same joint, whose parameters are known to a quarter, and stated a quarter too small."""
+
+    parameters: ClassVar = {"inertia": Prior(0.375, 0.125, "A s²/rad"), "drag": Prior(0.15, 0.05, "A s/rad")}
+
+
+def test_what_a_delay_changes_is_told_of_the_calibrated_simulation() -> None:
+    """Its size is that of the simulation as it fits, and a delay of fifteen readings is known to a fraction of one."""
+    late = swinging(1, delay_s=0.3)
+    (effect,) = compare(late, RoughlyStated()).answer.effects
+    delay, size = effect.parameters["delay_s"], effect.parameters["relative_size"]
+    on_time, current = swinging(1).channels["motor_current_A"], late.channels["motor_current_A"]
+    true = np.sqrt(np.mean((shifted(late, on_time, -0.3) - on_time) ** 2)) / np.mean(np.abs(current))
+    assert size.value == pytest.approx(true, rel=0.05)
+    assert delay.low < 0.3 < delay.high
+    assert delay.high - delay.low < STEP_S
+
+
 def late_with_friction(seed: int) -> Recording:
     """Return a joint with friction, of which the current is late by a quarter of a second."""
     return swinging(seed, delay_s=0.25, coulomb=0.3)
