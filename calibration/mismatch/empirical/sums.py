@@ -144,7 +144,7 @@ def profile(sums: CovariateSums, folds: Sequence[int] | None = None) -> Profile:
 
     normal = weigh(sums.gram) + np.diag(sums.precision)
     # Columns that are zero on these folds have no coefficient.
-    normal[np.diag_indices_from(normal)] += 1e-9 * np.maximum(np.diag(normal), 1e-300)
+    normal[np.diag_indices_from(normal)] += np.where(np.diag(normal) > 0, 1e-9 * np.diag(normal), 1.0)
     against = weigh(sums.column_moment) + sums.precision * sums.centre
     cross, power, moment = weigh(sums.cross), weigh(sums.power), weigh(sums.moment)
     solved = np.linalg.solve(normal, np.column_stack((cross.T, against)))

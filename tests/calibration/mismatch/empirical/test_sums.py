@@ -59,3 +59,16 @@ def test_without_a_curve_the_held_out_squares_are_those_of_the_readings(equation
         expected = squares_of_readings(train.design, train.fit(named.terms), fold)
         found = squares_on_fold(sums, fold, nothing, profile(sums, sums.other_folds(fold)).others(nothing))
         assert found == pytest.approx(expected, rel=1e-5)  # both are sums in single precision
+
+
+def test_a_column_that_is_zero_on_a_curve_s_wheels_has_no_coefficient(equations: NormalEquations) -> None:
+    """A ripple of one wheel has columns for the others too: beside a curve they were a division by next to nothing."""
+    named = equations.fit([term_of(equations, "drag"), term_of(equations, "offset")])
+    curve = best_of_each_smooth_term(equations, named.terms)[0][1]
+    sums = sums_of(equations, named, curve)
+    for values in (sums.cross, sums.gram, sums.column_moment):
+        values[..., -1] = 0.0
+    sums.gram[..., -1, :] = 0.0
+    of = profile(sums)
+    assert np.isfinite(of.matrix).all()
+    assert of.others(np.zeros(len(sums.at)))[-1] == 0.0
