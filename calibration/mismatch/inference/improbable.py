@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.inference.alternatives import alternatives
+from regolithd.calibration.mismatch.inference.intermittent import unexplained_if_intermittent
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, probability
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.decision import names_of
@@ -43,7 +44,8 @@ def unexplained_if_improbable(decision: Decision) -> Decision:
 def without_improbable_curves(decision: Decision) -> Decision:
     """Return the decision without its curves, where the answer without them is more probable than all others together.
 
-    What stands for another finding, or comes and goes, is not decided by evidence, and stays.
+    What stands for another finding, or comes and goes, is not decided by evidence, and stays. Where a curve goes, the
+    readings that it stood for are asked for what comes and goes.
     """
     if not decision.unnamed or decision.intermittent or not decided_by_evidence(decision):
         return decision
@@ -52,7 +54,7 @@ def without_improbable_curves(decision: Decision) -> Decision:
     if probability(others, decision.equations.thresholds) >= EVEN or frozenset(others[0].effects) != without:
         return decision
     refused = decision.refused | {names_of(decision)}
-    return replace(decision, unnamed=(), whole=decision.named, refused=refused)
+    return unexplained_if_intermittent(replace(decision, unnamed=(), whole=decision.named, refused=refused))
 
 
 def _curve_like(decision: Decision, other: Alternative) -> Term | None:

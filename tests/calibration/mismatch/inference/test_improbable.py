@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from linear_machine import CANDIDATES, equations_of, problem_of, table
+import numpy as np
+from linear_machine import AXES, CANDIDATES, INSTANTS, equations_of, problem_of, table
 
 from regolithd.calibration.mismatch.inference import improbable
 from regolithd.calibration.mismatch.inference.alternatives import alternatives
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     import pytest
 
 
-def decided(drag: float) -> Decision:
+def decided(drag: float | np.ndarray) -> Decision:
     """Return what is decided of a recording with a drag of this size."""
     equations = equations_of(problem_of(table(drag=drag)))
     return decide(equations.over(with_smooth_terms(equations.design)), CANDIDATES)
@@ -75,3 +76,18 @@ def test_a_curve_that_is_less_probable_than_nothing_is_none(monkeypatch: pytest.
     assert not found.unnamed
     assert not found.whole.terms
     assert all(other.effects != ("unexplained",) for other in alternatives(found))
+
+
+def test_spells_that_an_improbable_curve_stood_for_are_unexplained(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three spells of a drag happen to be at some speeds: a curve over the speed goes, and they stay."""
+    spells = np.zeros((INSTANTS, AXES))
+    for begin in (120, 390, 610):
+        spells[begin : begin + 20, 0] = 0.5
+    decision = without_names(decided(spells))
+    equations = decision.equations
+    over_speed = [group for group in equations.design.groups if group.name == "wheel_speed" and not group.named]
+    curve = next(term for _, term in equations.further((), over_speed) if term.wheels == (0,))
+    monkeypatch.setattr(improbable, "decided_by_evidence", lambda _: True)
+    found = without_improbable_curves(replace(decision, unnamed=(curve,), whole=equations.fit((curve,))))
+    assert [(term.name, term.wheels) for term in found.unnamed] == [("time", (0,))]
+    assert len(found.intermittent) == 1
