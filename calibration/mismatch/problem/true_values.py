@@ -24,9 +24,10 @@ MOST_FITTED = 16
 """Windows (of 256 instants each) in which the models are fitted and compared: longer recordings cost no more."""
 LEAST_VARIANCE = 1e-4
 """The truth's variance in error variances, below which it is a constant: there is nothing to be told of its density."""
-LEAST_ERROR = 0.05
-"""Error in standard deviations of the truth below which it biases a coefficient by less than a quarter of a percent: a
-density is not worth what it would add where the error is not quite as stated, such as one with a memory."""
+LEAST_ERROR = 0.001
+"""Error in standard deviations of the truth below which no density is asked for (a choice). An error of a twentieth
+biases a coefficient by a quarter of a percent, but where a column rests at a level for most of the time, its readings
+there are nothing but error, and all that is left of a residual follows them."""
 LEAST_POSTERIOR = 1e-6
 """A posterior's variance in error variances is at least this, that of a million readings: less is rounding."""
 

@@ -94,16 +94,16 @@ class JumpChain:
             draws = np.sum([chain.draws(part) for part in windows.parts()], axis=0)
             persistence = float(np.clip(1 - draws.sum() / len(windows.rows), 0.0, GREATEST_PERSISTENCE))
             weight = draws + WEIGHT_BEFORE * density.weight
-            density = MixingDensity(density.at, weight / weight.sum())
+            density = MixingDensity(density.at, weight / weight.sum(), density.spread)
         return JumpChain(density.without_negligible(), persistence, self.deviation)
 
     def posterior(self, windows: Windows) -> tuple[Array, Array]:
         """Return mean and variance of the truth at the windows' rows, given the readings."""
-        powers = np.stack((self.density.at, self.density.at**2), axis=1)
         parts = []
         for part in windows.parts():
             filtered, chance = self._recursions(part)
-            moments = np.matmul(np.multiply(filtered, chance, out=chance), powers)
+            chance = np.multiply(filtered, chance, out=chance)
+            moments = np.einsum("twv,ktwv->twk", chance, self._moments(part.readings))
             parts.append(moments.transpose(1, 0, 2)[part.used.T])
         mean, square = np.concatenate(parts).T
         return mean, np.maximum(square - mean**2, 0.0)
@@ -143,8 +143,16 @@ class JumpChain:
                 factor[windows.begins[t]] = 1.0
         return filtered, after
 
+    def _moments(self, readings: Array) -> Array:
+        """Return the truth's mean and mean square at each value, given its reading, (2, instant, window, value)."""
+        at, spread = self.density.at, self.density.spread
+        known = np.isfinite(readings)[..., None]
+        share = np.where(known, spread / (spread + self.deviation**2), 0.0)
+        mean = at + share * (np.nan_to_num(readings)[..., None] - at)
+        return np.stack((mean, mean**2 + (1 - share) * spread))
+
     def _likelihood(self, readings: Array) -> Array:
         """Return each value's likelihood, shape (instant, window, value), in proportion; 1 where nothing is known."""
         known = np.isfinite(readings)[..., None]
-        apart = (np.nan_to_num(readings)[..., None] - self.density.at) / self.deviation
-        return np.where(known, cut_off(-0.5 * apart**2), 1.0)
+        apart, total = np.nan_to_num(readings)[..., None] - self.density.at, self.deviation**2 + self.density.spread
+        return np.where(known, cut_off(-0.5 * (apart**2 / total + np.log(total))), 1.0)

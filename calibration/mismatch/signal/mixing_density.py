@@ -27,6 +27,8 @@ FINEST_SHARE = 1 / 4000
 """Narrowest bin as a share of the readings' range: a far outlier must not make millions of them."""
 ROUNDS = 60
 """Rounds of expectation and maximisation (a choice): more of them sharpen atoms that the readings hardly show."""
+LEAST_TOLD = 1e-9
+"""What readings say beside a prior, as a share of what both say, at least: less is rounding."""
 LEAST_WEIGHT = 1e-12
 """Weight of a value that the readings rule out."""
 NEGLIGIBLE_WEIGHT = 1e-5
@@ -45,10 +47,12 @@ class MixingDensity:
     ----------
     at: the values, ascending, shape (value,)
     weight: their shares, above 0, which sum to 1, shape (value,)
+    spread: variance of the truth about each value, 0 of a value on the fine grid, shape (value,)
     """
 
     at: Array
     weight: Array
+    spread: Array
 
     @property
     def effective_count(self) -> float:
@@ -58,41 +62,65 @@ class MixingDensity:
     def without_negligible(self) -> MixingDensity:
         """Return the values that have a weight worth computing."""
         held = self.weight > NEGLIGIBLE_WEIGHT
-        return MixingDensity(self.at[held], self.weight[held] / self.weight[held].sum())
+        return MixingDensity(self.at[held], self.weight[held] / self.weight[held].sum(), self.spread[held])
 
     def reweighted(self, mean: Array, variance: Array, prior_mean: float, prior_variance: float) -> tuple[Array, Array]:
         """Return mean and variance of normal posteriors, shape (time,), whose normal prior density is exchanged.
 
         A posterior in proportion to likelihood times normal prior becomes one to likelihood times this density.
         """
-        given = np.log(self.weight) + 0.5 * (self.at - prior_mean) ** 2 / prior_variance
-        powers = np.stack((self.at, self.at**2))
+        given = np.log(self.weight)
         moments = np.empty((2, len(mean)))
         for first in range(0, len(mean), AT_ONCE):
             some = slice(first, first + AT_ONCE)
-            # −(mean − at)² / 2 variance, but for what is the same for all values
-            factors = np.stack((mean[some], np.full(mean[some].shape, -0.5)), axis=1) / variance[some, None]
-            chance = cut_off(given + factors @ powers)
-            moments[:, some] = powers @ chance.T / chance.sum(axis=1)
+            # What the readings say without the prior: a normal likelihood again.
+            precision = np.maximum(1 / variance[some] - 1 / prior_variance, LEAST_TOLD / variance[some])[:, None]
+            told = (mean[some] / variance[some] - prior_mean / prior_variance)[:, None] / precision
+            apart = told - self.at
+            total = 1 / precision + self.spread
+            chance = cut_off(given - 0.5 * (apart**2 / total + np.log(total)))
+            shrunk = self.at + self.spread / total * apart
+            square = shrunk**2 + self.spread / total / precision
+            moments[:, some] = np.einsum("tv,ktv->kt", chance, np.stack((shrunk, square))) / chance.sum(axis=1)
         return moments[0], np.maximum(moments[1] - moments[0] ** 2, 0.0)
 
 
 def mixing_density(readings: Array, deviation: float) -> MixingDensity:
     """Return the density of the true values behind finite readings (n,) with normal errors of this deviation."""
-    at, count = _occupied(readings, GRID_STEP * deviation, MOST_VALUES)
+    at, count, spread = _cells(readings, GRID_STEP * deviation)
     bins, in_bin = _occupied(readings, BIN_STEP * deviation, MOST_BINS)
-    likelihood = cut_off(-0.5 * ((bins[:, None] - at) / deviation) ** 2)
+    total = deviation**2 + spread
+    likelihood = cut_off(-0.5 * ((bins[:, None] - at) ** 2 / total + np.log(total)))
     weight, share = count / count.sum(), in_bin / in_bin.sum()
     for _ in range(ROUNDS):
         weight = weight * ((share / (likelihood @ weight)) @ likelihood)
     weight = np.maximum(weight, LEAST_WEIGHT)
-    return MixingDensity(at, weight / weight.sum())
+    return MixingDensity(at, weight / weight.sum(), spread)
 
 
 def cut_off(exponent: Array) -> Array:
     """Return exponentials in proportion along the last axis, the greatest 1, none of them negligible."""
     beside = exponent - exponent.max(axis=-1, keepdims=True)
     return np.exp(np.maximum(beside, NEGLIGIBLE_EXPONENT, out=beside), out=beside)
+
+
+def _cells(readings: Array, step: float) -> tuple[Array, Array, Array]:
+    """Return means, counts and the truth's variance of cells of readings: of the grid, or wider where few are read.
+
+    Over a range of a thousand errors most of the grid's steps have a reading or none, and an atom has hundreds. It
+    keeps the fine steps, and what lies between is any value of a wider cell.
+    """
+    place = ((readings - float(readings.min())) / step).astype(np.int64)
+    places, of_place = np.unique(place, return_inverse=True)
+    count, total = np.bincount(of_place).astype(np.float64), np.bincount(of_place, readings)
+    if len(places) <= MOST_VALUES:
+        return total / count, count, np.zeros(len(places))
+    # A cell ends where the count passes a multiple of a cell's share: it has about that share, or is one step.
+    cell = np.unique((np.cumsum(count) - 0.5 * count) // (count.sum() / MOST_VALUES), return_inverse=True)[1]
+    first, last = np.flatnonzero(np.diff(cell, prepend=-1)), np.flatnonzero(np.diff(cell, append=cell[-1] + 1))
+    width = (places[last] - places[first]) * step
+    members = np.bincount(cell, count)
+    return np.bincount(cell, total) / members, members, width**2 / 12
 
 
 def _occupied(readings: Array, step: float, most: int) -> tuple[Array, Array]:

@@ -47,3 +47,16 @@ def test_a_sensor_that_rests_at_zero_stays_there() -> None:
     resting = np.arange(1200) % 400 >= 300
     assert not found[resting].any()
     assert found[~resting].all()
+
+
+def test_a_force_that_is_mostly_none_is_none_there() -> None:
+    """A press pushes with up to 400 errors of its load cell, and reads its error alone while it rests."""
+    random = np.random.default_rng(5)
+    truth = np.zeros(6000)
+    for begin in range(200, 6000, 400):
+        truth[begin : begin + 100] = random.uniform(20, 120) * np.sin(np.pi * np.arange(100) / 100)
+    columns = {"t_s": 0.1 * np.arange(6000.0), "force_kN": truth + random.normal(0, 0.3, 6000)}
+    expected = expected_inputs(from_columns(columns), {"force_kN": SensorError(0.0, 0.3)}).channels["force_kN"][:, 0]
+    at_rest = truth == 0
+    assert np.sqrt(np.mean((expected - truth)[at_rest] ** 2)) < 0.1
+    assert np.sqrt(np.mean((expected - truth)[~at_rest] ** 2)) < 0.35

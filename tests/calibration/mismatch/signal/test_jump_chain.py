@@ -13,7 +13,7 @@ from regolithd.calibration.mismatch.signal.mixing_density import MixingDensity, 
 
 Array = NDArray[np.float64]
 ANY = 1000
-CHAIN = JumpChain(MixingDensity(np.array([-1.0, 0.0, 2.0]), np.array([0.2, 0.5, 0.3])), 0.7, 0.8)
+CHAIN = JumpChain(MixingDensity(np.array([-1.0, 0.0, 2.0]), np.array([0.2, 0.5, 0.3]), np.zeros(3)), 0.7, 0.8)
 
 
 def by_paths(readings: Array, starts: tuple[int, ...]) -> tuple[Array, Array]:
