@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.problem.compared import blanks_of, isolated_outliers, left_out
@@ -20,6 +22,11 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.predictor import Predictor
+
+Array = NDArray[np.float64]
+
+SAME = 1e-9
+"""One less the correlation of two columns, up to which they are one, in whatever unit: their digits."""
 
 
 def build_problem(
@@ -49,6 +56,8 @@ def build_problem(
     outliers = isolated_outliers(residual, recording.run, thresholds)
     as_read = None if run.as_read is prepared else complete_inputs(run.as_read)
     found, constants = covariates_of(prepared, simulation, complete_inputs(prepared), prediction, as_read)
+    found, notes = without_the_reading_itself(found, measured, simulation.channel)
+    prepared = replace(prepared, notes=(*prepared.notes, *notes))
     covariates, blanks = blanks_of(found, simulation.undefined_at_times, compared, thresholds)
     mask = compared & ~outliers
     for blank in blanks.values():
@@ -75,3 +84,29 @@ def build_problem(
         left_out=left_out(simulation.channel, measured, run, outliers, blanks, labels),
         thresholds=thresholds,
     )
+
+
+def without_the_reading_itself(
+    covariates: Mapping[str, Array], measured: Array, channel: str
+) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """Return the covariates (time, wheel) but those that are the predicted column's own reading, and a note of each.
+
+    A curve over a reading explains the noise of that reading.
+    """
+    own = [name for name, values in covariates.items() if _is_reading_of(values, measured)]
+    notes = tuple(
+        f"{name} is the reading of {channel} itself, whose noise it would explain; it is left out. Return what the "
+        f"simulation predicts for it from `covariates`, or another sensor's reading."
+        for name in own
+    )
+    return {name: values for name, values in covariates.items() if name not in own}, notes
+
+
+def _is_reading_of(values: Array, measured: Array) -> bool:
+    """Return whether two columns (time, wheel) are the same but for a unit."""
+    known = np.isfinite(values) & np.isfinite(measured)
+    if values.shape != measured.shape or known.sum() < 3:
+        return False
+    one, other = (each[known] - each[known].mean() for each in (values, measured))
+    size = float(np.sqrt((one @ one) * (other @ other)))
+    return size > 0 and abs(float(one @ other)) > (1 - SAME) * size

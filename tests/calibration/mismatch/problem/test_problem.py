@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -13,6 +14,11 @@ from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.prior import own_name
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
 from regolithd.calibration.mismatch.thresholds import Thresholds
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+Array = np.ndarray
 
 
 def test_prediction_and_covariates_have_the_recording_s_shape() -> None:
@@ -151,3 +157,17 @@ def test_a_stated_effect_is_added_unless_the_simulation_has_it() -> None:
     inside = StatedEffect("slope", (1,), 3 * column, 0.1, in_simulation=True)
     np.testing.assert_array_equal(replace(problem, stated=(outside, inside, outside)).added, 2 * column)
     assert not problem.added.any()
+
+
+@pytest.mark.parametrize("per_V", [1.0, -1000.0])
+def test_a_covariate_is_not_the_reading_that_is_predicted(per_V: float) -> None:
+    """In whatever unit: a curve over it would explain the noise of each reading. A note says what to return instead."""
+
+    class OwnReading(Level):
+        def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+            return {**super().covariates(inputs), "place": per_V * inputs["reading_V"]}
+
+    problem = build_problem(from_columns(table(), unit="axis"), OwnReading())
+    assert "place" not in problem.covariates
+    (note,) = problem.recording.notes
+    assert note.startswith("place is the reading of reading_V itself")
