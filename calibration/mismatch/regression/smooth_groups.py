@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.candidates.motion import along_motion, transition_of
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.regression.group import Group
 from regolithd.calibration.mismatch.signal.hat_basis import FEWEST_KNOTS, hat_functions
@@ -69,7 +70,7 @@ def couplings_of(problem: Problem) -> dict[str, Array]:
         "gain": problem.filled - (np.mean(problem.filled, axis=0) if problem.simulation.arbitrary_zero else 0.0),
     }
     if "direction" in problem.covariates:
-        found["drag"] = np.nan_to_num(problem.covariates["direction"])
+        found["drag"] = motion_of(problem)
     return found
 
 
@@ -82,8 +83,17 @@ def acting(problem: Problem, covariate: str, coupling: str) -> tuple[Array, Arra
     couplings = couplings_of(problem)
     if coupling in couplings:
         return values, couplings[coupling]
-    direction = np.nan_to_num(problem.covariates.get("direction", np.ones(values.shape)))
-    return values, direction * problem.contrasts(covariate)[coupling.removeprefix("drag, ")]
+    return values, motion_of(problem) * problem.contrasts(covariate)[coupling.removeprefix("drag, ")]
+
+
+def motion_of(problem: Problem) -> Array:
+    """Return by what a drag acts along the motion, shape (time, wheel): a step at standstill, or as friction reverses.
+
+    A law that turns round as the machine does would else have that alone to gain beside a curve. 1 without a direction.
+    """
+    if "direction" not in problem.covariates:
+        return np.ones(problem.mask.shape)
+    return along_motion(problem, transition_of(problem))
 
 
 def _ways_to_act(
@@ -92,9 +102,8 @@ def _ways_to_act(
     """Yield coupling, factor and sharing: on all or on one wheel, and oppositely on two parts of the machine."""
     for coupling, factor in couplings.items():
         yield coupling, factor, ("all", "one")
-    direction = np.nan_to_num(problem.covariates.get("direction", np.ones(problem.mask.shape)))
     for name, contrast in problem.contrasts(covariate).items():
-        yield f"drag, {name}", direction * contrast, ("all",)
+        yield f"drag, {name}", motion_of(problem) * contrast, ("all",)
 
 
 def _with_group(
@@ -129,7 +138,7 @@ def _differs_between_wheels_only(problem: Problem, values: Array) -> bool:
 def with_periodic_terms(design: DesignMatrix, residual: Array) -> DesignMatrix:
     """Add the strongest sine over time in a residual [time, wheel], acting as drag: of all wheels, and of each."""
     problem, limits = design.problem, design.problem.thresholds
-    along = np.nan_to_num(problem.covariates.get("direction", np.ones(problem.mask.shape)))
+    along = motion_of(problem)
     time_s, step_s = problem.time_s[:, 0], problem.recording.step_s
     lowest_Hz, highest_Hz = limits.fewest_periods / problem.length_s, 1 / (limits.shortest_period * step_s)
     if lowest_Hz >= highest_Hz:

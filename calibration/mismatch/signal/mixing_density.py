@@ -119,8 +119,8 @@ def _cells(readings: Array, step: float) -> tuple[Array, Array, Array]:
     cell = np.unique((np.cumsum(count) - 0.5 * count) // (count.sum() / MOST_VALUES), return_inverse=True)[1]
     first, last = np.flatnonzero(np.diff(cell, prepend=-1)), np.flatnonzero(np.diff(cell, append=cell[-1] + 1))
     width = (places[last] - places[first]) * step
-    members = np.bincount(cell, count)
-    return np.bincount(cell, total) / members, members, width**2 / 12
+    members, sums = (np.bincount(cell, each).astype(np.float64) for each in (count, total))
+    return sums / members, members, width**2 / 12
 
 
 def _occupied(readings: Array, step: float, most: int) -> tuple[Array, Array]:
