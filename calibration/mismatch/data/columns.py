@@ -86,7 +86,17 @@ def file_columns(path: Path, unit: str, rover: str | None = None, rows: tuple[in
     table = _table(path) if rows is None else _parquet_rows(path, *rows)
     if rover is not None:
         table = table.filter(_text(table, ROVER) == rover).drop_columns([ROVER])
-    return _columns(table, unit, _Source(f"{path}: ", "row" if path.suffix == ".parquet" else "line"))
+    found = _columns(table, unit, _Source(f"{path}: ", "row" if path.suffix == ".parquet" else "line"))
+    del table
+    return_memory()
+    return found
+
+
+def return_memory() -> None:
+    """Return to the system what Arrow keeps of the tables that it has read, for those that it may read next."""
+    import pyarrow as pa  # noqa: PLC0415
+
+    pa.default_memory_pool().release_unused()
 
 
 def rovers_in(path: Path) -> tuple[str, ...]:
@@ -97,10 +107,25 @@ def rovers_in(path: Path) -> tuple[str, ...]:
     RecordingError
         When the file cannot be read.
     """
-    if path.suffix != ".parquet" and ROVER.encode() not in _first_line_of(path):
-        return ()
-    table = _table(path)
-    return tuple(str(name) for name in np.unique(_text(table, ROVER)) if name) if ROVER in table.column_names else ()
+    if path.suffix == ".parquet":
+        names = _texts_in_parquet(path, ROVER)
+    elif ROVER.encode() in _first_line_of(path):
+        table = _csv_table(path)
+        names = set(_text(table, ROVER)) if ROVER in table.column_names else set()
+    else:
+        names = set()
+    return tuple(sorted(str(name) for name in names if name))
+
+
+def _texts_in_parquet(path: Path, name: str) -> set[str]:
+    """Return what a column holds, as text, with no more than a batch of it in memory; nothing without this column."""
+    import pyarrow.parquet  # noqa: PLC0415
+
+    with parquet_errors(path):
+        file = pyarrow.parquet.ParquetFile(path)
+        if name not in file.schema_arrow.names:
+            return set()
+        return {text for batch in file.iter_batches(ROWS_AT_ONCE, columns=[name]) for text in _text(batch, name)}
 
 
 def _first_line_of(path: Path) -> bytes:
@@ -180,6 +205,8 @@ def _parquet_rows(path: Path, first: int, last: int) -> Any:  # noqa: ANN401  # 
                 row += size
                 continue
             for batch in file.iter_batches(ROWS_AT_ONCE, row_groups=[group]):
+                if row >= last:
+                    break
                 begins, ends = max(first - row, 0), min(last - row, batch.num_rows)
                 found.append(batch.slice(begins, max(ends - begins, 0)))
                 row += batch.num_rows
@@ -257,7 +284,7 @@ def _columns(table: Any, unit: str, source: _Source) -> Columns:  # noqa: ANN401
     for number, name in enumerate(names):
         column = table.column(number)
         try:
-            values = _as_numbers(column)
+            values = as_numbers(column)
             if values is None and name == unit:
                 values = _as_names(column)
             cells = column.to_pylist() if values is None else []
@@ -283,7 +310,7 @@ def _names(table: Any, place: str) -> list[str]:  # noqa: ANN401
     return names
 
 
-def _as_numbers(column: Any) -> Column | None:  # noqa: ANN401
+def as_numbers(column: Any) -> Column | None:  # noqa: ANN401
     """Return a column of numbers, None where its type is something else."""
     import pyarrow as pa  # noqa: PLC0415
 

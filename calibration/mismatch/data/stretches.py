@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from regolithd.calibration.mismatch.data.columns import ROWS_AT_ONCE, parquet_errors
+from regolithd.calibration.mismatch.data.columns import ROWS_AT_ONCE, as_numbers, parquet_errors, return_memory
 from regolithd.calibration.mismatch.data.recording import RUN, TIME_UNITS_S
 
 if TYPE_CHECKING:
@@ -96,12 +96,14 @@ def _stretches(path: Path, rows: int, _changed_ns: int, _bytes: int) -> tuple[St
         row, elapsed_s = row + len(steps), float(since[-1]) if len(since) else elapsed_s
     if len(cuts) > 1 and total - cuts[-1][0] < length / 2:
         cuts.pop()
+    return_memory()
     ends = [*cuts[1:], (total, elapsed_s)]
     return tuple(Stretch(a, b, from_s, to_s) for (a, from_s), (b, to_s) in zip(cuts, ends, strict=True))
 
 
 def _steps(path: Path) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_]]]:
     """Yield the step of time [s] before each row, and whether a run begins with it; nothing where there is no time."""
+    import pyarrow as pa  # noqa: PLC0415
     import pyarrow.parquet  # noqa: PLC0415
 
     with parquet_errors(path):
@@ -110,11 +112,13 @@ def _steps(path: Path) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_]]
         names = [name for name in (clock, RUN) if name in file.schema_arrow.names]
         before: NDArray[np.float64] | None = None
         for batch in file.iter_batches(ROWS_AT_ONCE, columns=names) if clock else ():
-            now = np.stack([_numbers(batch.column(name)) for name in names], axis=1)
+            columns = pa.Table.from_batches([batch])
+            now = np.stack([_numbers(columns.column(name)) for name in names], axis=1)
             steps = np.diff(now, axis=0, prepend=now[:1] if before is None else before)
             before = now[-1:]
             yield steps[:, 0] * TIME_UNITS_S[str(clock)], np.any(steps[:, 1:] != 0, axis=1)
 
 
 def _numbers(column: Any) -> NDArray[np.float64]:  # noqa: ANN401  # pyarrow has no types
-    return np.asarray(column.to_numpy(zero_copy_only=False), np.float64)
+    values = as_numbers(column)
+    return np.asarray(column.to_numpy(), np.float64) if values is None else values

@@ -19,8 +19,9 @@ from regolithd.calibration.mismatch.fleet.choice.search import places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
 from regolithd.calibration.mismatch.fleet.told.findings import Chosen, Names, answer_of_fleet
-from regolithd.calibration.mismatch.fleet.work.found import Found, found_in, one_channel, without_columns
+from regolithd.calibration.mismatch.fleet.work.found import Found, found_in, one_channel
 from regolithd.calibration.mismatch.fleet.work.grid import GridGroup, grid_of
+from regolithd.calibration.mismatch.fleet.work.kept_columns import KeptColumns
 from regolithd.calibration.mismatch.fleet.work.sums import Laws, Sums, forms_of, sums_of
 from regolithd.calibration.mismatch.fleet.work.workers import ThisProcess, Workers
 from regolithd.calibration.mismatch.inference.several_channels import joined
@@ -178,24 +179,33 @@ class _Work:
     keys: list[str] = field(default_factory=list)
 
     def done(
-        self, step: str, members: Sequence[Member], task_of: Callable[[int], Callable[[], Result]], depends: str
+        self,
+        step: str,
+        members: Sequence[Member],
+        task_of: Callable[[int], Callable[[], Result]],
+        depends: str,
+        kept: Callable[[int, Result], Result] = lambda _, result: result,
     ) -> dict[int, Result]:
-        """Return what the step gives for each recording that it can be done for, by its number."""
+        """Return what the step gives for each recording that it can be done for, by its number.
+
+        Of each result, as it comes, `kept` returns what is held in memory.
+        """
         found: dict[int, Result] = {}
         keys = [self._key(step, member, depends) for member in members]
         self.keys += keys
         if self.store is not None:
-            stored = {number: self.store.read(key) for number, key in enumerate(keys) if members[number].digest}
-            found = {number: value for number, value in stored.items() if value is not None}
+            for number, key in enumerate(keys):
+                if members[number].digest and (value := self.store.read(key)) is not None:
+                    found[number] = kept(number, value)
         self.progress(step, len(found), len(members))
-        tasks = {number: partial(_tried, task_of(number)) for number in range(len(members)) if number not in found}
-        for number, result in self.workers.results(tasks):
+        left = [number for number in range(len(members)) if number not in found]
+        for number, result in self.workers.results(left, lambda number: partial(_tried, task_of(number))):
             if isinstance(result, str):
                 self.notes.append(f"{members[number].name} is left out: {result}")
                 continue
-            found[number] = result
             if self.store is not None and members[number].digest:
                 self.store.write(keys[number], result)
+            found[number] = kept(number, result)
             self.progress(step, len(found), len(members))
         if not found:
             raise MismatchError("; ".join(self.notes) or "there is no recording")
@@ -240,20 +250,25 @@ def _of_channel(
     work: _Work,
 ) -> Chosen:
     """Compare each recording, sum their products in a common grid, and choose the effects of the fleet."""
-    found = work.done("comparing", members, lambda n: partial(_find, members[n].read, load, channel), channel)
+    columns = KeptColumns()
+    found = work.done(
+        "comparing",
+        members,
+        lambda n: partial(_find, members[n].read, load, channel),
+        channel,
+        lambda n, result: columns.without(members[n].name, result),
+    )
     kept = sorted(found)
-    members, results = [members[n] for n in kept], [found.pop(n) for n in kept]
+    members, results = [members[n] for n in kept], [found[n] for n in kept]
     grid = grid_of(forms_of(simulation), results, 0)
     laws: Laws = tuple((group.candidate.name, group.shape) for group in grid)
     sums = work.done(
         "summing",
         members,
-        lambda n: partial(_sum, members[n].read, load, channel, laws, results[n]),
+        lambda n: partial(_sum, members[n].read, load, channel, laws, columns.restored(members[n].name, results[n])),
         json.dumps((channel, laws), sort_keys=True),
     )
     kept = sorted(sums)
-    # The columns of all recordings would be in memory together; their sums are all that is needed of them.
-    results = [without_columns(each) for each in results]
     names = _names([members[n] for n in kept])
     equations = _equations([sums[n] for n in kept], names, [members[n] for n in kept], grid, level)
     work.progress("searching", len(kept), len(kept))

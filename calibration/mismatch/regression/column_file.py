@@ -28,8 +28,42 @@ AT_ONCE_BYTES = 4 * 2**20
 """Bytes of columns that are in memory at once, at most (a choice: much longer pieces are no quicker)."""
 
 
+class TemporaryColumns:
+    """A temporary file of numbers in single precision; places in it are in bytes."""
+
+    def __init__(self) -> None:
+        self._file = tempfile.TemporaryFile(prefix="regolithd-", buffering=0)  # noqa: SIM115  # closed below
+        weakref.finalize(self, self._file.close)
+
+    def write(self, values: Single, offset: int) -> None:
+        """Write an array at a place.
+
+        Raises
+        ------
+        MismatchError
+            When the folder for temporary files is full.
+        """
+        left = np.ascontiguousarray(values, np.float32).reshape(-1).data.cast("B")
+        try:
+            while left:
+                written = os.pwrite(self._file.fileno(), left, offset)
+                left, offset = left[written:], offset + written
+        except OSError as error:
+            raise MismatchError(
+                f"columns of a comparison do not fit into {tempfile.gettempdir()} ({error.strerror}); "
+                "set TMPDIR to a folder with more room"
+            ) from error
+
+    def fill(self, values: Single, offset: int) -> None:
+        """Fill an array that is contiguous with what was written from a place on."""
+        left = values.reshape(-1).data.cast("B")
+        while left:
+            read = os.preadv(self._file.fileno(), [left], offset)
+            left, offset = left[read:], offset + read
+
+
 class ColumnFile:
-    """Columns of shape (wheel, time), which can be appended and read.
+    """Columns of one recording, of shape (wheel, time), which can be appended and read.
 
     Attributes
     ----------
@@ -41,8 +75,7 @@ class ColumnFile:
     def __init__(self, wheels: int, instants: int) -> None:
         self.shape, self.count = (wheels, instants), 0
         self.begins: Index = np.zeros(0, np.int64)
-        self._file = tempfile.TemporaryFile(prefix="regolithd-", buffering=0)  # noqa: SIM115  # closed below
-        weakref.finalize(self, self._file.close)
+        self._file = TemporaryColumns()
 
     @property
     def at_once(self) -> int:
@@ -61,17 +94,7 @@ class ColumnFile:
         MismatchError
             When the folder for temporary files is full.
         """
-        left = np.ascontiguousarray(columns, np.float32).reshape(-1).data.cast("B")
-        offset = self.count * self._column_bytes
-        try:
-            while left:
-                written = os.pwrite(self._file.fileno(), left, offset)
-                left, offset = left[written:], offset + written
-        except OSError as error:
-            raise MismatchError(
-                f"columns of a comparison do not fit into {tempfile.gettempdir()} ({error.strerror}); "
-                "set TMPDIR to a folder with more room"
-            ) from error
+        self._file.write(columns, self.count * self._column_bytes)
         self.count += len(columns)
         self.begins = np.concatenate((self.begins, begins))
 
@@ -79,19 +102,13 @@ class ColumnFile:
         """Return some columns, shape (column, wheel, time)."""
         found = np.empty((len(at), *self.shape), np.float32)
         for first, last in _adjacent(at):
-            self._fill(found[first:last], int(at[first]) * self._column_bytes)
+            self._file.fill(found[first:last], int(at[first]) * self._column_bytes)
         return found
 
     def read_part(self, found: Single, at: Sequence[int] | Index, wheel: int, first: int) -> None:
         """Fill an array (column, time) with some columns on a wheel, from a place in time on."""
         for row, column in zip(found, at, strict=True):
-            self._fill(row, int(column) * self._column_bytes + 4 * (wheel * self.shape[1] + first))
-
-    def _fill(self, values: Single, offset: int) -> None:
-        left = values.reshape(-1).data.cast("B")
-        while left:
-            read = os.preadv(self._file.fileno(), [left], offset)
-            left, offset = left[read:], offset + read
+            self._file.fill(row, int(column) * self._column_bytes + 4 * (wheel * self.shape[1] + first))
 
 
 def _adjacent(at: Sequence[int] | Index) -> Iterator[tuple[int, int]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -133,12 +133,6 @@ def _found_term(decision: Decision, term: Term) -> FoundTerm:
         penalty=equations.penalty(term),
         columns=columns,
     )
-
-
-def without_columns(found: Found) -> Found:
-    """Return what was found without the terms' columns, which are as long as the recording."""
-    terms = tuple(replace(term, columns=np.zeros((len(term.columns), 0, 0), np.float32)) for term in found.terms)
-    return replace(found, terms=terms)
 
 
 def shapes_in(problem: Problem, candidates: Sequence[Candidate]) -> dict[str, Shapes]:

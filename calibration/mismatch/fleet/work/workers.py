@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from collections import deque
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol, TypeVar
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 from regolithd.calibration.mismatch.errors import MismatchError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Callable, Iterator, Sequence
 
 Result = TypeVar("Result")
 
@@ -25,24 +26,33 @@ DASK_RETRIES = 3
 """Failures of one recording on a cluster before it is an error (a choice)."""
 CONNECT_S = "30s"
 """How long to wait for the scheduler (a choice)."""
+TASKS_EACH = 2
+"""Tasks that are made for each worker at a time (a choice: it does one, and the next awaits it)."""
 THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
 """One process for each core: threads of the linear algebra would only compete."""
 
 
 class Workers(Protocol):
-    """Calls tasks, and yields what each returns as it comes, with its number."""
+    """Calls tasks, and yields what each returns as it comes, with its number.
 
-    def results(self, tasks: Mapping[int, Callable[[], Result]]) -> Iterator[tuple[int, Result]]:
-        """Yield (number, result) in any order."""
+    A task is made when its turn comes, and is not kept: it may hold arrays as long as its recording.
+    """
+
+    def results(
+        self, numbers: Sequence[int], task_of: Callable[[int], Callable[[], Result]]
+    ) -> Iterator[tuple[int, Result]]:
+        """Yield (number, result) in any order; `task_of` makes the task of a number."""
 
 
 class ThisProcess:
     """One task after the other, here."""
 
-    def results(self, tasks: Mapping[int, Callable[[], Result]]) -> Iterator[tuple[int, Result]]:
-        """Yield in the order of the tasks."""
-        for number, task in tasks.items():
-            yield number, task()
+    def results(
+        self, numbers: Sequence[int], task_of: Callable[[int], Callable[[], Result]]
+    ) -> Iterator[tuple[int, Result]]:
+        """Yield in the order of the numbers."""
+        for number in numbers:
+            yield number, task_of(number)()
 
 
 class AllCores:
@@ -51,7 +61,9 @@ class AllCores:
     def __init__(self, processes: int | None = None) -> None:
         self._processes = processes or len(os.sched_getaffinity(0))
 
-    def results(self, tasks: Mapping[int, Callable[[], Result]]) -> Iterator[tuple[int, Result]]:
+    def results(
+        self, numbers: Sequence[int], task_of: Callable[[int], Callable[[], Result]]
+    ) -> Iterator[tuple[int, Result]]:
         """Yield as they come; where a process dies, what is left is done by new ones.
 
         Raises
@@ -59,12 +71,12 @@ class AllCores:
         MismatchError
             When processes keep dying.
         """
-        left = dict(tasks)
+        left = list(numbers)
         for _ in range(MOST_BROKEN_POOLS):
             try:
                 with _one_thread_each(), self._pool() as pool:
-                    for number, result in _submitted(pool, left):
-                        del left[number]
+                    for number, result in _submitted(pool, left, task_of, lambda: self._processes):
+                        left.remove(number)
                         yield number, result
             except BrokenProcessPool:
                 continue
@@ -93,19 +105,39 @@ class DaskCluster:
         except (OSError, ValueError) as error:
             raise MismatchError(f"no Dask scheduler answers at {scheduler}: {error}") from error
 
-    def results(self, tasks: Mapping[int, Callable[[], Result]]) -> Iterator[tuple[int, Result]]:
+    def results(
+        self, numbers: Sequence[int], task_of: Callable[[int], Callable[[], Result]]
+    ) -> Iterator[tuple[int, Result]]:
         """Yield as they come; the scheduler gives the work of a lost worker to another."""
         with self._client.get_executor(retries=DASK_RETRIES, pure=False) as pool:
-            yield from _submitted(pool, tasks)
+            yield from _submitted(pool, numbers, task_of, self._threads)
+
+    def _threads(self) -> int:
+        """Return how many tasks the cluster does at once now: workers come and go."""
+        return sum(self._client.nthreads().values())
 
 
-def _submitted(pool: Executor, tasks: Mapping[int, Callable[[], Result]]) -> Iterator[tuple[int, Result]]:
-    numbers = {pool.submit(task): number for number, task in tasks.items()}
+def _submitted(
+    pool: Executor,
+    numbers: Sequence[int],
+    task_of: Callable[[int], Callable[[], Result]],
+    workers: Callable[[], int],
+) -> Iterator[tuple[int, Result]]:
+    """Yield results as they come, with a few tasks for each worker in the pool at a time."""
+    left, running = deque(numbers), dict[Future[Result], int]()
     try:
-        for future in as_completed(numbers):
-            yield numbers.pop(future), future.result()
+        while left or running:
+            most = TASKS_EACH * max(workers(), 1)
+            while left and len(running) < most:
+                number = left.popleft()
+                running[pool.submit(task_of(number))] = number
+            done = wait(running, return_when=FIRST_COMPLETED).done
+            while done:
+                future = done.pop()
+                yield running.pop(future), future.result()
+                del future  # and with it the result, while others are waited for
     finally:
-        for future in numbers:
+        for future in running:
             future.cancel()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyarrow as pa
@@ -10,6 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from regolithd.calibration.mismatch.data import stretches
+from regolithd.calibration.mismatch.data.columns import rovers_in
 from regolithd.calibration.mismatch.data.recording import read_recording
 from regolithd.calibration.mismatch.data.stretches import Stretch, rows_in, stretches_of
 from regolithd.calibration.mismatch.errors import RecordingError
@@ -69,6 +70,28 @@ def test_a_run_begins_anew_and_the_time_goes_on(tmp_path: Path) -> None:
     found = stretches_of(written(tmp_path, table(t_s=time_s, run=runs)), 500)
     assert [each.from_s for each in found] == [0.0, pytest.approx(124.5, abs=1)]
     assert stretches_of(written(tmp_path, table(t_s=time_s)), 500) == ()
+
+
+def test_before_the_stretches_are_read_no_other_column_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Memory would hold the whole recording to see whose it is, and where it can be cut."""
+    read: list[list[str]] = []
+    iter_batches = pq.ParquetFile.iter_batches
+
+    def watched(file: Any, *args: Any, columns: list[str], **options: Any) -> Any:
+        read.append(columns)
+        return iter_batches(file, *args, columns=columns, **options)
+
+    def whole(*_: object) -> None:
+        raise AssertionError("the whole file is read")
+
+    monkeypatch.setattr(pq.ParquetFile, "iter_batches", watched)
+    monkeypatch.setattr(pq.ParquetFile, "read", whole)
+    path = written(tmp_path, table())
+    assert rovers_in(path) == ()
+    assert len(stretches_of(path, 500)) == 2
+    named = written(tmp_path, table(rover=np.repeat(["b", "", "a"], [INSTANTS, 300, 200])))
+    assert rovers_in(named) == ("a", "b")
+    assert read == [["t_s"], ["rover"]]
 
 
 def test_rows_wheel_by_wheel_have_no_stretches(tmp_path: Path) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import weakref
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import fleet_arm
 import pyarrow.parquet
@@ -15,15 +16,18 @@ from jsonschema import Draft202012Validator
 from regolithd.calibration.mismatch import MismatchError, compare
 from regolithd.calibration.mismatch.fleet.comparison import FleetComparison, Member, compare_fleet
 from regolithd.calibration.mismatch.fleet.told.answer import fleet_answer_schema
+from regolithd.calibration.mismatch.fleet.work.found import Found
 from regolithd.calibration.mismatch.fleet.work.store import Store
-from regolithd.calibration.mismatch.fleet.work.workers import DaskCluster
+from regolithd.calibration.mismatch.fleet.work.workers import DaskCluster, ThisProcess
 from regolithd.calibration.validation.fleet_study.__main__ import largest_difference
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from regolithd.calibration.mismatch.fleet.told.answer import FleetEffect
+
+Result = TypeVar("Result")
 
 DRIVES = 5
 NOTHING: list[Mapping[str, Any]] = [{}] * DRIVES
@@ -127,6 +131,35 @@ def test_a_comparison_continues_with_what_is_stored(
     assert largest_difference(fleet.to_json(), again.to_json()) < 1e-9
     # Each step is told once at its begin, and once for each recording that is computed.
     assert sum(1 for step, _, _ in steps if step in {"comparing", "summing"}) == 2 + 2
+
+
+class Watched(ThisProcess):
+    """Tasks one after the other; it counts the recordings of which columns are in memory when another is compared."""
+
+    def __init__(self) -> None:
+        self.alive: list[int] = []
+        self._columns: list[list[weakref.ref[Any]]] = []
+
+    def results(
+        self, numbers: Sequence[int], task_of: Callable[[int], Callable[[], Result]]
+    ) -> Iterator[tuple[int, Result]]:
+        """Yield in the order of the numbers."""
+        for number in numbers:
+            self.alive.append(sum(any(each() is not None for each in some) for some in self._columns))
+            result = task_of(number)()
+            if isinstance(result, Found):
+                self._columns.append([weakref.ref(term.columns) for term in result.terms])
+            yield number, result
+
+
+def test_memory_holds_the_columns_of_one_recording_at_a_time(tmp_path: Path) -> None:
+    """However many there are: each shows an effect, whose columns are as long as it."""
+    drives: list[Mapping[str, Any]] = [{"coulomb": (0.2, 0.2)}] * 4
+    watched = Watched()
+    compare_fleet(fleet_arm.season(tmp_path, {"a": drives}), fleet_arm.loader(tmp_path), workers=watched)
+    assert len(watched.alive) == 2 * len(drives)
+    assert max(watched.alive) == 1
+    assert watched.alive[len(drives) + 1 :] == [0] * (len(drives) - 1)
 
 
 def test_nothing_is_said_of_a_sound_rover(fleet: FleetComparison) -> None:

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 from regolithd.calibration.mismatch.errors import MismatchError
-from regolithd.calibration.mismatch.fleet.work.workers import AllCores, DaskCluster, ThisProcess
+from regolithd.calibration.mismatch.fleet.work.workers import TASKS_EACH, AllCores, DaskCluster, ThisProcess, Workers
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
 
@@ -31,21 +32,34 @@ def dies_first(marker: Path, number: int) -> int:
 
 def test_this_process_does_every_task() -> None:
     """Results come with the numbers of their tasks."""
-    assert dict(ThisProcess().results({n: partial(square, n) for n in range(3)})) == {0: 0, 1: 1, 2: 4}
+    assert dict(ThisProcess().results(range(3), lambda n: partial(square, n))) == {0: 0, 1: 1, 2: 4}
+
+
+@pytest.mark.parametrize(("workers", "ahead"), [(ThisProcess(), 1), (AllCores(2), 2 * TASKS_EACH)])
+def test_a_task_is_made_when_its_turn_comes(workers: Workers, ahead: int) -> None:
+    """Of many tasks, which may hold long arrays, only a few for each worker are there at a time."""
+    made: list[int] = []
+
+    def task_of(number: int) -> Callable[[], int]:
+        made.append(number)
+        return partial(square, number)
+
+    for done, _ in enumerate(workers.results(range(20), task_of)):
+        assert len(made) <= done + ahead
+    assert made == list(range(20))
 
 
 def test_a_process_that_dies_is_replaced(tmp_path: Path) -> None:
     """All results are there, each once."""
-    tasks = {n: partial(dies_first, tmp_path / "died", n) for n in range(4)}
-    results = list(AllCores(2).results(tasks))
-    assert sorted(results) == [(n, n * n) for n in range(4)]
+    results = list(AllCores(2).results(range(9), lambda n: partial(dies_first, tmp_path / "died", n)))
+    assert sorted(results) == [(n, n * n) for n in range(9)]
     assert (tmp_path / "died").exists()
 
 
 def test_processes_that_keep_dying_are_an_error(tmp_path: Path) -> None:
     """With how many recordings are left."""
     with pytest.raises(MismatchError, match="died 3 times, with 1 recordings left"):
-        list(AllCores(1).results({0: partial(die, tmp_path)}))
+        list(AllCores(1).results([0], lambda _: partial(die, tmp_path)))
 
 
 def die(_: Path) -> None:
