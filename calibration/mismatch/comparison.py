@@ -23,7 +23,6 @@ from regolithd.calibration.mismatch.inference.several_channels import merged_ans
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.equations import smooth_equations, with_library
-from regolithd.calibration.mismatch.report.notebook import notebook_html
 from regolithd.calibration.mismatch.selection.decision import decide
 from regolithd.calibration.mismatch.selection.regions import in_regions
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
@@ -73,6 +72,9 @@ class Comparison:
         write_corrected(path, self.answer, self.evidence, self.simulation, empirical=empirical)
 
     def _repr_html_(self) -> str:
+        # A notebook alone shows the report; the command line starts sooner without it.
+        from regolithd.calibration.mismatch.report.notebook import notebook_html  # noqa: PLC0415
+
         return notebook_html(self.answer, self.evidence)
 
 

@@ -22,7 +22,6 @@ from regolithd.calibration.mismatch.problem.prior import own_name
 from regolithd.calibration.mismatch.simulation.corrected_curves import TABLE, entry_of, stated_curves
 from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects as stated_effects  # noqa: PLC0414  # for its users
 from regolithd.calibration.mismatch.simulation.load import model_folder, read_tables
-from regolithd.calibration.toml_document import with_tables
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -66,6 +65,8 @@ def write_corrected(
     if path.resolve().parent != source.resolve().parent and tables["simulation"]["model"] != "rover-wheel":
         folder = model_folder(tables, source.resolve().parent)
         new["simulation"] = {**new["simulation"], "path": os.path.relpath(folder.resolve(), path.resolve().parent)}
+    from regolithd.calibration.toml_document import with_tables  # noqa: PLC0415  # most comparisons write no TOML
+
     path.write_text(with_tables(source.read_text(encoding="utf-8-sig"), new), encoding="utf-8")
 
 

@@ -8,7 +8,6 @@ from hashlib import sha256
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.errors import MismatchError
-from regolithd.calibration.mismatch.report.page import Provenance, write_report
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -49,6 +48,9 @@ def write_json(path: Path, answer: Answer) -> None:
 
 def write_page(path: Path, found: Comparison, recordings: Sequence[Path], simulation: Path) -> None:
     """Write the report, with names and SHA-256 of the files that it came from."""
+    # Most comparisons write no page.
+    from regolithd.calibration.mismatch.report.page import Provenance, write_report  # noqa: PLC0415
+
     digests = [sha256(file.read_bytes()).hexdigest() for file in (*recordings, simulation)]
     names = [recording.name for recording in recordings]
     command = f"regolithd mismatch {' '.join(names)} --simulation {simulation.name} --report {path.name}"

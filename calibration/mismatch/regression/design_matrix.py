@@ -249,9 +249,11 @@ def _readings(problem: Problem, order: Index) -> tuple[Readings, ...]:
 
 def _arranged(problem: Problem, order: Index, columns: Sequence[Array]) -> Single:
     """Return columns (time, wheel) as (column, wheel, time) in the order of folds, 0 outside the mask."""
-    found = np.empty((len(columns), problem.mask.shape[1], len(order)), np.float32)
+    wheels = problem.mask.shape[1]
+    found: Single = np.empty((len(columns), wheels, len(order)), np.float32)
+    in_time = order * wheels + np.arange(wheels)[:, None]
     for row, column in zip(found, columns, strict=True):
-        row[:] = np.where(problem.mask, column, 0.0).astype(np.float32)[order].T
+        row[:] = np.take(np.where(problem.mask, column, 0.0).astype(np.float32), in_time)
     return found
 
 

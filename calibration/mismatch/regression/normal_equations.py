@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.batch import Batch, Left
 from regolithd.calibration.mismatch.regression.group import Fit, Term
-from regolithd.calibration.mismatch.regression.penalties import penalty, visible_in_own_channel
+from regolithd.calibration.mismatch.regression.penalties import least_penalty, penalty, visible_in_own_channel
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
 
 if TYPE_CHECKING:
@@ -143,12 +143,13 @@ class NormalEquations:
     def largest_score(self, found: Iterable[tuple[float, Term]]) -> tuple[float, Term] | None:
         """Return the term with the largest Δχ² less penalty, of terms with their Δχ²; None where there is none.
 
-        No penalty is computed of what would not be the best without one; only its own channel's credit is negative.
+        No penalty is computed of what would not be the best with the least one; only its own channel's credit is
+        negative.
         """
         best: tuple[float, Term] | None = None
         for gain, term in sorted(found, key=lambda pair: -pair[0]):
             credit = 0.0 if term.group.own_channel is None else self.thresholds.largest_own_channel_credit
-            if best is None or gain + credit > best[0]:
+            if best is None or gain - least_penalty(term, self.thresholds) + credit > best[0]:
                 score = gain - self.penalty(term)
                 if best is None or score > best[0]:
                     best = score, term
@@ -180,12 +181,11 @@ class NormalEquations:
             of_sets, of_groups = np.nonzero(may_share[:, batch.which])
             asked = batch.gains(left, of_sets, of_groups, self.thresholds.least_tolerance)
             gains[of_sets, batch.which[of_groups]] = asked
-        found = [(float(gains[of, k]), Term(wanted[k], sets[of])) for of, k in zip(*np.nonzero(gains > 0), strict=True)]
-        return [
-            (gain * term.group.noise_reduction, term)
-            for gain, term in found
-            if visible_in_own_channel(term, self.thresholds)
-        ]
+        of_sets, of_groups = np.nonzero(gains > 0)
+        counted = gains * np.array([group.noise_reduction for group in wanted])
+        terms = [Term(wanted[k], sets[of]) for of, k in zip(of_sets.tolist(), of_groups.tolist(), strict=True)]
+        found = zip(counted[of_sets, of_groups].tolist(), terms, strict=True)
+        return [(gain, term) for gain, term in found if visible_in_own_channel(term, self.thresholds)]
 
     def _may_share(self, groups: Sequence[Group]) -> NDArray[np.bool_]:
         """Return which sets of wheels may share which groups, shape (set, group)."""

@@ -30,6 +30,13 @@ def full_penalty(term: Term, wheel_count: int, thresholds: Thresholds) -> float:
     return total
 
 
+def least_penalty(term: Term, thresholds: Thresholds) -> float:
+    """Return what the full penalty is at least, wherever the term is: quick to compute."""
+    group = term.group
+    count = len(group.columns) if group.acting is None else 0
+    return thresholds.coefficient_penalty * float(count) + group.selection_penalty
+
+
 def own_channel_credit(term: Term, thresholds: Thresholds) -> float:
     """Return the part of a fault's Δχ² in its own channel that counts in the predicted one: one cause for both."""
     if term.group.own_channel is None:

@@ -124,23 +124,26 @@ class JumpChain:
         likelihood = self._likelihood(windows.readings)
         filtered, after = np.empty(likelihood.shape), np.empty(likelihood.shape)
         weight, total = self.density.weight, np.empty(windows.readings.shape)
-        drawn, begun = (1 - self.persistence) * weight, [bool(each.any()) for each in windows.begins]
-        chance = np.broadcast_to(weight, likelihood.shape[1:])
-        for t, seen in enumerate(likelihood):
-            chance = drawn + self.persistence * chance
+        drawn, before = (1 - self.persistence) * weight, np.broadcast_to(weight, likelihood.shape[1:])
+        begun = np.logical_or.reduce(windows.begins, axis=1).tolist()
+        # The arrays are small, and the steps many: each is written where it stays, without arrays in between.
+        for t in range(len(likelihood)):
+            chance = np.multiply(before, self.persistence, out=filtered[t])
+            chance += drawn
             if begun[t]:
                 chance[windows.begins[t]] = weight
-            chance *= seen
-            total[t] = chance.sum(axis=1)
+            chance *= likelihood[t]
+            np.add.reduce(chance, axis=1, out=total[t])
             chance /= total[t][:, None]
-            filtered[t] = chance
-        factor = np.ones(likelihood.shape[1:])
-        for t in range(len(likelihood) - 1, -1, -1):
-            after[t] = factor
-            seen = likelihood[t] * (factor / total[t][:, None])
-            factor = self.persistence * seen + (seen @ drawn)[:, None]
+            before = chance
+        after[-1] = 1.0
+        for t in range(len(likelihood) - 1, 0, -1):
+            seen = after[t] / total[t][:, None]
+            seen *= likelihood[t]
+            np.multiply(seen, self.persistence, out=after[t - 1])
+            after[t - 1] += (seen @ drawn)[:, None]
             if begun[t]:
-                factor[windows.begins[t]] = 1.0
+                after[t - 1][windows.begins[t]] = 1.0
         return filtered, after
 
     def _moments(self, readings: Array) -> Array:

@@ -41,6 +41,12 @@ def test_a_covariate_is_called_as_the_simulation_says_or_as_the_column_that_it_i
     assert found == {"wheel_speed": "belt speed (m/s)", "load": "pull of the rope (kN)"}
 
 
+def test_a_column_that_differs_late_is_another_one() -> None:
+    """However long the beginning is that two columns have in common, blanks included."""
+    speed = np.append(np.full(5000, np.nan), 1.0)[:, None]
+    assert labels_of({}, {"speed": speed}, {"slow_m_s": 2 * speed, "belt_m_s": speed.copy()}) == {"speed": "belt (m/s)"}
+
+
 def test_the_prediction_as_a_covariate_is_called_so_or_as_the_simulation_calls_the_torque() -> None:
     """It is no column of its own."""
     size = np.full((3, 1), 48.0)

@@ -11,6 +11,7 @@ from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.regression.group import Group, Term
 from regolithd.calibration.mismatch.regression.penalties import (
     full_penalty,
+    least_penalty,
     own_channel_credit,
     penalty,
     visible_in_own_channel,
@@ -39,6 +40,16 @@ def test_columns_that_do_nothing_on_a_wheel_cost_nothing_there() -> None:
     group = replace(GROUP, acting=acting, sharing=("one",))
     first, second = (full_penalty(Term(group, (w,)), 2, THRESHOLDS) for w in (0, 1))
     assert first - second == pytest.approx(2)
+
+
+def test_the_least_penalty_is_not_more_than_any() -> None:
+    """On all wheels or on one, with columns that act on some of them or on all."""
+    acting = np.array([[True, False], [True, False], [False, True]])
+    for group in (GROUP, replace(GROUP, acting=acting), replace(GROUP, acting=acting, sharing=("one",))):
+        assert least_penalty(Term(group, (0,)), THRESHOLDS) >= group.selection_penalty
+        for wheels in ((0, 1), (0,), (1,)):
+            assert least_penalty(Term(group, wheels), THRESHOLDS) <= full_penalty(Term(group, wheels), 2, THRESHOLDS)
+    assert least_penalty(Term(GROUP, (0, 1)), THRESHOLDS) == full_penalty(Term(GROUP, (0, 1)), 2, THRESHOLDS)
 
 
 @pytest.mark.parametrize(("gain", "credit", "visible"), [(10.0, 5.0, False), (40.0, 20.0, True), (1e4, 300.0, True)])
