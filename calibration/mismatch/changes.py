@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Change, Contribution
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Candidate, Coefficient, Shape
-from regolithd.calibration.mismatch.candidates.motion import TRANSITION, transition_of
+from regolithd.calibration.mismatch.candidates.motion import REVERSAL_KEYS
+from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of, lateness
 from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw
 from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
@@ -98,13 +99,16 @@ class Stated:
         return self.candidate.self_consistent_shape(problem, shape, twice) != shape
 
     def shape(self, problem: Problem) -> Shape:
-        """Return the shape as corrected, with the transition of the direction that this recording shows, if it does.
+        """Return the shape as corrected, with the reversal of the friction that this recording shows, if it does.
 
         How gradually friction turns round is found once for a recording, for every law that reverses.
         """
-        here = {} if self.in_simulation else transition_of(problem)
-        reverses = here and any(TRANSITION in shape for shape in self.candidate.shapes(problem))
-        return {**self.contribution.shape, **(here if reverses else {})}
+        here = {} if self.in_simulation else reversal_of(problem)
+        reverses = here and any(not REVERSAL_KEYS.keys().isdisjoint(shape) for shape in self.candidate.shapes(problem))
+        as_corrected = self.contribution.shape
+        if not reverses:
+            return as_corrected
+        return {**{key: value for key, value in as_corrected.items() if key not in REVERSAL_KEYS}, **here}
 
     def _columns(self, problem: Problem, coefficients: Sequence[float]) -> Array:
         """Return the candidate's columns; what never varies in this recording, a level drive's pitch, counts too."""

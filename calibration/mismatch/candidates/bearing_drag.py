@@ -16,7 +16,8 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     onset_grid,
     onset_range,
 )
-from regolithd.calibration.mismatch.candidates.motion import TRANSITION_KEY, along_motion, transition_of
+from regolithd.calibration.mismatch.candidates.motion import REVERSAL_KEYS, along_motion
+from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -55,7 +56,7 @@ class BearingDrag(Candidate):
     forms = GROWTHS
     coefficients: ClassVar = (Coefficient("drag_current", "{unit}"),)
     sharing: ClassVar = ("one",)
-    shape_keys: ClassVar = {**GROWTH_KEYS, **TRANSITION_KEY}
+    shape_keys: ClassVar = {**GROWTH_KEYS, **REVERSAL_KEYS}
     free: ClassVar = {"onset_s": (0.0, float("inf"))}
 
     def form_of(self, shape: Shape) -> str:
@@ -68,11 +69,11 @@ class BearingDrag(Candidate):
         rises = (0.0, *(share * problem.length_s for share in RISES))
         rising: list[Shape] = [{"onset_s": t, "rise_s": rise} for t in at for rise in rises]
         wear: list[Shape] = [{"onset_s": t, **_wear(problem, p)} for t in at for p in (1.0, *POWERS)]
-        return [{**transition_of(problem), **shape} for shape in (*rising, *wear)]
+        return [{**reversal_of(problem), **shape} for shape in (*rising, *wear)]
 
     def onset_profiles(self, problem: Problem) -> Sequence[Shape]:
         """Add more powers of time than the search has: the onset's interval depends on how the drag grows after it."""
-        further = [{**transition_of(problem), **_wear(problem, power)} for power in FURTHER_POWERS]
+        further = [{**reversal_of(problem), **_wear(problem, power)} for power in FURTHER_POWERS]
         return [*super().onset_profiles(problem), *further]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:

@@ -14,7 +14,8 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     Shape,
 )
 from regolithd.calibration.mismatch.candidates.celsius import known_temperature_degC, temperature_degC
-from regolithd.calibration.mismatch.candidates.motion import TRANSITION_KEY, along_motion, transition_of
+from regolithd.calibration.mismatch.candidates.motion import REVERSAL_KEYS, along_motion
+from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -68,7 +69,7 @@ class ColdLubricantFriction(Candidate):
         "pole_degC": "T_p of Vogel's law, g = exp((T_r − T_p)/s ((T_r − T_p)/(T − T_p) − 1))",
         "scale_K": "s, the change of temperature for a factor e near T_r",
         "no_drag_above_degC": "T_e of the line, g = (T_e − T)/(T_e − T_r), 0 above T_e",
-        **TRANSITION_KEY,
+        **REVERSAL_KEYS,
     }
     free: ClassVar = {"power": POWERS, "scale_K": (STEEPEST_K, 80.0), "no_drag_above_degC": (-60.0, 80.0)}
 
@@ -85,7 +86,7 @@ class ColdLubricantFriction(Candidate):
         ends = np.unique(np.maximum([*np.nanquantile(temperature, END_QUANTILES), top], soonest)).tolist()
         found: list[Shape] = []
         for power in POWERS:
-            cold: Shape = {**transition_of(problem), "power": power, "reference_degC": _coldest(problem)}
+            cold: Shape = {**reversal_of(problem), "power": power, "reference_degC": _coldest(problem)}
             found += [{**cold, "pole_degC": pole, "scale_K": scale} for pole in POLES_DEGC for scale in SCALES_K]
             found += [{**cold, "no_drag_above_degC": end} for end in (*ends, top + BEYOND_K)]
         return found

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
-from regolithd.calibration.mismatch.candidates.motion import TRANSITION_KEY, along_motion, transition_of
+from regolithd.calibration.mismatch.candidates.motion import REVERSAL_KEYS, along_motion
+from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,11 +30,11 @@ class CoulombFriction(Candidate):
     label = "Coulomb friction"
     parameter_labels: ClassVar = {"coulomb_current": "Coulomb friction"}
     coefficients: ClassVar = (Coefficient("coulomb_current", "{unit}"),)
-    shape_keys: ClassVar = TRANSITION_KEY
+    shape_keys: ClassVar = REVERSAL_KEYS
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the one shape: a step at standstill, or the recording's transition."""
-        return [transition_of(problem)]
+        return [reversal_of(problem)]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return sign(ω)."""

@@ -14,7 +14,8 @@ from regolithd.calibration.mismatch.candidates.candidate import (
     Coefficient,
     Shape,
 )
-from regolithd.calibration.mismatch.candidates.motion import TRANSITION_KEY, along_motion, transition_of
+from regolithd.calibration.mismatch.candidates.motion import REVERSAL_KEYS, along_motion
+from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,7 +62,7 @@ class LoadDependentEfficiency(Candidate):
         "power": "p (0: a constant share)",
         "light": "l",
         "bent": "a of the linear efficiency",
-        **TRANSITION_KEY,
+        **REVERSAL_KEYS,
     }
     coefficients: ClassVar = (Coefficient("relative_loss", "1", 0),)
 
@@ -80,7 +81,7 @@ class LoadDependentEfficiency(Candidate):
         light: list[Shape] = [{"light": s} for s in LIGHT_LOADS]
         bent: list[Shape] = [{"bent": b} for b in SLOPES]
         reference = max(float(np.mean(np.abs(problem.filled[problem.mask]))), 1e-30)
-        return [{**transition_of(problem), **form, "reference_size": reference} for form in (*curved, *light, *bent)]
+        return [{**reversal_of(problem), **form, "reference_size": reference} for form in (*curved, *light, *bent)]
 
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
         """Return the linear efficiency with the fitted slope, as long as at least a third of the efficiency is left."""

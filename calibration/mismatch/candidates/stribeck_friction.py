@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
-from regolithd.calibration.mismatch.candidates.motion import TRANSITION, TRANSITION_KEY, along_motion, transition_of
+from regolithd.calibration.mismatch.candidates.motion import REVERSAL_KEYS, TRANSITION, along_motion
+from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -56,7 +57,7 @@ class StribeckFriction(Candidate):
     shape_keys: ClassVar = {
         "stribeck_speed_rad_s": "ω_s",
         "fades": "`exponent 1` (δ = 1, exponential), `exponent 2` (δ = 2, Gaussian) or `quotient`",
-        **TRANSITION_KEY,
+        **REVERSAL_KEYS,
     }
     free: ClassVar = {"stribeck_speed_rad_s": (0.0, np.inf)}
 
@@ -71,7 +72,7 @@ class StribeckFriction(Candidate):
         recording shows such a transition, both a step and the transition are tried. What decays before the friction
         has turned round is no Stribeck effect: it is a transition of another form.
         """
-        transition = transition_of(problem)
+        transition = reversal_of(problem)
         ways_to_turn: list[Shape] = [{}, transition] if transition else [{}]
         return [
             {**turn, "stribeck_speed_rad_s": float(speed), "fades": fades}

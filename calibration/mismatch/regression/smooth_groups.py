@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.motion import along_motion, transition_of
+from regolithd.calibration.mismatch.candidates.motion import along_motion
+from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.regression.group import Group
 from regolithd.calibration.mismatch.signal.hat_basis import FEWEST_KNOTS, hat_functions
@@ -93,7 +94,7 @@ def motion_of(problem: Problem) -> Array:
     """
     if "direction" not in problem.covariates:
         return np.ones(problem.mask.shape)
-    return along_motion(problem, transition_of(problem))
+    return along_motion(problem, reversal_of(problem))
 
 
 def _ways_to_act(

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from linear_machine import problem_of, table
+from linear_machine import AXES, STEP_S, problem_of, table
 
 from regolithd.calibration.mismatch.candidates.bearing_drag import BearingDrag
 from regolithd.calibration.mismatch.candidates.coulomb_friction import CoulombFriction
-from regolithd.calibration.mismatch.candidates.motion import TRANSITIONS, along_motion, transition_of
+from regolithd.calibration.mismatch.candidates.motion import along_motion
+from regolithd.calibration.mismatch.candidates.reversal import TRANSITIONS, reversal_of
 from regolithd.calibration.mismatch.candidates.stribeck_friction import StribeckFriction
 
 FASTEST = 2.0
@@ -25,7 +26,7 @@ def with_friction(transition_rad_s: float, noise: float = 0.05) -> dict[str, np.
 
 def test_a_step_stays_a_step() -> None:
     """Friction that turns round at once has no transition in its shape."""
-    assert transition_of(problem_of(with_friction(0.0))) == {}
+    assert reversal_of(problem_of(with_friction(0.0))) == {}
 
 
 def test_extra_drag_near_standstill_is_tried_as_a_step_as_well() -> None:
@@ -34,7 +35,7 @@ def test_extra_drag_near_standstill_is_tried_as_a_step_as_well() -> None:
     speed = np.abs(columns["speed_rad_s"])
     drag = 0.8 / (1 + (speed / (0.05 * FASTEST)) ** 2)
     problem = problem_of({**columns, "speed_rad_s": speed, "reading_V": columns["reading_V"] + drag})
-    assert transition_of(problem) != {}
+    assert reversal_of(problem) != {}
     turns = {"transition_rad_s" in shape for shape in StribeckFriction().shapes(problem)}
     assert turns == {False, True}
 
@@ -54,19 +55,19 @@ def test_a_stribeck_effect_fades_after_the_friction_has_turned_round() -> None:
 
 def test_without_friction_there_is_no_transition() -> None:
     """Noise alone prefers no transition."""
-    assert transition_of(problem_of(table())) == {}
+    assert reversal_of(problem_of(table())) == {}
 
 
 def test_a_smooth_reversal_is_found() -> None:
     """The nearest of the transitions that are looked for, as a speed of this machine."""
-    found = transition_of(problem_of(with_friction(TRANSITIONS[-1] * FASTEST)))
+    found = reversal_of(problem_of(with_friction(TRANSITIONS[-1] * FASTEST)))
     assert float(found["transition_rad_s"]) == pytest.approx(TRANSITIONS[-1] * FASTEST, rel=0.25)
 
 
 @pytest.mark.parametrize("between", [0.013, 0.03])
 def test_a_transition_between_those_that_are_tried_is_refined(between: float) -> None:
     """What is left of a friction near standstill would else be taken for a law of low speeds."""
-    found = transition_of(problem_of(with_friction(between * FASTEST, noise=0.02)))
+    found = reversal_of(problem_of(with_friction(between * FASTEST, noise=0.02)))
     assert float(found["transition_rad_s"]) == pytest.approx(between * FASTEST, rel=0.15)
 
 
@@ -75,8 +76,39 @@ def test_noise_with_a_memory_does_not_hide_a_transition() -> None:
     columns = with_friction(0.03 * FASTEST, noise=0.02)
     of_axes = np.random.default_rng(3).normal(0, 0.02, (len(columns["reading_V"]) // 2, 2))
     wander = np.cumsum(of_axes, axis=0).ravel()
-    found = transition_of(problem_of({**columns, "reading_V": columns["reading_V"] + wander}))
+    found = reversal_of(problem_of({**columns, "reading_V": columns["reading_V"] + wander}))
     assert float(found["transition_rad_s"]) == pytest.approx(0.03 * FASTEST, rel=0.15)
+
+
+def with_presliding(way_rad: float, noise: float = 0.03) -> dict[str, np.ndarray]:
+    """Return a recording with a friction that follows the way since each reversal (Dahl, 1968), by small steps."""
+    columns = table(noise=noise)
+    speed = columns["speed_rad_s"].reshape(-1, AXES)
+    friction, state, fine = np.zeros(speed.shape), np.sign(speed[0]), 50
+    for instant in range(1, len(speed)):
+        for step in range(fine):
+            between = speed[instant - 1] + (speed[instant] - speed[instant - 1]) * (step + 0.5) / fine
+            state = state + (np.sign(between) - state) * np.abs(between) * STEP_S / fine / way_rad
+        friction[instant] = state
+    return {**columns, "reading_V": columns["reading_V"] + 0.8 * friction.ravel()}
+
+
+@pytest.mark.parametrize("way_rad", [0.8, 2.0])
+def test_friction_that_follows_the_way_is_found_by_its_way(way_rad: float) -> None:
+    """The linear machine swings by some thirty radians."""
+    found = reversal_of(problem_of(with_presliding(way_rad)))
+    assert found == {"presliding_rad": pytest.approx(way_rad, rel=0.2)}
+
+
+def test_friction_that_follows_the_way_has_its_state_from_before() -> None:
+    """After each reversal it turns round with the way, whatever the speed; a run begins with all of it."""
+    problem = problem_of(with_presliding(2.0))
+    along, direction = along_motion(problem, {"presliding_rad": 2.0}), problem.covariates["direction"]
+    begin = int(np.flatnonzero(direction[:, 1])[0])
+    assert along[begin, 1] == direction[begin, 1]
+    turned = int(np.flatnonzero(np.diff(direction[:, 1]))[0]) + 1
+    assert abs(along[turned, 1] - along[turned - 1, 1]) < 0.5
+    assert np.abs(along).max() <= 1.0
 
 
 def test_every_law_that_reverses_has_it_in_its_shape() -> None:

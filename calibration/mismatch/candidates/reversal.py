@@ -1,0 +1,190 @@
+"""How friction turns round in a recording: at once, gradually with the speed, or with the way since the reversal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.candidates.motion import PRESLIDING, TRANSITION, along_motion, way_of
+from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
+from regolithd.calibration.mismatch.problem.covariates import USUAL_SPEED_QUANTILE
+from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED, Whitening, estimate_whitening
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from regolithd.calibration.mismatch.candidates.candidate import Shape
+    from regolithd.calibration.mismatch.problem.problem import Problem
+
+Array = NDArray[np.float64]
+
+TRANSITIONS = (0.0025, 0.005, 0.01, 0.02, 0.04)
+"""Speeds at which the friction has turned round by three quarters, as shares of the highest usual speed (a choice: from
+where it is a step for most readings to where it would be taken for viscous friction); the best is refined between its
+neighbours."""
+WAYS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
+"""Ways after which all but 1/e has turned round, as shares of the usual way from one reversal to the next (a choice, as
+above)."""
+FEWEST_REVERSALS = 8
+"""Reversals of an axis from which a way is looked for (a choice: one may be a stop)."""
+REFINED_TO = 0.05
+"""Relative tolerance of the refined shape (a choice: its effect on the residual is of second order)."""
+LEAST_WITHIN = 0.01
+"""Share of the readings in motion that must be within a reversal, to tell it from a step (a choice)."""
+LEAST_GAIN = 10.8
+"""Δχ² from which a gradual reversal is preferred to a step: one chance in a thousand for one more coefficient."""
+TURNED = 0.75
+"""Share of the friction that has turned round where a reading is no more within a reversal: tanh 1."""
+SINGULAR = 1e-12
+"""Relative singular value of the products below which laws are the same (a choice: double precision, with a margin)."""
+
+
+def reversal_of(problem: Problem) -> Shape:
+    """Return the shape that explains this recording's friction better than a step does, empty where none does."""
+    keys = (TRANSITION, PRESLIDING)
+
+    def found() -> Array:
+        best = _best_reversal(problem)
+        return np.array([float(best.get(key, 0.0)) for key in keys])
+
+    values = problem.run_once("reversal of the friction", 0.0, found)
+    return {key: float(value) for key, value in zip(keys, values, strict=True) if value}
+
+
+def _best_reversal(problem: Problem) -> Shape:
+    if not problem.has("wheel_speed", "direction"):
+        return {}
+    moving = problem.mask & (problem.known("direction") != 0)
+    tried = [shape for shape in _shapes(problem) if _share_within(problem, shape, moving) > LEAST_WITHIN]
+    if not tried:
+        return {}
+    beside = _beside_a_step(problem)
+    step = beside.squares_left({})
+    of_kind = {next(iter(shape)): shape for shape in sorted(tried, key=beside.squares_left, reverse=True)}
+    best, left = min((_refined(beside, shape) for shape in of_kind.values()), key=lambda pair: pair[1])
+    gain = beside.independent * (1 - left / max(step, 1e-300))
+    return best if gain > LEAST_GAIN else {}
+
+
+def _shapes(problem: Problem) -> Iterator[Shape]:
+    """Yield what is tried: speeds, and ways where the machine turns round often enough."""
+    speed = np.abs(problem.covariates["wheel_speed"][problem.mask])
+    if (speed > 0).any():
+        usual = float(np.nanquantile(speed[speed > 0], USUAL_SPEED_QUANTILE))
+        for share in TRANSITIONS:
+            yield {TRANSITION: share * usual}
+    way, direction = way_of(problem), problem.known("direction")
+    swings = []
+    for of_axis, turned in zip(np.where(np.isfinite(way), way, 0.0).T, direction.T, strict=True):
+        signs = turned[turned != 0]
+        if (reversals := np.count_nonzero(np.diff(signs))) >= FEWEST_REVERSALS:
+            swings.append(float(of_axis.sum()) / reversals)
+    for share in WAYS if swings else ():
+        yield {PRESLIDING: share * float(np.median(swings))}
+
+
+def _share_within(problem: Problem, shape: Shape, moving: NDArray[np.bool_]) -> float:
+    """Return which share of the readings in motion is within a reversal."""
+    along = along_motion(problem, shape) * problem.known("direction")
+    return float(np.mean(along[moving] < TURNED)) if moving.any() else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """A recording, whitened by the noise that friction which reverses at once leaves.
+
+    How friction turns round shows within moments of each reversal, in what noise with a memory hardly hides.
+
+    Attributes
+    ----------
+    problem: the recording's
+    whitening, deviation: of that noise; its standard deviation has the shape (wheel,)
+    independent: as many independent readings know as much as all whitened ones
+    free, residual: the free parameters' columns and the residual, shapes (column, reading) and (1, reading)
+    """
+
+    problem: Problem
+    whitening: Whitening
+    deviation: Array
+    independent: float
+    free: Array
+    residual: Array
+
+    def squares_left(self, shape: Shape) -> float:
+        """Return the sum of squares that the free parameters and friction of any usual law leave, with this shape."""
+        laws = _in_order(self.problem, _laws(self.problem, shape), self.whitening, self.deviation)
+        return float(np.sum(_left(np.concatenate((self.free, laws)), self.residual) ** 2))
+
+
+def _beside_a_step(problem: Problem) -> _Beside:
+    free = [problem.tangent(name) for name, prior in problem.simulation.parameters.items() if prior.std > 0]
+    free = list(as_shown(problem, free))
+    residual = np.where(problem.mask, problem.measured - problem.filled, 0.0)
+    ones = np.ones(residual.shape[1])
+    as_read = _in_order(problem, [residual, *free, *_laws(problem, {})], NOT_WHITENED, ones)
+    left = _left(as_read[1:], as_read[:1])[0]
+    ends = np.cumsum([len(rows) for rows, _ in problem.courses])[:-1]
+    parts = np.split(left, ends)
+    deviation = np.array([np.sqrt(np.mean(part**2)) if part.size else 0.0 for part in parts])
+    deviation = np.where(deviation > 0, deviation, 1.0)
+    courses = [
+        (part / of_wheel, runs)
+        for part, of_wheel, (_, runs) in zip(parts, deviation, problem.courses, strict=True)
+        if part.any()
+    ]
+    whitening = estimate_whitening(courses, problem.thresholds)
+    white = np.zeros(residual.shape)
+    for wheel, ((rows, runs), part) in enumerate(zip(problem.courses, parts, strict=True)):
+        white[rows, wheel] = whitening.apply(part / deviation[wheel], runs)
+    return _Beside(
+        problem,
+        whitening,
+        deviation,
+        float(problem.mask.sum()) / problem.noise_of(white).autocorrelation_time,
+        _in_order(problem, free, whitening, deviation),
+        _in_order(problem, [residual], whitening, deviation),
+    )
+
+
+def _laws(problem: Problem, shape: Shape) -> list[Array]:
+    """Return friction that does not depend on speed, grows with its root, with it, and with the load.
+
+    A late channel shows it late: on time, it would seem to turn round with the way.
+    """
+    direction, speed = along_motion(problem, shape), np.abs(problem.known("wheel_speed"))
+    laws = [direction, direction * np.sqrt(speed), direction * speed, direction * np.abs(problem.filled)]
+    return list(as_shown(problem, laws))
+
+
+def _in_order(problem: Problem, columns: Sequence[Array], whitening: Whitening, deviation: Array) -> Array:
+    """Return columns (time, wheel) over the noise's deviation, whitened, shape (column, reading): wheel by wheel."""
+    parts = []
+    for wheel, (rows, runs) in enumerate(problem.courses):
+        values = np.array([column[rows, wheel] for column in columns]).reshape(len(columns), -1)
+        parts.append(whitening.apply(values / deviation[wheel], runs))
+    return np.concatenate(parts, axis=1)
+
+
+def _left(columns: Array, residual: Array) -> Array:
+    """Return what the columns leave of a residual, shape (1, reading), by least squares."""
+    size = np.sqrt(np.sum(columns**2, axis=1))
+    columns = columns[size > 0] / size[size > 0, None]
+    fitted = np.linalg.lstsq(columns @ columns.T, columns @ residual[0], rcond=SINGULAR)[0]
+    return residual - fitted @ columns
+
+
+def _refined(beside: _Beside, shape: Shape) -> tuple[Shape, float]:
+    """Return the best shape between half and twice this one, and the sum of squares that it leaves."""
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415  # most recordings need none, and no SciPy for it
+
+    ((name, value),) = shape.items()
+    found = minimize_scalar(
+        lambda log: beside.squares_left({name: float(np.exp(log))}),
+        bounds=(np.log(float(value) / 2), np.log(2 * float(value))),
+        method="bounded",
+        options={"xatol": REFINED_TO},
+    )
+    return {name: float(np.exp(found.x))}, float(found.fun)
