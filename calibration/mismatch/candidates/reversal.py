@@ -62,10 +62,11 @@ def _best_reversal(problem: Problem) -> Shape:
     if not tried:
         return {}
     beside = _beside_a_step(problem)
-    step = beside.squares_left({})
+    if not (step := beside.squares_left({})) > 0:
+        return {}  # a drive that was simulated without noise
     of_kind = {next(iter(shape)): shape for shape in sorted(tried, key=beside.squares_left, reverse=True)}
     best, left = min((_refined(beside, shape) for shape in of_kind.values()), key=lambda pair: pair[1])
-    gain = beside.independent * (1 - left / max(step, 1e-300))
+    gain = beside.independent * (1 - left / step)
     return best if gain > LEAST_GAIN else {}
 
 

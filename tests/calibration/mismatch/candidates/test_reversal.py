@@ -58,6 +58,11 @@ def test_without_friction_there_is_no_transition() -> None:
     assert reversal_of(problem_of(table())) == {}
 
 
+def test_a_drive_that_was_simulated_without_noise_has_none() -> None:
+    """A proposed experiment's readings are its prediction: there is nothing to explain."""
+    assert reversal_of(problem_of(table(noise=0.0))) == {}
+
+
 def test_a_smooth_reversal_is_found() -> None:
     """The nearest of the transitions that are looked for, as a speed of this machine."""
     found = reversal_of(problem_of(with_friction(TRANSITIONS[-1] * FASTEST)))

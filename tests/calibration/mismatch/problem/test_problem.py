@@ -161,7 +161,7 @@ def test_a_stated_effect_is_added_unless_the_simulation_has_it() -> None:
 
 @pytest.mark.parametrize("per_V", [1.0, -1000.0])
 def test_a_covariate_is_not_the_reading_that_is_predicted(per_V: float) -> None:
-    """In whatever unit: a curve over it would explain the noise of each reading. A note says what to return instead."""
+    """In whatever unit, it would explain the noise of each reading, and a note says what to return instead."""
 
     class OwnReading(Level):
         def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
