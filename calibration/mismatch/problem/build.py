@@ -50,7 +50,7 @@ def build_problem(
     inputs = inputs or inputs_of(recording, simulation)
     run = simulated(inputs, simulation, {**simulation.variants(), **chosen}, thresholds)
     prepared, prediction = run.recording, run.prediction
-    measured = prepared.channel(simulation.channel)
+    measured = run.as_read.channel(simulation.channel)  # as read, also where it is an input that is smoothed
     compared = run.known & np.isfinite(measured)
     residual = np.where(compared, measured - prediction, np.nan)
     outliers = isolated_outliers(residual, recording.run, thresholds)

@@ -103,7 +103,7 @@ def simulated(inputs: Inputs, simulation: Predictor, values: Mapping[str, float]
     if other is not None:
         apart = np.abs(simulation.predict(complete_inputs(other), values) - prediction)
         blank = np.any(list(blanks.values()), axis=0)
-        residual = (prepared.channel(simulation.channel) - prediction)[~blank]
+        residual = (inputs.as_read.channel(simulation.channel) - prediction)[~blank]
         residual = residual[np.isfinite(residual)]
         least = max(
             thresholds.carried_share * robust_std(residual), 1e-9 * float(np.max(np.abs(residual), initial=0.0))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from linear_machine import AXES, INSTANTS, STEP_S, Level, problem_of, table
 
 from regolithd.calibration.mismatch import RecordingError, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
-from regolithd.calibration.mismatch.problem.prior import own_name
+from regolithd.calibration.mismatch.problem.prior import SensorError, own_name
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
 from regolithd.calibration.mismatch.thresholds import Thresholds
 
@@ -171,3 +171,16 @@ def test_a_covariate_is_not_the_reading_that_is_predicted(per_V: float) -> None:
     assert "place" not in problem.covariates
     (note,) = problem.recording.notes
     assert note.startswith("place is the reading of reading_V itself")
+
+
+def test_a_predicted_column_that_is_an_input_too_is_compared_as_read() -> None:
+    """Its stated error smooths what `predict` sees of it, and nothing of what the prediction is held against."""
+
+    class OwnInput(Level):
+        inputs = ("reading_V",)
+        sensors: ClassVar = {"reading_V": SensorError(absolute=0.2)}
+
+    columns = table()
+    problem = build_problem(from_columns(columns, unit="axis"), OwnInput())
+    np.testing.assert_array_equal(problem.measured.ravel(), columns["reading_V"])
+    assert np.std(problem.recording.channels["reading_V"]) < 0.8 * np.std(columns["reading_V"])
