@@ -269,6 +269,10 @@ class Candidate:
         """
         return shape
 
+    def resolution(self, problem: Problem) -> float:  # noqa: ARG002
+        """Return within how much of a shape parameter the columns' slope with it may jump: one is taken across it."""
+        return 0.0
+
     def stated_coefficient(self, shape: Shape) -> tuple[float, float] | None:  # noqa: ARG002
         """Return the coefficient at which a shape is exact, and its relative standard deviation, where it states one.
 

@@ -126,6 +126,10 @@ class SensorDelay(Candidate):
         at = float(shape[name])
         return max(bounds[0], at / RATIO_OF_CHANNEL), min(bounds[1], at * RATIO_OF_CHANNEL)
 
+    def resolution(self, problem: Problem) -> float:
+        """Return a reading: what is interpolated on straight lines has a corner at each."""
+        return problem.recording.step_s
+
     def parameters(self, shape: Shape, values: Sequence[float]) -> dict[str, float]:
         """Return the delay: of the predicted channel that of the shape, since its coefficient has the share passed."""
         return {"delay_s": next((float(shape[kind]) for kind in OF_CHANNEL if kind in shape), float(values[0]))}

@@ -116,9 +116,10 @@ def _shape_slopes(equations: NormalEquations, fit: Fit) -> Iterator[tuple[ShapeS
         for name, (low, high) in candidate.bounds(problem, shape).items():
             if name not in shape or name == candidate.change_point:
                 continue
-            step = equations.thresholds.slope_step * (high - low)
-            changed = columns_of(problem, candidate, {**shape, name: float(shape[name]) + step})
-            slope = np.einsum("c,ctw->tw", values, changed - columns_of(problem, candidate, shape)) / step
+            reach = max(0.5 * equations.thresholds.slope_step * (high - low), candidate.resolution(problem))
+            ends = max(float(shape[name]) - reach, low), min(float(shape[name]) + reach, high)
+            behind, ahead = (columns_of(problem, candidate, {**shape, name: end}) for end in ends)
+            slope = np.einsum("c,ctw->tw", values, ahead - behind) / (ends[1] - ends[0])
             on = np.zeros(slope.shape[1])
             on[list(term.wheels)] = 1
             slope = np.where(problem.mask, slope, 0.0) * on
