@@ -50,7 +50,8 @@ def print_answer(console: Console, answer: Answer, labels: Labels, wheels: Seque
 def sure_of(answer: Answer) -> str:
     """Return how probable the answer is, and which other is next."""
     if answer.probability is None:
-        return "probability of this answer: not known"
+        why = ": what is unexplained was not decided by the evidence of a curve" if answer.unexplained else ""
+        return f"probability of this answer: not known{why}"
     text = f"probability of this answer: {answer.probability:.2f}"
     if (other := answer.next_best) is None:
         return text

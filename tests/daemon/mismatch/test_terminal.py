@@ -121,7 +121,7 @@ def test_of_several_channels_each_finding_and_each_error_names_its_own() -> None
         "  sensor-delay in current: A delay of pressure.",
         "  changed in current: viscous-friction is larger than the corrected simulation has it.",
         "  unexplained in pressure: 40 % of the residual follows the flow, 0 to 9 s",
-        "  probability of this answer: not known",
+        "  probability of this answer: not known: what is unexplained was not decided by the evidence of a curve",
         "  held-out error of pressure: 1.5, noise floor 1",
         "  held-out error of current: 1.5 before, 1.25 after, noise floor 1",
     ]

@@ -15,9 +15,10 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import regolithd
 from regolithd.calibration.mismatch.data.stretches import LONGEST_AT_ONCE
@@ -31,9 +32,6 @@ from regolithd.calibration.validation.blind_trials.recordings.files import (
     write_trial,
 )
 from regolithd.calibration.validation.blind_trials.recordings.generator import Plan, make_trial
-
-if TYPE_CHECKING:
-    from regolithd.calibration.validation.blind_trials.recordings.generator import Trial
 
 DURATIONS_S = (300.0, 600.0, 1200.0, 1800.0, 3600.0)
 COUNTS = (2, 4, 8, 16)
@@ -110,21 +108,31 @@ def _of_long_recordings(scratch: Path, most_rows: int) -> list[Cost]:
     found: list[Cost] = []
     most = len(os.sched_getaffinity(0))
     for rows in sorted({min(MOST_ROWS, most_rows), most_rows} if most_rows > LONGEST_AT_ONCE else ()):
-        trial = make_trial(Plan(1, 3, "single", ("viscous-friction",)), duration_s=rows / ROWS_PER_S)
-        write_long(trial, scratch)
-        (scratch / "SIM.toml").write_text(toml_text(trial.tables))
+        written = written_apart(rows, scratch)
         on = [most] if found else range(1, most + 1)
-        found += [measure(scratch, "recording.parquet", trial.load_N.size, COUNTS[-1], workers) for workers in on]
+        found += [measure(scratch, "recording.parquet", written, COUNTS[-1], workers) for workers in on]
     return found
 
 
-def write_long(trial: Trial, folder: Path) -> None:
-    """Write a recording as Parquet."""
+def written_apart(rows: int, folder: Path) -> int:
+    """Write a recording and its SIM.toml in a process of its own, and return the number of rows.
+
+    Before `execve` a new process is a copy of the one that starts it, whose memory counts in its peak (`getrusage`).
+    """
+    with ProcessPoolExecutor(1, get_context("spawn")) as other:
+        return other.submit(write_long, rows, folder).result()
+
+
+def write_long(rows: int, folder: Path) -> int:
+    """Write a recording as Parquet, and its SIM.toml; return the number of rows."""
     import pyarrow as pa  # noqa: PLC0415
     import pyarrow.parquet as pq  # noqa: PLC0415
 
+    trial = make_trial(Plan(1, 3, "single", ("viscous-friction",)), duration_s=rows / ROWS_PER_S)
     table = pa.table(dict(zip(COLUMNS, recording_columns(trial), strict=True)))
     pq.write_table(table, folder / "recording.parquet")
+    (folder / "SIM.toml").write_text(toml_text(trial.tables))
+    return int(trial.load_N.size)
 
 
 def counted(rows: int) -> str:
