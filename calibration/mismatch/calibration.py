@@ -76,8 +76,6 @@ def bent(problem: Problem, values: Mapping[str, float]) -> bool:
 
 def late_otherwise(problem: Problem, values: Mapping[str, float]) -> bool:
     """Return whether a late channel changes by more, or less, than at the problem's values: its size would be wrong."""
-    if problem.late is None:
-        return False
     here, there = problem.filled, problem.changed(**values)
     shown = as_shown(problem, [here, there])
     now, then = ((late - at)[problem.mask] for late, at in zip(shown, (here, there), strict=True))

@@ -226,15 +226,16 @@ def _search(
         del found, equations  # memory holds the matrix of one search at a time, and TMPDIR its columns
         found = _search_at(smooth_equations(pose(values)), candidates, progress)
         values = moved_values(found.decision.equations, found.decision.whole)
+    if found.decision.late is None:
+        return found
     for _ in range(LATE_SEARCHES):
-        late = found.decision.late
-        if late is None or (problem.late and not late_otherwise(problem, values)):
-            break
-        problem = replace(pose(values), late=late)
+        problem = replace(pose(values), late=found.decision.late)
         again = _search_at(smooth_equations(problem), candidates, progress)
         if again.decision.late is None:
             break
         found, values = again, moved_values(again.decision.equations, again.decision.whole)
+        if not late_otherwise(problem, values):
+            break
     return found
 
 

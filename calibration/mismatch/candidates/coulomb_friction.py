@@ -33,7 +33,7 @@ class CoulombFriction(Candidate):
     shape_keys: ClassVar = REVERSAL_KEYS
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """Return the one shape: a step at standstill, or the recording's transition."""
+        """Return the one shape: a step at standstill, or as friction reverses in the recording."""
         return [reversal_of(problem)]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:

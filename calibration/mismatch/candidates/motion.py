@@ -49,6 +49,10 @@ def way_of(problem: Problem) -> Array:
 
     A run starts, and what follows a gap, after a way that is not known.
     """
+    return problem.once("way", lambda: _way_of(problem))
+
+
+def _way_of(problem: Problem) -> Array:
     recording, moving = problem.recording, problem.known("direction") != 0
     speed = np.where(moving, np.abs(problem.known("wheel_speed")), 0.0)
     steps = np.diff(recording.time_s)
@@ -60,5 +64,5 @@ def way_of(problem: Problem) -> Array:
 
 def _yielded(problem: Problem, presliding: float) -> Array:
     """Return which share of a friction, with its sign, acts after each way: exact for each way in one direction."""
-    kept = np.exp(-problem.once("way", lambda: way_of(problem)) / presliding)
+    kept = np.exp(-way_of(problem) / presliding)
     return recursion(kept, (1 - kept) * problem.known("direction"))

@@ -50,7 +50,8 @@ def reversal_of(problem: Problem) -> Shape:
         best = _best_reversal(problem)
         return np.array([float(best.get(key, 0.0)) for key in keys])
 
-    values = problem.run_once("reversal of the friction", 0.0, found)
+    # Copies of a problem share what was run once, and a copy may be late where the problem is not.
+    values = problem.run_once(f"reversal of the friction, late by {problem.late}", 0.0, found)
     return {key: float(value) for key, value in zip(keys, values, strict=True) if value}
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,7 +56,7 @@ def build_problem(
     as_read = None if run.as_read is prepared else complete_inputs(run.as_read)
     found, constants = covariates_of(prepared, simulation, complete_inputs(prepared), prediction, as_read)
     found, notes = without_the_reading_itself(found, measured, simulation.channel)
-    prepared = replace(prepared, notes=(*prepared.notes, *notes))
+    prepared = prepared.with_notes(*notes)
     covariates, blanks = blanks_of(found, simulation.undefined_at_times, compared, thresholds)
     mask = compared & ~outliers
     for blank in blanks.values():

@@ -94,7 +94,7 @@ def motion_of(problem: Problem) -> Array:
     """
     if "direction" not in problem.covariates:
         return np.ones(problem.mask.shape)
-    return along_motion(problem, reversal_of(problem))
+    return problem.once("motion", lambda: along_motion(problem, reversal_of(problem)))
 
 
 def _ways_to_act(

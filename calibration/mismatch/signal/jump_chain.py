@@ -103,7 +103,9 @@ class JumpChain:
         for part in windows.parts():
             filtered, chance = self._recursions(part)
             chance = np.multiply(filtered, chance, out=chance)
-            moments = np.einsum("twv,ktwv->twk", chance, self._moments(part.readings))
+            error = np.where(np.isfinite(part.readings), self.deviation**2, np.inf)[..., None]
+            at_values = self.density.moments(np.nan_to_num(part.readings)[..., None], error)
+            moments = np.einsum("twv,ktwv->twk", chance, at_values)
             parts.append(moments.transpose(1, 0, 2)[part.used.T])
         mean, square = np.concatenate(parts).T
         return mean, np.maximum(square - mean**2, 0.0)
@@ -146,16 +148,8 @@ class JumpChain:
                 after[t - 1][windows.begins[t]] = 1.0
         return filtered, after
 
-    def _moments(self, readings: Array) -> Array:
-        """Return the truth's mean and mean square at each value, given its reading, (2, instant, window, value)."""
-        at, spread = self.density.at, self.density.spread
-        known = np.isfinite(readings)[..., None]
-        share = np.where(known, spread / (spread + self.deviation**2), 0.0)
-        mean = at + share * (np.nan_to_num(readings)[..., None] - at)
-        return np.stack((mean, mean**2 + (1 - share) * spread))
-
     def _likelihood(self, readings: Array) -> Array:
         """Return each value's likelihood, shape (instant, window, value), in proportion; 1 where nothing is known."""
         known = np.isfinite(readings)[..., None]
-        apart, total = np.nan_to_num(readings)[..., None] - self.density.at, self.deviation**2 + self.density.spread
-        return np.where(known, cut_off(-0.5 * (apart**2 / total + np.log(total))), 1.0)
+        likelihood = cut_off(self.density.log_likelihood(np.nan_to_num(readings)[..., None], self.deviation**2))
+        return np.where(known, likelihood, 1.0)

@@ -76,22 +76,31 @@ class MixingDensity:
             # What the readings say without the prior: a normal likelihood again.
             precision = np.maximum(1 / variance[some] - 1 / prior_variance, LEAST_TOLD / variance[some])[:, None]
             told = (mean[some] / variance[some] - prior_mean / prior_variance)[:, None] / precision
-            apart = told - self.at
-            total = 1 / precision + self.spread
-            chance = cut_off(given - 0.5 * (apart**2 / total + np.log(total)))
-            shrunk = self.at + self.spread / total * apart
-            square = shrunk**2 + self.spread / total / precision
-            moments[:, some] = np.einsum("tv,ktv->kt", chance, np.stack((shrunk, square))) / chance.sum(axis=1)
+            chance = cut_off(given + self.log_likelihood(told, 1 / precision))
+            moments[:, some] = np.einsum("tv,ktv->kt", chance, self.moments(told, 1 / precision)) / chance.sum(axis=1)
         return moments[0], np.maximum(moments[1] - moments[0] ** 2, 0.0)
+
+    def log_likelihood(self, reading: Array, variance: Array | float) -> Array:
+        """Return that of each value, given readings of shape (…, 1) with this error variance, but for a constant."""
+        total = variance + self.spread
+        return np.asarray(-0.5 * ((reading - self.at) ** 2 / total + np.log(total)))
+
+    def moments(self, reading: Array, variance: Array | float) -> Array:
+        """Return the truth's mean and mean square at each value, given readings (…, 1), shape (2, …, value).
+
+        An error variance of ∞ stands for a reading that is not known.
+        """
+        share = self.spread / (variance + self.spread)
+        mean = self.at + share * (reading - self.at)
+        return np.stack((mean, mean**2 + (1 - share) * self.spread))
 
 
 def mixing_density(readings: Array, deviation: float) -> MixingDensity:
     """Return the density of the true values behind finite readings (n,) with normal errors of this deviation."""
     at, count, spread = _cells(readings, GRID_STEP * deviation)
     bins, in_bin = _occupied(readings, BIN_STEP * deviation, MOST_BINS)
-    total = deviation**2 + spread
-    likelihood = cut_off(-0.5 * ((bins[:, None] - at) ** 2 / total + np.log(total)))
     weight, share = count / count.sum(), in_bin / in_bin.sum()
+    likelihood = cut_off(MixingDensity(at, weight, spread).log_likelihood(bins[:, None], deviation**2))
     for _ in range(ROUNDS):
         weight = weight * ((share / (likelihood @ weight)) @ likelihood)
     weight = np.maximum(weight, LEAST_WEIGHT)

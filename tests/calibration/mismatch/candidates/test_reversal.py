@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from linear_machine import AXES, STEP_S, problem_of, table
@@ -124,6 +126,16 @@ def test_every_law_that_reverses_has_it_in_its_shape() -> None:
     (column,) = CoulombFriction().columns(problem, {"transition_rad_s": 0.5})
     speed, direction = problem.covariates["wheel_speed"], problem.covariates["direction"]
     assert column == pytest.approx(np.where(direction == 0, 0.0, np.tanh(speed / 0.5)))
+
+
+def test_friction_of_a_late_channel_is_looked_for_late() -> None:
+    """On time it seems to turn round with the way; a copy of the problem that knows the delay asks anew."""
+    columns = table(noise=0.02)
+    drag = 0.8 * np.sign(columns["speed_rad_s"].reshape(-1, AXES))
+    late = np.vstack((np.repeat(drag[:1], 4, axis=0), drag[:-4]))
+    problem = problem_of({**columns, "reading_V": columns["reading_V"] + late.ravel()})
+    assert reversal_of(problem) != {}
+    assert reversal_of(replace(problem, late=("secant_s", 4 * STEP_S))) == {}
 
 
 def test_a_shape_without_a_transition_is_a_step() -> None:
