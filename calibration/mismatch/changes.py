@@ -101,7 +101,7 @@ class Stated:
     def shape(self, problem: Problem) -> Shape:
         """Return the shape as corrected, with the reversal of the friction that this recording shows, if it does.
 
-        How gradually friction turns round is found once for a recording, for every law that reverses.
+        How gradually friction reverses is found once for a recording, for every law that reverses.
         """
         here = {} if self.in_simulation else reversal_of(problem)
         reverses = here and any(not REVERSAL_KEYS.keys().isdisjoint(shape) for shape in self.candidate.shapes(problem))

@@ -1,9 +1,9 @@
 """The direction of motion, as laws of friction depend on it: a step at standstill, or gradually about a reversal.
 
-Dry friction does not turn round at once. Before it slides, a contact yields like a spring (presliding): the friction
-follows the way since the reversal, whatever the speed (Dahl, 1968). And a speed that is measured with noise or averaged
-over a reading crosses zero gradually. How far, or how slow, belongs to the machine, not to one law, so it is found once
-for a recording (`reversal.py`) and stands in the shape of each law that reverses.
+Dry friction does not reverse at once. Before it slides, a contact yields like a spring (presliding): the friction
+follows the displacement since the reversal, whatever the speed (Dahl, 1968). And a speed that is measured with noise or
+averaged over a reading crosses zero gradually. How far, or how slow, belongs to the machine, not to one law, so it is
+found once for a recording (`reversal.py`) and stands in the shape of each law that reverses.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 TRANSITION = "transition_rad_s"
-"""The shape parameter of a law that reverses: the speed at which the friction has turned round by three quarters."""
+"""The shape parameter of a law that reverses: the speed at which the friction has reversed by three quarters."""
 PRESLIDING = "presliding_rad"
-"""The shape parameter of a law that reverses: the way after which all but 1/e of the friction has turned round."""
+"""The shape parameter of a law that reverses: the displacement after which all but 1/e of the friction has reversed."""
 REVERSAL_KEYS = {
-    TRANSITION: "ω_t of a friction that turns round with the speed: its law times tanh(|ω|/ω_t)",
-    PRESLIDING: "θ_p of a friction that turns round with the way, in the unit of ω times s: its law times z sign(ω), "
-    "dz = (sign(ω) − z) |dθ|/θ_p (without either key: at once)",
+    TRANSITION: "ω_t of a friction that reverses with the speed: its law times tanh(|ω|/ω_t)",
+    PRESLIDING: "θ_p of a friction that reverses with the displacement, in the unit of ω times s: its law times "
+    "z sign(ω), dz = (sign(ω) − z) |dθ|/θ_p (without either key: at once)",
 }
 """What the keys mean, for the documentation."""
 
 
 def along_motion(problem: Problem, shape: Shape) -> Array:
-    """Return sign(ω), or as it turns round where the shape says so, 0 at standstill, shape (time, wheel)."""
+    """Return sign(ω), or as it reverses where the shape says so, 0 at standstill, shape (time, wheel)."""
     direction = problem.known("direction")
     if TRANSITION in shape:
         return np.asarray(direction * np.tanh(np.abs(problem.known("wheel_speed")) / float(shape[TRANSITION])))
@@ -44,25 +44,26 @@ def along_motion(problem: Problem, shape: Shape) -> Array:
     return np.asarray(direction)
 
 
-def way_of(problem: Problem) -> Array:
-    """Return the way from the instant before, without what is noise at standstill, shape (time, wheel); ∞ at a start.
+def displacement_of(problem: Problem) -> Array:
+    """Return the displacement since the instant before, without noise at standstill, shape (time, wheel).
 
-    A run starts, and what follows a gap, after a way that is not known.
+    It is ∞ where a run starts and after a gap: what happened before is not known.
     """
-    return problem.once("way", lambda: _way_of(problem))
+    return problem.once("displacement", lambda: _displacement_of(problem))
 
 
-def _way_of(problem: Problem) -> Array:
+def _displacement_of(problem: Problem) -> Array:
     recording, moving = problem.recording, problem.known("direction") != 0
     speed = np.where(moving, np.abs(problem.known("wheel_speed")), 0.0)
     steps = np.diff(recording.time_s)
     whole = (np.diff(recording.run) == 0) & (steps < LONGEST_STEP * recording.step_s)
-    way = np.full(speed.shape, np.inf)
-    way[1:] = np.where(whole[:, None], 0.5 * (speed[1:] + speed[:-1]) * np.where(whole, steps, 0.0)[:, None], np.inf)
-    return way
+    travelled = 0.5 * (speed[1:] + speed[:-1]) * np.where(whole, steps, 0.0)[:, None]
+    displacement = np.full(speed.shape, np.inf)
+    displacement[1:] = np.where(whole[:, None], travelled, np.inf)
+    return displacement
 
 
 def _yielded(problem: Problem, presliding: float) -> Array:
-    """Return which share of a friction, with its sign, acts after each way: exact for each way in one direction."""
-    kept = np.exp(-way_of(problem) / presliding)
+    """Return which share of a friction, with its sign, acts at each reading, exact between reversals."""
+    kept = np.exp(-displacement_of(problem) / presliding)
     return recursion(kept, (1 - kept) * problem.known("direction"))

@@ -1,4 +1,4 @@
-"""How friction turns round in a recording: at once, gradually with the speed, or with the way since the reversal."""
+"""How friction reverses in a recording: at once, with the speed, or with the displacement since the reversal."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.motion import PRESLIDING, TRANSITION, along_motion, way_of
+from regolithd.calibration.mismatch.candidates.motion import PRESLIDING, TRANSITION, along_motion, displacement_of
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.problem.covariates import USUAL_SPEED_QUANTILE
 from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED, Whitening, estimate_whitening
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 TRANSITIONS = (0.0025, 0.005, 0.01, 0.02, 0.04)
-"""Speeds at which the friction has turned round by three quarters, as shares of the highest usual speed (a choice: from
+"""Speeds at which the friction has reversed by three quarters, as shares of the highest usual speed (a choice: from
 where it is a step for most readings to where it would be taken for viscous friction); the best is refined between its
 neighbours."""
-WAYS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
-"""Ways after which all but 1/e has turned round, as shares of the usual way from one reversal to the next (a choice, as
-above)."""
+DISPLACEMENTS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
+"""Displacements after which all but 1/e has reversed, as shares of the usual one from a reversal to the next (a choice,
+as above)."""
 FEWEST_REVERSALS = 8
-"""Reversals of an axis from which a way is looked for (a choice: one may be a stop)."""
+"""Reversals of an axis from which a displacement is looked for (a choice: one may be a stop)."""
 REFINED_TO = 0.05
 """Relative tolerance of the refined shape (a choice: its effect on the residual is of second order)."""
 LEAST_WITHIN = 0.01
@@ -37,7 +37,7 @@ LEAST_WITHIN = 0.01
 LEAST_GAIN = 10.8
 """Δχ² from which a gradual reversal is preferred to a step: one chance in a thousand for one more coefficient."""
 TURNED = 0.75
-"""Share of the friction that has turned round where a reading is no more within a reversal: tanh 1."""
+"""Share of the friction that has reversed where a reading is no more within a reversal: tanh 1."""
 SINGULAR = 1e-12
 """Relative singular value of the products below which laws are the same (a choice: double precision, with a margin)."""
 
@@ -72,19 +72,19 @@ def _best_reversal(problem: Problem) -> Shape:
 
 
 def _shapes(problem: Problem) -> Iterator[Shape]:
-    """Yield what is tried: speeds, and ways where the machine turns round often enough."""
+    """Yield what is tried: speeds, and displacements where the machine reverses often enough."""
     speed = np.abs(problem.covariates["wheel_speed"][problem.mask])
     if (speed > 0).any():
         usual = float(np.nanquantile(speed[speed > 0], USUAL_SPEED_QUANTILE))
         for share in TRANSITIONS:
             yield {TRANSITION: share * usual}
-    way, direction = way_of(problem), problem.known("direction")
+    displacement, direction = displacement_of(problem), problem.known("direction")
     swings = []
-    for of_axis, turned in zip(np.where(np.isfinite(way), way, 0.0).T, direction.T, strict=True):
+    for of_axis, turned in zip(np.where(np.isfinite(displacement), displacement, 0.0).T, direction.T, strict=True):
         signs = turned[turned != 0]
         if (reversals := np.count_nonzero(np.diff(signs))) >= FEWEST_REVERSALS:
             swings.append(float(of_axis.sum()) / reversals)
-    for share in WAYS if swings else ():
+    for share in DISPLACEMENTS if swings else ():
         yield {PRESLIDING: share * float(np.median(swings))}
 
 
@@ -98,7 +98,7 @@ def _share_within(problem: Problem, shape: Shape, moving: NDArray[np.bool_]) -> 
 class _Beside:
     """A recording, whitened by the noise that friction which reverses at once leaves.
 
-    How friction turns round shows within moments of each reversal, in what noise with a memory hardly hides.
+    How friction reverses shows within moments of each reversal, in what noise with a memory hardly hides.
 
     Attributes
     ----------
@@ -154,7 +154,7 @@ def _beside_a_step(problem: Problem) -> _Beside:
 def _laws(problem: Problem, shape: Shape) -> list[Array]:
     """Return friction that does not depend on speed, grows with its root, with it, and with the load.
 
-    A late channel shows it late: on time, it would seem to turn round with the way.
+    A late channel shows it late: on time, it would seem to reverse with the displacement.
     """
     direction, speed = along_motion(problem, shape), np.abs(problem.known("wheel_speed"))
     laws = [direction, direction * np.sqrt(speed), direction * speed, direction * np.abs(problem.filled)]

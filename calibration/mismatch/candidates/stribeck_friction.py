@@ -68,9 +68,9 @@ class StribeckFriction(Candidate):
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return Stribeck speeds between the slowest and half of the highest speed, in three forms.
 
-        Extra drag near standstill looks like a friction that turns round gradually, and the other way about: where the
+        Extra drag near standstill looks like a friction that reverses gradually, and the other way about: where the
         recording shows such a transition, both a step and the transition are tried. What decays before the friction
-        has turned round is no Stribeck effect: it is a transition of another form.
+        has reversed is no Stribeck effect: it is a transition of another form.
         """
         transition = reversal_of(problem)
         ways_to_turn: list[Shape] = [{}, transition] if transition else [{}]

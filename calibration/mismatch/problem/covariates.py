@@ -75,7 +75,7 @@ def covariates_of(
 def direction_of(speed: Array) -> Array:
     """Return the sign of a speed (time, wheel); 0 where it is within the noise that the sensor has at standstill.
 
-    An axis that stands reads a little more or less than zero. The sign of that is no direction: no friction turns round
+    An axis that stands reads a little more or less than zero. The sign of that is no direction: no friction reverses
     with it. NaN stays NaN. The noise is estimated from the readings that are given, so give whole recordings.
     """
     directions = [np.where(np.abs(column) > _noise_at_standstill(column), np.sign(column), 0.0) for column in speed.T]

@@ -90,7 +90,7 @@ def acting(problem: Problem, covariate: str, coupling: str) -> tuple[Array, Arra
 def motion_of(problem: Problem) -> Array:
     """Return by what a drag acts along the motion, shape (time, wheel): a step at standstill, or as friction reverses.
 
-    A law that turns round as the machine does would else have that alone to gain beside a curve. 1 without a direction.
+    A law that reverses as the machine does would else have that alone to gain beside a curve. 1 without a direction.
     """
     if "direction" not in problem.covariates:
         return np.ones(problem.mask.shape)

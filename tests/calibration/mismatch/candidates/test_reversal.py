@@ -19,7 +19,7 @@ FASTEST = 2.0
 
 
 def with_friction(transition_rad_s: float, noise: float = 0.05) -> dict[str, np.ndarray]:
-    """Return a recording with a friction that turns round within a speed; 0: at once."""
+    """Return a recording with a friction that reverses within a speed; 0: at once."""
     columns = table(noise=noise)
     speed = columns["speed_rad_s"]
     turned = np.tanh(speed / transition_rad_s) if transition_rad_s else np.sign(speed)
@@ -27,7 +27,7 @@ def with_friction(transition_rad_s: float, noise: float = 0.05) -> dict[str, np.
 
 
 def test_a_step_stays_a_step() -> None:
-    """Friction that turns round at once has no transition in its shape."""
+    """Friction that reverses at once has no transition in its shape."""
     assert reversal_of(problem_of(with_friction(0.0))) == {}
 
 
@@ -87,28 +87,28 @@ def test_noise_with_a_memory_does_not_hide_a_transition() -> None:
     assert float(found["transition_rad_s"]) == pytest.approx(0.03 * FASTEST, rel=0.15)
 
 
-def with_presliding(way_rad: float, noise: float = 0.03) -> dict[str, np.ndarray]:
-    """Return a recording with a friction that follows the way since each reversal (Dahl, 1968), by small steps."""
+def with_presliding(presliding_rad: float, noise: float = 0.03) -> dict[str, np.ndarray]:
+    """Return a recording with a friction that follows the displacement since each reversal (Dahl, 1968)."""
     columns = table(noise=noise)
     speed = columns["speed_rad_s"].reshape(-1, AXES)
     friction, state, fine = np.zeros(speed.shape), np.sign(speed[0]), 50
     for instant in range(1, len(speed)):
         for step in range(fine):
             between = speed[instant - 1] + (speed[instant] - speed[instant - 1]) * (step + 0.5) / fine
-            state = state + (np.sign(between) - state) * np.abs(between) * STEP_S / fine / way_rad
+            state = state + (np.sign(between) - state) * np.abs(between) * STEP_S / fine / presliding_rad
         friction[instant] = state
     return {**columns, "reading_V": columns["reading_V"] + 0.8 * friction.ravel()}
 
 
-@pytest.mark.parametrize("way_rad", [0.8, 2.0])
-def test_friction_that_follows_the_way_is_found_by_its_way(way_rad: float) -> None:
+@pytest.mark.parametrize("presliding_rad", [0.8, 2.0])
+def test_friction_that_follows_the_displacement_is_found(presliding_rad: float) -> None:
     """The linear machine swings by some thirty radians."""
-    found = reversal_of(problem_of(with_presliding(way_rad)))
-    assert found == {"presliding_rad": pytest.approx(way_rad, rel=0.2)}
+    found = reversal_of(problem_of(with_presliding(presliding_rad)))
+    assert found == {"presliding_rad": pytest.approx(presliding_rad, rel=0.2)}
 
 
-def test_friction_that_follows_the_way_has_its_state_from_before() -> None:
-    """After each reversal it turns round with the way, whatever the speed; a run begins with all of it."""
+def test_friction_that_follows_the_displacement_has_its_state_from_before() -> None:
+    """It follows the displacement, whatever the speed; a run begins with all of it."""
     problem = problem_of(with_presliding(2.0))
     along, direction = along_motion(problem, {"presliding_rad": 2.0}), problem.covariates["direction"]
     begin = int(np.flatnonzero(direction[:, 1])[0])

@@ -164,7 +164,7 @@ class Cart(Simulation):
 
 
 def test_near_standstill_the_prediction_goes_on_as_long_as_the_motion() -> None:
-    """The cart slows down, stands and goes on or turns round: a late friction begins and ends with the motion."""
+    """The cart slows down, stands and goes on or reverses: a late friction begins and ends with the motion."""
     speed = np.round(np.clip(1.5 * np.sin(TIME_S / 9) + 0.8 * np.sin(TIME_S / 4), -1, 1), 1)
     friction = np.where(speed == 0, 0.3, 2.0 * np.sign(speed))
     problem = build_problem(
