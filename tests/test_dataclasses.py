@@ -70,6 +70,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
     assert found == {
         "Simulated",
         "Linearisation",
+        "StatedShare",
         "DesignMatrix",
         "Ranges",
         "RangeSums",

@@ -145,8 +145,9 @@ class SensorDelay(Candidate):
         return values[0] >= LEAST_READINGS * problem.recording.step_s and LEAST_PASSED <= share <= 1 / LEAST_PASSED
 
     def stated_coefficient(self, shape: Shape) -> tuple[float, float] | None:
-        """Return the delay of the predicted channel, and how well the share of the change is known to be 1."""
-        return next(((float(shape[kind]), PASSED_STD) for kind in OF_CHANNEL if kind in shape), None)
+        """Return the coefficient at which all of the change was recorded, and how well that share is known to be 1."""
+        passed = float(shape.get(PASSED, 1.0))
+        return next(((float(shape[kind]) / passed, PASSED_STD) for kind in OF_CHANNEL if kind in shape), None)
 
     def shape_at(self, shape: Shape, value: float) -> Shape:
         """Return the shape with the share of the predicted change that was recorded."""

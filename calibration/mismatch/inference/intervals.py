@@ -29,8 +29,10 @@ UNIT_OF_ENDING = {"_rad_s": ANGULAR_SPEED, "_degC": "degC", "_K": "K", "_s": "s"
 def parameters_of(equations: NormalEquations, fit: Fit, blocks: Index) -> list[dict[str, Parameter]]:
     """Return each term's parameters with bounds that hold them nine times in ten."""
     linearisation = linearised(equations, fit)
-    step, covariance = sandwich(equations, fit, linearisation, blocks)
+    step, covariance, inverse = sandwich(equations, fit, linearisation, blocks)
     moved = step + normal_draws(covariance, equations.thresholds.interval_draws)
+    for stated in linearisation.shares:
+        moved = stated.at_most_one(moved, inverse)
     found = []
     for index in range(len(fit.terms)):
         at = linearisation.of_term(fit, index)

@@ -20,7 +20,7 @@ from regolithd.calibration.mismatch.regression.residuals import whitened_residua
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+SMALL_STEP = 1e-6
+"""Relative step of a shape parameter for the slope of a stated coefficient (double precision)."""
 SINGULAR = 1e-9
 """Relative eigenvalue below which a direction counts as undetermined."""
 
@@ -49,16 +51,44 @@ class ShapeSlope:
 
 
 @dataclass(frozen=True, eq=False)
+class StatedShare:
+    """The share of the coefficient that a shape states, 1 at most: inputs with errors show less than happens, not more.
+
+    The fit does not have this prior. Where a law changes in proportion to its shape parameter, nothing else tells the
+    coefficient from that.
+
+    Attributes
+    ----------
+    share, std: where the fit stands, and the standard deviation of its prior, whose mean is 1
+    along: its slope with each column of the linearisation, shape (column,)
+    """
+
+    share: float
+    std: float
+    along: Array
+
+    def at_most_one(self, moved: Array, inverse: Array) -> Array:
+        """Return draws, shape (draw, column): those with a larger share have 1, and all else at its optimum for that.
+
+        `inverse` is that of the information and the priors, shape (column, column).
+        """
+        beyond = np.maximum(self.share + moved @ self.along - 1, 0.0)
+        follows = inverse @ self.along
+        return np.asarray(moved - np.outer(beyond, follows / (self.along @ follows)))
+
+
+@dataclass(frozen=True, eq=False)
 class Linearisation:
     """A fit as a linear function of everything that is uncertain.
 
     Attributes
     ----------
     columns: coefficients' columns, then shape parameters' slopes, then discrepancies, shape (column, time, wheel)
-    precision: prior precision of each, shape (column,)
-    pull: slope of the log prior where the fit stands, shape (column,); of what was not fitted as a coefficient alone
+    precision: of the prior, shape (column, column)
+    pull: slope of the log prior where the fit stands, shape (column,); 0 for what the fit has as its prior already
     slopes: what the columns after the coefficients' are
     ends: where each term's discrepancies begin, and after the last one end, shape (term + 1,)
+    shares: of coefficients that shapes state
     """
 
     columns: Array
@@ -66,6 +96,7 @@ class Linearisation:
     pull: Array
     slopes: tuple[ShapeSlope, ...]
     ends: Index
+    shares: tuple[StatedShare, ...] = ()
 
     def of_term(self, fit: Fit, index: int) -> list[int]:
         """Return the places of all columns of a term: its coefficients', slopes and discrepancies."""
@@ -84,15 +115,20 @@ def linearised(equations: NormalEquations, fit: Fit) -> Linearisation:
     shape = equations.problem.mask.shape
     discrepancies = [discrepancy_basis(equations, fit, index) for index in range(len(fit.terms))]
     sizes = [len(basis) for basis in discrepancies]
-    precision = np.full(sum(sizes), equations.thresholds.discrepancy_std**-2)
-    precision = np.concatenate((np.zeros(len(columns)), precision))
-    precision[: len(equations.nuisance.columns)] = equations.nuisance.precision
-    pull = np.zeros_like(precision)
+    each = np.full(sum(sizes), equations.thresholds.discrepancy_std**-2)
+    each = np.concatenate((np.zeros(len(columns)), each))
+    each[: len(equations.nuisance.columns)] = equations.nuisance.precision
+    pull = np.zeros_like(each)
     for place, slope in enumerate(slopes, len(fit.columns)):
-        precision[place], pull[place] = _prior_of_shape(fit.terms[slope.term], slope)
+        each[place], pull[place] = _prior_of_shape(fit.terms[slope.term], slope)
+    precision = np.diag(each)
+    shares = tuple(_stated_shares(equations, fit, slopes, len(each)))
+    for stated in shares:
+        precision += np.outer(stated.along, stated.along) / stated.std**2
+        pull += (1 - stated.share) / stated.std**2 * stated.along
     stacked = np.stack(columns) if columns else np.zeros((0, *shape))
     ends = len(columns) + np.cumsum([0, *sizes])
-    return Linearisation(np.concatenate((stacked, *discrepancies)), precision, pull, tuple(slopes), ends)
+    return Linearisation(np.concatenate((stacked, *discrepancies)), precision, pull, tuple(slopes), ends, shares)
 
 
 def _prior_of_shape(term: Term, slope: ShapeSlope) -> tuple[float, float]:
@@ -103,6 +139,29 @@ def _prior_of_shape(term: Term, slope: ShapeSlope) -> tuple[float, float]:
     mean, std = priors[slope.name]
     away = mean - float(term.group.shape[slope.name])
     return 1 / (std * slope.scale) ** 2, away / (std**2 * slope.scale)
+
+
+def _stated_shares(
+    equations: NormalEquations, fit: Fit, slopes: Sequence[ShapeSlope], count: int
+) -> Iterator[StatedShare]:
+    """Yield the share of what its shape states that each term's coefficient is, where one states it."""
+    for index, term in enumerate(fit.terms):
+        candidate, shape = term.group.candidate, term.group.shape
+        stated = candidate.stated_coefficient(shape) if candidate else None
+        if candidate is None or stated is None:
+            continue
+        (place,) = range(*fit.of_term(index).indices(len(fit.columns)))
+        scale = float(equations.design.scale[term.group.columns[0]])
+        share = float(fit.coefficients[place]) / scale / stated[0]
+        along = np.zeros(count)
+        along[place] = 1 / (scale * stated[0])
+        for column, slope in enumerate(slopes, len(fit.columns)):
+            if slope.term == index:
+                value = float(shape[slope.name])
+                longer = candidate.stated_coefficient({**shape, slope.name: value * (1 + SMALL_STEP)})
+                rise = (longer[0] - stated[0]) / (SMALL_STEP * value) if longer else 0.0
+                along[column] = -share * rise / (stated[0] * slope.scale)
+        yield StatedShare(share, stated[1], along)
 
 
 def _shape_slopes(equations: NormalEquations, fit: Fit) -> Iterator[tuple[ShapeSlope, Array]]:
@@ -128,22 +187,24 @@ def _shape_slopes(equations: NormalEquations, fit: Fit) -> Iterator[tuple[ShapeS
                 yield ShapeSlope(index, name, scale), slope / scale
 
 
-def sandwich(equations: NormalEquations, fit: Fit, linearisation: Linearisation, blocks: Index) -> tuple[Array, Array]:
-    """Return how far all would move from where they stand, and their covariance.
+def sandwich(
+    equations: NormalEquations, fit: Fit, linearisation: Linearisation, blocks: Index
+) -> tuple[Array, Array, Array]:
+    """Return how far all would move from where they stand, their covariance, and the inverse of A.
 
     The fit's own coefficients are at their optimum, priors included, and do not move; what was not fitted does.
     """
     design, precision, weights = equations.design, linearisation.precision, equations.weights
     columns = design.whitened_in_time(linearisation.columns)
     information = np.einsum("atw,w,btw->ab", columns, weights, columns, optimize=True)
-    inverse = pseudo_inverse(information + np.diag(precision), SINGULAR)
+    inverse = pseudo_inverse(information + precision, SINGULAR)
     scores = columns * (design.in_time(whitened_residual_of(equations, fit)) * weights)[None]
     sums = block_sums(scores, blocks)
     count = int(blocks.max()) + 1
-    middle = sums.T @ sums * count / max(count - 1, 1) + np.diag(precision)
+    middle = sums.T @ sums * count / max(count - 1, 1) + precision
     fitted = np.arange(len(information)) < len(fit.columns)
-    pull = np.where(fitted, 0.0, sums.sum(axis=0) + linearisation.pull)
-    return inverse @ pull, inverse @ middle @ inverse
+    pull = np.where(fitted, 0.0, sums.sum(axis=0)) + linearisation.pull
+    return inverse @ pull, inverse @ middle @ inverse, inverse
 
 
 def block_sums(scores: Array, blocks: Index) -> Array:

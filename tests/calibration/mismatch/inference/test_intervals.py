@@ -9,19 +9,29 @@ import numpy as np
 import pytest
 from linear_machine import NOISE, Power, equations_of, problem_of, table, term_of
 
+from regolithd.calibration.mismatch import Prior, Simulation, from_columns
+from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.inference.intervals import normal_draws, parameters_of, unit_of
 from regolithd.calibration.mismatch.inference.parameter_interval import interval
-from regolithd.calibration.mismatch.inference.sandwich import block_sums, linearised, sandwich
+from regolithd.calibration.mismatch.inference.sandwich import StatedShare, block_sums, linearised, sandwich
 from regolithd.calibration.mismatch.inference.size_interval import _over_kinds_of_shape, _rms
+from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
 from regolithd.calibration.mismatch.signal.noise import NoiseModel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
+    Array = NDArray[np.float64]
+
 WHITE = NoiseModel(np.full(2, NOISE), 1.0)
+ONE = NoiseModel(np.full(1, NOISE), 1.0)
 
 
 def exact_law(equations: NormalEquations) -> NormalEquations:
@@ -46,11 +56,12 @@ def test_the_sandwich_of_white_noise_is_the_inverse_information() -> None:
     fit = equations.fit([term_of(equations, "drag")])
     blocks = blocks_of_time(equations.problem, WHITE)
     linearisation = linearised(equations, fit)
-    step, covariance = sandwich(equations, fit, linearisation, blocks)
+    step, covariance, inverse = sandwich(equations, fit, linearisation, blocks)
     assert np.abs(step[:2]).max() < 1e-3
     assert np.sqrt(covariance[1, 1]) == pytest.approx(np.sqrt(fit.covariance[1, 1]), rel=0.35)
     assert linearisation.of_term(fit, 0) == [1, *range(2, len(linearisation.columns))]
-    np.testing.assert_allclose(linearisation.precision[2:], 1e8)
+    np.testing.assert_allclose(np.diag(linearisation.precision)[2:], 1e8)
+    np.testing.assert_allclose(inverse[:2, :2], fit.covariance, rtol=0.01)
 
 
 def test_nine_in_ten_intervals_hold_the_truth() -> None:
@@ -71,7 +82,7 @@ def test_a_law_may_be_wrong_by_a_share_at_each_knot_and_on_each_axis() -> None:
     fit = equations.fit([term_of(equations, "drag")])
     linearisation = linearised(equations, fit)
     assert linearisation.columns.shape == (2 + 6 + 2, *equations.problem.mask.shape)
-    np.testing.assert_allclose(linearisation.precision, [4.0, 0.0, *[0.15**-2] * 8], rtol=1e-5)
+    np.testing.assert_allclose(np.diag(linearisation.precision), [4.0, 0.0, *[0.15**-2] * 8], rtol=1e-5)
     blocks = blocks_of_time(equations.problem, WHITE)
     deviations = [
         np.sqrt(sandwich(each, fit, linearised(each, fit), blocks)[1][1, 1])
@@ -109,6 +120,51 @@ def test_a_shape_parameter_has_its_interval() -> None:
     (found,) = parameters_of(equations, equations.fit([term]), blocks_of_time(equations.problem, WHITE))
     assert found["power"].low <= 1.5 <= found["power"].high
     assert found["power"].high - found["power"].low < 0.6
+
+
+def test_a_larger_share_than_one_gives_way_to_the_best_fit_at_one() -> None:
+    """As least squares with the share held at 1 has it; draws below are as they were."""
+    random = np.random.default_rng(2)
+    columns, along = random.normal(size=(60, 3)), np.array([0.5, -0.2, 0.0])
+    information = columns.T @ columns
+    best = np.linalg.solve(information, columns.T @ random.normal(size=60))
+    moved = np.stack((best, best - 2 * along))
+    stated = StatedShare(1.3 - float(along @ best), 0.2, along)
+    held, below = stated.at_most_one(moved, np.linalg.inv(information))
+    assert stated.share + held @ along == pytest.approx(1.0)
+    free = np.array([[0.2, 0.0], [0.5, 0.0], [0.0, 1.0]])  # directions in which the share stays
+    assert free.T @ information @ (held - best) == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_array_equal(below, moved[1])
+
+
+class Slow(Simulation):
+    """A reading that follows a slow input."""
+
+    channel, unit, wheel_column = "reading_V", "V", None
+    inputs = ("level_V",)
+    parameters: ClassVar = {"gain": Prior(1.0, 0.01, "1")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the input times the gain."""
+        return values["gain"] * inputs["level_V"]
+
+
+def test_a_delay_whose_change_is_in_proportion_to_it_has_its_interval() -> None:
+    """Only that all of the change is recorded tells a delay from another of a part of it: over forty seeds."""
+    held, widths = 0, []
+    t_s = 0.5 * np.arange(800)
+    level = 4 * np.sin(t_s / 13) + 3 * np.sin(t_s / 29)
+    for seed in range(40):
+        recorded = np.interp(t_s - 2.0, t_s, level) + 0.6 * np.random.default_rng(seed).normal(size=800)
+        recording = from_columns({"t_s": t_s, "level_V": level, "reading_V": recorded})
+        equations = exact_law(equations_of(build_problem(recording, Slow()), (SensorDelay(),)))
+        equations, term = optimised_shape(equations, (), term_of(equations, "sensor-delay", (0,)))
+        (found,) = parameters_of(equations, equations.fit([term]), blocks_of_time(equations.problem, ONE))
+        delay = found["delay_s"]
+        held += delay.low <= 2.0 <= delay.high
+        widths.append(delay.high - delay.low)
+    assert 33 <= held <= 40
+    assert np.median(widths) < 1.2
 
 
 class Bent(Power):
