@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
+ON_TIME_WITHIN = 0.5
+"""Readings by which an input that was put on time may still be late (a choice: what sampling leaves open)."""
 STEPS = 6
 """Linearisations at most (a choice: a smooth simulation needs two or three)."""
 
@@ -81,6 +83,12 @@ def late_otherwise(problem: Problem, values: Mapping[str, float]) -> bool:
     now, then = ((late - at)[problem.mask] for late, at in zip(shown, (here, there), strict=True))
     share = problem.thresholds.size_discrepancy_std
     return float(np.mean((then - now) ** 2)) > share**2 * float(np.mean(now**2))
+
+
+def put_on_time_by(problem: Problem, late: Mapping[str, float]) -> bool:
+    """Return whether a problem has all these inputs on time that are late by so much [s]."""
+    within = ON_TIME_WITHIN * problem.recording.step_s
+    return all(abs(delay - problem.on_time.get(name, 0.0)) <= within for name, delay in late.items())
 
 
 def shifts_to_values(problem: Problem, shifts: Mapping[str, float]) -> dict[str, float]:

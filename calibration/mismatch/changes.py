@@ -16,7 +16,7 @@ from regolithd.calibration.mismatch.answer import Change, Contribution
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.candidates.motion import REVERSAL_KEYS
 from regolithd.calibration.mismatch.candidates.reversal import reversal_of
-from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of, lateness
+from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of, late_inputs, lateness
 from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw
 from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
 from regolithd.calibration.mismatch.inference.statements import after_number, on_wheels
@@ -240,12 +240,20 @@ def corrected_problem(problem: Problem, stated: Sequence[Stated]) -> Problem:
             column=each.column(problem),
             relative_std=each.contribution.relative_std,
             in_simulation=each.in_simulation,
+            on_time=not each.in_simulation and each.contribution.shape.get("late") in problem.on_time,
             deviations=each.deviations(problem),
         )
         for each in stated
     )
     added = replace(problem, stated=effects).added
     return replace(problem, stated=effects, prediction=problem.prediction + added)
+
+
+def stated_late_inputs(stated: Sequence[Stated], inputs: Sequence[str]) -> dict[str, float]:
+    """Return which of these inputs a corrected simulation has on time, and by how much they are recorded late [s]."""
+    return late_inputs(
+        [(each.contribution.name, each.contribution.shape) for each in stated if not each.in_simulation], inputs
+    )
 
 
 def with_changes(problem: Problem, candidates: Sequence[Candidate], stated: Sequence[Stated]) -> tuple[Candidate, ...]:

@@ -6,11 +6,17 @@ recording, simulation ─▶ problem ─▶ equations ─▶ decision ─▶ ans
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
-from regolithd.calibration.mismatch.calibration import bent, late_otherwise, linearised_where_it_fits, moved_values
+from regolithd.calibration.mismatch.calibration import (
+    bent,
+    late_otherwise,
+    linearised_where_it_fits,
+    moved_values,
+    put_on_time_by,
+)
 from regolithd.calibration.mismatch.candidates.library import library
-from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, with_changes
+from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, stated_late_inputs, with_changes
 from regolithd.calibration.mismatch.corrected import write_corrected
 from regolithd.calibration.mismatch.data.recording import as_recording
 from regolithd.calibration.mismatch.empirical.found import curves_of
@@ -44,7 +50,7 @@ if TYPE_CHECKING:
 
 
 LATE_SEARCHES = 2
-"""Searches beside a late channel, at most (a choice: parameters that move far as the delay is found move once)."""
+"""Searches beside a late column, at most (a choice: parameters that move far as the delay is found move once)."""
 
 
 @dataclass(frozen=True)
@@ -184,10 +190,11 @@ def decided(
     candidates: Sequence[Candidate] = [each.form_for(simulation) for each in simulation.candidates(library())]
     stated = stated_in(candidates, effects, simulation.stated_effects(), simulation.empirical_curves)
 
-    inputs = inputs_of(recorded, simulation)
+    inputs, on_time = inputs_of(recorded, simulation), stated_late_inputs(stated, simulation.inputs)
 
-    def pose(values: Mapping[str, float] | None) -> Problem:
-        problem = build_problem(recorded, simulation, values, inputs=inputs, thresholds=thresholds)
+    def pose(values: Mapping[str, float] | None, late: Mapping[str, float] | None = None) -> Problem:
+        late = {**on_time, **(late or {})}
+        problem = build_problem(recorded, simulation, values, inputs=inputs, late=late, thresholds=thresholds)
         return corrected_problem(problem, stated)
 
     search = _search(candidates, stated, pose, progress)
@@ -195,6 +202,12 @@ def decided(
     decision, held_out = earned(search.decision, search.grid)
     decision = without_improbable_curves(in_regions(decision))
     return Decided(decision, held_out, search.candidates, search.applicable)
+
+
+class _Pose(Protocol):
+    """The problem at these values of the parameters, or at the stated ones, with late inputs put on time [s]."""
+
+    def __call__(self, values: Mapping[str, float] | None, late: Mapping[str, float] | None = None, /) -> Problem: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,31 +223,30 @@ class _Search:
 def _search(
     candidates: Sequence[Candidate],
     stated: Sequence[Stated],
-    pose: Callable[[Mapping[str, float] | None], Problem],
+    pose: _Pose,
     progress: Callable[[str], None],
 ) -> _Search:
-    """Search, and once more where what was found moves the parameters far, or makes all else late with the channel.
+    """Search, and once more where what was found moves the parameters far, or where a column is late.
 
-    What a delay changes depends on the prediction, so that the simulation is linearised anew beside it, too.
+    What a delay changes depends on the prediction, so that the simulation is linearised anew beside it, too: with all
+    else late with the channel, and with inputs that are late on time.
     """
     equations = linearised_where_it_fits(pose)
     problem = equations.problem
     candidates = with_changes(problem, candidates, stated)
     found = _search_at(equations, candidates, progress)
     values = moved_values(found.decision.equations, found.decision.whole)
-    if found.decision.late is None and bent(problem, values):
+    if not found.decision.has_delay and bent(problem, values):
         del found, equations  # memory holds the matrix of one search at a time, and TMPDIR its columns
         found = _search_at(smooth_equations(pose(values)), candidates, progress)
         values = moved_values(found.decision.equations, found.decision.whole)
-    if found.decision.late is None:
-        return found
-    for _ in range(LATE_SEARCHES):
-        problem = replace(pose(values), late=found.decision.late)
+    for _ in range(LATE_SEARCHES if found.decision.has_delay else 0):
+        problem = replace(pose(values, found.decision.late_inputs), late=found.decision.late)
         again = _search_at(smooth_equations(problem), candidates, progress)
-        if again.decision.late is None:
+        if not again.decision.has_delay:
             break
         found, values = again, moved_values(again.decision.equations, again.decision.whole)
-        if not late_otherwise(problem, values):
+        if not late_otherwise(problem, values) and put_on_time_by(problem, found.decision.late_inputs):
             break
     return found
 

@@ -124,7 +124,7 @@ class _Beside:
 def _beside_a_step(problem: Problem) -> _Beside:
     free = [problem.tangent(name) for name, prior in problem.simulation.parameters.items() if prior.std > 0]
     free = list(as_shown(problem, free))
-    residual = np.where(problem.mask, problem.measured - problem.filled, 0.0)
+    residual = problem.residual
     ones = np.ones(residual.shape[1])
     as_read = _in_order(problem, [residual, *free, *_laws(problem, {})], NOT_WHITENED, ones)
     left = _left(as_read[1:], as_read[:1])[0]

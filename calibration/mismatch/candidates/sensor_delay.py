@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Array, Candidate, Coefficient, Shape
-from regolithd.calibration.mismatch.problem.covariates import LONGEST_STEP
-from regolithd.calibration.mismatch.signal.recursion import recursion
+from regolithd.calibration.mismatch.problem.delayed import filtered, shifted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -47,7 +46,7 @@ class SensorDelay(Candidate):
     agree.
 
     What acts on the machine shows as late as the predicted channel is: once that is named, all else is searched for
-    again, late by as much.
+    again, late by as much. Once an input's delay is named, all else is searched for with that input on time.
 
     A delay of less than 1.25 readings has no name, since a sampled input does not say what it was between two readings:
     what it changes stays unexplained. `shape.late` is the column that is late; the effect's `channel` is the predicted
@@ -95,7 +94,7 @@ class SensorDelay(Candidate):
         of_inputs: list[Shape] = [
             {"late": name, "input_secant_s": delay}
             for name in simulation.inputs
-            for delay in _delays(problem, RATIO_OF_INPUT)
+            for delay in sorted({*_delays(problem, RATIO_OF_INPUT), *filter(None, [problem.on_time.get(name)])})
         ]
         return [*of_channel, *of_inputs]
 
@@ -107,10 +106,12 @@ class SensorDelay(Candidate):
                 behind = delayed(problem.recording, _without_blanks(problem, delay), delay)
                 return (float(shape.get(PASSED, 1.0)) * (behind - problem.prediction) / delay)[None]
         late, delay = str(shape["late"]), float(shape["input_secant_s"])
+        already = problem.on_time.get(late, 0.0)
 
         def change() -> Array:
-            moved = problem.with_input(late, shifted(problem.recording, problem.recording.channels[late], delay))
-            return (moved - problem.filled) / delay
+            further = shifted(problem.recording, problem.recording.channels[late], delay - already)
+            moved = problem.with_input(late, further) if delay != already else problem.filled
+            return (moved - (problem.as_simulated if already else problem.filled)) / delay
 
         return problem.run_once(f"{late} late", delay, change)[None]
 
@@ -206,36 +207,6 @@ def _standing(direction: Array, first: int, end: int) -> slice:
     return slice(still, still + int(other[-1]) + 1 if other.size else still)
 
 
-def filtered(recording: Recording, values: Array, time_constant_s: float) -> Array:
-    """Return values (time, wheel) behind a first-order filter, exact for straight lines between readings.
-
-    Each run begins at its first value; so does what follows a gap.
-    """
-    steps = np.diff(recording.time_s)
-    whole = (np.diff(recording.run) == 0) & (steps < LONGEST_STEP * recording.step_s)
-    decay = float(np.exp(-recording.step_s / time_constant_s))
-    slope = (1 - decay) * time_constant_s / recording.step_s
-    begins = np.concatenate(([True], ~whole))
-    added = (1 - slope) * values
-    added[1:] += (slope - decay) * values[:-1]
-    added[begins] = values[begins]
-    return recursion(np.where(begins, 0.0, decay)[:, None], added)
-
-
-def shifted(recording: Recording, values: Array, by_s: float) -> Array:
-    """Return values (time, wheel) as they are `by_s` later in the same run, on straight lines; ends are held."""
-    moved = np.array(values, np.float64)
-    for run in np.unique(recording.run):
-        here = recording.run == run
-        at = recording.time_s[here]
-        for k in range(values.shape[1]):
-            column = values[here, k]
-            known = np.isfinite(column)
-            if known.sum() > 1:
-                moved[here, k] = np.where(known, np.interp(at + by_s, at[known], column[known]), np.nan)
-    return moved
-
-
 OF_CHANNEL: Mapping[str, Callable[[Recording, Array, float], Array]] = {
     "secant_s": lambda recording, values, delay: shifted(recording, values, -delay),
     "filter_s": filtered,
@@ -271,6 +242,12 @@ def _bridged(values: Array) -> Array:
         if known.any() and not known.all():
             column[:] = np.interp(rows, rows[known], column[known])
     return found
+
+
+def late_inputs(effects: Iterable[tuple[str, Shape]], inputs: Sequence[str]) -> dict[str, float]:
+    """Return how late each of these inputs is by some effects, names and shapes [s]."""
+    shapes = [shape for name, shape in effects if name == SensorDelay.name and "input_secant_s" in shape]
+    return {str(shape["late"]): float(shape["input_secant_s"]) for shape in shapes if shape["late"] in inputs}
 
 
 def lateness(effects: Iterable[tuple[str, Shape]], channel: str) -> tuple[str, float] | None:

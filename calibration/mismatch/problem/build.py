@@ -12,7 +12,7 @@ from regolithd.calibration.mismatch.problem.compared import blanks_of, isolated_
 from regolithd.calibration.mismatch.problem.covariates import covariates_of
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.problem import Problem
-from regolithd.calibration.mismatch.problem.simulated import Inputs, inputs_of, simulated
+from regolithd.calibration.mismatch.problem.simulated import Inputs, inputs_of, put_on_time, simulated
 from regolithd.calibration.mismatch.problem.words import labels_of
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
@@ -34,11 +34,13 @@ def build_problem(
     values: Mapping[str, float] | None = None,
     *,
     inputs: Inputs | None = None,
+    late: Mapping[str, float] | None = None,
     thresholds: Thresholds = THRESHOLDS,
 ) -> Problem:
     """Simulate the recording, with `values` for the parameters or as the simulation states them.
 
-    `inputs` are those of the recording, where they have been prepared for other values before.
+    `inputs` are those of the recording, where they have been prepared for other values before; `late` are inputs that
+    are put on time, and how late they were recorded [s].
 
     Raises
     ------
@@ -47,7 +49,12 @@ def build_problem(
     """
     chosen = dict(values or {name: prior.value for name, prior in simulation.parameters.items()})
     inputs = inputs or inputs_of(recording, simulation)
-    run = simulated(inputs, simulation, {**simulation.variants(), **chosen}, thresholds)
+    all_values = {**simulation.variants(), **chosen}
+    run = simulated(put_on_time(inputs, late) if late else inputs, simulation, all_values, thresholds)
+    as_recorded = None
+    if late:
+        as_recorded = simulation.predict(complete_inputs(inputs.expected), all_values)
+        as_recorded = np.where(np.isfinite(as_recorded), as_recorded, run.prediction)
     prepared, prediction = run.recording, run.prediction
     measured = run.as_read.channel(simulation.channel)  # as read, also where it is an input that is smoothed
     compared = run.known & np.isfinite(measured)
@@ -82,6 +89,8 @@ def build_problem(
         row=simulation.row(recording.wheels),
         left_out=left_out(simulation.channel, measured, run, outliers, blanks, labels),
         thresholds=thresholds,
+        on_time=dict(late or {}),
+        as_recorded=as_recorded,
     )
 
 

@@ -48,6 +48,7 @@ class StatedEffect:
     column: what it adds to the prediction, shape (time, wheel)
     relative_std: relative standard deviation of its size, from the comparison that found it
     in_simulation: whether the simulation's own prediction has it; else it is added on the output
+    on_time: whether it is the delay of an input that the problem has on time, so that its prediction has it
     deviations: what one standard deviation of other numbers in its law adds, shape (time, wheel) each
     """
 
@@ -56,6 +57,7 @@ class StatedEffect:
     column: Array
     relative_std: float
     in_simulation: bool = False
+    on_time: bool = False
     deviations: tuple[Array, ...] = ()
 
 
@@ -79,6 +81,9 @@ class Problem:
     side, row: each wheel's place on the machine, or None
     thresholds: the numbers that decide
     made: what takes runs of the simulation, or long, by name and step: a cache, which copies of the problem share
+    on_time: how late inputs were recorded that are put on time here [s], by name
+    as_recorded: where some are, the prediction from the inputs as they were recorded, without stated effects; None:
+        `prediction` is of these
     late: how the predicted channel is late, by `sensor_delay.OF_CHANNEL`, and by how much [s]: what acts on the machine
         shows so much later; None: it is not, or it is not known yet
     """
@@ -98,6 +103,8 @@ class Problem:
     stated: tuple[StatedEffect, ...] = ()
     thresholds: Thresholds = THRESHOLDS
     made: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)
+    on_time: Mapping[str, float] = field(default_factory=dict)
+    as_recorded: Array | None = None
     late: tuple[str, float] | None = None
     _derived: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
     """What was computed from covariates and readings, by name: a cache, which a copy begins anew."""
@@ -128,9 +135,22 @@ class Problem:
         return np.where(np.isfinite(self.prediction), self.prediction, 0.0)
 
     @cached_property
+    def as_simulated(self) -> Array:
+        """What the simulation predicts of the recording as it is, 0 where it predicts nothing: effects add to that."""
+        if self.as_recorded is None:
+            return self.filled
+        delays = [effect.column for effect in self.stated if effect.on_time]
+        return self._where_predicted(sum(delays, self.as_recorded + self.added))
+
+    @cached_property
+    def residual(self) -> Array:
+        """What was measured less what the simulation predicts, 0 where it is not compared, shape (time, wheel)."""
+        return np.where(self.mask, self.measured - self.as_simulated, 0.0)
+
+    @cached_property
     def added(self) -> Array:
         """What stated effects add on the output of the simulation, shape (time, wheel)."""
-        columns = [effect.column for effect in self.stated if not effect.in_simulation]
+        columns = [effect.column for effect in self.stated if not (effect.in_simulation or effect.on_time)]
         return sum(columns, np.zeros(self.mask.shape))
 
     @cached_property

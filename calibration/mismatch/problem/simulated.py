@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.data.slow_channels import bridged, filled_between
 from regolithd.calibration.mismatch.errors import RecordingError
+from regolithd.calibration.mismatch.problem.delayed import shifted
 from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.signal.robust import robust_std
@@ -93,6 +94,21 @@ def inputs_of(recording: Recording, simulation: Predictor) -> Inputs:
         otherwise, _ = _prepared(recording, simulation, other_way=True)
         otherwise = expected_inputs(otherwise, simulation.sensors, normal)
     return Inputs(as_read, expected, otherwise, blanks)
+
+
+def put_on_time(inputs: Inputs, late: Mapping[str, float]) -> Inputs:
+    """Return the inputs with some of their columns as they would have been recorded without their delay [s]."""
+
+    def moved(recording: Recording) -> Recording:
+        columns = {name: shifted(recording, recording.channels[name], delay) for name, delay in late.items()}
+        return recording.with_channels(**columns)
+
+    otherwise = None if inputs.bridged_otherwise is None else moved(inputs.bridged_otherwise)
+    blanks = {
+        name: shifted(inputs.expected, blank.astype(np.float64), late.get(name, 0.0)) > 0
+        for name, blank in inputs.blanks.items()
+    }
+    return Inputs(moved(inputs.as_read), moved(inputs.expected), otherwise, blanks)
 
 
 def simulated(inputs: Inputs, simulation: Predictor, values: Mapping[str, float], thresholds: Thresholds) -> Simulated:

@@ -214,7 +214,7 @@ def empty_design(problem: Problem, folds: Index) -> DesignMatrix:
     """Return a design matrix without columns; `folds` is each instant's fold, shape (time,)."""
     order = np.argsort(folds, kind="stable")
     cuts = np.searchsorted(folds[order], np.arange(folds.max() + 2))
-    residual = _arranged(problem, order, [problem.measured - problem.filled])[0]
+    residual = _arranged(problem, order, [problem.residual])[0]
     known = _folds_of(problem.mask.T[:, order].astype(np.float64), cuts)
     columns = ColumnFile(*residual.shape)
     return DesignMatrix(

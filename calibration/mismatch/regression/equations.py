@@ -56,7 +56,7 @@ def _free_parameters(problem: Problem) -> tuple[DesignMatrix, Nuisance, NoiseMod
     So the noise is that of what the parameters leave when they are fitted under a short autocorrelation time.
     """
     limits = problem.thresholds
-    noise = problem.noise_of(problem.measured - problem.filled)
+    noise = problem.noise_of(problem.residual)
     folds = folds_of_blocks(problem, blocks_of_time(problem, noise))
     design, nuisance = with_nuisance(empty_design(problem, folds))
     short = min(noise.autocorrelation_time, limits.provisional_autocorrelation_time)

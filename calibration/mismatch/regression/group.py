@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape, Sharing
+    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.region import Region
 
 Array = NDArray[np.float64]
@@ -83,6 +84,10 @@ class Term:
     def name(self) -> str:
         """The candidate's or the covariate's."""
         return self.group.name
+
+    def settled_in(self, problem: Problem) -> bool:
+        """Return whether it is the delay of an input that a problem has on time: what was found before it was posed."""
+        return not self.group.is_change and self.group.shape.get("late") in problem.on_time
 
 
 @dataclass(frozen=True)

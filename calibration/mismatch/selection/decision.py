@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import lateness
+from regolithd.calibration.mismatch.candidates.sensor_delay import late_inputs, lateness
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.candidate_groups import with_candidate
 from regolithd.calibration.mismatch.regression.residuals import residual_of
@@ -87,6 +87,17 @@ class Decision:
         """How the predicted channel is late by a named effect, and by how much [s]; None: it is not."""
         named = [(term.name, term.group.shape) for term in self.named.terms]
         return lateness(named, self.equations.problem.simulation.channel)
+
+    @property
+    def has_delay(self) -> bool:
+        """Whether a named effect makes a column late."""
+        return self.late is not None or bool(self.late_inputs)
+
+    @property
+    def late_inputs(self) -> dict[str, float]:
+        """Inputs of the simulation that are late by a named effect, and by how much [s]."""
+        named = [(term.name, term.group.shape) for term in self.named.terms if not term.group.is_change]
+        return late_inputs(named, self.equations.problem.simulation.inputs)
 
 
 def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decision:

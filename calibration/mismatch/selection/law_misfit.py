@@ -1,7 +1,8 @@
 """What effects explain as a whole, and how much of it their laws miss.
 
 No law is exact to the last percent. A corrected effect that has changed is inexact by a share of its whole size, of
-which the prediction has a part already.
+which the prediction has a part already. The delay of an input that is on time has no law to miss: the simulation runs
+with that input.
 """
 
 from __future__ import annotations
@@ -40,12 +41,18 @@ def without_term(equations: NormalEquations, term: Term, rest: Sequence[Term]) -
     return (as_stated(equations) if term.group.is_change else equations).fit(rest)
 
 
+def settled(equations: NormalEquations, fit: Fit) -> Fit:
+    """Return the fit of those terms alone by which an input is late that the problem has on time."""
+    return equations.fit([term for term in fit.terms if term.settled_in(equations.problem)])
+
+
 def explained(equations: NormalEquations, fit: Fit) -> float:
-    """Return the Δχ² of a fit, with what is in the prediction already of corrected effects that it changes."""
+    """Return the Δχ² of a fit's laws, with what is in the prediction already of corrected effects that it changes."""
     sizes = [term.group.candidate.stated_size if term.group.candidate else 0.0 for term in fit.terms]
+    total = fit.delta_chi2 - settled(equations, fit).delta_chi2
     if not any(sizes):
-        return fit.delta_chi2
-    held, total = as_stated(equations), fit.delta_chi2
+        return total
+    held = as_stated(equations)
     for index, (term, size) in enumerate(zip(fit.terms, sizes, strict=True)):
         if not size:
             continue

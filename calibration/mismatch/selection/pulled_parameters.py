@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from regolithd.calibration.mismatch.selection.law_misfit import settled
+
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
@@ -17,11 +19,14 @@ if TYPE_CHECKING:
 def drop_what_pulls_parameters_out(equations: NormalEquations, named: Fit) -> Fit:
     """Return the fit without the effects beside which parameters leave their priors that are within them otherwise.
 
-    The effect without which fewest are outside is left out first; of equals, that which gains least.
+    The effect without which fewest are outside is left out first; of equals, that which gains least. The delay of an
+    input that is on time stays: the parameters would make up for it.
     """
-    without_any = _outside(equations, equations.fit(()))
-    while named.terms and _outside(equations, named) - without_any:
-        fits = [equations.fit(named.without(index)) for index in range(len(named.terms))]
+    kept = settled(equations, named)
+    without_any = _outside(equations, kept)
+    while len(named.terms) > len(kept.terms) and _outside(equations, named) - without_any:
+        others = [index for index, term in enumerate(named.terms) if term not in kept.terms]
+        fits = [equations.fit(named.without(index)) for index in others]
         named = min(fits, key=lambda fit: (len(_outside(equations, fit) - without_any), -equations.score(fit)))
     return named
 

@@ -104,9 +104,8 @@ def sums_of(
     candidates = {each.name: each for each in forms_of(of_channel)}
     problem = _posed(recording, simulation, of_channel, found, thresholds)
     columns = _columns(problem, [(candidates[name], shape) for name, shape in laws], found.terms)
-    residual = np.where(problem.mask, problem.measured - problem.filled, 0.0)
     # Measured from the stated values, not from where this recording's own comparison linearised the simulation.
-    residual += np.einsum("c,ctw->tw", columns.shifts, columns.values[: len(columns.shifts)])
+    residual = problem.residual + np.einsum("c,ctw->tw", columns.shifts, columns.values[: len(columns.shifts)])
     noise = NoiseModel(found.deviation, found.autocorrelation_times)
     gram, moment, fourth = _products(columns.values, residual)
     return Sums(

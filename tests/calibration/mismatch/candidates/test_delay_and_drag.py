@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
-from regolithd.calibration.mismatch.candidates.sensor_delay import shifted
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.problem.delayed import shifted
 from regolithd.calibration.mismatch.simulation.load import load_simulation
 
 if TYPE_CHECKING:

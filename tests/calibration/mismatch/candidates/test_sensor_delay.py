@@ -10,9 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
-from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay, as_shown, filtered, shifted
+from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay, as_shown
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.problem.delayed import filtered, shifted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

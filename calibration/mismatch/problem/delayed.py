@@ -1,0 +1,46 @@
+"""Columns behind a dead time or a first-order filter, in each run by itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.problem.covariates import LONGEST_STEP
+from regolithd.calibration.mismatch.signal.recursion import recursion
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.data.recording import Recording
+
+Array = NDArray[np.float64]
+
+
+def filtered(recording: Recording, values: Array, time_constant_s: float) -> Array:
+    """Return values (time, wheel) behind a first-order filter, exact for straight lines between readings.
+
+    Each run begins at its first value; so does what follows a gap.
+    """
+    steps = np.diff(recording.time_s)
+    whole = (np.diff(recording.run) == 0) & (steps < LONGEST_STEP * recording.step_s)
+    decay = float(np.exp(-recording.step_s / time_constant_s))
+    slope = (1 - decay) * time_constant_s / recording.step_s
+    begins = np.concatenate(([True], ~whole))
+    added = (1 - slope) * values
+    added[1:] += (slope - decay) * values[:-1]
+    added[begins] = values[begins]
+    return recursion(np.where(begins, 0.0, decay)[:, None], added)
+
+
+def shifted(recording: Recording, values: Array, by_s: float) -> Array:
+    """Return values (time, wheel) as they are `by_s` later in the same run, on straight lines; ends are held."""
+    moved = np.array(values, np.float64)
+    for run in np.unique(recording.run):
+        here = recording.run == run
+        at = recording.time_s[here]
+        for k in range(values.shape[1]):
+            column = values[here, k]
+            known = np.isfinite(column)
+            if known.sum() > 1:
+                moved[here, k] = np.where(known, np.interp(at + by_s, at[known], column[known]), np.nan)
+    return moved
