@@ -89,6 +89,7 @@ def build_problem(
         row=simulation.row(recording.wheels),
         left_out=left_out(simulation.channel, measured, run, outliers, blanks, labels),
         thresholds=thresholds,
+        doubt=inputs.doubt,
         on_time=dict(late or {}),
         as_recorded=as_recorded,
     )

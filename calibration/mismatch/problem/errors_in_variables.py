@@ -76,10 +76,7 @@ def expected_inputs(
         return recording
     values = np.concatenate([recording.channels[name] for name in names], axis=1)
     owners = [name for name in names for _ in recording.wheels]
-    scale = [
-        sensors[name].absolute + sensors[name].relative * float(known_mean(np.abs(column)))
-        for name, column in zip(owners, values.T, strict=True)
-    ]
+    scale = [_error_of(column, sensors[name]) for name, column in zip(owners, values.T, strict=True)]
     starts = np.flatnonzero(np.diff(recording.run, prepend=recording.run[0] - 1))
     rest, truths = _at_rest(values), normal_truths(values, np.array(scale) ** 2, starts)
     smooth = truths.mean.copy()
@@ -93,6 +90,15 @@ def expected_inputs(
         smooth[:, k] = refined_by_density(moving, scale[k], starts, truths.column(k))
     parts = np.split(np.where(rest, 0.0, smooth), len(names), axis=1)
     return recording.with_channels(**dict(zip(names, parts, strict=True)))
+
+
+def error_of(recording: Recording, name: str, error: SensorError) -> float:
+    """Return the standard deviation of an input's error, in its unit."""
+    return _error_of(recording.channels[name].ravel(), error) if name in recording.channels else 0.0
+
+
+def _error_of(readings: Array, error: SensorError) -> float:
+    return error.absolute + error.relative * float(known_mean(np.abs(readings)))
 
 
 def _at_rest(values: Array) -> NDArray[np.bool_]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.problem.input_doubt import InputDoubt
     from regolithd.calibration.mismatch.problem.predictor import Predictor
 
 Array = NDArray[np.float64]
@@ -81,6 +82,7 @@ class Problem:
     side, row: each wheel's place on the machine, or None
     thresholds: the numbers that decide
     made: what takes runs of the simulation, or long, by name and step: a cache, which copies of the problem share
+    doubt: of the prediction by the inputs' stated errors; None: none is stated
     on_time: how late inputs were recorded that are put on time here [s], by name
     as_recorded: where some are, the prediction from the inputs as they were recorded, without stated effects; None:
         `prediction` is of these
@@ -103,6 +105,7 @@ class Problem:
     stated: tuple[StatedEffect, ...] = ()
     thresholds: Thresholds = THRESHOLDS
     made: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)
+    doubt: InputDoubt | None = None
     on_time: Mapping[str, float] = field(default_factory=dict)
     as_recorded: Array | None = None
     late: tuple[str, float] | None = None

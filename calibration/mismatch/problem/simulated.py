@@ -18,6 +18,7 @@ from regolithd.calibration.mismatch.data.slow_channels import bridged, filled_be
 from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.problem.delayed import shifted
 from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
+from regolithd.calibration.mismatch.problem.input_doubt import InputDoubt, input_doubt
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.signal.robust import robust_std
 
@@ -45,12 +46,14 @@ class Inputs:
     expected: the same with inputs replaced by their conditional expectation
     bridged_otherwise: the same with blanks bridged in another way; None where there are none
     blanks: where each input was not measured
+    doubt: of the prediction by the inputs' stated errors; None: none is stated
     """
 
     as_read: Recording
     expected: Recording
     bridged_otherwise: Recording | None
     blanks: Mapping[str, Mask]
+    doubt: InputDoubt | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +96,9 @@ def inputs_of(recording: Recording, simulation: Predictor) -> Inputs:
     if blanks:
         otherwise, _ = _prepared(recording, simulation, other_way=True)
         otherwise = expected_inputs(otherwise, simulation.sensors, normal)
-    return Inputs(as_read, expected, otherwise, blanks)
+    stated = {name: prior.value for name, prior in simulation.parameters.items()}
+    doubt = input_doubt(as_read, expected, simulation, {**simulation.variants(), **stated})
+    return Inputs(as_read, expected, otherwise, blanks, doubt)
 
 
 def put_on_time(inputs: Inputs, late: Mapping[str, float]) -> Inputs:
@@ -108,7 +113,7 @@ def put_on_time(inputs: Inputs, late: Mapping[str, float]) -> Inputs:
         name: shifted(inputs.expected, blank.astype(np.float64), late.get(name, 0.0)) > 0
         for name, blank in inputs.blanks.items()
     }
-    return Inputs(moved(inputs.as_read), moved(inputs.expected), otherwise, blanks)
+    return Inputs(moved(inputs.as_read), moved(inputs.expected), otherwise, blanks, inputs.doubt)
 
 
 def simulated(inputs: Inputs, simulation: Predictor, values: Mapping[str, float], thresholds: Thresholds) -> Simulated:

@@ -42,6 +42,7 @@ class Course:
     in_time, in_folds: of each reading in an array (time, wheel), and in one (wheel, time in the order of folds)
     runs: which readings followed each other
     whitening: of the noise
+    reliability: of each reading, by which it is multiplied before it is whitened; None: all are alike
     """
 
     wheel: Index
@@ -50,11 +51,14 @@ class Course:
     in_folds: Index
     runs: tuple[slice, ...]
     whitening: Whitening
+    reliability: Single | None = None
 
     def whitened(self, columns: Array) -> Single:
         """Return columns (column, time, wheel), whitened, shape (column, reading)."""
         values = np.take(columns.reshape(len(columns), -1), self.in_time, axis=1).astype(np.float32)
-        return values if self.whitening is NOT_WHITENED else self.whitening.apply(values, self.runs)
+        if self.whitening is NOT_WHITENED:
+            return values
+        return self.whitening.apply(values if self.reliability is None else values * self.reliability, self.runs)
 
     def arranged(self, values: Single) -> Single:
         """Return what is in the order of folds (…, wheel, time) as (…, reading)."""
@@ -73,6 +77,8 @@ class DesignMatrix:
     cuts: where each fold begins and ends in that order, shape (fold + 1,)
     readings: where each wheel's readings are in that order, as they followed each other in time; and their runs
     whitening: of the noise
+    reliability: of each reading, by which it is multiplied before it is whitened, shape (wheel, time), in the order of
+        folds; None: all are alike
     residual_as_read: measured less predicted, shape (wheel, time), in the order of folds, 0 outside the mask
     residual: the same, whitened
     energy, counts: sum of squares and number of the whitened residual's readings, shape (fold, wheel)
@@ -96,6 +102,7 @@ class DesignMatrix:
     _whitened: ColumnFile = field(repr=False)
     """The same file where nothing is whitened."""
     _sums: Sums = field(repr=False)
+    reliability: Single | None = field(default=None, repr=False)
 
     @property
     def size(self) -> int:
@@ -145,7 +152,10 @@ class DesignMatrix:
         found = np.zeros_like(values)
         for row, wheel in enumerate(range(len(self.readings)) if wheels is None else wheels):
             places, runs = self.readings[wheel]
-            found[..., row, places] = self.whitening.apply(values[..., row, places], runs)
+            read = values[..., row, places]
+            if self.reliability is not None:
+                read = read * self.reliability[wheel, places]
+            found[..., row, places] = self.whitening.apply(read, runs)
         return found
 
     def course_of(self, wheels: Sequence[int]) -> Course:
@@ -157,7 +167,8 @@ class DesignMatrix:
         place = np.concatenate([places for places, _ in on])
         wheel = np.repeat(np.asarray(wheels, np.int64), [len(places) for places, _ in on])
         in_time = self.order[place] * len(self.readings) + wheel
-        return Course(wheel, place, in_time, wheel * len(self.order) + place, tuple(runs), self.whitening)
+        reliability = None if self.reliability is None else self.reliability[wheel, place]
+        return Course(wheel, place, in_time, wheel * len(self.order) + place, tuple(runs), self.whitening, reliability)
 
     def in_folds(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return (…, time, wheel) in the order of time as (…, wheel, time in the order of folds)."""
@@ -173,11 +184,11 @@ class DesignMatrix:
         """Return readings (…, time, wheel) in the order of time, whitened; 0 without readings."""
         return self.in_time(self.whitened(self.in_folds(values)))
 
-    def whitened_by(self, whitening: Whitening) -> DesignMatrix:
-        """Return the same columns under another whitening; the sums under this one are not kept."""
+    def whitened_by(self, whitening: Whitening, reliability: Single | None = None) -> DesignMatrix:
+        """Return the same columns under another whitening and reliability; the sums under these are not kept."""
         self._sums.forget()
         file = self._as_read if whitening is NOT_WHITENED else ColumnFile(*self._as_read.shape)
-        other = replace(self, whitening=whitening, _whitened=file)
+        other = replace(self, whitening=whitening, reliability=reliability, _whitened=file)
         residual = other.whitened(self.residual_as_read)
         sums = Sums(file, residual, self.order, self.cuts, searched=True)
         return replace(other, residual=residual, energy=_energy(residual, self.cuts), _sums=sums)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Single = NDArray[np.float32]
 Columns = tuple[tuple[int, tuple[int, ...]], ...]
 
 KINDS = ("all", "some", "one")
@@ -86,9 +87,9 @@ class NormalEquations:
             return self
         return normal_equations(self.design, self.nuisance, weights, self.folds)
 
-    def whitened(self, whitening: Whitening, weights: Array) -> NormalEquations:
+    def whitened(self, whitening: Whitening, weights: Array, reliability: Single | None = None) -> NormalEquations:
         """Return the equations under another whitening, with the weights of the whitened wheels."""
-        return normal_equations(self.design.whitened_by(whitening), self.nuisance, weights, self.folds)
+        return normal_equations(self.design.whitened_by(whitening, reliability), self.nuisance, weights, self.folds)
 
     def over(self, design: DesignMatrix) -> NormalEquations:
         """Return the equations of a design matrix that this one was extended to."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.signal.noise import NoiseModel
+from regolithd.calibration.mismatch.signal.variance_components import variance_components
 from regolithd.calibration.mismatch.signal.whitening import estimate_whitening
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
+Single = NDArray[np.float32]
 
 
 def fit_of_significant_terms(equations: NormalEquations) -> Fit:
@@ -41,14 +43,36 @@ def fit_of_significant_terms(equations: NormalEquations) -> Fit:
 
 
 def whitened(equations: NormalEquations, residual: Array) -> NormalEquations:
-    """Return the equations whitened by the noise of a residual [time, wheel]."""
-    courses = []
-    for (places, runs), values in zip(equations.design.readings, equations.design.in_folds(residual), strict=True):
-        deviation = float(np.sqrt(np.mean(values[places] ** 2))) if len(places) else 0.0
+    """Return the equations whitened by the noise of a residual [time, wheel], readings in doubt weighing less."""
+    design, courses = equations.design, []
+    reliability, values = reliability_of(design, residual), design.in_folds(residual)
+    values = values if reliability is None else values * reliability
+    for (places, runs), of_wheel in zip(design.readings, values, strict=True):
+        deviation = float(np.sqrt(np.mean(of_wheel[places] ** 2))) if len(places) else 0.0
         if deviation > 0:
-            courses.append((values[places] / deviation, runs))
-    equations = equations.whitened(estimate_whitening(courses, equations.thresholds), equations.weights)
+            courses.append((of_wheel[places] / deviation, runs))
+    equations = equations.whitened(estimate_whitening(courses, equations.thresholds), equations.weights, reliability)
     return equations.weighted(noise_of_whitened(equations.design, residual).weights)
+
+
+def reliability_of(design: DesignMatrix, residual: Array) -> Single | None:
+    """Return by what readings are multiplied to scatter alike, shape (wheel, time in the order of folds).
+
+    Those scatter more of which the prediction is in doubt by its inputs' errors. None where no error is stated.
+    """
+    doubt = design.problem.doubt
+    if doubt is None:
+        return None
+    left, alone, together = (design.in_folds(each) for each in (residual, doubt.alone, doubt.together))
+    places = [places for places, _ in design.readings]
+    squares, known = ([each[wheel, at] for wheel, at in enumerate(places)] for each in (left**2, alone))
+    constant, share = variance_components(squares, known)
+    found = np.ones(left.shape, np.float32)
+    for wheel, (at, level) in enumerate(zip(places, constant, strict=True)):
+        if level > 0:
+            found[wheel, at] = np.sqrt(level / (level + share * together[wheel, at]))
+
+    return found
 
 
 def noise_of_whitened(design: DesignMatrix, residual: Array) -> NoiseModel:
