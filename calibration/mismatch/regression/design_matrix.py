@@ -56,9 +56,9 @@ class Course:
     def whitened(self, columns: Array) -> Single:
         """Return columns (column, time, wheel), whitened, shape (column, reading)."""
         values = np.take(columns.reshape(len(columns), -1), self.in_time, axis=1).astype(np.float32)
-        if self.whitening is NOT_WHITENED:
-            return values
-        return self.whitening.apply(values if self.reliability is None else values * self.reliability, self.runs)
+        if self.reliability is not None:
+            values *= self.reliability
+        return values if self.whitening is NOT_WHITENED else self.whitening.apply(values, self.runs)
 
     def arranged(self, values: Single) -> Single:
         """Return what is in the order of folds (…, wheel, time) as (…, reading)."""
@@ -147,15 +147,15 @@ class DesignMatrix:
 
     def whitened(self, values: NDArray[Any], wheels: Sequence[int] | None = None) -> NDArray[Any]:
         """Return readings (…, wheel, time in the order of folds), whitened, of all wheels or of some; 0 elsewhere."""
+        on = range(len(self.readings)) if wheels is None else wheels
+        if self.reliability is not None:
+            values = values * self.reliability[list(on)]
         if self.whitening is NOT_WHITENED:
             return values
         found = np.zeros_like(values)
-        for row, wheel in enumerate(range(len(self.readings)) if wheels is None else wheels):
+        for row, wheel in enumerate(on):
             places, runs = self.readings[wheel]
-            read = values[..., row, places]
-            if self.reliability is not None:
-                read = read * self.reliability[wheel, places]
-            found[..., row, places] = self.whitening.apply(read, runs)
+            found[..., row, places] = self.whitening.apply(values[..., row, places], runs)
         return found
 
     def course_of(self, wheels: Sequence[int]) -> Course:
@@ -187,7 +187,8 @@ class DesignMatrix:
     def whitened_by(self, whitening: Whitening, reliability: Single | None = None) -> DesignMatrix:
         """Return the same columns under another whitening and reliability; the sums under these are not kept."""
         self._sums.forget()
-        file = self._as_read if whitening is NOT_WHITENED else ColumnFile(*self._as_read.shape)
+        same = whitening is NOT_WHITENED and reliability is None
+        file = self._as_read if same else ColumnFile(*self._as_read.shape)
         other = replace(self, whitening=whitening, reliability=reliability, _whitened=file)
         residual = other.whitened(self.residual_as_read)
         sums = Sums(file, residual, self.order, self.cuts, searched=True)

@@ -12,9 +12,11 @@ from regolithd.calibration.mismatch.regression.candidate_groups import with_cand
 from regolithd.calibration.mismatch.regression.design_matrix import empty_design
 from regolithd.calibration.mismatch.regression.normal_equations import normal_equations
 from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
+from regolithd.calibration.mismatch.regression.reliability import reliability_of
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.signal.noise import NoiseModel
+from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,8 +60,12 @@ def _free_parameters(problem: Problem) -> tuple[DesignMatrix, Nuisance, NoiseMod
     limits = problem.thresholds
     noise = problem.noise_of(problem.residual)
     folds = folds_of_blocks(problem, blocks_of_time(problem, noise))
-    design, nuisance = with_nuisance(empty_design(problem, folds))
+    empty = empty_design(problem, folds)
+    if (reliability := reliability_of(empty, problem.residual)) is not None:
+        empty = empty.whitened_by(NOT_WHITENED, reliability)
+        noise = problem.noise_of(empty.whitened_in_time(problem.residual))
+    design, nuisance = with_nuisance(empty)
     short = min(noise.autocorrelation_time, limits.provisional_autocorrelation_time)
     provisional = normal_equations(design, nuisance, NoiseModel(noise.deviation, short).weights)
     left = residual_of(provisional, provisional.fit(()))
-    return design, nuisance, problem.noise_of(left)
+    return design, nuisance, problem.noise_of(design.whitened_in_time(left))

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.regression.reliability import reliability_of
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.signal.noise import NoiseModel
-from regolithd.calibration.mismatch.signal.variance_components import variance_components
 from regolithd.calibration.mismatch.signal.whitening import estimate_whitening
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
-Single = NDArray[np.float32]
 
 
 def fit_of_significant_terms(equations: NormalEquations) -> Fit:
@@ -55,26 +54,6 @@ def whitened(equations: NormalEquations, residual: Array) -> NormalEquations:
     return equations.weighted(noise_of_whitened(equations.design, residual).weights)
 
 
-def reliability_of(design: DesignMatrix, residual: Array) -> Single | None:
-    """Return by what readings are multiplied to scatter alike, shape (wheel, time in the order of folds).
-
-    Those scatter more of which the prediction is in doubt by its inputs' errors. None where no error is stated.
-    """
-    doubt = design.problem.doubt
-    if doubt is None:
-        return None
-    left, alone, together = (design.in_folds(each) for each in (residual, doubt.alone, doubt.together))
-    places = [places for places, _ in design.readings]
-    squares, known = ([each[wheel, at] for wheel, at in enumerate(places)] for each in (left**2, alone))
-    constant, share = variance_components(squares, known)
-    found = np.ones(left.shape, np.float32)
-    for wheel, (at, level) in enumerate(zip(places, constant, strict=True)):
-        if level > 0:
-            found[wheel, at] = np.sqrt(level / (level + share * together[wheel, at]))
-
-    return found
-
-
 def noise_of_whitened(design: DesignMatrix, residual: Array) -> NoiseModel:
     """Return the noise of a residual [time, wheel] once it is whitened."""
     return design.problem.noise_of(design.whitened_in_time(residual))
@@ -82,7 +61,7 @@ def noise_of_whitened(design: DesignMatrix, residual: Array) -> NoiseModel:
 
 def _noise_beside(equations: NormalEquations, terms: Sequence[Term]) -> NoiseModel:
     """Return the noise of what these terms leave."""
-    return equations.problem.noise_of(residual_of(equations, equations.fit(terms)))
+    return noise_of_whitened(equations.design, residual_of(equations, equations.fit(terms)))
 
 
 def _most_significant(equations: NormalEquations, most: int, least_score: float) -> list[Term]:

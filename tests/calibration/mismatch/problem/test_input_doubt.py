@@ -1,0 +1,132 @@
+"""How uncertain a prediction is by its inputs' errors, and what a comparison makes of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch import Prior, SensorError, Simulation, compare
+from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.problem.input_doubt import LEAST_LEFT, input_doubt
+from regolithd.calibration.mismatch.problem.simulated import inputs_of
+from regolithd.calibration.mismatch.regression.equations import smooth_equations
+from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.selection.noise_estimation import fit_of_significant_terms, whitened
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+Array = NDArray[np.float64]
+COUNT, WHEELS, ERROR_M_S = 3000, 4, 0.001
+STATED = {"stiffness_A": 12.0, "offset_A": 1.0}
+
+
+class Slipping(Simulation):
+    """The current of wheels whose slip is a quotient of two speeds: steep where both are small."""
+
+    channel, unit, wheel_column = "current_A", "A", "wheel"
+    inputs = ("wheel_m_s", "ground_m_s")
+    parameters: ClassVar = {"stiffness_A": Prior(12.0, 0.6, "A"), "offset_A": Prior(1.0, 0.1, "A")}
+    sensors: ClassVar = {"ground_m_s": SensorError(absolute=ERROR_M_S)}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return a current that saturates with the slip."""
+        slip = 1 - inputs["ground_m_s"] / inputs["wheel_m_s"]
+        return values["offset_A"] + values["stiffness_A"] * np.tanh(8 * slip)
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the speed and the slip."""
+        return {"wheel_speed": inputs["wheel_m_s"], "slip": 1 - inputs["ground_m_s"] / inputs["wheel_m_s"]}
+
+
+def driven(seed: int, noise: float = 0.8) -> Recording:
+    """Return a drive with starts and stops, whose ground speed is read with an error, the same on all wheels."""
+    random, t_s = np.random.default_rng(seed), 0.5 * np.arange(COUNT)
+    phase = (t_s % 50) / 50
+    wheel = 0.03 + 0.2 * np.clip(np.minimum(phase, 1 - phase) * 10, 0, 1)
+    slip = np.repeat(random.uniform(-0.05, 0.25, COUNT // 6), 6)
+    true = wheel * (1 - slip)
+    read = true + ERROR_M_S * random.normal(size=COUNT)
+    current = 0.95 + 12.3 * np.tanh(8 * slip)
+    columns = {
+        "t_s": np.repeat(t_s, WHEELS),
+        "wheel": np.tile(np.arange(1.0, WHEELS + 1), COUNT),
+        "wheel_m_s": np.repeat(wheel, WHEELS),
+        "ground_m_s": np.repeat(read, WHEELS),
+        "current_A": np.repeat(current, WHEELS) + noise * random.normal(size=COUNT * WHEELS),
+    }
+    return from_columns(columns)
+
+
+def test_the_doubt_is_what_the_error_changes() -> None:
+    """By the slope of the prediction, to first order; wheels with one sensor are as uncertain together as alone."""
+    recording = driven(1)
+    found = input_doubt(recording, recording, Slipping(), STATED)
+    assert found is not None
+    wheel, ground = recording.channels["wheel_m_s"], recording.channels["ground_m_s"]
+    slope = 12 * 8 * (1 - np.tanh(8 * (1 - ground / wheel)) ** 2) / wheel
+    small = slope * ERROR_M_S < 0.3
+    np.testing.assert_allclose(np.sqrt(found.alone[small]), slope[small] * ERROR_M_S, rtol=0.4)
+    assert np.median(np.sqrt(found.alone) / (slope * ERROR_M_S)) == pytest.approx(1, abs=0.05)
+    np.testing.assert_allclose(found.together, WHEELS * found.alone)
+
+
+def test_smoothing_takes_a_part_of_the_error_out_of_each_reading_and_not_out_of_their_mean() -> None:
+    """Of a speed that hardly changes, as good as all: what is left is slow."""
+    slow = driven(2)
+    ground = np.broadcast_to(0.1 + 0.001 * np.sin(slow.time_s / 300)[:, None], slow.shape)
+    error = ERROR_M_S * np.random.default_rng(6).normal(size=(COUNT, 1))
+    slow = slow.with_channels(ground_m_s=ground + error, wheel_m_s=np.full(slow.shape, 0.11))
+    inputs = inputs_of(slow, Slipping())
+    assert inputs.doubt is not None
+    as_read = input_doubt(slow, slow, Slipping(), STATED)
+    assert as_read is not None
+    left = np.mean(inputs.doubt.alone) / np.mean(as_read.alone)
+    assert 0.9 * LEAST_LEFT < left < 0.2
+    assert np.mean(inputs.doubt.together) == pytest.approx(np.mean(as_read.together), rel=0.2)
+
+
+def test_without_an_error_there_is_no_doubt() -> None:
+    """Nothing is computed, and all readings weigh alike."""
+
+    class Exact(Slipping):
+        """The same with exact inputs."""
+
+        sensors: ClassVar = {}
+
+    recording = driven(3)
+    assert input_doubt(recording, recording, Exact(), STATED) is None
+    equations = smooth_equations(build_problem(recording, Exact()))
+    left = residual_of(equations, fit_of_significant_terms(equations))
+    assert whitened(equations, left).design.reliability is None
+
+
+def test_readings_in_doubt_weigh_less() -> None:
+    """The slowest half of the quickest, or less, and columns as the residual does."""
+    problem = build_problem(driven(3), Slipping())
+    equations = smooth_equations(problem)
+    left = residual_of(equations, fit_of_significant_terms(equations))
+    design = whitened(equations, left).design
+    assert design.reliability is not None
+    weight = design.in_time(design.reliability)
+    wheel = problem.recording.channels["wheel_m_s"]
+    assert np.mean(weight[wheel < 0.05]) < 0.5 * np.mean(weight[wheel > 0.22])
+    column = problem.tangent("stiffness_A")
+    course = design.course_of((0, 1, 2, 3))
+    np.testing.assert_allclose(
+        course.whitened(column[None])[0],
+        course.arranged(design.whitened(design.in_folds(column).astype(np.float32))),
+        atol=1e-5,
+    )
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_errors_of_a_common_speed_near_standstill_are_no_physics(seed: int) -> None:
+    """Nothing is left out of this simulation but the errors of its inputs."""
+    found = compare(driven(seed), Slipping()).answer
+    assert found.verdict == "consistent", [effect.name for effect in found.effects]
+    assert all(each.prior_stds_away < 3 for each in found.parameters)
