@@ -31,6 +31,12 @@ STEP = 0.3
 """Relative change of stiffness and shear modulus of the prediction's difference quotient (a choice: as in a rut)."""
 
 
+STIFFNESS: tuple[str, tuple[str, ...]] = ("stiffness_factor", ("k_c_", "k_phi_"))
+SHEAR: tuple[str, tuple[str, ...]] = ("shear_factor", ("shear_modulus_m",))
+"""The variant of a simulation by which soil is stiffer, or shears more; else its parameters, whose names begin so."""
+COHESION = "cohesion_Pa"
+
+
 class MultiPassCompaction(Candidate):
     """A change of the current or of the soil that depends on the number of earlier passes.
 
@@ -46,7 +52,10 @@ class MultiPassCompaction(Candidate):
     experiment = "drive one virgin lane, then twice more in the same ruts"
     source = "multi-pass tests on sand: most of the compaction in the first pass"
     requires = ("torque",)
-    needs = "wheels one behind the other (row of the simulation)"
+    needs = (
+        "wheels one behind the other (row of the simulation); for the forms of the soil, its parameters k_c_… or "
+        "k_phi_…, shear_modulus_m and cohesion_Pa"
+    )
     acts_unloaded = False
     forms = tuple(FORMS.values())
     shape_keys: ClassVar = {
@@ -73,8 +82,9 @@ class MultiPassCompaction(Candidate):
         """Return compaction from the first pass alone to equal in each, counted from the front or the leading end."""
         leads = ("front", "travel") if "direction" in problem.covariates else ("front",)
         ways = ["current"]
-        ways += ["stiffness"] if "stiffness_factor" in problem.simulation.variants() else []
-        ways += ["soil"] if {"shear_factor", "cohesion_Pa"} <= {*problem.simulation.variants(), *problem.values} else []
+        stiffness, shear = (_has(problem, *each) for each in (STIFFNESS, SHEAR))
+        ways += ["stiffness"] if stiffness else []
+        ways += ["soil"] if stiffness and shear and COHESION in problem.values else []
         return [{"kept": kept, "leads": lead, "by": way} for kept in KEPT for lead in leads for way in ways]
 
     def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
@@ -93,8 +103,21 @@ class MultiPassCompaction(Candidate):
         done = np.where(passes > 0, 1.0, 0.0) + np.where(passes > 1, kept * (passes - 1), 0.0)
         if shape["by"] == "current":
             return (problem.filled * done)[None]
-        stiffer = problem.secant("stiffness_factor", STEP)
+        stiffer = _relative_change(problem, *STIFFNESS, STEP)
         if shape["by"] == "stiffness":
             return (stiffer * done)[None]
-        coheres = problem.values["cohesion_Pa"] * problem.tangent("cohesion_Pa")
-        return np.stack((stiffer * done, problem.secant("shear_factor", -STEP) * done, coheres * done))
+        coheres = problem.values[COHESION] * problem.tangent(COHESION)
+        return np.stack((stiffer * done, _relative_change(problem, *SHEAR, -STEP) * done, coheres * done))
+
+
+def _has(problem: Problem, variant: str, parameters: tuple[str, ...]) -> bool:
+    """Return whether a simulation has a variant by which it changes, or a parameter whose name begins so."""
+    return variant in problem.simulation.variants() or any(name.startswith(parameters) for name in problem.values)
+
+
+def _relative_change(problem: Problem, variant: str, parameters: tuple[str, ...], step: float) -> Array:
+    """Return the prediction's change per relative change of a variant, or of all parameters that begin so."""
+    if variant in problem.simulation.variants():
+        return problem.secant(variant, step)
+    names = [name for name in problem.values if name.startswith(parameters)]
+    return np.sum([problem.values[name] * problem.tangent(name) for name in names], axis=0)
