@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-ROUNDS = 20
-"""Rounds of the weighted regression (a choice: it settles to a percent in five)."""
+ROUNDS, SETTLED = 20, 0.003
+"""Rounds of the weighted regression at most, and the change of κ at which it ends (a choice: weights hardly change)."""
 LEAST_CONSTANT = 0.1
 """Share of a course's mean square that is constant noise at least (a choice: no reading knows everything)."""
 
@@ -27,18 +27,20 @@ def variance_components(squares: Sequence[Array], known: Sequence[Array]) -> tup
     """
     least = [LEAST_CONSTANT * float(np.mean(each)) if each.size else 0.0 for each in squares]
     constant, share = [float(np.mean(each)) if each.size else 0.0 for each in squares], 1.0
-    for _ in range(ROUNDS):
+    for turn in range(ROUNDS):
         weights = [
             1 / np.maximum(level + share * doubt, 1e-300) ** 2 for level, doubt in zip(constant, known, strict=True)
         ]
         away = [doubt - _mean(doubt, weight) for doubt, weight in zip(known, weights, strict=True)]
         moment = sum(float(np.sum(w * far * square)) for w, far, square in zip(weights, away, squares, strict=True))
         energy = sum(float(np.sum(w * far**2)) for w, far in zip(weights, away, strict=True))
-        share = float(np.clip(moment / energy, 0.0, 1.0)) if energy > 0 else 0.0
+        before, share = share, float(np.clip(moment / energy, 0.0, 1.0)) if energy > 0 else 0.0
         constant = [
             max(_mean(square - share * doubt, weight), floor)
             for square, doubt, weight, floor in zip(squares, known, weights, least, strict=True)
         ]
+        if abs(share - before) < SETTLED and turn > 0:
+            break
     return constant, share
 
 
