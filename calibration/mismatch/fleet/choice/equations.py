@@ -7,7 +7,7 @@ Weights are one over the long-run variance of each recording's noise, so Δχ² 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
@@ -191,6 +191,26 @@ class FleetEquations:
                 moment[acting] += factor * self.moment[i, w, of]
             matrix[np.ix_(acting, acting)] += part
         return matrix, moment
+
+    def beside(self, terms: Iterable[tuple[int, int]]) -> FleetEquations:
+        """Return the equations in which these terms, recordings and places in their `own`, take up what they can.
+
+        Their columns are free on each wheel by itself, and eliminated: what is left is outside their span.
+        """
+        of: dict[int, list[int]] = {}
+        for recording, place in terms:
+            of.setdefault(recording, []).extend(self.sums[recording].own[place])
+        gram, moment = self.gram.copy(), self.moment.copy()
+        for i, free in of.items():
+            sums = self.sums[i]
+            own, fleet = column_map(sums, self.tangents, self.groups)
+            for w, name in enumerate(sums.wheels):
+                k, weight, products = self.wheels.index(name), sums.weights[w], sums.gram[w]
+                inverse = pseudo_inverse(products[np.ix_(free, free)], SINGULAR)
+                cross = products[np.ix_(own, free)] @ inverse
+                gram[i, k][np.ix_(fleet, fleet)] -= weight * cross @ products[np.ix_(free, own)]
+                moment[i, k][fleet] -= weight * cross @ sums.moment[w, free]
+        return replace(self, gram=gram, moment=moment)
 
     def left_moment(self, fit: FleetFit) -> Array:
         """Return the moments of all columns with what a fit leaves, shape (recording, wheel, column)."""

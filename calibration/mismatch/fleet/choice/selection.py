@@ -107,8 +107,9 @@ class Chooser:
 
     def _transfer_margin(self, fit: FleetFit, index: int) -> float:
         """Return by how much a term's Δχ² on recordings that did not fit it passes the share that is asked for."""
-        equations, rest = self.equations, without(fit, index)
-        if len(equations.of_rovers(fit.terms[index].units.rovers)) < FEWEST_TO_CONFIRM:
+        equations, rest, units = self.equations, without(fit, index), fit.terms[index].units
+        of_one_size = [(rover,) for rover in units.rovers] if units.kind == "each rover" else [units.rovers]
+        if max(len(equations.of_rovers(rovers)) for rovers in of_one_size) < FEWEST_TO_CONFIRM:
             return 0.0
         came_back, gained = 0.0, fit.delta_chi2 - equations.fit(rest).delta_chi2
         for fold in folds_of(equations):
@@ -120,14 +121,17 @@ class Chooser:
 
 
 FEWEST_TO_CONFIRM = 3
-"""Recordings of its rovers below which no other recording can confirm an effect (a choice)."""
+"""Recordings of the rovers that share its size, below which no other recording can confirm an effect (a choice)."""
 
 
 def folds_of(equations: FleetEquations) -> list[Array]:
-    """Return the folds, each 1 for its recordings: every fifth of each rover's, in the order of time."""
+    """Return the folds, each 1 for its recordings: every fifth of each rover's, in the order of time.
+
+    The first of each rover is in another fold than that of the rover before: a fleet may have one recording of each.
+    """
     fold = np.zeros(equations.count, np.int64)
-    for recordings in equations.recordings_of:
-        fold[list(recordings)] = np.arange(len(recordings)) % THRESHOLDS.folds
+    for rover, recordings in enumerate(equations.recordings_of):
+        fold[list(recordings)] = (rover + np.arange(len(recordings))) % THRESHOLDS.folds
     return [(fold == number).astype(np.float64) for number in np.unique(fold)]
 
 

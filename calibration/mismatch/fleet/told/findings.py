@@ -83,15 +83,31 @@ class Chosen:
         return self.chooser.equations
 
 
+@dataclass(frozen=True, eq=False)
+class _Sizes:
+    """Parameters and effects, fitted with what single recordings show beside them, and their standard deviations."""
+
+    fit: FleetFit
+    stds: Array
+
+    @classmethod
+    def beside(cls, equations: FleetEquations, fit: FleetFit, shown: Sequence[tuple[int, int]]) -> _Sizes:
+        """Return them from the equations in which what is shown, by recording and place, takes up what it can."""
+        rest = equations.beside(shown)
+        again = rest.fit(fit.terms)
+        return cls(again, size_stds(rest, again))
+
+
 def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
     """Return the answer of one channel."""
     equations, fit, simulation = chosen.equations, chosen.fit, chosen.simulation
     held_out = _held_out(chosen.chooser, fit)
-    effects = tuple(_effect(chosen, index, held_out) for index in range(len(fit.terms)))
     shown = shown_beside(equations, fit, chosen.found, chosen.names.recordings)
+    sizes = _Sizes.beside(equations, fit, shown.terms)
+    effects = tuple(_effect(chosen, index, sizes, held_out) for index in range(len(fit.terms)))
     single = tuple(_of_recording(chosen, i, effect) for i, effect in shown.effects)
     rest = tuple(_unexplained(chosen, i, each) for i, each in shown.unexplained)
-    parameters = _parameters(chosen)
+    parameters = _parameters(chosen, sizes)
     named = effects or single or any(each.beyond_prior() for each in parameters)
     verdict: Verdict = "unexplained" if rest else "missing-physics" if named else "consistent"
     floor = _noise_floor(chosen)
@@ -140,7 +156,7 @@ def _rms(squares: Array, counts: Array) -> float:
     return float(np.sqrt(max(float(squares.sum()), 0.0) / max(float(counts.sum()), 1.0)))
 
 
-def _effect(chosen: Chosen, index: int, held_out: tuple[Array, Array, list[Array]]) -> FleetEffect:
+def _effect(chosen: Chosen, index: int, sizes: _Sizes, held_out: tuple[Array, Array, list[Array]]) -> FleetEffect:
     equations, fit, names = chosen.equations, chosen.fit, chosen.names
     term = fit.terms[index]
     candidate, acting = term.group.candidate, equations.factors(term).any(axis=0)
@@ -149,7 +165,7 @@ def _effect(chosen: Chosen, index: int, held_out: tuple[Array, Array, list[Array
     wheels = tuple(equations.wheels[w] for w in term.units.wheels if where[:, w].any())
     since = term.course.kind in {"since", "growing"}
     first, last = onset_places(equations, fit, index) if since else (0, 0)
-    parameters = _sizes(chosen, index)
+    parameters = _sizes(chosen, index, sizes)
     rovers = tuple(names.rovers[rover] for rover in term.units.rovers)
     kind, all_wheels = chosen.simulation.wheel_column, len(equations.wheels)
     return FleetEffect(
@@ -174,13 +190,13 @@ def _effect(chosen: Chosen, index: int, held_out: tuple[Array, Array, list[Array
     )
 
 
-def _sizes(chosen: Chosen, index: int) -> dict[str, Parameter]:
+def _sizes(chosen: Chosen, index: int, sizes: _Sizes) -> dict[str, Parameter]:
     """Return coefficients and relative size with their intervals; of a size of each rover's own, the mean."""
-    equations, fit = chosen.equations, chosen.fit
+    fit = sizes.fit
     term, span = fit.terms[index], fit.spans[index]
     count = len(term.group.columns)
-    stds = size_stds(equations, fit)[span].reshape(-1, count)
-    values = fit.coefficients[span].reshape(-1, count)
+    stds = sizes.stds[span].reshape(-1, count)
+    values = sizes.fit.coefficients[span].reshape(-1, count)
     weights = 1 / np.maximum(stds, 1e-300) ** 2
     mean = np.sum(weights * values, axis=0) / np.sum(weights, axis=0)
     std = np.maximum(1 / np.sqrt(np.sum(weights, axis=0)), np.std(values, axis=0))
@@ -193,7 +209,7 @@ def _sizes(chosen: Chosen, index: int) -> dict[str, Parameter]:
     for name, value in term.group.shape.items():
         if name in term.group.candidate.free and name != term.group.candidate.change_point:
             found[name] = Parameter(float(value), float("nan"), float("nan"), unit_of(name, labels))
-    size = relative_size(equations, fit, index)
+    size = relative_size(chosen.equations, fit, index)
     share = NINETY_PERCENT_STDS * float(np.max(std / np.maximum(np.abs(mean), 1e-300)))
     return {**found, "relative_size": Parameter(size, size * (1 - share), size * (1 + share), "1")}
 
@@ -233,9 +249,9 @@ def _unexplained(chosen: Chosen, recording: int, rest: object) -> FleetUnexplain
     return FleetUnexplained(**vars(rest), rovers=(rover,), recordings=(names.recordings[recording],))
 
 
-def _parameters(chosen: Chosen) -> tuple[FleetParameter, ...]:
+def _parameters(chosen: Chosen, sizes: _Sizes) -> tuple[FleetParameter, ...]:
     """Return each parameter where the recordings moved it: of the fleet, or of each rover; of recordings, none."""
-    equations, fit, names = chosen.equations, chosen.fit, chosen.names
+    equations, names = chosen.equations, chosen.names
     owners: dict[str, list[tuple[str, ...]]] = {
         "shared": [names.rovers],
         "rover": [(rover,) for rover in names.rovers],
@@ -249,8 +265,8 @@ def _parameters(chosen: Chosen) -> tuple[FleetParameter, ...]:
             value, std = prior.value, 0.0
             if name in equations.tangents:
                 at = place * len(equations.tangents) + equations.tangents.index(name)
-                value += float(fit.coefficients[at])
-                std = float(np.sqrt(max(fit.covariance[at, at], 0.0)))
+                value += float(sizes.fit.coefficients[at])
+                std = float(sizes.stds[at])
             reach = NINETY_PERCENT_STDS * std
             found.append(
                 FleetParameter(name, prior.unit, prior.value, prior.std, value, value - reach, value + reach, rovers)

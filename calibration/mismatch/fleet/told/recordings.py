@@ -27,15 +27,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Shown:
-    """Findings with the places of their recordings."""
+    """Findings with the places of their recordings, and the terms, by recording and place, that they are of."""
 
     effects: tuple[tuple[int, Effect], ...]
     unexplained: tuple[tuple[int, Unexplained], ...]
+    terms: tuple[tuple[int, int], ...]
 
 
 def shown_beside(equations: FleetEquations, fit: FleetFit, found: Sequence[Found], names: Sequence[str]) -> Shown:
     """Return the effects and structures that recordings show beside the fit."""
-    effects, rest = [], []
+    effects, rest, own = [], [], []
     for i, of_recording in enumerate(found):
         terms = of_recording.terms
         named = [term for term in terms if term.named]
@@ -44,11 +45,12 @@ def shown_beside(equations: FleetEquations, fit: FleetFit, found: Sequence[Found
             needed += term.penalty + 2 * float(np.log(len(names)))
             if gain_beside(equations, fit, i, k) <= needed:
                 continue
+            own.append((i, k))
             if term.named:
                 effects += [(i, each) for each in of_recording.findings.effects if each.name == term.name][:1]
             else:
                 rest += [(i, each) for each in of_recording.findings.unexplained[k - len(named) : k - len(named) + 1]]
-    return Shown(tuple(effects), tuple(rest))
+    return Shown(tuple(effects), tuple(rest), tuple(own))
 
 
 def gain_beside(equations: FleetEquations, fit: FleetFit, recording: int, index: int) -> float:

@@ -66,7 +66,8 @@ class Found:
     Attributes
     ----------
     findings: as `regolithd mismatch` has them for this recording alone
-    values: the parameters at which the simulation was linearised
+    values, late_inputs, late: the parameters at which the simulation was linearised, which inputs were put on time
+        there and by how much [s], and how the predicted channel is late: as in `Problem`
     deviation, autocorrelation_times: of the noise beside all that was found, shape (wheel,)
     noise_floor: root mean square of what all that was found leaves
     entry_threshold: score above which an effect was named
@@ -84,6 +85,8 @@ class Found:
     terms: tuple[FoundTerm, ...]
     shapes: dict[str, Shapes]
     labels: dict[str, str] = field(default_factory=dict)
+    late_inputs: dict[str, float] = field(default_factory=dict)
+    late: tuple[str, float] | None = None
 
 
 def one_channel(simulation: Simulation, channel: str) -> Simulation:
@@ -117,6 +120,8 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
         terms=tuple(_found_term(decision, term) for term in whole.terms),
         shapes=shapes_in(problem, of_recording.candidates),
         labels=dict(problem.labels),
+        late_inputs=dict(problem.on_time),
+        late=problem.late,
     )
 
 

@@ -7,13 +7,14 @@ sums of different recordings add up.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in
 from regolithd.calibration.mismatch.fleet.work.found import one_channel
 from regolithd.calibration.mismatch.problem.build import build_problem
@@ -146,7 +147,8 @@ def _posed(
         each for each in simulation.corrected_effects if not simulation.channels or each.channel == of_channel.channel
     ]
     stated = stated_in(forms_of(of_channel), effects, of_channel.stated_effects(), of_channel.empirical_curves)
-    return corrected_problem(build_problem(recording, of_channel, found.values, thresholds=thresholds), stated)
+    problem = build_problem(recording, of_channel, found.values, late=found.late_inputs, thresholds=thresholds)
+    return replace(corrected_problem(problem, stated), late=found.late)
 
 
 def _columns(problem: Problem, laws: Sequence[tuple[Candidate, Shape]], terms: Sequence[FoundTerm]) -> _Columns:
@@ -155,7 +157,7 @@ def _columns(problem: Problem, laws: Sequence[tuple[Candidate, Shape]], terms: S
     shifts = [problem.values[name] - parameters[name].value if name in parameters else 0.0 for name in names]
     count, places = len(made), []
     for candidate, shape in laws:
-        fresh = np.asarray(candidate.columns(problem, shape), np.float64) if candidate.applies(problem) else ()
+        fresh = columns_of(problem, candidate, shape) if candidate.applies(problem) else ()
         places.append(tuple(range(count, count + len(fresh))))
         made, count = [*made, *fresh], count + len(fresh)
     own = []

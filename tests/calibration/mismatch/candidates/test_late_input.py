@@ -3,63 +3,23 @@
 from __future__ import annotations
 
 import inspect
-import sys
-from typing import TYPE_CHECKING, ClassVar
+from functools import partial
+from hashlib import sha256
+from typing import TYPE_CHECKING
 
+import fleet_arm
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+import tram
+from tram import COUNT, DELAY_S, Tram, driven
 
-from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch import Member, compare, load_simulation, read_recording
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
-from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.fleet.comparison import compare_fleet
 from regolithd.calibration.mismatch.problem.build import build_problem
-from regolithd.calibration.mismatch.simulation.load import load_simulation
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
     from pathlib import Path
-
-Array = NDArray[np.float64]
-COUNT, DELAY_S = 5000, 7.0
-
-
-class Tram(Simulation):
-    """The current of a drive uphill, whose grade comes from a slow barometer."""
-
-    channel, unit = "current_A", "A"
-    inputs = ("speed_m_s", "grade")
-    one_way = True
-    parameters: ClassVar = {
-        "weight": Prior(30.0, 1.5, "A s/m"),
-        "rolling": Prior(0.02, 0.002, "1"),
-        "idle_A": Prior(0.5, 0.03, "A"),
-    }
-
-    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
-        """Return what weight, rolling resistance and electronics take."""
-        slope = values["rolling"] + inputs["grade"]
-        return values["idle_A"] + values["weight"] * slope * inputs["speed_m_s"]
-
-    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
-        """Return speed and grade."""
-        return {"wheel_speed": inputs["speed_m_s"], "pitch": inputs["grade"]}
-
-
-def driven(seed: int, delay_s: float = DELAY_S, drag: float = 0.0) -> Recording:
-    """Return a drive over hills of which the grade is read late, and the current with quadratic drag."""
-    random, t_s = np.random.default_rng(seed), np.arange(COUNT, dtype=np.float64)
-    parts = [(random.uniform(0.004, 0.03), random.uniform(0, 6)) for _ in range(8)]
-    speed = 3 + sum(0.7 * np.sin(2 * np.pi * f * t_s + phase) for f, phase in parts[:4])
-    hills = [(f, phase + 1) for f, phase in parts]
-
-    def grade(at: Array) -> Array:
-        return sum((0.012 * np.sin(2 * np.pi * f * at + phase) for f, phase in hills), np.zeros(COUNT))
-
-    current = 0.47 + 30.6 * (0.0193 + grade(t_s)) * speed + drag * speed**2
-    noise = 0.25 * random.normal(size=COUNT)
-    columns = {"t_s": t_s, "speed_m_s": speed, "grade": grade(t_s - delay_s), "current_A": current + noise}
-    return from_columns(columns)
 
 
 def test_what_else_acts_is_found_beside_a_late_input() -> None:
@@ -99,7 +59,7 @@ def test_a_delay_changes_as_much_with_the_input_on_time_as_without() -> None:
 
 def test_a_corrected_delay_puts_the_input_of_a_later_recording_on_time(tmp_path: Path) -> None:
     """The same is consistent, and drag that is new has its name and size."""
-    (tmp_path / "tram.py").write_text(inspect.getsource(sys.modules[__name__]))
+    (tmp_path / "tram.py").write_text(inspect.getsource(tram))
     (tmp_path / "SIM.toml").write_text('[simulation]\nmodel = "tram:Tram"\n')
     first = compare(driven(3), load_simulation(tmp_path / "SIM.toml"))
     assert [effect.name for effect in first.answer.effects] == ["sensor-delay"]
@@ -113,3 +73,21 @@ def test_a_corrected_delay_puts_the_input_of_a_later_recording_on_time(tmp_path:
     (change,) = late.changes
     assert (change.name, change.parameter) == ("sensor-delay", "delay_s")
     assert change.low < 12.0 < change.high
+
+
+def test_a_fleet_is_compared_with_late_inputs_on_time(tmp_path: Path) -> None:
+    """Delay and drag have their names and sizes, and no parameter takes up what they leave."""
+    (tmp_path / "tram.py").write_text(inspect.getsource(tram))
+    (tmp_path / "SIM.toml").write_text('[simulation]\nmodel = "tram:Tram"\n')
+    members = []
+    for seed, rover in enumerate(("A", "B", "C"), start=11):
+        path = fleet_arm.write_recording(tmp_path / f"{rover}.csv", tram.columns(seed, drag=0.1))
+        digest = sha256(path.read_bytes()).hexdigest()
+        members.append(Member(path.name, rover, None, partial(read_recording, path), digest))
+    found = compare_fleet(members, partial(load_simulation, tmp_path / "SIM.toml")).answer
+    assert {effect.name for effect in found.effects} == {"sensor-delay", "quadratic-drag"}
+    for effect in found.effects:
+        name, true = {"sensor-delay": ("delay_s", DELAY_S)}.get(effect.name, ("quadratic_coefficient", 0.1))
+        assert effect.parameters[name].low < true < effect.parameters[name].high
+    assert found.unexplained == ()
+    assert all(abs(each.value - each.prior) < 2.5 * each.prior_std for each in found.parameters)

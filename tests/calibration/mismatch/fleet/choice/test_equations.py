@@ -66,6 +66,22 @@ def test_a_term_has_one_size_or_one_for_each_rover(drives: list[Drive]) -> None:
     np.testing.assert_array_equal(wave[0], [[0, 0], [1, 1], [1, 1], [1, 1], [1, 1]])
 
 
+def test_what_a_recording_shows_by_itself_takes_up_what_it_can(drives: list[Drive]) -> None:
+    """The fit is that of readings without all that is along its columns on each wheel; other recordings stay."""
+    own = (3, 4)
+    sums = [each.sums() for each in drives]
+    sums[1] = replace(sums[1], own=tuple((column,) for column in own))
+    without = [Drive(each.columns.copy(), each.residual.copy()) for each in drives]
+    for wheel in (0, 1):
+        along = without[1].columns[list(own), :, wheel].T.copy()
+        for values in (*without[1].columns[:, :, wheel], without[1].residual[:, wheel]):
+            np.subtract(values, along @ np.linalg.lstsq(along, values, rcond=None)[0], out=values)
+    found = fleet_equations(sums, ROVER, range(5), GROUPS, "rover").beside([(1, 0), (1, 1)]).fit(TERMS)
+    direct = least_squares(without, found)
+    np.testing.assert_allclose(found.coefficients, direct.coefficients, rtol=1e-8)
+    np.testing.assert_allclose(found.covariance, direct.covariance, rtol=1e-6, atol=1e-12)
+
+
 def test_recordings_left_out_have_no_part_in_a_fit(drives: list[Drive]) -> None:
     """Those with `used` of 0 are neither fitted nor counted."""
     equations = equations_of(drives, ROVER)

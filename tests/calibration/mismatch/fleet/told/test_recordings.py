@@ -102,3 +102,4 @@ def test_a_finding_is_told_as_its_recording_tells_it() -> None:
     result = shown_beside(of, fit, [found(), of_recording, found()], ["a", "b", "c"])
     assert result.effects == ((1, FINDINGS.effects[1]),)
     assert result.unexplained == ((1, FINDINGS.unexplained[0]),)
+    assert result.terms == ((1, 0), (1, 1))
