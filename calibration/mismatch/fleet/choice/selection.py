@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -63,7 +64,7 @@ class Chooser:
         rovers = set(more.terms[-1].units.rovers)
         others = [k for k, term in enumerate(less.terms) if rovers & set(term.units.rovers)]
         beside = sum(less.delta_chi2 - self.equations.fit(without(less, k)).delta_chi2 for k in others)
-        return more.delta_chi2 - less.delta_chi2 > THRESHOLDS.further_share * beside
+        return more.delta_chi2 - less.delta_chi2 > FURTHER_SHARE * beside
 
     def _searched_anew(self, fit: FleetFit) -> FleetFit:
         """Return the fit with each term replaced by the best one on overlapping units beside the others."""
@@ -80,8 +81,9 @@ class Chooser:
         return fit
 
     def acceptable(self, fit: FleetFit) -> bool:
-        """Return whether every coefficient has its sign, and every effect is possible and large enough."""
-        return all(self._acceptable_term(fit, index) for index in range(len(fit.terms)))
+        """Return whether every coefficient has its sign, every effect is large enough, and each law has one shape."""
+        one_shape = all(_one_shape(*pair) for pair in combinations(fit.terms, 2))
+        return one_shape and all(self._acceptable_term(fit, index) for index in range(len(fit.terms)))
 
     def _acceptable_term(self, fit: FleetFit, index: int) -> bool:
         term, span = fit.terms[index], fit.spans[index]
@@ -120,6 +122,18 @@ class Chooser:
         return came_back + loss - THRESHOLDS.transferred_share * gained
 
 
+def _one_shape(one: FleetTerm, other: FleetTerm) -> bool:
+    """Return whether two terms are no two shapes of one law on the same wheel: the second would mend the first.
+
+    What changes at a date is the same law with another size.
+    """
+    apart = not (set(one.units.rovers) & set(other.units.rovers) and set(one.units.wheels) & set(other.units.wheels))
+    return apart or one.name != other.name or one.group == other.group
+
+
+FURTHER_SHARE = 0.05
+"""Share of the Δχ² of the effects on the same rovers that a further one must gain (a choice: a law of the fleet has one
+of the grid's shapes, and the best four of a cold gearbox's twelve differ by one to four percent)."""
 FEWEST_TO_CONFIRM = 3
 """Recordings of the rovers that share its size, below which no other recording can confirm an effect (a choice)."""
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.answer import Effect, Unexplained
     from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
-    from regolithd.calibration.mismatch.fleet.work.found import Found
+    from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ def shown_beside(equations: FleetEquations, fit: FleetFit, found: Sequence[Found
         for k, term in enumerate(terms):
             needed = of_recording.entry_threshold if term.named else THRESHOLDS.smooth_term_entry
             needed += term.penalty + 2 * float(np.log(len(names)))
-            if gain_beside(equations, fit, i, k) <= needed:
+            if _is_of_the_fleet(equations, fit, i, term) or gain_beside(equations, fit, i, k) <= needed:
                 continue
             own.append((i, k))
             if term.named:
@@ -51,6 +51,13 @@ def shown_beside(equations: FleetEquations, fit: FleetFit, found: Sequence[Found
             else:
                 rest += [(i, each) for each in of_recording.findings.unexplained[k - len(named) : k - len(named) + 1]]
     return Shown(tuple(effects), tuple(rest), tuple(own))
+
+
+def _is_of_the_fleet(equations: FleetEquations, fit: FleetFit, recording: int, term: FoundTerm) -> bool:
+    """Return whether an effect of the fleet acts in a recording by the same law: its size there is in the catalogue."""
+    same = [index for index, of_fleet in enumerate(fit.terms) if term.named and of_fleet.name == term.name]
+    wheels = [equations.wheels.index(equations.sums[recording].wheels[wheel]) for wheel in term.wheels]
+    return any(fit.factors[fit.spans[index], recording][:, wheels].any() for index in same)
 
 
 def gain_beside(equations: FleetEquations, fit: FleetFit, recording: int, index: int) -> float:

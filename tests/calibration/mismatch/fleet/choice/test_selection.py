@@ -147,7 +147,7 @@ def test_what_cannot_be_improved_stays() -> None:
 
 
 def test_a_further_effect_must_gain_a_share_of_the_others_on_its_rovers() -> None:
-    """A hundredth of a large effect's Δχ² may be the error of its law; effects of other rovers do not count."""
+    """A few hundredths of a large effect's Δχ² may be the error of its shape; effects of other rovers do not count."""
     of = equations({n: {**on_both(1, 4.0), **on_both(3, 0.1)} if n % 2 == 0 else on_both(3, 0.1) for n in range(10)})
     large = of.fit((term(DRAG, Course("always")),))
     beside, elsewhere = (of.fit((*large.terms, term(WAVE, Course("always"), rovers=(n,)))) for n in (0, 1))
@@ -162,3 +162,16 @@ def test_every_fifth_recording_of_a_rover_is_in_the_same_fold() -> None:
     folds = folds_of(equations_of([drive(n) for n in range(7)], (0, 0, 0, 0, 0, 0, 1)))
     assert [np.flatnonzero(fold).tolist() for fold in folds] == [[0, 5], [1, 6], [2], [3], [4]]
     np.testing.assert_array_equal(np.sum(folds, axis=0), np.ones(7))
+
+
+def test_a_law_has_one_shape_on_a_wheel_and_may_have_another_size_since_a_date() -> None:
+    """A second shape on the same wheels mends the first; on another rover or wheel it is that one's own."""
+    steeper = replace(DRAG, shape={"power": 2.0}, columns=(3,))
+    of = equations({n: {**on_both(1, 0.4), **on_both(3, 0.2)} for n in range(10)})
+    always, since = Course("always"), Course("since", 4)
+    first = term(DRAG, always)
+    assert not chooser(of).acceptable(of.fit((first, term(steeper, always))))
+    assert not chooser(of).acceptable(of.fit((first, term(steeper, always, wheels=(1,)))))
+    assert chooser(of).acceptable(of.fit((first, term(steeper, always, rovers=(1,)))))
+    grown = equations({n: on_both(1, 0.2 if n < 4 else 0.4) for n in range(10)})
+    assert chooser(grown).acceptable(grown.fit((first, term(DRAG, since))))

@@ -103,3 +103,12 @@ def test_a_finding_is_told_as_its_recording_tells_it() -> None:
     assert result.effects == ((1, FINDINGS.effects[1]),)
     assert result.unexplained == ((1, FINDINGS.unexplained[0]),)
     assert result.terms == ((1, 0), (1, 1))
+
+
+def test_what_the_fleet_has_is_not_told_again_of_a_recording() -> None:
+    """Not where it acts; before its date it is the recording's own."""
+    of = with_own(drive(1, {**on_both(OWN, 0.2), **on_both(1, 0.3)}))
+    own = found(shown("steady-drag", named=True))
+    for first, told in ((1, ()), (2, ((1, 0),))):
+        fit = of.fit((term(DRAG, Course("since", first)),))
+        assert shown_beside(of, fit, [found(), own, found()], ["a", "b", "c"]).terms == told
