@@ -86,6 +86,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "_Draws",
         *(
             "Found",
+            "_Sizes",
             "FoundTerm",
             "Sums",
             "_Columns",

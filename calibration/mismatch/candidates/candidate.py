@@ -293,6 +293,10 @@ class Candidate:
         """Return how many distinct shapes the search chooses from: 2 ln of it is the penalty for that choice."""
         return max(len(self.shapes(problem)), 1)
 
+    def left_open(self, problem: Problem, name: str) -> float:  # noqa: ARG002
+        """Return the standard deviation of a shape parameter that no recording could reduce."""
+        return 0.0
+
     def propose_shapes(self, problem: Problem, residual: Array) -> Sequence[Shape]:  # noqa: ARG002
         """Return shapes suggested by a residual [time, wheel], where a grid would have to be too fine."""
         return []

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.lag_scan import best_lag
 from regolithd.calibration.mismatch.problem.delayed import filtered, shifted
 
 if TYPE_CHECKING:
@@ -20,16 +21,22 @@ FINEST_READINGS = 2.0
 LEAST_READINGS = 1.25
 """Shortest delay that is named, in readings: what a sampled input does between two readings is not recorded, and a
 solver that holds it, or interpolates it, is early or late by up to one (a choice: a quarter of a reading more)."""
+OF_INPUT = "input_secant_s"
+"""The shape parameter that holds the dead time of an input."""
 PASSED = "passed"
-"""The shape parameter of a delay of the predicted channel: the share of the predicted change that was recorded."""
-PASSED_STD = 0.2
-"""Standard deviation of that share about 1 (a choice: inputs whose noise is a fifth of the change's power)."""
+"""The shape parameter of the share of the predicted change that was recorded."""
+PASSED_STD, PASSED_STD_OF_INPUT = 0.2, 0.025
+"""Standard deviation of that share about 1, for the predicted channel and for an input (a choice: inputs whose noise is
+a fifth of the change's power; a late input itself is smoothed by its stated error first, and then its size is that
+of other effects, by `size_discrepancy_std`)."""
 LEAST_PASSED = 0.5
 """That share, or its reciprocal, below which something else than a delay is fitted; and the ratio of an input's delay
 to that which its change was computed for (a choice; the grid's ratio of 4 is the square of its reciprocal)."""
 RATIO_OF_CHANNEL, RATIO_OF_INPUT = 2.0, 4.0
 """Ratio of neighbouring delays in the grid, for the predicted channel and for an input (a choice: a fitted delay is
 refined from the nearest; each delay of an input costs a run of the simulation)."""
+UNIFORM_STD = 0.29
+"""Standard deviation of what is even over one unit: 1/√12."""
 LONGEST_SHARE = 0.1
 """The longest delay, as a share of the recording (a choice: a longer one is a wrong clock, which is seen at once)."""
 
@@ -39,11 +46,10 @@ class SensorDelay(Candidate):
 
     The predicted channel is late by a dead time (a bus, polling), or by the time constant of a first-order filter,
     which is how late it is on a ramp. The change of the prediction is exact for the shape's own delay (no Taylor
-    series); per second of delay, so that the coefficient is the delay. That of the predicted channel is optimised with
-    its coefficient, since a delay shows in when the channel steps. How far it steps is predicted from inputs with
-    errors: `passed` is the share of the predicted change that was recorded, 1 ± 0.2 before the recording and from a
-    half to two after it. The delay of an input costs a run of the simulation, and only follows the fit until both
-    agree.
+    series); per second of delay, so that the coefficient is the delay. Both are optimised together, since a delay shows
+    in when the column steps. How far it steps is predicted from inputs with errors: `passed` is the share of the
+    predicted change that was recorded, 1 ± 0.2 before the recording and from a half to two after it. The delay of an
+    input costs a run of the simulation for each whole reading; between them the change is interpolated.
 
     What acts on the machine shows as late as the predicted channel is: once that is named, all else is searched for
     again, late by as much. Once an input's delay is named, all else is searched for with that input on time.
@@ -69,10 +75,10 @@ class SensorDelay(Candidate):
         "late": "the column that is late",
         "secant_s": "dead time of the predicted channel",
         "filter_s": "time constant of its first-order filter",
-        "input_secant_s": "dead time of an input",
+        OF_INPUT: "dead time of an input",
         PASSED: "share of the predicted change that was recorded (without the key: 1)",
     }
-    free: ClassVar = {"secant_s": (0.0, float("inf")), "filter_s": (0.0, float("inf"))}
+    free: ClassVar = {"secant_s": (0.0, float("inf")), "filter_s": (0.0, float("inf")), OF_INPUT: (0.0, float("inf"))}
 
     def words_for(self, shape: Shape) -> str:
         """Return which column is late."""
@@ -92,11 +98,24 @@ class SensorDelay(Candidate):
             for delay in _delays(problem, RATIO_OF_CHANNEL)
         ]
         of_inputs: list[Shape] = [
-            {"late": name, "input_secant_s": delay}
+            {"late": name, OF_INPUT: delay}
             for name in simulation.inputs
             for delay in sorted({*_delays(problem, RATIO_OF_INPUT), *filter(None, [problem.on_time.get(name)])})
         ]
         return [*of_channel, *of_inputs]
+
+    def propose_shapes(self, problem: Problem, residual: Array) -> Sequence[Shape]:
+        """Return each input at the delay that the residual fits best to first order.
+
+        The grid is too coarse for delays that are longer than the input takes to change.
+        """
+        most, found = int(LONGEST_SHARE * problem.length_s / problem.recording.step_s), list[Shape]()
+        for name in problem.simulation.inputs:
+            values = problem.recording.channels[name]
+            readings = best_lag(problem, values, _slope(problem, name), residual, most)
+            if readings >= FINEST_READINGS and not problem.on_time.get(name):
+                found.append({"late": name, OF_INPUT: readings * problem.recording.step_s})
+        return found
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the prediction's change for this delay of this channel, over the delay."""
@@ -105,19 +124,12 @@ class SensorDelay(Candidate):
                 delay = float(shape[kind])
                 behind = delayed(problem.recording, _without_blanks(problem, delay), delay)
                 return (float(shape.get(PASSED, 1.0)) * (behind - problem.prediction) / delay)[None]
-        late, delay = str(shape["late"]), float(shape["input_secant_s"])
-        already = problem.on_time.get(late, 0.0)
-
-        def change() -> Array:
-            further = shifted(problem.recording, problem.recording.channels[late], delay - already)
-            moved = problem.with_input(late, further) if delay != already else problem.filled
-            return (moved - (problem.as_simulated if already else problem.filled)) / delay
-
-        return problem.run_once(f"{late} late", delay, change)[None]
+        late, delay = str(shape["late"]), float(shape[OF_INPUT])
+        return (float(shape.get(PASSED, 1.0)) * _change(problem, late, delay) / delay)[None]
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Return delays from a fraction of a reading to the longest."""
-        return dict.fromkeys(OF_CHANNEL, (0.1 * problem.recording.step_s, LONGEST_SHARE * problem.length_s))
+        return dict.fromkeys(KINDS, (0.1 * problem.recording.step_s, LONGEST_SHARE * problem.length_s))
 
     def search_range(
         self, problem: Problem, shape: Shape, name: str, bounds: tuple[float, float]
@@ -131,9 +143,13 @@ class SensorDelay(Candidate):
         """Return a reading: what is interpolated on straight lines has a corner at each."""
         return problem.recording.step_s
 
+    def left_open(self, problem: Problem, name: str) -> float:
+        """Return half a reading for an input, evenly: a simulation may hold it between readings, or interpolate."""
+        return UNIFORM_STD * problem.recording.step_s if name == OF_INPUT else 0.0
+
     def parameters(self, shape: Shape, values: Sequence[float]) -> dict[str, float]:
-        """Return the delay: of the predicted channel that of the shape, since its coefficient has the share passed."""
-        return {"delay_s": next((float(shape[kind]) for kind in OF_CHANNEL if kind in shape), float(values[0]))}
+        """Return the delay of the shape, since the coefficient has the share passed."""
+        return {"delay_s": next((float(shape[kind]) for kind in KINDS if kind in shape), float(values[0]))}
 
     def plausible(self, problem: Problem, shape: Shape, values: Sequence[float]) -> bool:
         """Return whether the delay is more than sampling itself leaves open, and about that of its shape.
@@ -141,26 +157,57 @@ class SensorDelay(Candidate):
         Of the predicted channel, it shows in changes of about the predicted size.
         """
         share = float(shape.get(PASSED, 1.0))
-        if "input_secant_s" in shape:
-            share = float(values[0]) / float(shape["input_secant_s"])
+        if OF_INPUT in shape and PASSED not in shape:
+            share = float(values[0]) / float(shape[OF_INPUT])
         return values[0] >= LEAST_READINGS * problem.recording.step_s and LEAST_PASSED <= share <= 1 / LEAST_PASSED
 
     def stated_coefficient(self, shape: Shape) -> tuple[float, float] | None:
         """Return the coefficient at which all of the change was recorded, and how well that share is known to be 1."""
         passed = float(shape.get(PASSED, 1.0))
-        return next(((float(shape[kind]) / passed, PASSED_STD) for kind in OF_CHANNEL if kind in shape), None)
+        std = PASSED_STD_OF_INPUT if OF_INPUT in shape else PASSED_STD
+        return next(((float(shape[kind]) / passed, std) for kind in KINDS if kind in shape), None)
 
     def shape_at(self, shape: Shape, value: float) -> Shape:
         """Return the shape with the share of the predicted change that was recorded."""
-        delay = next(float(shape[kind]) for kind in OF_CHANNEL if kind in shape)
+        delay = next(float(shape[kind]) for kind in KINDS if kind in shape)
         return {**shape, PASSED: float(shape.get(PASSED, 1.0)) * value / delay}
 
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
         """Return the shape at the fitted delay, with the same share of the change."""
-        name = next(name for name in (*OF_CHANNEL, "input_secant_s") if name in shape)
+        name = next(name for name in KINDS if name in shape)
         delay = float(np.clip(values[0], *self.bounds(problem, shape)["secant_s"]))
         before = float(shape[name])
         return shape if abs(delay - before) < SHAPE_TOLERANCE * before else {**shape, name: delay}
+
+
+def _change(problem: Problem, name: str, delay_s: float) -> Array:
+    """Return the prediction's change with an input on time that is late by so much, shape (time, wheel).
+
+    A column is on a straight line between two readings: so is the change between two delays of whole readings, which
+    are counted from the delay that the problem has on time.
+    """
+    already, step = problem.on_time.get(name, 0.0), problem.recording.step_s
+    whole, part = divmod((delay_s - already) / step, 1.0)
+
+    def moved(readings: float) -> Array:
+        if not readings:
+            return problem.filled
+        further = shifted(problem.recording, problem.recording.channels[name], readings * step)
+        return problem.run_once(f"{name} late", already + readings * step, lambda: problem.with_input(name, further))
+
+    found = moved(whole) if not part else (1 - part) * moved(whole) + part * moved(whole + 1)
+    return np.asarray(found - (problem.as_simulated if already else problem.filled))
+
+
+def _slope(problem: Problem, name: str) -> Array:
+    """Return ∂prediction/∂input at each instant, shape (time, wheel); 0 for an input that does not vary."""
+    values = problem.recording.channels[name]
+    step = problem.thresholds.tangent_step * float(np.nanstd(values))
+    if not step > 0:
+        return np.zeros(problem.mask.shape)
+    return problem.run_once(
+        f"slope with {name}", step, lambda: (problem.with_input(name, values + step) - problem.filled) / step
+    )
 
 
 def _delays(problem: Problem, ratio: float) -> list[float]:
@@ -214,6 +261,10 @@ OF_CHANNEL: Mapping[str, Callable[[Recording, Array, float], Array]] = {
 """What delays the predicted channel, by the shape parameter that holds the delay: dead time, or a filter."""
 
 
+KINDS = (*OF_CHANNEL, OF_INPUT)
+"""The shape parameters that hold a delay, of which a shape has one."""
+
+
 def columns_of(problem: Problem, candidate: Candidate, shape: Shape) -> Array:
     """Return a candidate's columns as the predicted channel shows them: late where it is late."""
     return late_with(problem, candidate, np.asarray(candidate.columns(problem, shape), np.float64))
@@ -246,8 +297,8 @@ def _bridged(values: Array) -> Array:
 
 def late_inputs(effects: Iterable[tuple[str, Shape]], inputs: Sequence[str]) -> dict[str, float]:
     """Return how late each of these inputs is by some effects, names and shapes [s]."""
-    shapes = [shape for name, shape in effects if name == SensorDelay.name and "input_secant_s" in shape]
-    return {str(shape["late"]): float(shape["input_secant_s"]) for shape in shapes if shape["late"] in inputs}
+    shapes = [shape for name, shape in effects if name == SensorDelay.name and OF_INPUT in shape]
+    return {str(shape["late"]): float(shape[OF_INPUT]) for shape in shapes if shape["late"] in inputs}
 
 
 def lateness(effects: Iterable[tuple[str, Shape]], channel: str) -> tuple[str, float] | None:

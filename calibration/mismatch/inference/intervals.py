@@ -62,10 +62,12 @@ def _of_term(
     central = candidate.parameters(shape, (fit.coefficients[at] / scale).tolist())
     drawn: dict[str, list[float]] = {name: [] for name in central}
     free = [(len(fit.columns) + k, slope) for k, slope in enumerate(linearisation.slopes) if slope.term == index]
-    for row in moved[: equations.thresholds.parameter_draws]:
+    beyond = normal_draws(np.eye(1), len(moved))[:, 0]
+    for row, more in zip(moved[: equations.thresholds.parameter_draws], beyond, strict=False):
         other = dict(shape)
         for place, slope in free:
-            other[slope.name] = float(shape[slope.name]) + row[place] / slope.scale
+            left_open = more * candidate.left_open(equations.problem, slope.name)
+            other[slope.name] = float(shape[slope.name]) + row[place] / slope.scale + left_open
         for name, value in candidate.parameters(other, ((fit.coefficients[at] + row[at]) / scale).tolist()).items():
             drawn[name].append(value)
     channel, labels = equations.problem.simulation.unit, equations.problem.labels

@@ -44,3 +44,10 @@ def shifted(recording: Recording, values: Array, by_s: float) -> Array:
             if known.sum() > 1:
                 moved[here, k] = np.where(known, np.interp(at + by_s, at[known], column[known]), np.nan)
     return moved
+
+
+def beyond_the_end(recording: Recording, by_s: float) -> NDArray[np.bool_]:
+    """Return where `shifted` by so much holds the end of a run, shape (time, wheel)."""
+    ends = np.zeros(recording.run.max() + 1)
+    np.maximum.at(ends, recording.run, recording.time_s)
+    return np.repeat((recording.time_s + by_s > ends[recording.run])[:, None], recording.shape[1], axis=1)

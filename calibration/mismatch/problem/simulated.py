@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.data.slow_channels import bridged, filled_between
 from regolithd.calibration.mismatch.errors import RecordingError
-from regolithd.calibration.mismatch.problem.delayed import shifted
+from regolithd.calibration.mismatch.problem.delayed import beyond_the_end, shifted
 from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
 from regolithd.calibration.mismatch.problem.input_doubt import InputDoubt, input_doubt
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
@@ -102,7 +102,10 @@ def inputs_of(recording: Recording, simulation: Predictor) -> Inputs:
 
 
 def put_on_time(inputs: Inputs, late: Mapping[str, float]) -> Inputs:
-    """Return the inputs with some of their columns as they would have been recorded without their delay [s]."""
+    """Return the inputs with some of their columns as they would have been recorded without their delay [s].
+
+    What they were at the end of each run was not recorded any more.
+    """
 
     def moved(recording: Recording) -> Recording:
         columns = {name: shifted(recording, recording.channels[name], delay) for name, delay in late.items()}
@@ -113,6 +116,8 @@ def put_on_time(inputs: Inputs, late: Mapping[str, float]) -> Inputs:
         name: shifted(inputs.expected, blank.astype(np.float64), late.get(name, 0.0)) > 0
         for name, blank in inputs.blanks.items()
     }
+    for name, delay in late.items():
+        blanks[name] = blanks.get(name, False) | beyond_the_end(inputs.expected, delay)
     return Inputs(moved(inputs.as_read), moved(inputs.expected), otherwise, blanks, inputs.doubt)
 
 

@@ -141,7 +141,10 @@ def optimised_shape(equations: NormalEquations, others: Sequence[Term], term: Te
 def _at_its_coefficient(
     equations: NormalEquations, others: Sequence[Term], term: Term, candidate: Candidate
 ) -> tuple[NormalEquations, Term]:
-    """Return the term in the shape, of any kind that states its coefficient, that has the largest Δχ² beside that."""
+    """Return the term in the shape, of any kind that states its coefficient, that has the largest Δχ² beside that.
+
+    Kinds have other free parameters, and the same words.
+    """
     problem, profile = equations.problem, shape_profile(equations, others, candidate, term.wheels)
 
     def gain(shape: Shape) -> float:
@@ -152,7 +155,9 @@ def _at_its_coefficient(
         return lambda value: gain({**shape, name: value})
 
     kinds: dict[frozenset[str], tuple[float, Shape]] = {}
-    for shape in candidate.shapes(problem):
+    words = {name: value for name, value in term.group.shape.items() if isinstance(value, str)}
+    own = {name: value for name, value in term.group.shape.items() if name in words or name in candidate.free}
+    for shape in (own, *(each for each in candidate.shapes(problem) if words.items() <= each.items())):
         kind, found = frozenset(shape), gain(shape)
         if found > kinds.get(kind, (-float("inf"), shape))[0]:
             kinds[kind] = found, shape

@@ -253,7 +253,7 @@ def test_a_delay_is_longer_than_sampling_leaves_open() -> None:
     assert delay.search_range(P, {**shape, "secant_s": 0.08}, "secant_s", bounds) == pytest.approx((0.05, 0.16))
     assert delay.search_range(P, {**shape, "secant_s": 4.0}, "secant_s", bounds) == pytest.approx((2.0, 6.0))
     assert delay.parameters(shape, [1.5]) == {"delay_s": 2.0}, "1.5 / 2 is the share of the change that was recorded"
-    assert delay.parameters({"late": "speed_rad_s", "input_secant_s": 2.0}, [1.5]) == {"delay_s": 1.5}
+    assert delay.parameters({"late": "speed_rad_s", "input_secant_s": 2.0}, [1.5]) == {"delay_s": 2.0}
 
 
 def beginning(whole: Problem, count: int) -> Problem:

@@ -11,7 +11,7 @@ import fleet_arm
 import numpy as np
 import pytest
 import tram
-from tram import COUNT, DELAY_S, Tram, driven
+from tram import COUNT, DELAY_S, Array, Tram, driven
 
 from regolithd.calibration.mismatch import Member, compare, load_simulation, read_recording
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
@@ -40,7 +40,8 @@ def test_a_delay_changes_as_much_with_the_input_on_time_as_without() -> None:
     recording, delay = driven(2), SensorDelay()
     late = {"grade": DELAY_S}
     before, problem = build_problem(recording, Tram()), build_problem(recording, Tram(), late=late)
-    np.testing.assert_allclose(problem.residual, before.residual)
+    np.testing.assert_allclose(problem.residual[problem.mask], before.residual[problem.mask])
+    assert np.flatnonzero(~problem.mask[:, 0]).tolist() == list(range(COUNT - 7, COUNT)), "what follows is not recorded"
     within = slice(20, COUNT - 20)  # the ends are held
     shape = {"late": "grade", "input_secant_s": 5.0}
     np.testing.assert_allclose(
@@ -55,6 +56,30 @@ def test_a_delay_changes_as_much_with_the_input_on_time_as_without() -> None:
     speed = recording.channels["speed_m_s"]
     tangent = problem.values["weight"] * speed[within]
     np.testing.assert_allclose(problem.tangent("rolling")[within], tangent, rtol=1e-6)
+
+
+@pytest.mark.parametrize("delay_s", [40.0, 100.0])
+def test_a_delay_may_be_longer_than_its_input_takes_to_change(delay_s: float) -> None:
+    """It is found among delays of all whole readings, to the reading; the drag beside it has its name."""
+    for seed, drag in ((20, 0.0), (23, 0.05)):
+        found = compare(driven(seed, delay_s, drag), Tram()).answer
+        assert {effect.name for effect in found.effects} == {"sensor-delay", *(["quadratic-drag"] if drag else [])}
+        delay = next(effect for effect in found.effects if effect.name == "sensor-delay").parameters["delay_s"]
+        assert delay.low < delay_s < delay.high
+        assert delay.high - delay.low < 1.0
+        assert delay.value == pytest.approx(delay_s, abs=0.1)
+        assert found.unexplained == ()
+
+
+def test_the_change_is_interpolated_between_delays_of_whole_readings() -> None:
+    """Exact where the prediction is linear in the input, at two runs for all delays between."""
+    problem, delay = build_problem(driven(2), Tram()), SensorDelay()
+
+    def change(delay_s: float) -> Array:
+        return delay_s * delay.columns(problem, {"late": "grade", "input_secant_s": delay_s})[0]
+
+    np.testing.assert_allclose(change(6.25), 0.75 * change(6.0) + 0.25 * change(7.0))
+    assert [name for name, _ in problem.made if name == "grade late"] == ["grade late"] * 2
 
 
 def test_a_corrected_delay_puts_the_input_of_a_later_recording_on_time(tmp_path: Path) -> None:

@@ -129,7 +129,9 @@ def test_the_share_of_the_change_is_kept_apart_from_the_delay() -> None:
     problem = problem_of(load, load, moving)
     shape = {"late": "current_A", "secant_s": 0.5}
     assert DELAY.stated_coefficient(shape) == (0.5, 0.2)
-    assert DELAY.stated_coefficient({"late": "load_A", "input_secant_s": 0.5}) is None
+    assert DELAY.stated_coefficient({"late": "load_A", "input_secant_s": 0.5}) == (0.5, 0.025)
+    assert DELAY.left_open(problem, "input_secant_s") == pytest.approx(problem.recording.step_s / 12**0.5, rel=0.01)
+    assert DELAY.left_open(problem, "secant_s") == 0.0
     with_share = DELAY.shape_at(shape, 0.4)
     assert with_share["passed"] == pytest.approx(0.8)
     np.testing.assert_allclose(
