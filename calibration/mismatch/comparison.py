@@ -29,6 +29,7 @@ from regolithd.calibration.mismatch.inference.several_channels import merged_ans
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.equations import smooth_equations, with_library
+from regolithd.calibration.mismatch.regression.reliability import noise_size_of
 from regolithd.calibration.mismatch.selection.decision import decide
 from regolithd.calibration.mismatch.selection.regions import in_regions
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
@@ -200,6 +201,9 @@ def decided(
     search = _search(candidates, stated, pose, progress)
     progress("measuring on held-out blocks and comparing with rivals")
     decision, held_out = earned(search.decision, search.grid)
+    if decision.has_delay and not search.decision.has_delay:  # refused beside what is found with the delay alone
+        search = _searched_beside_delays(search, decision, pose, progress)
+        decision, held_out = earned(search.decision, search.grid)
     decision = without_improbable_curves(in_regions(decision))
     return Decided(decision, held_out, search.candidates, search.applicable)
 
@@ -237,21 +241,41 @@ def _search(
     found = _search_at(equations, candidates, progress)
     values = moved_values(found.decision.equations, found.decision.whole)
     if not found.decision.has_delay and bent(problem, values):
+        noise_size = found.decision.equations.problem.noise_size
         del found, equations  # memory holds the matrix of one search at a time, and TMPDIR its columns
-        found = _search_at(smooth_equations(pose(values)), candidates, progress)
-        values = moved_values(found.decision.equations, found.decision.whole)
-    for _ in range(LATE_SEARCHES if found.decision.has_delay else 0):
-        problem = replace(pose(values, found.decision.late_inputs), late=found.decision.late)
-        again = _search_at(smooth_equations(problem), candidates, progress)
+        found = _search_at(smooth_equations(replace(pose(values), noise_size=noise_size)), candidates, progress)
+    return _searched_beside_delays(found, found.decision, pose, progress)
+
+
+def _searched_beside_delays(
+    found: _Search, decision: Decision, pose: _Pose, progress: Callable[[str], None]
+) -> _Search:
+    """Search again with the delays of a decision, until they agree; what was found, where it has none."""
+    values = moved_values(decision.equations, decision.whole)
+    for _ in range(LATE_SEARCHES if decision.has_delay else 0):
+        noise_size = decision.equations.problem.noise_size
+        problem = replace(pose(values, decision.late_inputs), late=decision.late, noise_size=noise_size)
+        again = _search_at(smooth_equations(problem), found.candidates, progress)
         if not again.decision.has_delay:
             break
-        found, values = again, moved_values(again.decision.equations, again.decision.whole)
-        if not late_otherwise(problem, values) and put_on_time_by(problem, found.decision.late_inputs):
+        found, decision = again, again.decision
+        values = moved_values(decision.equations, decision.whole)
+        if not late_otherwise(problem, values) and put_on_time_by(problem, decision.late_inputs):
             break
     return found
 
 
 def _search_at(equations: NormalEquations, candidates: Sequence[Candidate], progress: Callable[[str], None]) -> _Search:
+    """Search with one linearisation; once more where what is found leaves noise that grows with the predicted size."""
+    found = _searched(equations, candidates, progress)
+    problem, decision = equations.problem, found.decision
+    if problem.noise_size is None and (noise_size := noise_size_of(decision.equations, decision.whole)) is not None:
+        del found, decision, equations  # memory holds the matrix of one search at a time
+        return _searched(smooth_equations(replace(problem, noise_size=noise_size)), candidates, progress)
+    return found
+
+
+def _searched(equations: NormalEquations, candidates: Sequence[Candidate], progress: Callable[[str], None]) -> _Search:
     progress("computing the columns of all candidates")
     equations, applicable = with_library(equations, candidates)
     progress("searching")

@@ -83,6 +83,8 @@ class Problem:
     thresholds: the numbers that decide
     made: what takes runs of the simulation, or long, by name and step: a cache, which copies of the problem share
     doubt: of the prediction by the inputs' stated errors; None: none is stated
+    noise_size: by how much the noise's deviation grows with the predicted size, shape (time, wheel); None: it does not,
+        or it is not known yet
     on_time: how late inputs were recorded that are put on time here [s], by name
     as_recorded: where some are, the prediction from the inputs as they were recorded, without stated effects; None:
         `prediction` is of these
@@ -106,6 +108,7 @@ class Problem:
     thresholds: Thresholds = THRESHOLDS
     made: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)
     doubt: InputDoubt | None = None
+    noise_size: Array | None = None
     on_time: Mapping[str, float] = field(default_factory=dict)
     as_recorded: Array | None = None
     late: tuple[str, float] | None = None
@@ -229,8 +232,14 @@ class Problem:
         return self.run_once(name, step, lambda: (self.changed(**{name: value + step}) - self.filled) / step)
 
     def tangent(self, name: str) -> Array:
-        """Return ∂prediction/∂parameter, shape (time, wheel)."""
-        return self.secant(name, self.thresholds.tangent_step * (abs(self._all_values[name]) or 1.0))
+        """Return ∂prediction/∂parameter, shape (time, wheel).
+
+        By steps to both sides: by one alone, parameters whose products or quotients act would seem to be known each.
+        """
+        value = self._all_values[name]
+        step = self.thresholds.tangent_step * (abs(value) or 1.0)
+        ahead, behind = self.secant(name, step), self.secant(name, -step)
+        return np.where(np.isfinite(behind), (ahead + behind) / 2, ahead)
 
     def input_tangent(self, column: str) -> Array:
         """Return ∂prediction/∂ln(input), shape (time, wheel)."""

@@ -1,4 +1,7 @@
-"""Reliability of readings: those weigh less of which the prediction is in doubt by its inputs' stated errors."""
+"""Reliability of readings: those weigh less that scatter more, and it is known why.
+
+The prediction is in doubt by its inputs' stated errors; and many sensors' noise grows with what they measure.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.signal.robust import robust_std
 from regolithd.calibration.mismatch.signal.variance_components import variance_components
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
+    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -18,24 +27,86 @@ Single = NDArray[np.float32]
 LEAST_LOST = 0.02
 """Share of what all readings know, weighted alike, below which their doubt is passed over (a choice: it would hardly
 change an answer, and costs a second file of columns)."""
+LEAST_STDS = 5.0
+"""Standard deviations by which noise has to grow with the size (a choice: of thousands of courses none by chance)."""
+FURTHEST_STEP = 6.0
+"""Steps between readings beyond which a residual jumps, in their robust deviation (a choice: at a reversal, or where an
+input is set, it does for other reasons)."""
 
 
 def reliability_of(design: DesignMatrix, residual: Array) -> Single | None:
     """Return by what readings are multiplied to scatter alike, shape (wheel, time in the order of folds).
 
-    `residual` [time, wheel] shows how much they scatter, and which share of the doubt is true. None where no error is
-    stated, or hardly any reading is in doubt.
+    `residual` [time, wheel] shows which share of the doubt is true. None where they scatter alike, or hardly any does
+    not.
     """
-    doubt = design.problem.doubt
-    if doubt is None:
+    problem = design.problem
+    if problem.doubt is None and problem.noise_size is None:
         return None
-    left, alone, together = (design.in_folds(each) for each in (residual, doubt.alone, doubt.together))
+    _, found = _by_doubt(design, design.in_folds(residual))
+    if problem.noise_size is not None:
+        found /= np.maximum(design.in_folds(problem.noise_size), 1.0)
+    kept = np.concatenate([found[wheel, at] for wheel, (at, _) in enumerate(design.readings)])
+    return found if 1 - np.mean(kept**2) > LEAST_LOST else None
+
+
+def noise_size_of(equations: NormalEquations, fit: Fit) -> Array | None:
+    """Return by how much the noise's deviation grows with the predicted size, shape (time, wheel); None: it does not.
+
+    On each wheel by itself, by the steps that what a fit leaves makes from one reading to the next, in which slow
+    physics that is left out hardly shows.
+    """
+    design, problem = equations.design, equations.problem
+    if problem.simulation.arbitrary_zero:
+        return None
+    left = design.in_folds(residual_of(equations, fit))
+    left = left * _by_doubt(design, left)[0]
+    size = design.in_folds(problem.filled) ** 2
+    found, lost = np.ones(problem.mask.shape), 0.0
+    for wheel, (at, runs) in enumerate(design.readings):
+        squares, between = _steps(left[wheel, at], size[wheel, at], runs)
+        usual = float(np.mean(between)) if len(between) else 0.0
+        if usual > 0:
+            relative = float(np.mean(squares)) / usual
+            (level,), share = variance_components([squares], [between * relative])
+            growth = share * relative * problem.filled[:, wheel] ** 2 / level if level > 0 else np.zeros(len(found))
+            if share >= LEAST_STDS * _std_of_share(between * relative, level + share * between * relative):
+                found[:, wheel] = np.sqrt(1 + growth)
+                lost = max(lost, 1 - float(np.mean(1 / (1 + growth[problem.mask[:, wheel]]))))
+    return found if lost > LEAST_LOST else None
+
+
+def _by_doubt(design: DesignMatrix, left: Array) -> tuple[Single, Single]:
+    """Return the factors for what the inputs' stated errors add to each reading alone, and to a mean of many."""
+    doubt, shape = design.problem.doubt, left.shape
+    each, many = np.ones(shape, np.float32), np.ones(shape, np.float32)
+    if doubt is None:
+        return each, many
+    alone, together = (design.in_folds(values) for values in (doubt.alone, doubt.together))
     places = [places for places, _ in design.readings]
-    squares, known = ([each[wheel, at] for wheel, at in enumerate(places)] for each in (left**2, alone))
+    squares, known = ([values[wheel, at] for wheel, at in enumerate(places)] for values in (left**2, alone))
     constant, share = variance_components(squares, known)
-    found = np.ones(left.shape, np.float32)
     for wheel, (at, level) in enumerate(zip(places, constant, strict=True)):
         if level > 0:
-            found[wheel, at] = np.sqrt(level / (level + share * together[wheel, at]))
-    kept = np.concatenate([found[wheel, at] for wheel, at in enumerate(places)])
-    return found if 1 - np.mean(kept**2) > LEAST_LOST else None
+            each[wheel, at] = np.sqrt(level / (level + share * alone[wheel, at]))
+            many[wheel, at] = np.sqrt(level / (level + share * together[wheel, at]))
+    return each, many
+
+
+def _std_of_share(known: Array, variances: Array) -> float:
+    """Return the standard deviation of the share that squared steps show, of which neighbours have a reading in common.
+
+    The square of a normal step has twice the square of its variance; with half of it in common on either side, three
+    times.
+    """
+    weights = 1 / variances**2
+    away = known - float(np.sum(weights * known) / np.sum(weights))
+    return float(np.sqrt(3 / max(float(np.sum(weights * away**2)), 1e-300)))
+
+
+def _steps(left: Array, size: Array, runs: Sequence[slice]) -> tuple[Array, Array]:
+    """Return half the squared steps of the residual within runs, without jumps, and the mean size at their ends."""
+    steps = np.concatenate([np.diff(left[run]) for run in runs] or [np.zeros(0)])
+    between = np.concatenate([(size[run][1:] + size[run][:-1]) / 2 for run in runs] or [np.zeros(0)])
+    noise = np.abs(steps) <= FURTHEST_STEP * robust_std(steps)
+    return steps[noise] ** 2 / 2, between[noise]
