@@ -68,7 +68,7 @@ def _about(answer: Answer, channel: str, shown: Sequence[Evidence]) -> Answer:
 
 
 def _part(answer: Answer, evidence: Evidence, *, alone: bool) -> ChannelPart:
-    labels = Labels.of(evidence)
+    labels = Labels.of(evidence, alone=True)
     return ChannelPart(
         heading="" if alone else evidence.channel,
         along_motion=evidence.problem is None or "direction" in evidence.problem.covariates,

@@ -57,15 +57,22 @@ class Labels:
     corrected: frozenset[str] = frozenset()
 
     @classmethod
-    def of(cls, evidence: Evidence) -> Labels:
-        """Return the labels of the simulation that the evidence is about."""
+    def of(cls, evidence: Evidence, *, alone: bool = False) -> Labels:
+        """Return the labels of the evidence's simulation, of its channel `alone` or of all channels."""
         in_minutes = float(evidence.time_s[-1] - evidence.time_s[0]) > LONGEST_IN_SECONDS
         candidates = {candidate.name: candidate for candidate in evidence.candidates or library()}
         in_milli = evidence.unit in WITH_MILLI and float(np.nanmean(np.abs(evidence.measured))) < 1
-        problems = [each.problem for each in (evidence, *evidence.others)]
+        channels = (evidence, *evidence.others)
+        told = {name: label for each in channels for name, label in each.covariate_labels.items()}
+        # What has another name in another channel, as the predicted value has, is told by its general name.
+        same = {
+            n: label for n, label in told.items() if all(c.covariate_labels.get(n, label) == label for c in channels)
+        }
+        covariates = evidence.covariate_labels if alone else same
+        problems = [each.problem for each in channels]
         corrected = frozenset(effect.name for problem in problems if problem for effect in problem.stated)
         kind = noun_of(evidence.wheel_column)
-        return cls(kind, evidence.covariate_labels, candidates, in_minutes, in_milli, corrected)
+        return cls(kind, covariates, candidates, in_minutes, in_milli, corrected)
 
     @property
     def time_unit(self) -> str:

@@ -288,6 +288,18 @@ def test_an_effect_that_makes_held_out_data_worse_says_so(evidence: Evidence) ->
     assert "6.9 → 4.8 mA (−30.4 %)" in render_report(ANSWERS["missing-physics"], evidence, FROM)
 
 
+def test_what_channels_call_differently_has_its_general_name() -> None:
+    """The predicted value is one column in one channel and another in the next; alone each has its own."""
+    shared = {"temperature": "water temperature (°C)"}
+    thrust = replace(sample_answer.evidence(600.0), covariate_labels={**shared, "torque": "predicted thrust (N)"})
+    others = [replace(thrust, covariate_labels={**shared, "torque": f"predicted {n}"}) for n in ("power", "speed")]
+    both = replace(thrust, others=tuple(others))
+    assert Labels.of(both).the("torque") == "the predicted value"
+    assert Labels.of(both).axis("temperature") == "water temperature (°C)"
+    assert Labels.of(both, alone=True).axis("torque") == "predicted thrust (N)"
+    assert Labels.of(thrust).axis("torque") == "predicted thrust (N)"
+
+
 def test_the_next_best_answer_is_told_where_it_is_not_negligible() -> None:
     """Names with commas, and something unexplained at the end; nothing below half a percent."""
     labels = Labels.of(sample_answer.evidence(600.0))
