@@ -22,6 +22,7 @@ from regolithd.calibration.mismatch.data.recording import as_recording
 from regolithd.calibration.mismatch.empirical.found import curves_of
 from regolithd.calibration.mismatch.empirical.stated import beyond_the_range
 from regolithd.calibration.mismatch.inference.evidence import empirical_fits, evidence_of
+from regolithd.calibration.mismatch.inference.feedback import without_feedback
 from regolithd.calibration.mismatch.inference.findings import Findings, answer_of, findings_of
 from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, earned
 from regolithd.calibration.mismatch.inference.improbable import without_improbable_curves
@@ -204,7 +205,7 @@ def decided(
     if decision.has_delay and not search.decision.has_delay:  # refused beside what is found with the delay alone
         search = _searched_beside_delays(search, decision, pose, progress)
         decision, held_out = earned(search.decision, search.grid)
-    decision = without_improbable_curves(in_regions(decision))
+    decision = without_feedback(without_improbable_curves(in_regions(decision)))
     return Decided(decision, held_out, search.candidates, search.applicable)
 
 

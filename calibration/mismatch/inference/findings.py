@@ -75,6 +75,7 @@ def findings_of(
         notes=(
             *map(beyond_prior_in_words, moved),
             *problem.recording.notes,
+            *decision.notes,
             *_about_the_mask(problem),
             *not_looked_for(problem, candidates, {candidate.name for candidate in applicable}),
         ),

@@ -71,6 +71,7 @@ class Decision:
     whole: fit of both together
     intermittent: of those of the smooth terms that stand for what comes and goes, when and how much
     refused: answers, by their names, of which one name lowered no held-out error
+    notes: on what was decided
     """
 
     equations: NormalEquations
@@ -81,6 +82,7 @@ class Decision:
     whole: Fit
     intermittent: tuple[Intermittent, ...] = ()
     refused: frozenset[frozenset[str]] = frozenset()
+    notes: tuple[str, ...] = ()
 
     @property
     def late(self) -> tuple[str, float] | None:

@@ -1,0 +1,89 @@
+"""A controller that acts on the predicted reading passes its noise on, and that is no physics."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+Array = NDArray[np.float64]
+COUNT, STEP_S, NOISE_K = 2500, 5.0, 0.35
+
+
+class Chamber(Simulation):
+    """The temperature of a chamber that a heater warms: a state."""
+
+    channel, unit = "temperature_degC", "degC"
+    inputs = ("duty_pct", "outside_degC")
+    parameters: ClassVar = {
+        "power_W": Prior(900.0, 20.0, "W"),
+        "loss_W_K": Prior(14.0, 0.4, "W/K"),
+        "capacity_J_K": Prior(30000.0, 900.0, "J/K"),
+        "start_degC": Prior(20.0, 0.5, "degC"),
+    }
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the temperature by explicit steps."""
+        duty, outside = inputs["duty_pct"], inputs["outside_degC"]
+        found = np.full(duty.shape, values["start_degC"])
+        for k in range(1, len(found)):
+            net = values["power_W"] * duty[k - 1] / 100 - values["loss_W_K"] * (found[k - 1] - outside[k - 1])
+            found[k] = found[k - 1] + STEP_S * net / values["capacity_J_K"]
+        return found
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return what the controller sets, and the temperature outside."""
+        return {"duty": inputs["duty_pct"], "outside": inputs["outside_degC"]}
+
+
+def heated(seed: int, acts_on_noise: float, offset_K: float = 0.0) -> Recording:
+    """Return a recording of a controller that acts on a share of the reading's noise.
+
+    The reading is off by `offset_K` at full duty, by its square: a supply that sags, say.
+    """
+    random, t_s = np.random.default_rng(seed), STEP_S * np.arange(COUNT)
+    wanted = np.repeat(random.uniform(30, 60, COUNT // 250), 250)
+    outside = 15 + 4 * np.sin(t_s / 2500 + random.uniform(0, 6))
+    noise, state, total = NOISE_K * random.normal(size=COUNT), 20.2, 0.0
+    duty, measured = np.zeros(COUNT), np.zeros(COUNT)
+    for k in range(COUNT):
+        error = wanted[k] - state - acts_on_noise * noise[k]
+        total = float(np.clip(total + 0.02 * error, 0, 100))
+        duty[k] = np.clip(4 * error + total, 0, 100)
+        measured[k] = state + noise[k] + offset_K * (duty[k] / 100) ** 2
+        state += STEP_S * (9.1 * duty[k] - 14.2 * (state - outside[k])) / 30300
+    return from_columns({"t_s": t_s, "duty_pct": duty, "outside_degC": outside, "temperature_degC": measured})
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_controller_that_acts_on_the_noise_is_no_physics(seed: int) -> None:
+    """The residual follows the duty in what its past does not predict; a note says so."""
+    found = compare(heated(seed, acts_on_noise=1.0), Chamber()).answer
+    assert found.verdict == "consistent"
+    assert found.unexplained == ()
+    assert compare(heated(seed, acts_on_noise=0.0), Chamber()).answer.verdict == "consistent"
+
+
+def test_the_note_says_what_cannot_be_told_apart() -> None:
+    """It names the covariate and the reading, and what to record instead."""
+    notes = [compare(heated(seed, acts_on_noise=1.0), Chamber()).answer.notes for seed in range(4)]
+    (told, *_) = [note for each in notes for note in each if "controller" in note]
+    assert told.startswith("Duty follows the noise of the reading of temperature_degC")
+    assert "record another sensor" in told
+
+
+@pytest.mark.parametrize("acts_on_noise", [0.0, 0.3])
+def test_what_follows_the_duty_itself_stays_unexplained(acts_on_noise: float) -> None:
+    """An offset by the duty's square is followed by its past as well as by what is new."""
+    for seed in range(3):
+        found = compare(heated(seed, acts_on_noise, offset_K=2.0), Chamber()).answer
+        assert found.verdict == "unexplained"
+        assert "duty" in {place.covariate for place in found.unexplained}
