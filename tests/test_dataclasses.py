@@ -86,7 +86,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "_Draws",
         *(
             "Found",
-            "_Sizes",
+            "_Beside",
             "FoundTerm",
             "Sums",
             "_Columns",

@@ -202,7 +202,7 @@ def decided(
     search = _search(candidates, stated, pose, progress)
     progress("measuring on held-out blocks and comparing with rivals")
     decision, held_out = earned(search.decision, search.grid)
-    if decision.has_delay and not search.decision.has_delay:  # refused beside what is found with the delay alone
+    if decision.has_delay and not search.decision.has_delay:  # which was refused before held-out readings asked
         search = _searched_beside_delays(search, decision, pose, progress)
         decision, held_out = earned(search.decision, search.grid)
     decision = without_feedback(without_improbable_curves(in_regions(decision)))

@@ -48,8 +48,9 @@ class SensorDelay(Candidate):
     which is how late it is on a ramp. The change of the prediction is exact for the shape's own delay (no Taylor
     series); per second of delay, so that the coefficient is the delay. Both are optimised together, since a delay shows
     in when the column steps. How far it steps is predicted from inputs with errors: `passed` is the share of the
-    predicted change that was recorded, 1 ± 0.2 before the recording and from a half to two after it. The delay of an
-    input costs a run of the simulation for each whole reading; between them the change is interpolated.
+    predicted change that was recorded, 1 ± 0.2 before the recording (1 ± 0.025 of an input, which is smoothed by its
+    stated error first) and from a half to two after it. The delay of an input costs a run of the simulation for each
+    whole reading; between them the change is interpolated.
 
     What acts on the machine shows as late as the predicted channel is: once that is named, all else is searched for
     again, late by as much. Once an input's delay is named, all else is searched for with that input on time.
@@ -109,13 +110,17 @@ class SensorDelay(Candidate):
 
         The grid is too coarse for delays that are longer than the input takes to change.
         """
-        most, found = int(LONGEST_SHARE * problem.length_s / problem.recording.step_s), list[Shape]()
-        for name in problem.simulation.inputs:
-            values = problem.recording.channels[name]
-            readings = best_lag(problem, values, _slope(problem, name), residual, most)
-            if readings >= FINEST_READINGS and not problem.on_time.get(name):
-                found.append({"late": name, OF_INPUT: readings * problem.recording.step_s})
-        return found
+        most = int(LONGEST_SHARE * problem.length_s / problem.recording.step_s)
+        inputs = [name for name in problem.simulation.inputs if not problem.on_time.get(name)]
+        lags = {
+            name: best_lag(problem, problem.recording.channels[name], _slope(problem, name), residual, most)
+            for name in inputs
+        }
+        return [
+            {"late": name, OF_INPUT: readings * problem.recording.step_s}
+            for name, readings in lags.items()
+            if readings >= FINEST_READINGS
+        ]
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the prediction's change for this delay of this channel, over the delay."""

@@ -11,23 +11,28 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.inference.sandwich import block_sums
 from regolithd.calibration.mismatch.inference.statements import capital
+from regolithd.calibration.mismatch.problem.covariates import FOLLOW_SPEED
 from regolithd.calibration.mismatch.problem.words import word_for
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
-from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.selection.decision import names_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
-OF_MOTION = frozenset({"time", "place", "direction", "wheel_speed", "wheel_acceleration", "wheel_angle", "torque"})
+OF_MOTION = frozenset({*FOLLOW_SPEED, "wheel_speed", "place", "time", "torque"})
 """Covariates that no controller sets from the predicted reading alone: what is quick in them is physics."""
 NEWEST, LAGS = 2, 8
 """The latest reading of the past, and how many are taken (a choice: noise may have a memory of a reading)."""
@@ -67,47 +72,44 @@ def without_feedback(decision: Decision) -> Decision:
 
 
 def _still_there(decision: Decision, curves: Sequence[Term]) -> tuple[Term, ...]:
-    """Return the curves that gain enough beside the named effects alone: they were chosen beside those that go."""
+    """Return the curves that score enough beside the named effects alone: they were chosen beside those that go."""
     equations, named = decision.equations, decision.named
-    gains = [equations.fit((*named.terms, curve)).delta_chi2 - named.delta_chi2 for curve in curves]
-    least = equations.thresholds.smooth_term_entry
-    needed = [least + equations.penalty(curve) for curve in curves]
-    return tuple(curve for curve, gain, enough in zip(curves, gains, needed, strict=True) if gain > enough)
+    least = equations.score(named) + equations.thresholds.smooth_term_entry
+    return tuple(curve for curve in curves if equations.score(equations.fit((*named.terms, curve))) > least)
 
 
 def _is_fed_back(decision: Decision, covariate: str) -> bool:
     """Return whether the residual follows a covariate's curves in what its past does not predict, and hardly else."""
     equations, whole = decision.equations, decision.whole
-    problem, design = equations.problem, equations.design
     over = [k for k, term in enumerate(whole.terms) if term.name == covariate and not term.group.named]
-    residual = residual_of(equations, equations.fit([term for k, term in enumerate(whole.terms) if k not in over]))
-    curve = np.zeros(problem.mask.shape)
-    for k in over:
-        wheels, coefficients = list(whole.terms[k].wheels), whole.coefficients[whole.of_term(k)]
-        columns = design.in_time(design.columns_as_read(whole.terms[k].group.columns))
-        curve[:, wheels] += np.einsum("c,ctw->tw", coefficients, columns)[:, wheels]
-    blocks = blocks_of_time(problem, decision.noise)
-    pasts, curves, left, block = [], [], [], []
-    for wheel, (rows, runs) in enumerate(problem.courses):
-        for at in (rows[run][NEWEST + LAGS :] for run in runs if curve[rows[run], wheel].any()):
-            course = curve[rows, wheel]
-            place = np.searchsorted(rows, at)
-            pasts.append(np.stack([course[place - lag] for lag in range(NEWEST, NEWEST + LAGS)], axis=1))
-            curves.append(curve[at, wheel])
-            left.append(residual[at, wheel])
-            block.append(blocks[at] * len(problem.courses) + wheel)
-    if not pasts or not (now := np.concatenate(curves)).size:
-        return False
-    past = np.concatenate(pasts) @ np.linalg.lstsq(np.concatenate(pasts), now, rcond=None)[0]
-    return _follows_the_new_alone(np.stack((past, now - past), axis=1), np.concatenate(left), np.concatenate(block))
+    others = equations.fit([term for k, term in enumerate(whole.terms) if k not in over])
+    curve = sum((contribution(equations, whole, k) for k in over), np.zeros(equations.problem.mask.shape))
+    past, known = _by_its_past(equations.problem, curve)
+    new, left = (np.where(known, values, 0.0) for values in (curve - past, residual_of(equations, others)))
+    blocks = blocks_of_time(equations.problem, decision.noise)
+    return bool(known.any()) and _follows_the_new_alone(np.stack((past, new)), left, blocks)
 
 
-def _follows_the_new_alone(parts: Array, left: Array, block: NDArray[np.int64]) -> bool:
-    """Return whether what is left (reading,) follows the second of two parts (reading, 2), and the first hardly."""
-    inverse = np.linalg.pinv(parts.T @ parts)
-    slopes = inverse @ (parts.T @ left)
-    scores = parts * (left - parts @ slopes)[:, None]
-    sums = np.stack([np.bincount(block, score) for score in scores.T], axis=1)
+def _by_its_past(problem: Problem, curve: Array) -> tuple[Array, Mask]:
+    """Return what a curve's own past predicts of it, shape (time, wheel), and where there is enough of that; else 0."""
+    past, known = np.zeros(curve.shape), np.zeros(curve.shape, np.bool_)
+    at = [(rows[run], wheel) for wheel, (rows, runs) in enumerate(problem.courses) for run in runs]
+    at = [(rows, wheel) for rows, wheel in at if len(rows) > NEWEST + LAGS and curve[rows, wheel].any()]
+    if at:
+        before = [sliding_window_view(curve[each], LAGS)[1:-NEWEST] for each in at]
+        where = [(rows[NEWEST + LAGS :], wheel) for rows, wheel in at]
+        now = np.concatenate([curve[each] for each in where])
+        weights = np.linalg.lstsq(np.concatenate(before), now, rcond=None)[0]
+        for each, readings in zip(where, before, strict=True):
+            past[each], known[each] = readings @ weights, True
+    return past, known
+
+
+def _follows_the_new_alone(parts: Array, left: Array, blocks: NDArray[np.int64]) -> bool:
+    """Return whether what is left [time, wheel] follows the second of two parts [part, time, wheel] alone."""
+    inverse = np.linalg.pinv(np.einsum("atw,btw->ab", parts, parts))
+    slopes = inverse @ np.einsum("atw,tw->a", parts, left)
+    sums = block_sums(parts * (left - np.einsum("a,atw->tw", slopes, parts)), blocks)
     covariance = inverse @ (sums.T @ sums) @ inverse
     apart, spread = slopes[1] - slopes[0], np.sqrt(covariance[0, 0] + covariance[1, 1] - 2 * covariance[0, 1])
     past_std = float(np.sqrt(covariance[0, 0]))

@@ -65,14 +65,14 @@ def noise_size_of(equations: NormalEquations, fit: Fit) -> Array | None:
     found, lost = np.ones(problem.mask.shape), 0.0
     for wheel, (at, runs) in enumerate(design.readings):
         squares, between = _steps(left[wheel, at], size[wheel, at], runs)
-        usual = float(np.mean(between)) if len(between) else 0.0
-        if usual > 0:
-            relative = float(np.mean(squares)) / usual
-            (level,), share = variance_components([squares], [between * relative])
-            growth = share * relative * problem.filled[:, wheel] ** 2 / level if level > 0 else np.zeros(len(found))
-            if share >= LEAST_STDS * _std_of_share(between * relative, level + share * between * relative):
-                found[:, wheel] = np.sqrt(1 + growth)
-                lost = max(lost, 1 - float(np.mean(1 / (1 + growth[problem.mask[:, wheel]]))))
+        if not (squares.any() and between.any()):
+            continue
+        relative = float(np.mean(squares)) / float(np.mean(between))
+        (level,), share = variance_components([squares], [between * relative])
+        if share >= LEAST_STDS * _std_of_share(between * relative, level + share * between * relative):
+            growth = share * relative * problem.filled[:, wheel] ** 2 / level
+            found[:, wheel] = np.sqrt(1 + growth)
+            lost = max(lost, 1 - float(np.mean(1 / (1 + growth[problem.mask[:, wheel]]))))
     return found if lost > LEAST_LOST else None
 
 

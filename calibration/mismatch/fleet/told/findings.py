@@ -84,14 +84,14 @@ class Chosen:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sizes:
+class _Beside:
     """Parameters and effects, fitted with what single recordings show beside them, and their standard deviations."""
 
     fit: FleetFit
     stds: Array
 
     @classmethod
-    def beside(cls, equations: FleetEquations, fit: FleetFit, shown: Sequence[tuple[int, int]]) -> _Sizes:
+    def of(cls, equations: FleetEquations, fit: FleetFit, shown: Sequence[tuple[int, int]]) -> _Beside:
         """Return them from the equations in which what is shown, by recording and place, takes up what it can."""
         rest = equations.beside(shown)
         again = rest.fit(fit.terms)
@@ -103,11 +103,11 @@ def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
     equations, fit, simulation = chosen.equations, chosen.fit, chosen.simulation
     held_out = _held_out(chosen.chooser, fit)
     shown = shown_beside(equations, fit, chosen.found, chosen.names.recordings)
-    sizes = _Sizes.beside(equations, fit, shown.terms)
-    effects = tuple(_effect(chosen, index, sizes, held_out) for index in range(len(fit.terms)))
+    beside = _Beside.of(equations, fit, shown.terms)
+    effects = tuple(_effect(chosen, index, beside, held_out) for index in range(len(fit.terms)))
     single = tuple(_of_recording(chosen, i, effect) for i, effect in shown.effects)
     rest = tuple(_unexplained(chosen, i, each) for i, each in shown.unexplained)
-    parameters = _parameters(chosen, sizes)
+    parameters = _parameters(chosen, beside)
     named = effects or single or any(each.beyond_prior() for each in parameters)
     verdict: Verdict = "unexplained" if rest else "missing-physics" if named else "consistent"
     floor = _noise_floor(chosen)
@@ -156,7 +156,7 @@ def _rms(squares: Array, counts: Array) -> float:
     return float(np.sqrt(max(float(squares.sum()), 0.0) / max(float(counts.sum()), 1.0)))
 
 
-def _effect(chosen: Chosen, index: int, sizes: _Sizes, held_out: tuple[Array, Array, list[Array]]) -> FleetEffect:
+def _effect(chosen: Chosen, index: int, beside: _Beside, held_out: tuple[Array, Array, list[Array]]) -> FleetEffect:
     equations, fit, names = chosen.equations, chosen.fit, chosen.names
     term = fit.terms[index]
     candidate, acting = term.group.candidate, equations.factors(term).any(axis=0)
@@ -165,7 +165,7 @@ def _effect(chosen: Chosen, index: int, sizes: _Sizes, held_out: tuple[Array, Ar
     wheels = tuple(equations.wheels[w] for w in term.units.wheels if where[:, w].any())
     since = term.course.kind in {"since", "growing"}
     first, last = onset_places(equations, fit, index) if since else (0, 0)
-    parameters = _sizes(chosen, index, sizes)
+    parameters = _sizes(chosen, index, beside)
     rovers = tuple(names.rovers[rover] for rover in term.units.rovers)
     kind, all_wheels = chosen.simulation.wheel_column, len(equations.wheels)
     return FleetEffect(
@@ -190,13 +190,13 @@ def _effect(chosen: Chosen, index: int, sizes: _Sizes, held_out: tuple[Array, Ar
     )
 
 
-def _sizes(chosen: Chosen, index: int, sizes: _Sizes) -> dict[str, Parameter]:
+def _sizes(chosen: Chosen, index: int, beside: _Beside) -> dict[str, Parameter]:
     """Return coefficients and relative size with their intervals; of a size of each rover's own, the mean."""
-    fit = sizes.fit
+    fit = beside.fit
     term, span = fit.terms[index], fit.spans[index]
     count = len(term.group.columns)
-    stds = sizes.stds[span].reshape(-1, count)
-    values = sizes.fit.coefficients[span].reshape(-1, count)
+    stds = beside.stds[span].reshape(-1, count)
+    values = fit.coefficients[span].reshape(-1, count)
     weights = 1 / np.maximum(stds, 1e-300) ** 2
     mean = np.sum(weights * values, axis=0) / np.sum(weights, axis=0)
     std = np.maximum(1 / np.sqrt(np.sum(weights, axis=0)), np.std(values, axis=0))
@@ -249,7 +249,7 @@ def _unexplained(chosen: Chosen, recording: int, rest: object) -> FleetUnexplain
     return FleetUnexplained(**vars(rest), rovers=(rover,), recordings=(names.recordings[recording],))
 
 
-def _parameters(chosen: Chosen, sizes: _Sizes) -> tuple[FleetParameter, ...]:
+def _parameters(chosen: Chosen, beside: _Beside) -> tuple[FleetParameter, ...]:
     """Return each parameter where the recordings moved it: of the fleet, or of each rover; of recordings, none."""
     equations, names = chosen.equations, chosen.names
     owners: dict[str, list[tuple[str, ...]]] = {
@@ -265,8 +265,8 @@ def _parameters(chosen: Chosen, sizes: _Sizes) -> tuple[FleetParameter, ...]:
             value, std = prior.value, 0.0
             if name in equations.tangents:
                 at = place * len(equations.tangents) + equations.tangents.index(name)
-                value += float(sizes.fit.coefficients[at])
-                std = float(sizes.stds[at])
+                value += float(beside.fit.coefficients[at])
+                std = float(beside.stds[at])
             reach = NINETY_PERCENT_STDS * std
             found.append(
                 FleetParameter(name, prior.unit, prior.value, prior.std, value, value - reach, value + reach, rovers)
