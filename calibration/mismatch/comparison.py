@@ -22,7 +22,7 @@ from regolithd.calibration.mismatch.data.recording import as_recording
 from regolithd.calibration.mismatch.empirical.found import curves_of
 from regolithd.calibration.mismatch.empirical.stated import beyond_the_range
 from regolithd.calibration.mismatch.inference.evidence import empirical_fits, evidence_of
-from regolithd.calibration.mismatch.inference.feedback import without_feedback
+from regolithd.calibration.mismatch.inference.feedback import fed_back, notes_of_feedback
 from regolithd.calibration.mismatch.inference.findings import Findings, answer_of, findings_of
 from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, earned
 from regolithd.calibration.mismatch.inference.improbable import without_improbable_curves
@@ -194,18 +194,35 @@ def decided(
 
     inputs, on_time = inputs_of(recorded, simulation), stated_late_inputs(stated, simulation.inputs)
 
+    fed: frozenset[str] = frozenset()
+
     def pose(values: Mapping[str, float] | None, late: Mapping[str, float] | None = None) -> Problem:
         late = {**on_time, **(late or {})}
         problem = build_problem(recorded, simulation, values, inputs=inputs, late=late, thresholds=thresholds)
-        return corrected_problem(problem, stated)
+        return replace(corrected_problem(problem, stated), fed_back=fed)
 
+    found = _decided(candidates, stated, pose, progress)
+    while further := fed_back(found.decision):
+        fed = fed | further
+        found = _decided(candidates, stated, pose, progress)
+    notes = notes_of_feedback(found.decision.equations.problem)
+    return replace(found, decision=replace(found.decision, notes=(*found.decision.notes, *notes)))
+
+
+def _decided(
+    candidates: Sequence[Candidate],
+    stated: Sequence[Stated],
+    pose: _Pose,
+    progress: Callable[[str], None],
+) -> Decided:
+    """Search, and keep what held-out readings confirm and what is more probable than chance."""
     search = _search(candidates, stated, pose, progress)
     progress("measuring on held-out blocks and comparing with rivals")
     decision, held_out = earned(search.decision, search.grid)
     if decision.has_delay and not search.decision.has_delay:  # which was refused before held-out readings asked
         search = _searched_beside_delays(search, decision, pose, progress)
         decision, held_out = earned(search.decision, search.grid)
-    decision = without_feedback(without_improbable_curves(in_regions(decision)))
+    decision = without_improbable_curves(in_regions(decision))
     return Decided(decision, held_out, search.candidates, search.applicable)
 
 

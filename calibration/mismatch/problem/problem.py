@@ -90,6 +90,7 @@ class Problem:
         `prediction` is of these
     late: how the predicted channel is late, by `sensor_delay.OF_CHANNEL`, and by how much [s]: what acts on the machine
         shows so much later; None: it is not, or it is not known yet
+    fed_back: covariates that follow the channel's noise: no curve over them explains anything
     """
 
     recording: Recording
@@ -112,6 +113,7 @@ class Problem:
     on_time: Mapping[str, float] = field(default_factory=dict)
     as_recorded: Array | None = None
     late: tuple[str, float] | None = None
+    fed_back: frozenset[str] = frozenset()
     _derived: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
     """What was computed from covariates and readings, by name: a cache, which a copy begins anew."""
 

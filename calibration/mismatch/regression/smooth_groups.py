@@ -56,7 +56,7 @@ def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
 def has_smooth_term(problem: Problem, covariate: str) -> bool:
     """Return whether a curve over a covariate may explain something; over a place, where the machine returns to it."""
     if covariate != "place":
-        return covariate not in WITHOUT_SMOOTH_TERM
+        return covariate not in WITHOUT_SMOOTH_TERM | problem.fed_back
     for column in problem.covariates[covariate].T:
         known = column[np.isfinite(column)]
         if known.size and float(np.sum(np.abs(np.diff(known)))) >= LEAST_PASSES * float(np.ptp(known)) > 0:
