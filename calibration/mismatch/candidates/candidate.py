@@ -38,12 +38,32 @@ Sharing = Literal["all", "one"]
 
 NO_LOADS: Mapping[str, tuple[str, ...]] = {
     "temperature": ("°C", "degC", "K", "mK", "°F", "degF"),
-    "place or angle": ("m", "mm", "cm", "µm", "km", "rad", "mrad", "deg", "°"),
-    "speed": ("m/s", "mm/s", "cm/s", "m/min", "km/h", "mph", "rad/s", "deg/s", "°/s", "rpm", "1/min", "r/min", "Hz"),
-    "acceleration": ("m/s²", "mm/s²", "rad/s²", "deg/s²", "°/s²", "m/s2", "mm/s2", "rad/s2", "deg/s2"),
+    "place or angle": (
+        *("m", "mm", "cm", "dm", "µm", "um", "km", "in", "inch", "ft", "yd", "mi"),
+        *("rad", "mrad", "deg", "°", "arcmin", "arcsec", "rev", "turn", "turns"),
+    ),
+    "speed": (
+        *("m/s", "mm/s", "cm/s", "m/min", "mm/min", "km/h", "mph", "ft/s", "ft/min", "in/s"),
+        *("rad/s", "deg/s", "°/s", "rpm", "rps", "1/min", "r/min", "rev/min", "rev/s", "Hz"),
+    ),
+    "acceleration": (
+        "m/s²",
+        "mm/s²",
+        "ft/s²",
+        "rad/s²",
+        "deg/s²",
+        "°/s²",
+        "m/s2",
+        "mm/s2",
+        "ft/s2",
+        "rad/s2",
+        "deg/s2",
+    ),
     "content or flow": (
-        *("l", "L", "m³", "m3", "m³/s", "m3/s", "m³/h", "m3/h"),
-        *("l/s", "L/s", "l/min", "L/min", "l/h", "kg/s", "kg/h"),
+        *("l", "L", "ml", "mL", "m³", "m3", "gal", "ft³", "ft3"),
+        *("m³/s", "m3/s", "m³/min", "m3/min", "m³/h", "m3/h", "l/s", "L/s", "l/min", "L/min", "l/h", "L/h"),
+        *("ml/min", "mL/min", "gal/min", "gpm", "ft³/s", "ft3/s", "ft³/min", "ft3/min", "cfm"),
+        *("kg/s", "kg/min", "kg/h", "t/h", "lb/s", "lb/min", "lb/h"),
     ),
 }
 """Units of what a drive's load may change but is not made of, by quantity. Any other unit, a percentage or counts too,
