@@ -62,6 +62,12 @@ def moved_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:
     return values
 
 
+def out_of_bounds(equations: NormalEquations, fit: Fit) -> frozenset[str]:
+    """Return the parameters that a fit moves further out of their bounds than noise does."""
+    values, priors = moved_values(equations, fit), equations.problem.simulation.parameters
+    return frozenset(name for name, prior in priors.items() if prior.out_of_bounds(values[name]))
+
+
 def bent(problem: Problem, values: Mapping[str, float]) -> bool:
     """Return whether the prediction at other values differs from its tangents by more than the noise lets pass."""
     shifts = {name: values[name] - problem.values[name] for name in values if values[name] != problem.values[name]}

@@ -13,6 +13,7 @@ from regolithd.calibration.mismatch.calibration import (
     late_otherwise,
     linearised_where_it_fits,
     moved_values,
+    out_of_bounds,
     put_on_time_by,
 )
 from regolithd.calibration.mismatch.candidates.library import library
@@ -195,15 +196,19 @@ def decided(
     inputs, on_time = inputs_of(recorded, simulation), stated_late_inputs(stated, simulation.inputs)
 
     fed: frozenset[str] = frozenset()
+    held: frozenset[str] = frozenset()
 
     def pose(values: Mapping[str, float] | None, late: Mapping[str, float] | None = None) -> Problem:
         late = {**on_time, **(late or {})}
         problem = build_problem(recorded, simulation, values, inputs=inputs, late=late, thresholds=thresholds)
-        return replace(corrected_problem(problem, stated), fed_back=fed)
+        return replace(corrected_problem(problem, stated), fed_back=fed, held=held)
 
     found = _decided(candidates, stated, pose, progress)
-    while further := fed_back(found.decision):
-        fed = fed | further
+    while True:
+        further, out = fed_back(found.decision), out_of_bounds(found.decision.equations, found.decision.whole)
+        if not further | out:
+            break
+        fed, held = fed | further, held | out
         found = _decided(candidates, stated, pose, progress)
     notes = notes_of_feedback(found.decision.equations.problem)
     return replace(found, decision=replace(found.decision, notes=(*found.decision.notes, *notes)))

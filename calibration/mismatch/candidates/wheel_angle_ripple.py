@@ -8,7 +8,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
-from regolithd.calibration.mismatch.signal.skewness import running_mean
+from regolithd.calibration.mismatch.signal.means import running_mean
 from regolithd.calibration.mismatch.signal.spectrum import padded_length, power_of_sums
 
 if TYPE_CHECKING:

@@ -19,12 +19,18 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.data.recording import Recording
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 Between = Literal["linear", "hold", "blank"]
 
 SLOWER = 2.0
 """Rows from one reading to the next (median) from which a channel counts as slower (a choice: every other row)."""
 LONGEST_GAP = 3.0
 """Periods of the slow sensor across which its value is still taken as known (a choice: two readings missing)."""
+
+FEWEST = 3
+"""Readings of a slower sensor that show how much it changes between them, at least."""
+OFTEN_THE_SAME = 0.5
+"""Share of readings that repeat the one before, above which a held column is asked for at intervals (a choice)."""
 
 
 def filled_between(recording: Recording, predicted: str, between: Mapping[str, Between]) -> Recording:
@@ -44,6 +50,36 @@ def filled_between(recording: Recording, predicted: str, between: Mapping[str, B
             word = "held" if how == "hold" else "interpolated on straight lines"
             told.append(f"{name} is measured less often than the other channels; between its readings it is {word}.")
     return recording.with_channels(**filled).with_notes(*told) if filled else recording
+
+
+def drawn_between(recording: Recording, filled: Recording, name: str, how: Between) -> tuple[Array, Index]:
+    """Return a filled column (time, wheel) as it may have been between its readings, and the row of the last reading.
+
+    In each gap it is off by one standard deviation, up or down by lot. About a straight line that is what a Brownian
+    motion is off between two of its readings: it has 2 u (1 − u) times the variance of a reading about the line between
+    its neighbours, at a share u of the gap. What is held has changed to the next reading with the probability u, if it
+    is asked for: where each reading differs from the one before, it is reported when it changes.
+    """
+    before, found = recording.channels[name], filled.channels[name].copy()
+    last, random = np.repeat(np.arange(len(before))[:, None], before.shape[1], axis=1), np.random.default_rng(0)
+    for wheel, column in enumerate(before.T):
+        known = np.flatnonzero(np.isfinite(column))
+        if known.size == column.size or known.size < FEWEST:
+            continue
+        steps = np.diff(column[known])
+        about = np.pad(np.diff(steps) / 2, 1) ** 2
+        lot = random.choice([-1.0, 1.0], size=len(steps))
+        asked = np.mean(steps == 0) > OFTEN_THE_SAME
+        for gap in np.flatnonzero((np.diff(known) > 1) & np.isfinite(found[known[:-1] + 1, wheel])):
+            first, after = known[gap], known[gap + 1]
+            share = np.arange(1, after - first) / (after - first)
+            if how == "hold":
+                off = np.sqrt(share) * steps[gap] * asked
+            else:
+                off = lot[gap] * np.sqrt(share * (1 - share) * (about[gap] + about[gap + 1]))
+            found[first + 1 : after, wheel] += off
+            last[first + 1 : after, wheel] = first
+    return found, last
 
 
 def bridged(

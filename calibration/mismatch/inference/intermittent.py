@@ -1,9 +1,8 @@
-"""A residual that is skewed: something comes and goes, which no law of a covariate describes.
+"""A residual whose mean switches: something comes and goes, which no law of a covariate describes.
 
-Noise is as often above its mean as below, however slowly it varies. A cable that rubs now and then, a valve that sticks
-three times, or an hour of tail wind adds to one side alone: most readings have none of it, and some have much. Its mean
-resembles a constant friction or offset; its spells lengthen the noise's memory, in which they would be lost. They show
-in the mean over about their length, where the noise is smaller and they are not.
+A cable that rubs now and then, a valve that sticks three times, or an hour of tail wind adds to some readings alone.
+Its mean resembles a constant friction or offset; its spells lengthen the noise's memory, in which they would be lost.
+They are told from noise by their two levels (`signal/switching_mean.py`).
 """
 
 from __future__ import annotations
@@ -17,10 +16,13 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
 from regolithd.calibration.mismatch.selection.decision import Intermittent
-from regolithd.calibration.mismatch.signal.skewness import of_usual_noise, skewed_lengths
+from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
 from regolithd.calibration.mismatch.signal.spells import spells_in
+from regolithd.calibration.mismatch.signal.switching_mean import switching_mean
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
@@ -34,14 +36,14 @@ CONSTANT = frozenset({"direction", "none"})
 
 
 def unexplained_if_intermittent(decision: Decision) -> Decision:
-    """Return the decision with a curve over time unexplained on each wheel whose residual is skewed.
+    """Return the decision with a curve over time unexplained on each wheel whose residual has spells.
 
     An effect of constant size that was named there is the mean of what comes and goes, and loses its name.
     """
     equations = decision.equations
     explained = {wheel for term in decision.unnamed for wheel in term.wheels}
-    skewed = {wheels: spells for wheels, spells in skewed_wheels(decision).items() if explained.isdisjoint(wheels)}
-    found = _with_curves(decision, skewed) if skewed else ()
+    in_spells = {wheels: each for wheels, each in wheels_with_spells(decision).items() if explained.isdisjoint(wheels)}
+    found = _with_curves(decision, in_spells) if in_spells else ()
     if not found:
         return decision
     curves = tuple(each.term for each in found)
@@ -52,8 +54,8 @@ def unexplained_if_intermittent(decision: Decision) -> Decision:
     return replace(decision, named=named, unnamed=unnamed, whole=whole, intermittent=found)
 
 
-def skewed_wheels(decision: Decision) -> dict[tuple[int, ...], TimedSpells]:
-    """Return the wheels on which what is left, as read or along the motion, is skewed by more than chance, and when.
+def wheels_with_spells(decision: Decision) -> dict[tuple[int, ...], TimedSpells]:
+    """Return the wheels on which the mean of what is left switches, as read or along the motion, and when.
 
     Each wheel is asked alone; where none shows it, all together: what acts on all adds up, and their noise does not.
     """
@@ -63,32 +65,55 @@ def skewed_wheels(decision: Decision) -> dict[tuple[int, ...], TimedSpells]:
     for index in range(len(decision.named.terms)):
         explained += contribution(equations, decision.named, index)
     every = tuple(range(left.shape[1]))
-    found: dict[tuple[int, ...], TimedSpells] = {}
-    for wheels in ((wheel,) for wheel in every):
-        if spells := _skewed(problem, left, explained, wheels):
-            found[wheels] = spells
-    if len(every) > 1 and not found and (spells := _skewed(problem, left, explained, every)):
+    direction = np.nan_to_num(problem.covariates.get("direction", np.ones(left.shape)))
+    ways = (np.ones(left.shape), direction) if np.ptp(direction[problem.mask]) else (direction,)
+    as_it_acts = [_Courses(problem, left, explained, along) for along in ways]
+    alone = ((wheel, _likeliest(courses.spells_on((wheel,)) for courses in as_it_acts)) for wheel in every)
+    found: dict[tuple[int, ...], TimedSpells] = {(wheel,): spells for wheel, spells in alone if spells}
+    if len(every) > 1 and not found and (spells := _likeliest(courses.spells_on(every) for courses in as_it_acts)):
         found[every] = spells
     return found
 
 
-def _skewed(problem: Problem, left: Array, explained: Array, wheels: tuple[int, ...]) -> TimedSpells | None:
-    """Return the spells in what is left of these wheels, if it is skewed as read or along the motion.
+def _likeliest(found: Iterable[tuple[float, TimedSpells] | None]) -> TimedSpells | None:
+    """Return the spells with the highest gain."""
+    return max((each for each in found if each), default=(0.0, None))[1]
 
-    Where it is both, they are told as they act: so that more of the power is on one side.
+
+class _Courses:
+    """What is left of each wheel, and what the named effects explain there, over the size of the noise.
+
+    Parameters
+    ----------
+    left, explained: shape (time, wheel)
+    along: factor of each reading, of the same shape: the direction, or 1; what it makes 0 is not looked at
     """
-    on, limits, found = list(wheels), problem.thresholds, []
-    direction = np.nan_to_num(problem.covariates.get("direction", np.ones(left.shape)))
-    for along in (np.ones(left.shape), direction):
-        read = (problem.mask & (along != 0))[:, on]
-        course, beside = of_usual_noise(left[:, on], explained[:, on], read, along[:, on], limits)
-        if lengths := skewed_lengths(course, beside, limits):
-            spells, time_s = spells_in(course, lengths), problem.time_s[read.any(axis=1), 0]
-            found.append((float(time_s[spells.first]), float(time_s[spells.last]), spells.share))
-    return max(found, key=lambda spells: spells[2], default=None)
+
+    def __init__(self, problem: Problem, left: Array, explained: Array, along: Array) -> None:
+        self._problem, self._left, self._explained, self._along = problem, left, explained, along
+        self._read = problem.mask & (along != 0)
+        self._of_wheel = [self._of((wheel,)) for wheel in range(left.shape[1])]
+
+    def spells_on(self, wheels: tuple[int, ...]) -> tuple[float, TimedSpells] | None:
+        """Return the spells in the sum of these wheels, with their gain; small ones are the misfit of a named law."""
+        problem, limits = self._problem, self._problem.thresholds
+        course, beside = self._of(wheels) if len(wheels) > 1 else self._of_wheel[wheels[0]]
+        peers = [
+            of_wheel for wheel, (of_wheel, _) in enumerate(self._of_wheel) if len(wheels) == 1 and wheel not in wheels
+        ]
+        switching = switching_mean(course, peers, limits)
+        if switching is None or switching.power < limits.form_misfit * np.mean(beside**2):
+            return None
+        spells, time_s = spells_in(course, switching), problem.time_s[self._read[:, list(wheels)].any(axis=1), 0]
+        return switching.gain, (float(time_s[spells.first]), float(time_s[spells.last]), spells.share)
+
+    def _of(self, wheels: tuple[int, ...]) -> tuple[Array, Array]:
+        on = list(wheels)
+        left, explained, along = (each[:, on] for each in (self._left, self._explained, self._along))
+        return of_usual_noise(left, explained, self._read[:, on], along, self._problem.thresholds)
 
 
-def _with_curves(decision: Decision, skewed: dict[tuple[int, ...], TimedSpells]) -> tuple[Intermittent, ...]:
+def _with_curves(decision: Decision, in_spells: dict[tuple[int, ...], TimedSpells]) -> tuple[Intermittent, ...]:
     """Return the best curve over time on each of these sets of wheels, where it has one; a sine is no spells."""
     equations = decision.equations
     over_time = [
@@ -99,7 +124,7 @@ def _with_curves(decision: Decision, skewed: dict[tuple[int, ...], TimedSpells])
     found = equations.further(decision.named.terms, over_time)
     found.sort(key=lambda gain_and_term: gain_and_term[0] - equations.penalty(gain_and_term[1]))
     curves = {term.wheels: term for _, term in found}
-    return tuple(Intermittent(curves[wheels], *spells) for wheels, spells in skewed.items() if wheels in curves)
+    return tuple(Intermittent(curves[wheels], *spells) for wheels, spells in in_spells.items() if wheels in curves)
 
 
 def _constant_on(term: Term, wheels: set[int]) -> bool:

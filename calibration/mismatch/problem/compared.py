@@ -85,6 +85,10 @@ def left_out(
         (known & silent, "the simulation predicts nothing there"),
         *((known & ~silent & blank, f"{name} was not measured there") for name, blank in run.blanks.items()),
         (known & run.carried, f"the prediction depends on {', '.join(run.blanks)}, which was not measured before"),
+        *(
+            (known & changed, f"{name}, which is measured less often, changed between its readings")
+            for name, changed in run.changed.items()
+        ),
         (outliers, "single, isolated readings far outside all others"),
         *((blank, f"{word_for(name, labels)} was not measured there") for name, blank in blanks.items()),
     ]

@@ -16,7 +16,7 @@ from regolithd.calibration.mismatch.problem.errors_in_variables import error_of,
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.predictor import Predictor
@@ -29,7 +29,7 @@ LEAST_LEFT = 0.02
 
 @dataclass(frozen=True, eq=False)
 class InputDoubt:
-    """The variance of a prediction by its inputs' stated errors, shape (time, wheel) each.
+    """The variance of a prediction by what is uncertain of its inputs, shape (time, wheel) each.
 
     Attributes
     ----------
@@ -61,7 +61,16 @@ def input_doubt(
             lot = random.choice([-error, error], size=(len(before), 1))
             variance = np.nan_to_num(simulation.predict({**inputs, name: inputs[name] + lot}, values) - before) ** 2
             alone += variance * _left_by_smoothing(as_read.channels[name] - inputs[name], error)
-            together += variance * _wheels_in_common(inputs[name])
+            together += variance * wheels_in_common(inputs[name])
+    return InputDoubt(alone, together)
+
+
+def total_doubt(doubts: Iterable[InputDoubt | None]) -> InputDoubt | None:
+    """Return the sum of what independent causes make uncertain; None: nothing does."""
+    known = [doubt for doubt in doubts if doubt is not None]
+    if not known:
+        return None
+    alone, together = (np.sum([getattr(doubt, name) for doubt in known], axis=0) for name in ("alone", "together"))
     return InputDoubt(alone, together)
 
 
@@ -73,7 +82,7 @@ def _left_by_smoothing(taken_out: Array, error: float) -> float:
     return float(np.clip(1 - known_mean(taken_out.ravel() ** 2) / error**2, LEAST_LEFT, 1.0))
 
 
-def _wheels_in_common(values: Array) -> int:
+def wheels_in_common(values: Array) -> int:
     """Return how many wheels have one sensor: all, where its readings (time, wheel) are the same on each."""
     return (
         values.shape[1] if np.array_equal(values, np.broadcast_to(values[:, :1], values.shape), equal_nan=True) else 1

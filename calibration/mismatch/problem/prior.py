@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 
 
 @dataclass(frozen=True)
 class Prior:
     """A parameter's normal prior density; a `std` of 0 means that the value is exact.
 
-    One that is not `told` is fitted like any other, but is no part of the answer: nobody can act on its value.
+    One that is not `told` is fitted like any other, but is no part of the answer: nobody can act on its value. One that
+    a recording would move out of its `bounds`, where it cannot be, is held at its value: something else does that.
     """
 
     value: float
     std: float = 0.0
     unit: str = "1"
     told: bool = True
+    bounds: tuple[float, float] = (-inf, inf)
+
+    def out_of_bounds(self, value: float) -> bool:
+        """Return whether a fitted value is out of the bounds by more than noise: by half of their width."""
+        low, high = self.bounds
+        return not low - (high - low) / 2 <= value <= high + (high - low) / 2
 
 
 @dataclass(frozen=True)

@@ -8,17 +8,17 @@ compared either. A simulation without a state depends on nothing but its instant
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.data.slow_channels import bridged, filled_between
+from regolithd.calibration.mismatch.data.slow_channels import bridged, drawn_between, filled_between
 from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.problem.delayed import beyond_the_end, shifted
 from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
-from regolithd.calibration.mismatch.problem.input_doubt import InputDoubt, input_doubt
+from regolithd.calibration.mismatch.problem.input_doubt import InputDoubt, input_doubt, total_doubt, wheels_in_common
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.signal.robust import robust_std
 
@@ -46,7 +46,8 @@ class Inputs:
     expected: the same with inputs replaced by their conditional expectation
     bridged_otherwise: the same with blanks bridged in another way; None where there are none
     blanks: where each input was not measured
-    doubt: of the prediction by the inputs' stated errors; None: none is stated
+    doubt: of the prediction by the inputs' stated errors, and between the readings of slower ones; None: there is none
+    between: by how much the prediction is uncertain since a slower column was read, by column, shape (time, wheel)
     """
 
     as_read: Recording
@@ -54,6 +55,7 @@ class Inputs:
     bridged_otherwise: Recording | None
     blanks: Mapping[str, Mask]
     doubt: InputDoubt | None = None
+    between: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +69,7 @@ class Simulated:
     prediction: shape (time, wheel), NaN where the simulation says nothing
     blanks: where each input was not measured
     carried: where the prediction depends on an input that was not measured earlier
+    changed: where it depends on how a slower column changed between its readings, by column
     """
 
     recording: Recording
@@ -74,11 +77,12 @@ class Simulated:
     prediction: Array
     blanks: Mapping[str, Mask]
     carried: Mask
+    changed: Mapping[str, Mask]
 
     @property
     def known(self) -> Mask:
         """Where the prediction is made from what was measured."""
-        unknown = np.any([self.carried, *self.blanks.values()], axis=0)
+        unknown = np.any([self.carried, *self.blanks.values(), *self.changed.values()], axis=0)
         return np.asarray(np.isfinite(self.prediction) & ~unknown)
 
 
@@ -97,8 +101,11 @@ def inputs_of(recording: Recording, simulation: Predictor) -> Inputs:
         otherwise, _ = _prepared(recording, simulation, other_way=True)
         otherwise = expected_inputs(otherwise, simulation.sensors, normal)
     stated = {name: prior.value for name, prior in simulation.parameters.items()}
-    doubt = input_doubt(as_read, expected, simulation, {**simulation.variants(), **stated})
-    return Inputs(as_read, expected, otherwise, blanks, doubt)
+    values = {**simulation.variants(), **stated}
+    between = _between_readings(recording, as_read, simulation, values)
+    doubts = (input_doubt(as_read, expected, simulation, values), *(each.doubt for each in between.values()))
+    within = {name: each.within for name, each in between.items()}
+    return Inputs(as_read, expected, otherwise, blanks, total_doubt(doubts), within)
 
 
 def put_on_time(inputs: Inputs, late: Mapping[str, float]) -> Inputs:
@@ -118,24 +125,32 @@ def put_on_time(inputs: Inputs, late: Mapping[str, float]) -> Inputs:
     }
     for name, delay in late.items():
         blanks[name] = blanks.get(name, False) | beyond_the_end(inputs.expected, delay)
-    return Inputs(moved(inputs.as_read), moved(inputs.expected), otherwise, blanks, inputs.doubt)
+    return replace(
+        inputs,
+        as_read=moved(inputs.as_read),
+        expected=moved(inputs.expected),
+        bridged_otherwise=otherwise,
+        blanks=blanks,
+    )
 
 
 def simulated(inputs: Inputs, simulation: Predictor, values: Mapping[str, float], thresholds: Thresholds) -> Simulated:
     """Run the simulation with these parameters; twice where an input has blanks."""
     prepared, other, blanks = inputs.expected, inputs.bridged_otherwise, inputs.blanks
     prediction = simulation.predict(complete_inputs(prepared), values)
-    carried = np.zeros(prediction.shape, np.bool_)
+    carried, blank = np.zeros(prediction.shape, np.bool_), np.zeros(prediction.shape, np.bool_)
+    for each in blanks.values():
+        blank |= each
+    residual = (inputs.as_read.channel(simulation.channel) - prediction)[~blank]
+    residual = residual[np.isfinite(residual)]
+    rounding, deviation = 1e-9 * float(np.max(np.abs(residual), initial=0.0)), robust_std(residual)
     if other is not None:
         apart = np.abs(simulation.predict(complete_inputs(other), values) - prediction)
-        blank = np.any(list(blanks.values()), axis=0)
-        residual = (inputs.as_read.channel(simulation.channel) - prediction)[~blank]
-        residual = residual[np.isfinite(residual)]
-        least = max(
-            thresholds.carried_share * robust_std(residual), 1e-9 * float(np.max(np.abs(residual), initial=0.0))
-        )
+        least = max(thresholds.carried_share * deviation, rounding)
         carried = np.isfinite(prediction) & ~blank & ~(apart <= least)
-    return Simulated(prepared, inputs.as_read, prediction, blanks, carried)
+    most = max(thresholds.between_share * deviation, rounding)
+    changed = {name: ~blank & ~carried & (within > most) for name, within in inputs.between.items()}
+    return Simulated(prepared, inputs.as_read, prediction, blanks, carried, changed)
 
 
 def _prepared(
@@ -145,8 +160,13 @@ def _prepared(
 
     Columns are bridged before the simulation derives others from them, and derived inputs after.
     """
+    filled = filled_between(recording, simulation.channel, simulation.between_readings)
+    return _derived(filled, simulation, other_way=other_way)
+
+
+def _derived(filled: Recording, simulation: Predictor, *, other_way: bool = False) -> tuple[Recording, dict[str, Mask]]:
+    """Return the same of a recording whose slower columns are filled in."""
     between = simulation.between_readings
-    filled = filled_between(recording, simulation.channel, between)
     filled, recorded = bridged(filled, simulation.inputs, between, other_way=other_way)
     derived = simulation.prepare(filled)
     needed = (simulation.channel, *simulation.inputs)
@@ -154,6 +174,33 @@ def _prepared(
         raise RecordingError(f"the simulation needs {', '.join(missing)}, which the recording does not have")
     derived, more = bridged(derived, simulation.inputs, between, other_way=other_way)
     return derived, {**more, **recorded}
+
+
+@dataclass(frozen=True, eq=False)
+class _BetweenReadings:
+    """What a slower column makes uncertain of the prediction: all of it, and its size since the column was read."""
+
+    doubt: InputDoubt
+    within: Array
+
+
+def _between_readings(
+    recording: Recording, as_read: Recording, simulation: Predictor, values: Mapping[str, float]
+) -> dict[str, _BetweenReadings]:
+    """Return how uncertain the prediction is by each slower column that it depends on, between its readings."""
+    filled = filled_between(recording, simulation.channel, simulation.between_readings)
+    slower = [name for name, column in filled.channels.items() if column is not recording.channels[name]]
+    before = simulation.predict(complete_inputs(as_read), values) if slower else np.zeros(0)
+    found = {}
+    for name in slower:
+        drawn, last = drawn_between(recording, filled, name, simulation.between_readings.get(name, "linear"))
+        other, _ = _derived(filled.with_channels(**{name: drawn}), simulation)
+        off = np.nan_to_num(simulation.predict(complete_inputs(other), values) - before)
+        if off.any():
+            rows = np.stack([np.bincount(of_wheel)[of_wheel] for of_wheel in last.T], axis=1)
+            doubt = InputDoubt(off**2, off**2 * rows * wheels_in_common(drawn))
+            found[name] = _BetweenReadings(doubt, np.abs(off - np.take_along_axis(off, last, axis=0)))
+    return found
 
 
 def _inputs_of_speed(recording: Recording, simulation: Predictor) -> frozenset[str]:

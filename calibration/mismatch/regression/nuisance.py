@@ -97,7 +97,8 @@ def _from_prior(problem: Problem, name: str) -> float:
 def tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
     """Return names, prior standard deviations and tangents, shape (time, wheel) each."""
     simulation, wheels = problem.simulation, problem.recording.wheels
-    free = {name: prior.std for name, prior in simulation.parameters.items() if prior.std > 0}
+    priors = simulation.parameters.items()
+    free = {name: prior.std for name, prior in priors if prior.std > 0 and name not in problem.held}
     names, stds = list(free), list(free.values())
     found = list(as_shown(problem, [problem.tangent(name) for name in free]))
     of_parameter = dict(zip(names, found, strict=True))

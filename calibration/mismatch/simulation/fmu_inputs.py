@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 INSTANT = "instant of inputs within a step"
-ANY_INSTANT = Prior(0.5, 12**-0.5, told=False)
+ANY_INSTANT = Prior(0.5, 12**-0.5, told=False, bounds=(0.0, 1.0))
 """Mean and standard deviation of what is anywhere between 0 and 1."""
 REAL = {"Real": "setReal", "Float64": "setFloat64", "Float32": "setFloat32"}
 """FMPy's setters of continuous variables, by type."""

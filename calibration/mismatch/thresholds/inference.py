@@ -40,27 +40,21 @@ class InferenceThresholds:
         "127741224, 538660261)",
     )
     # What comes and goes
-    most_skewness_errors: float = threshold(
-        4.0,
-        "Standard errors of the skewness of running means beyond which a residual is skewed.",
-        "standard: 6e-5 on both sides of a normal distribution, thus about one in a thousand sound recordings at some "
-        "of their lengths, axes and directions",
-    )
-    least_skewness: float = threshold(
-        0.8,
-        "Skewness below which it is no finding: laws and sensors are not quite linear.",
-        f"{TRIALS}: in 94 recordings of twelve machines with nothing, or what was found, left out, it was at most 0.6 "
-        "where it was beyond 2.5 standard errors; with drag in spells, a sticking valve or slipstream 0.9 to 1.7",
+    switching_entry: float = threshold(
+        10.0,
+        "Gain (twice the log likelihood ratio) by which a mean that switches has to be likelier than noise.",
+        f"{TRIALS}: of 400 courses of ten kinds of noise at most 5, of 240 residuals of a rover, an AGV and an arm "
+        "without spells at most 8.4; seven spells of 1 to 1.5 times the noise, on one of six wheels, gain 8 to 110",
     )
     noise_size_readings: int = threshold(
         32,
         "Differences from one reading to the next that show how large the noise is about an instant.",
         f"{CHOICE}: their root mean square is then known to about 15 %, and noise grows and fades over more readings",
     )
-    fewest_means: int = threshold(
+    fewest_blocks: int = threshold(
         40,
-        "Running means that do not overlap, below which their skewness is not asked for.",
-        f"{CHOICE}: the skewness of 40 normal values is known to sqrt(6/40) = 0.4",
+        "Readings below which it is not asked for what comes and goes.",
+        f"{CHOICE}: ten spells of the shortest duration that is tried, with as much time between them",
     )
     # Identifiability
     confusion_rate: float = threshold(

@@ -34,6 +34,12 @@ class ProblemThresholds:
         "standard deviation, from which a reading after a blank is not compared.",
         f"{CHOICE}: it adds a hundredth to the residual's power at most",
     )
+    between_share: float = threshold(
+        0.3,
+        "Standard deviation of a prediction between the readings of a slower input, as a share of the residual's, from "
+        "which a reading is not compared.",
+        f"{CHOICE}: it adds a tenth to the residual's power at most; below it, readings weigh less",
+    )
     furthest_prior_stds: float = threshold(
         3.0,
         "Standard deviations of its prior beyond which a calibrated parameter is a finding of its own.",

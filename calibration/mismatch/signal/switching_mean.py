@@ -1,0 +1,215 @@
+"""Whether the mean of a course of readings switches between two levels: something comes and goes.
+
+A cable that rubs now and then adds the same to each of its spells. The likelihood of that, an autoregression whose mean
+is switched by a hidden Markov chain (Hamilton, 1989), is compared with those of noise that does not: a Gaussian
+autoregression of any memory, and an autoregression whose size switches. Neither spells of equal length nor few of them
+are needed, and noise that is as slow as the spells has its own likelihood. Other wheels tell how much slow noise there
+is: that one wheel has far more of it than its peers is less probable than that it has spells.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.signal.markov_chain import MarkovChains
+from regolithd.calibration.mismatch.signal.means import block_means
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+Array = NDArray[np.float64]
+
+BLOCKS = (600, 150)
+"""Blocks of readings into which a course is divided: short spells show in many, and long ones above the noise of few (a
+choice: the likelihood of 600 takes some milliseconds)."""
+HIGHEST_ORDER = 6
+"""Order of the noise's autoregression, at most (a choice: over blocks, which have little memory left)."""
+FREE = 3
+"""Numbers that either kind of switching has beyond an autoregression, each a unit of log likelihood (Akaike, 1974)."""
+HIGHEST_CORRELATION = 0.98
+"""From one block to the next, of the noise beside the spells (a choice: what is slower is no noise)."""
+LEAST_NOISE = 0.1
+"""Share of the variance that is noise, at least (a choice: larger steps are found as curves over time)."""
+
+AMPLITUDES, SHARES, DURATIONS = (0.7, 1.1, 1.5, 1.8), (0.08, 0.2, 0.35, 0.5), (4.0, 10.0, 25.0)
+"""Grid of the second level above or below the first [standard deviations of the course], of the share of the time and
+of the mean duration [blocks] of a spell; refined about its best."""
+RATIOS, RATIO_SHARES, RATIO_DURATIONS = (1.7, 2.5, 4.0), (0.1, 0.25, 0.5, 0.75), (3.0, 8.0, 25.0)
+"""The same of noise whose size switches by a ratio."""
+REFINEMENTS = (1.0, 0.5)
+"""Steps about the best of a grid, in its own steps."""
+STEPS = (0.2, 0.3, 0.45)
+"""Steps of a grid for its refinement, in logarithms."""
+LARGEST_SHARE, SHORTEST, LONGEST = 0.6, 3.0, 200.0
+"""Limits of refined shares and durations [blocks]: a spell is no single block, which is an outlier."""
+
+
+@dataclass(frozen=True, eq=False)
+class SwitchingMean:
+    """Two levels of a course's mean.
+
+    Attributes
+    ----------
+    block: readings in a block
+    amplitude: the second level above the first
+    share, duration: of the time, and mean duration of a spell [blocks], in which the second level holds
+    gain: twice the logarithm of the likelihood ratio to noise alone, less what the free numbers cost
+    """
+
+    block: int
+    amplitude: float
+    share: float
+    duration: float
+    gain: float
+
+    @property
+    def power(self) -> float:
+        """Variance that the switching adds to the course."""
+        return self.amplitude**2 * self.share * (1 - self.share)
+
+    def acting(self, course: Array) -> Array:
+        """Return the probability that the second level holds in each block of the course, shape (block,)."""
+        values, size = _standardised(block_means(course, self.block))
+        model = np.array([[self.amplitude / size, self.share, self.duration]])
+        _, chains, first, after = _switching_densities(values, model)
+        return chains.second_state(first, after)
+
+
+def switching_mean(
+    course: Array, peers: Sequence[Array] = (), thresholds: Thresholds = THRESHOLDS
+) -> SwitchingMean | None:
+    """Return the two levels between which the mean of a course (reading,) switches; None: it does not, beyond chance.
+
+    `peers` are courses of other wheels, over the size of their noise as this one.
+    """
+    if len(course) < thresholds.fewest_blocks or not np.ptp(course) > 0:
+        return None
+    lengths = {max(len(course) // blocks, 1) for blocks in BLOCKS}
+    best = max((_of_blocks(course, peers, length) for length in lengths), key=lambda found: found.gain)
+    return best if best.gain > thresholds.switching_entry else None
+
+
+def _of_blocks(course: Array, peers: Sequence[Array], length: int) -> SwitchingMean:
+    values, size = _standardised(block_means(course, length))
+    unlike = _unlike_peers([block_means(peer, length) for peer in peers])
+
+    def switching(models: Array) -> Array:
+        return _switching_likelihood(values, models) - unlike(size**2 * _noise_variance(models))
+
+    amplitudes = (*AMPLITUDES, *(-each for each in AMPLITUDES))
+    (amplitude, share, duration), most = _maximised(switching, _grid(amplitudes, SHARES, DURATIONS))
+    resizing = _grid(RATIOS, RATIO_SHARES, RATIO_DURATIONS)
+    _, resized = _maximised(lambda models: _resized_likelihood(values, models), resizing)
+    of_noise = max(_autoregression_likelihood(values), resized - FREE) - float(unlike(np.array(size**2)))
+    return SwitchingMean(length, amplitude * size, share, duration, 2 * (most - FREE - of_noise))
+
+
+def _unlike_peers(peers: Sequence[Array]) -> Callable[[Array], Array]:
+    """Return by how much a variance is improbable beside those of peers (block,), in log likelihood below the highest.
+
+    The logarithms of variances are normally distributed over wheels, so that another one has Student's distribution
+    (Gelman et al., 2013, 3.2); fewer than two peers say nothing.
+    """
+    logs = np.log([variance for peer in peers if (variance := float(np.var(peer))) > 0])
+    if len(logs) < 2 or not np.ptp(logs) > 0:  # a scatter needs two
+        return lambda variance: np.zeros(np.shape(variance))
+    scale = float(np.var(logs, ddof=1)) * (1 + 1 / len(logs))
+    centre, count = float(np.mean(logs)), len(logs)
+    return lambda variance: count / 2 * np.log1p((np.log(variance) - centre) ** 2 / (scale * (count - 1)))
+
+
+def _standardised(values: Array) -> tuple[Array, float]:
+    """Return values of mean 0 and standard deviation 1, and the deviation that they had."""
+    size = float(np.std(values)) or 1.0
+    return (values - values.mean()) / size, size
+
+
+def _grid(*axes: tuple[float, ...]) -> Array:
+    """Return all combinations, shape (model, axis)."""
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+
+
+def _maximised(likelihood: Callable[[Array], Array], models: Array) -> tuple[tuple[float, float, float], float]:
+    """Return the model of the highest log likelihood, from a grid and its refinements, and that likelihood."""
+    best, highest = models[0], -np.inf
+    steps = _grid(*[(-1.0, 0.0, 1.0)] * 3) * STEPS
+    for factor in (None, *REFINEMENTS):
+        tried = models if factor is None else _limited(best * np.exp(factor * steps))
+        found = likelihood(tried)
+        if found.max() > highest:
+            best, highest = tried[int(np.argmax(found))], float(found.max())
+    size, share, duration = best.tolist()
+    return (size, share, duration), highest
+
+
+def _limited(models: Array) -> Array:
+    """Return models with shares and durations within their limits."""
+    return np.stack(
+        (models[:, 0], np.minimum(models[:, 1], LARGEST_SHARE), np.clip(models[:, 2], SHORTEST, LONGEST)), axis=-1
+    )
+
+
+def _autoregression_likelihood(values: Array) -> float:
+    """Return the log likelihood of Gaussian noise, of the order with the best AIC, less one for each coefficient."""
+    count = len(values)
+    lagged = np.stack([values[HIGHEST_ORDER - lag : count - lag] for lag in range(HIGHEST_ORDER + 1)])
+    products = lagged @ lagged.T / lagged.shape[1]
+    found = []
+    for order in range(HIGHEST_ORDER + 1):
+        own, across = products[1 : order + 1, 1 : order + 1], products[1 : order + 1, 0]
+        left = products[0, 0] - across @ np.linalg.lstsq(own, across, rcond=None)[0] if order else products[0, 0]
+        found.append(-0.5 * count * (np.log(max(left, 1e-300)) + 1) - order)
+    return float(max(found))
+
+
+def _noise_variance(models: Array) -> Array:
+    """Return the variance that the spells of each model (amplitude, share, duration) leave of 1 to the noise."""
+    amplitude, share, _ = models.T
+    return np.asarray(np.maximum(1 - amplitude**2 * share * (1 - share), LEAST_NOISE))
+
+
+def _switching_likelihood(values: Array, models: Array) -> Array:
+    """Return the log likelihood of each model (amplitude, share, duration), shape (model,)."""
+    possible, chains, first, after = _switching_densities(values, models)
+    return np.where(possible, chains.log_likelihood(first, after), -np.inf)
+
+
+def _switching_densities(values: Array, models: Array) -> tuple[NDArray[np.bool_], MarkovChains, Array, Array]:
+    """Return which models are possible, their chains, and the log densities of the first reading and of the others.
+
+    Variance and correlation of the noise are what the spells leave of those of the course (method of moments).
+    """
+    amplitude, share, duration = models.T
+    chains = MarkovChains(share, duration)
+    of_spells = amplitude**2 * share * (1 - share)
+    noise = _noise_variance(models)
+    lagged = float(values[:-1] @ values[1:]) / len(values)
+    correlation = np.clip((lagged - of_spells * chains.memory) / noise, 0, HIGHEST_CORRELATION)
+    levels = np.stack((-amplitude * share, amplitude * (1 - share)), axis=-1)
+    innovation = (noise * (1 - correlation**2))[:, None, None, None]
+    means = levels[:, None, :] - correlation[:, None, None] * levels[:, :, None]
+    new = (values[1:] - correlation[:, None] * values[:-1])[:, :, None, None] - means[:, None]
+    after = -0.5 * (new**2 / innovation + np.log(innovation))
+    first = -0.5 * ((values[0] - levels) ** 2 / noise[:, None] + np.log(noise[:, None]))
+    possible = (of_spells <= 1 - LEAST_NOISE) & (chains.leaving[0] < 0.5)  # else it is the usual state
+    return possible, chains, first, after
+
+
+def _resized_likelihood(values: Array, models: Array) -> Array:
+    """Return the log likelihood of noise whose size switches, of each model (ratio, share, duration), (model,)."""
+    ratio, share, duration = models.T
+    chains = MarkovChains(share, duration)
+    correlation = float(np.clip(values[:-1] @ values[1:] / (values @ values), 0, HIGHEST_CORRELATION))
+    new = values[1:] - correlation * values[:-1]
+    smaller = np.mean(new**2) / (1 - share + share * ratio**2)
+    variance = np.stack((smaller, smaller * ratio**2), axis=-1)
+    of_state = -0.5 * (new[:, None] ** 2 / variance[:, None] + np.log(variance[:, None]))
+    after = np.broadcast_to(of_state[:, :, None], (*of_state.shape[:2], 2, 2))
+    first = -0.5 * np.full((len(models), 2), values[0] ** 2)
+    possible = chains.leaving[0] < 0.5  # else it is the usual state
+    return np.where(possible, chains.log_likelihood(first, after), -np.inf)

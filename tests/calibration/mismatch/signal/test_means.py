@@ -1,0 +1,17 @@
+"""Means of readings that follow each other."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from regolithd.calibration.mismatch.signal.means import block_means, running_mean
+
+
+def test_running_means_are_those_of_readings_that_follow_each_other() -> None:
+    """Three readings have two means of two."""
+    assert running_mean(np.array([1.0, 3.0, 7.0]), 2).tolist() == [2.0, 5.0]
+
+
+def test_blocks_share_no_reading() -> None:
+    """Of seven readings, two blocks of three; the last reading is in none."""
+    assert block_means(np.arange(7.0), 3).tolist() == [1.0, 4.0]

@@ -1,0 +1,155 @@
+"""What comes and goes is told from noise of any memory, and of changing size."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
+from regolithd.calibration.mismatch.signal.spells import spells_in
+from regolithd.calibration.mismatch.signal.switching_mean import SwitchingMean, switching_mean
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.random import Generator
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+READINGS, RECORDINGS = 4000, 40
+
+
+def with_memory(random: Generator, readings: float) -> Array:
+    """Return noise of size 1 whose autocorrelation falls to 1/e in so many readings."""
+    decay = np.exp(-np.arange(int(6 * readings)) / readings)
+    long = np.convolve(random.normal(size=READINGS + len(decay) - 1), decay, "valid")
+    return np.asarray(long / np.sqrt(np.sum(decay**2)))
+
+
+def partly(random: Generator, readings: float, slow: float = 0.25) -> Array:
+    """Return noise of size 1 with this share of its variance in a memory, the rest in single readings."""
+    return np.asarray(np.sqrt(1 - slow) * random.normal(size=READINGS) + np.sqrt(slow) * with_memory(random, readings))
+
+
+def of_load(random: Generator, readings: int) -> Array:
+    """Return noise that grows with a load, which stays for so many readings."""
+    load = random.choice([0.3, 0.5, 1.0, 2.0], READINGS // readings)
+    return np.asarray(np.repeat(load, readings) * partly(random, 9))
+
+
+NOISE: dict[str, Callable[[Generator], Array]] = {
+    "white": lambda random: random.normal(size=READINGS),
+    "memory of 1 s at 5 Hz": lambda random: with_memory(random, 5),
+    "memory of 15 s at 5 Hz": lambda random: with_memory(random, 75),
+    "partly with a memory of 15 s": lambda random: partly(random, 75, 0.5),
+    "quantised": lambda random: np.round(partly(random, 9) / 0.5) * 0.5,
+    "heavy tails": lambda random: random.standard_t(3, READINGS),
+    "skewed single readings": lambda random: random.exponential(size=READINGS) - 1,
+    "grows with load": lambda random: of_load(random, 100),
+    "grows with load for long": lambda random: of_load(random, 400),
+    "of slowly changing size": lambda random: np.exp(0.5 * with_memory(random, 100)) * random.normal(size=READINGS),
+}
+
+
+def over_its_noise(course: Array) -> Array:
+    """Return one course of readings over the size of its noise."""
+    one = np.ones((len(course), 1))
+    return of_usual_noise((course - course.mean())[:, None], 0 * one, one > 0, one)[0]
+
+
+def found_in(course: Array, peers: Sequence[Array] = ()) -> SwitchingMean | None:
+    """Return the two levels of a course, if it has them."""
+    return switching_mean(over_its_noise(course), [over_its_noise(peer) for peer in peers])
+
+
+def in_spells(random: Generator, rms: float) -> tuple[Array, Array]:
+    """Return a drag of 40 to 125 readings with this rms now and then, and whether it acts."""
+    acting, at = np.zeros(READINGS, bool), int(random.uniform(50, 250))
+    drag = np.zeros(READINGS)
+    while at < READINGS:
+        length = int(random.uniform(40, 125))
+        part = slice(at, min(at + length, READINGS))
+        drag[part], acting[part] = random.uniform(0.5, 1.5), True
+        at += length + int(random.uniform(125, 450))
+    return drag * rms / np.sqrt(np.mean(drag**2)), acting
+
+
+@pytest.mark.parametrize("noise", NOISE.values(), ids=NOISE)
+def test_noise_hardly_ever_comes_and_goes(noise: Callable[[Generator], Array]) -> None:
+    """White, with a memory, quantised, with single readings that are skewed, and where its size changes."""
+    assert sum(bool(found_in(noise(np.random.default_rng(seed)))) for seed in range(RECORDINGS)) <= RECORDINGS / 20
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("rms", "rate"), [(0.7, 0.8), (1.0, 0.9)])
+def test_spells_are_seen_whichever_way_they_pull(rms: float, rate: float, sign: float) -> None:
+    """A belt that rubs a dozen times, as strongly over all readings as this share of the noise."""
+    seen = 0
+    for seed in range(RECORDINGS):
+        random = np.random.default_rng(seed)
+        seen += bool(found_in(sign * in_spells(random, rms)[0] + partly(random, 9)))
+    assert seen >= rate * RECORDINGS
+
+
+def test_spells_for_half_of_the_time_are_seen() -> None:
+    """Their skewness is 0: it is the two levels that show them."""
+    seen = 0
+    for seed in range(RECORDINGS):
+        random = np.random.default_rng(seed)
+        acting = np.repeat(random.random(READINGS // 200) < 0.5, 200)
+        seen += bool(found_in(1.3 * acting + partly(random, 9)))
+    assert seen >= 0.9 * RECORDINGS
+
+
+def test_peers_show_that_one_axis_has_more_than_noise() -> None:
+    """Seven spells on one of six axes, of 1.5 times the noise of a reading: too weak for that axis alone."""
+    alone = beside = sound = 0
+    for seed in range(RECORDINGS):
+        random = np.random.default_rng(seed)
+        peers = [partly(random, 25, 0.4) for _ in range(5)]
+        spells = np.zeros(READINGS)
+        for begin in np.linspace(200, READINGS - 400, 7).astype(int):
+            spells[begin : begin + int(random.uniform(100, 250))] = 1.5
+        own = partly(random, 25, 0.4)
+        alone += bool(found_in(own + spells))
+        beside += bool(found_in(own + spells, peers))
+        sound += bool(found_in(own, peers))
+    assert beside >= 0.7 * RECORDINGS
+    assert beside > 1.5 * alone
+    assert sound <= RECORDINGS / 20
+
+
+def test_an_axis_with_more_slow_noise_than_its_peers_has_no_spells() -> None:
+    """Twice as large as theirs: what is unlike its peers must have two levels as well."""
+    found = 0
+    for seed in range(RECORDINGS):
+        random = np.random.default_rng(seed)
+        peers = [partly(random, 25, 0.4) for _ in range(5)]
+        found += bool(found_in(partly(random, 25, 0.4) + with_memory(random, 25), peers))
+    assert found <= RECORDINGS / 20
+
+
+def test_spells_are_located_and_measured() -> None:
+    """From the first to the last, and their share of the power: in the median over recordings."""
+    first, last, shares = [], [], []
+    for seed in range(RECORDINGS):
+        random = np.random.default_rng(seed)
+        drag, acting = in_spells(random, 0.9)
+        course = over_its_noise(drag + partly(random, 9))
+        if switching := switching_mean(course):
+            spells, at = spells_in(course, switching), np.flatnonzero(acting)
+            first.append(spells.first - at[0])
+            last.append(spells.last - at[-1])
+            shares.append(spells.share)
+    assert abs(np.median(first)) < READINGS / 40
+    assert abs(np.median(last)) < READINGS / 40
+    assert np.median(shares) == pytest.approx(0.9**2 / (1 + 0.9**2), abs=0.1)
+
+
+def test_few_readings_and_readings_that_are_all_alike_show_nothing() -> None:
+    """Nothing is computed of them."""
+    assert switching_mean(np.zeros(4000)) is None
+    assert switching_mean(np.random.default_rng(0).normal(size=30)) is None
