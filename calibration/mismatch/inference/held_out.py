@@ -178,11 +178,11 @@ def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOut
             decision, held_out = replace(other, equations=equations), errors
         else:
             decision = replace(decision, equations=equations, refused=decision.refused | {names_of(other)})
-    intermittent = unexplained_if_intermittent(decision)
-    if len(intermittent.named.terms) < len(decision.named.terms):
-        equations, held_out = held_out_errors(intermittent.equations, intermittent.named, choice, threshold)
-        intermittent = replace(intermittent, equations=equations)
-    return unexplained_if_improbable(intermittent), held_out
+    told = unexplained_if_improbable(unexplained_if_intermittent(decision))
+    if told.named.terms != decision.named.terms:
+        equations, held_out = held_out_errors(told.equations, told.named, choice, threshold)
+        told = replace(told, equations=equations)
+    return told, held_out
 
 
 def _only_proposed(problem: Problem, group: Group) -> bool:

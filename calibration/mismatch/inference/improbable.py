@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.inference.alternatives import alternatives
 from regolithd.calibration.mismatch.inference.intermittent import unexplained_if_intermittent
-from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, probability
+from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, probability, probability_of_others
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.decision import names_of
 
@@ -26,11 +26,14 @@ EVEN = 0.5
 
 
 def unexplained_if_improbable(decision: Decision) -> Decision:
-    """Return the decision, with an unexplained curve where all other answers together outweigh "consistent".
+    """Return the decision, with an unexplained curve where other answers outweigh it that leave something unexplained.
 
-    It is the curve that can hold the effect of the most probable other answer.
+    Beside names it is the curve of an answer that is more probable than all others together. In the place of
+    "consistent" it is the curve that can hold the effect of the most probable other answer.
     """
     equations, named = decision.equations, decision.named
+    if decision.named.terms and not decision.unnamed:
+        return _most_probable_with_a_curve(decision)
     # A parameter that left its prior is the answer then, and no effect that acts as it does.
     if decision.whole.terms or equations.nuisance.leaving_their_priors(named, equations.problem).size:
         return decision
@@ -39,6 +42,17 @@ def unexplained_if_improbable(decision: Decision) -> Decision:
         return decision
     curve = _curve_like(decision, others[0])
     return decision if curve is None else replace(decision, unnamed=(curve,), whole=equations.fit((curve,)))
+
+
+def _most_probable_with_a_curve(decision: Decision) -> Decision:
+    """Return the other answer that has a curve beside names and is more probable than all others together, if any."""
+    others = alternatives(decision)
+    curves = tuple(term for other in others[:1] for term in other.terms if not term.group.named)
+    if not curves or probability_of_others(others, decision.equations.thresholds)[0] < EVEN:
+        return decision
+    whole = decision.equations.fit(others[0].terms)
+    named = decision.equations.fit([term for term in whole.terms if term.group.named])
+    return replace(decision, named=named, unnamed=curves, whole=whole)
 
 
 def without_improbable_curves(decision: Decision) -> Decision:

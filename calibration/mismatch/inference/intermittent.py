@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
 from regolithd.calibration.mismatch.selection.decision import Intermittent
+from regolithd.calibration.mismatch.selection.smooth_terms import drop_what_a_curve_explains
 from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
 from regolithd.calibration.mismatch.signal.spells import spells_in
 from regolithd.calibration.mismatch.signal.switching_mean import switching_mean
@@ -38,7 +39,8 @@ CONSTANT = frozenset({"direction", "none"})
 def unexplained_if_intermittent(decision: Decision) -> Decision:
     """Return the decision with a curve over time unexplained on each wheel whose residual has spells.
 
-    An effect of constant size that was named there is the mean of what comes and goes, and loses its name.
+    An effect of constant size that was named there is the mean of what comes and goes, and loses its name; so does one
+    that gains little beside it.
     """
     equations = decision.equations
     explained = {wheel for term in decision.unnamed for wheel in term.wheels}
@@ -49,6 +51,8 @@ def unexplained_if_intermittent(decision: Decision) -> Decision:
     curves = tuple(each.term for each in found)
     told = {wheel for term in curves for wheel in term.wheels}
     named = equations.fit([term for term in decision.named.terms if not _constant_on(term, told)])
+    for curve in curves:
+        named = drop_what_a_curve_explains(equations, named, curve)
     unnamed = (*decision.unnamed, *curves)
     whole = equations.fit((*named.terms, *unnamed))
     return replace(decision, named=named, unnamed=unnamed, whole=whole, intermittent=found)

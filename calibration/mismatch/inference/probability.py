@@ -52,8 +52,7 @@ def probability(others: Sequence[Alternative], thresholds: Thresholds) -> float:
 
 def other_answers(others: Sequence[Alternative], thresholds: Thresholds) -> tuple[OtherAnswer, ...]:
     """Return the most probable other answers, best first."""
-    relative = _relative(others, thresholds)
-    probabilities = thresholds.highest_probability * relative / (1 + relative.sum())
+    probabilities = probability_of_others(others, thresholds)
     return tuple(
         OtherAnswer(
             effects=tuple(name for name in other.effects if name != UNEXPLAINED),
@@ -62,6 +61,14 @@ def other_answers(others: Sequence[Alternative], thresholds: Thresholds) -> tupl
         )
         for other, probable in zip(others[:TOLD], probabilities, strict=False)
     )
+
+
+def probability_of_others(
+    others: Sequence[Alternative], thresholds: Thresholds
+) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """Return the share of each other answer."""
+    relative = _relative(others, thresholds)
+    return np.asarray(thresholds.highest_probability * relative / (1 + relative.sum()))
 
 
 def _relative(others: Sequence[Alternative], thresholds: Thresholds) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

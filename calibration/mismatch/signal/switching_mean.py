@@ -115,7 +115,7 @@ def _unlike_peers(peers: Sequence[Array]) -> Callable[[Array], Array]:
     The logarithms of variances are normally distributed over wheels, so that another one has Student's distribution
     (Gelman et al., 2013, 3.2); fewer than two peers say nothing.
     """
-    logs = np.log([variance for peer in peers if (variance := float(np.var(peer))) > 0])
+    logs = np.log([variance for peer in peers if peer.size and (variance := float(np.var(peer))) > 0])
     if len(logs) < 2 or not np.ptp(logs) > 0:  # a scatter needs two
         return lambda variance: np.zeros(np.shape(variance))
     scale = float(np.var(logs, ddof=1)) * (1 + 1 / len(logs))

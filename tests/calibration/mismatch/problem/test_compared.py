@@ -112,18 +112,20 @@ def test_what_does_not_apply_is_no_blank() -> None:
 
 
 def test_what_is_left_out_is_counted_with_its_reason() -> None:
-    """Predicted nothing, outliers, blanks; nothing is listed that left nothing out."""
+    """Predicted nothing, blanks, slower inputs that changed; nothing is listed that left nothing out."""
     measured = np.ones((10, 1))
     prediction = np.ones((10, 1))
     prediction[:2] = np.nan
     none, blank = np.zeros((10, 1), np.bool_), np.zeros((10, 1), np.bool_)
     blank[5:8] = True
     recording = from_columns({"t_s": np.arange(len(measured))})
-    run = Simulated(recording, recording, prediction, {}, none)
+    changed = np.arange(10)[:, None] == 9
+    run = Simulated(recording, recording, prediction, {}, none, {"load_N": changed, "slip": none})
     told = left_out("current_A", measured, run, none, {"yaw_rate": blank}, {"yaw_rate": "turning (rad/s)"})
-    assert [(each.channel, each.readings) for each in told] == [("current_A", 2), ("current_A", 3)]
+    assert [(each.channel, each.readings) for each in told] == [("current_A", 2), ("current_A", 1), ("current_A", 3)]
     assert "predicts nothing" in told[0].reason
-    assert told[1].reason == "turning was not measured there"
+    assert told[1].reason == "load_N, which is measured less often, changed between its readings"
+    assert told[2].reason == "turning was not measured there"
 
 
 def test_a_covariate_that_is_known_nowhere_is_left_out() -> None:
