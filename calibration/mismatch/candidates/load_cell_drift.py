@@ -97,6 +97,12 @@ class LoadCellDrift(Candidate):
             total += weight * self._simulated(problem, here)
         return total[None]
 
+    def search_range(
+        self, problem: Problem, shape: Shape, name: str, bounds: tuple[float, float]
+    ) -> tuple[float, float]:
+        """Return the whole range of offsets: the grid's best one may be one at which the two channels disagree."""
+        return bounds if name == "relative_offset" else super().search_range(problem, shape, name, bounds)
+
     def own_channel_evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array] | None:  # noqa: ARG002
         """Return Δχ² of the drift in each cell's own reading, and its coefficient there, which is 1."""
         gain = problem.once("drift seen by the cell", lambda: self._own_channel_gain(problem))

@@ -57,8 +57,9 @@ class ShapeProfile:
         return lambda value: self.less_prior({**shape, name: value})
 
     def less_prior(self, shape: Shape) -> float:
-        """Return the further Δχ² less what the shape must gain by its prior."""
-        return self(shape) - self.candidate.prior_penalty(self.equations.problem, shape)
+        """Return the further Δχ² less what the shape must gain by its prior, and by another channel's evidence."""
+        prior = self.candidate.prior_penalty(self.equations.problem, shape)
+        return self(shape) - prior - self._unlike_own_channel(shape)
 
     def __call__(self, shape: Shape) -> float:
         """Return the further Δχ²."""
@@ -81,6 +82,21 @@ class ShapeProfile:
         along, energy = coefficient * moment, coefficient**2 * complement
         share = min((along + prior) / (energy + prior), 1.0)
         return float(2 * share * along - share**2 * energy - prior * (share - 1) ** 2)
+
+    def _unlike_own_channel(self, shape: Shape) -> float:
+        """Return by how much a coefficient is improbable that another channel's fault has in the predicted one.
+
+        Its ratio to the one that the other channel shows is distributed log-normally about 1, and within its limits in
+        two standard deviations.
+        """
+        evidence, limits = self.candidate.own_channel_evidence(self.equations.problem, shape), self.equations.thresholds
+        if evidence is None:
+            return 0.0
+        (moment,), ((complement,),), _ = self._sums(shape)
+        own = float(evidence[1][self.course.wheel[0]])
+        ratio = moment / max(complement, 1e-300) / own
+        three_stds = np.log(limits.own_channel_ratio_high)
+        return float((3 * np.log(ratio) / three_stds) ** 2) if ratio > 0 else float("inf")
 
     def rows(self, columns: Array) -> Single:
         """Return columns (column, time, wheel), whitened and weighted, shape (column, reading)."""
