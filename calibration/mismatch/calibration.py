@@ -49,23 +49,26 @@ def linearised_where_it_fits(pose: Callable[[Mapping[str, float] | None], Proble
 
 
 def moved_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:
-    """Return the parameters' values in a fit, without the wheels' own deviations."""
-    problem, nuisance = equations.problem, equations.nuisance
-    values = dict(problem.values)
-    limits = problem.thresholds.furthest_linearisation_stds
-    for place, name in enumerate(nuisance.names):
-        prior = problem.simulation.parameters.get(name)
-        if prior is not None:
-            shift = float(fit.coefficients[place] / equations.design.scale[nuisance.columns[place]])
-            reach = limits * prior.std
-            values[name] = float(np.clip(values[name] + shift, prior.value - reach, prior.value + reach))
-    return values
+    """Return the parameters' values in a fit, without the wheels' own deviations, as far as they may be moved."""
+    problem = equations.problem
+    priors, limits = problem.simulation.parameters, problem.thresholds.furthest_linearisation_stds
+    return {**problem.values, **{name: priors[name].near(at, limits) for name, at in _fitted(equations, fit).items()}}
 
 
 def out_of_bounds(equations: NormalEquations, fit: Fit) -> frozenset[str]:
     """Return the parameters that a fit moves further out of their bounds than noise does."""
-    values, priors = moved_values(equations, fit), equations.problem.simulation.parameters
-    return frozenset(name for name, prior in priors.items() if prior.out_of_bounds(values[name]))
+    priors = equations.problem.simulation.parameters
+    return frozenset(name for name, at in _fitted(equations, fit).items() if priors[name].out_of_bounds(at))
+
+
+def _fitted(equations: NormalEquations, fit: Fit) -> dict[str, float]:
+    """Return the values of the free parameters in a fit."""
+    problem, nuisance = equations.problem, equations.nuisance
+    return {
+        name: problem.values[name] + float(fit.coefficients[place] / equations.design.scale[nuisance.columns[place]])
+        for place, name in enumerate(nuisance.names)
+        if name in problem.simulation.parameters
+    }
 
 
 def bent(problem: Problem, values: Mapping[str, float]) -> bool:

@@ -20,6 +20,11 @@ class Prior:
     told: bool = True
     bounds: tuple[float, float] = (-inf, inf)
 
+    def near(self, value: float, stds: float) -> float:
+        """Return a value as far as it may be from the prior: within its bounds and so many standard deviations."""
+        low, high = self.bounds
+        return min(max(value, self.value - stds * self.std, low), self.value + stds * self.std, high)
+
     def out_of_bounds(self, value: float) -> bool:
         """Return whether a fitted value is out of the bounds by more than noise: by half of their width."""
         low, high = self.bounds
