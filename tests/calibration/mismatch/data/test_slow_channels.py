@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
-from regolithd.calibration.mismatch.data.slow_channels import bridged, filled_between
+from regolithd.calibration.mismatch.data.slow_channels import bridged, drawn_between, filled_between
 
 TIME_S = 0.01 * np.arange(1000)
 
@@ -104,3 +104,41 @@ def test_channels_after_the_predicted_one_are_filled_too() -> None:
     np.testing.assert_allclose(found.channels["x"][:991, 0], TIME_S[:991])
     np.testing.assert_allclose(found.channels["z"][:991, 0], TIME_S[:991])
     np.testing.assert_array_equal(found.channels["mode"][:, 0], slow)
+
+
+def sampled(values: np.ndarray, period: int) -> Recording:
+    """Return a recording with a column that is read at every so many rows."""
+    read = np.where(np.arange(len(values)) % period == 0, values, np.nan)
+    return from_columns({"t_s": np.arange(float(len(values))), "current_A": np.zeros(len(values)), "speed_m_s": read})
+
+
+def test_what_is_between_readings_is_in_doubt_as_the_readings_scatter() -> None:
+    """Of a random walk, by as much as a straight line is off; of a straight line, not at all; readings are known."""
+    random = np.random.default_rng(1)
+    walk = np.cumsum(random.normal(size=20001))
+    recording = sampled(walk, 10)
+    filled = filled_between(recording, "current_A", {})
+    drawn, last = drawn_between(recording, filled, "speed_m_s", "linear")
+    line = filled.channels["speed_m_s"][:, 0]
+    assert np.array_equal(last[:, 0], np.arange(20001) // 10 * 10)
+    for row in (1, 5, 8):
+        off, true = drawn[row::10, 0] - line[row::10], walk[row::10] - line[row::10]
+        assert np.sqrt(np.mean(off**2)) == pytest.approx(np.sqrt(np.mean(true**2)), rel=0.1)
+    np.testing.assert_array_equal(drawn[::10, 0], walk[::10])
+    straight = sampled(np.arange(101.0), 10)
+    drawn, _ = drawn_between(straight, filled_between(straight, "current_A", {}), "speed_m_s", "linear")
+    np.testing.assert_allclose(drawn[:, 0], np.arange(101.0))
+
+
+def test_a_held_mode_is_in_doubt_where_it_changes_next() -> None:
+    """Asked for every ten rows, it has changed before it is read; one that is reported when it changes has not."""
+    mode = np.where(np.arange(201) < 95, 1.0, 3.0)
+    asked = sampled(mode, 10)
+    drawn, _ = drawn_between(asked, filled_between(asked, "current_A", {"speed_m_s": "hold"}), "speed_m_s", "hold")
+    np.testing.assert_array_equal(drawn[:91, 0], 1.0)
+    assert np.all(np.diff(drawn[90:100, 0]) > 0)
+    np.testing.assert_array_equal(drawn[100:, 0], 3.0)
+    told = sampled(np.arange(201) // 10 % 2 + 1.0, 10)
+    filled = filled_between(told, "current_A", {"speed_m_s": "hold"})
+    drawn, _ = drawn_between(told, filled, "speed_m_s", "hold")
+    np.testing.assert_array_equal(drawn, filled.channels["speed_m_s"])

@@ -9,7 +9,7 @@ import numpy as np
 from linear_machine import AXES, CANDIDATES, INSTANTS, equations_of, problem_of, table
 
 from regolithd.calibration.mismatch.inference import improbable
-from regolithd.calibration.mismatch.inference.alternatives import alternatives
+from regolithd.calibration.mismatch.inference.alternatives import Alternative, alternatives
 from regolithd.calibration.mismatch.inference.improbable import unexplained_if_improbable, without_improbable_curves
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
@@ -52,6 +52,22 @@ def test_nothing_is_unexplained_where_an_effect_is_more_probable() -> None:
     assert not decision.named.terms
     assert curve.wheels == term.wheels
     assert decision.whole.terms == (curve,)
+
+
+def test_a_name_gives_way_to_an_answer_with_a_curve_that_is_more_probable(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That answer has passed every test, and more evidence than all others together."""
+    decision = decided(0.3)
+    (term,) = decision.named.terms
+    curves = best_of_each_smooth_term(decision.equations, (term,))
+    ahead = Alternative(("drag", "unexplained"), -20.0, (term, curves[0][1]))
+    monkeypatch.setattr(improbable, "alternatives", lambda _: (ahead,))
+    found = unexplained_if_improbable(decision)
+    assert found.named.terms == (term,)
+    assert found.unnamed == (curves[0][1],)
+    assert found.whole.terms == ahead.terms
+    behind = replace(ahead, margin=1.0)
+    monkeypatch.setattr(improbable, "alternatives", lambda _: (behind,))
+    assert unexplained_if_improbable(decision) is decision
 
 
 def with_curve(decision: Decision) -> Decision:

@@ -130,3 +130,48 @@ def test_errors_of_a_common_speed_near_standstill_are_no_physics(seed: int) -> N
     found = compare(driven(seed), Slipping()).answer
     assert found.verdict == "consistent", [effect.name for effect in found.effects]
     assert all(each.prior_stds_away < 3 for each in found.parameters)
+
+
+class Ramping(Simulation):
+    """A current that rises with the slip, of wheels whose ground speed is read less often."""
+
+    channel, unit, wheel_column = "current_A", "A", "wheel"
+    inputs = ("wheel_m_s", "ground_m_s")
+    parameters: ClassVar = {"stiffness_A": Prior(12.0, 0.6, "A"), "offset_A": Prior(1.0, 0.1, "A")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return a current that saturates with the slip."""
+        slip = 1 - inputs["ground_m_s"] / inputs["wheel_m_s"]
+        return values["offset_A"] + values["stiffness_A"] * np.tanh(2 * slip)
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the speed and the slip."""
+        return {"wheel_speed": inputs["wheel_m_s"], "slip": 1 - inputs["ground_m_s"] / inputs["wheel_m_s"]}
+
+
+def slowly_read(seed: int) -> Recording:
+    """Return a drive whose wheels start and stop within two seconds, with a ground speed every two seconds."""
+    random, t_s = np.random.default_rng(seed), 0.5 * np.arange(COUNT)
+    phase = (t_s % 40) / 40
+    wheel = 0.03 + random.uniform(0.1, 0.3, COUNT // 80 + 1)[np.arange(COUNT) // 80] * np.clip(
+        np.minimum(phase, 1 - phase) * 20, 0, 1
+    )
+    slip = 0.05 + 0.1 * np.sin(t_s / 30) ** 2
+    true = wheel * (1 - slip)
+    current = 1.0 + 12.1 * np.tanh(2 * slip) + 0.3 * random.normal(size=COUNT)
+    read = np.where(np.arange(COUNT) % 4 == 0, true, np.nan)
+    return from_columns({"t_s": t_s, "wheel_m_s": wheel, "ground_m_s": read, "current_A": current})
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_straight_line_across_a_start_is_no_physics(seed: int) -> None:
+    """Slip is wrong between two readings of the ground speed while the wheels start: those rows are left out."""
+    recording = slowly_read(seed)
+    problem = build_problem(recording, Ramping())
+    (left,) = [each for each in problem.left_out if "changed between its readings" in each.reason]
+    assert left.reason.startswith("ground_m_s")
+    assert 0.02 * COUNT < left.readings < 0.3 * COUNT
+    known = np.isfinite(recording.channels["ground_m_s"])
+    assert problem.mask[known].all()  # where it was read
+    found = compare(recording, Ramping()).answer
+    assert found.verdict == "consistent", [effect.name for effect in found.effects]

@@ -112,6 +112,19 @@ def test_a_machine_that_holds_its_command_is_consistent_as_one_that_does_not(tmp
     assert tau.low <= TAU_S <= tau.high
 
 
+def test_a_command_that_is_late_by_steps_is_no_instant_within_one(tmp_path: Path) -> None:
+    """Three steps of delay are out of the bounds of what a recording does not say, and are named."""
+    simulation = _lag(tmp_path, "co-simulation")
+    rng = np.random.default_rng(6)
+    time_s = STEP_S * np.arange(6000)
+    command = np.convolve(rng.normal(0, 1, 6000), np.ones(20) / 20, "same") * 5
+    reading = np.append(np.zeros(3), _lagged(command, held=False)[:-3]) + rng.normal(0, 0.05, 6000)
+    found = compare({"t_s": time_s, "command": command, "reading": reading}, simulation).answer
+    assert [effect.name for effect in found.effects] == ["sensor-delay"]
+    delay = found.effects[0].parameters["delay_s"]
+    assert delay.low <= 3 * STEP_S <= delay.high
+
+
 def test_a_current_follows_its_voltage_without_a_step_of_delay(tmp_path: Path) -> None:
     """The heater's current is the voltage over the resistance at every row, also where the voltage jumps."""
     _needs_compiler()
