@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, relative_size
 from regolithd.calibration.mismatch.selection.law_misfit import explained
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape, shape_profile
+from regolithd.calibration.mismatch.signal.chi_squared import quantile
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,7 +56,7 @@ def _that_one_wheel_shows_alone(equations: NormalEquations, found: Sequence[Scor
     return {
         key
         for key, (gain, further) in shared.items()
-        if key in alone and gain - alone[key] < chi2_quantile(equations, further)
+        if key in alone and further and gain - alone[key] < chi2_quantile(equations, further)
     }
 
 
@@ -227,6 +228,4 @@ def wheels_of_faulty_sensors(fit: Fit) -> set[int]:
 
 def chi2_quantile(equations: NormalEquations, columns: int) -> float:
     """Return the Δχ² that so many coefficients gain by chance at the level of a single test."""
-    from scipy.special import chdtri  # noqa: PLC0415  # the laptop's; reading a recording must not load SciPy
-
-    return float(chdtri(columns, equations.thresholds.single_test_level))
+    return quantile(columns, equations.thresholds.single_test_level)
