@@ -141,4 +141,7 @@ class ColdLubricantFriction(Candidate):
 
 def _coldest(problem: Problem) -> float:
     """Return the coldest temperature [°C], single readings aside."""
-    return float(np.nanquantile(temperature_degC(problem)[problem.mask], COLDEST_QUANTILE))
+    def coldest() -> Array:
+        return np.asarray(np.nanquantile(temperature_degC(problem)[problem.mask], COLDEST_QUANTILE))
+
+    return float(problem.once("coldest temperature", coldest))

@@ -7,6 +7,7 @@ NaN. Order of rows, origin of time and names of wheels carry no meaning: rows ar
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,7 +76,7 @@ class Recording:
         """(time, wheel)."""
         return len(self.time_s), len(self.wheels)
 
-    @property
+    @cached_property
     def step_s(self) -> float:
         """The usual time from one instant to the next [s]."""
         steps = np.diff(self.time_s)[np.diff(self.run) == 0]

@@ -180,7 +180,7 @@ class Problem:
         moving = None if direction is None else self.known("direction") != 0
         return estimate_noise(residual, self.mask, self.thresholds, moving)
 
-    @property
+    @cached_property
     def wheel_sets(self) -> tuple[tuple[int, ...], ...]:
         """Sets of wheels, by their indices, that may share an effect beside all and each: a side, a row."""
         return tuple(self.simulation.wheel_sets(self.recording.wheels))
