@@ -238,10 +238,13 @@ class Problem:
 
         By steps to both sides: by one alone, parameters whose products or quotients act would seem to be known each.
         """
-        value = self._all_values[name]
-        step = self.thresholds.tangent_step * (abs(value) or 1.0)
-        ahead, behind = self.secant(name, step), self.secant(name, -step)
-        return np.where(np.isfinite(behind), (ahead + behind) / 2, ahead)
+        step = self.thresholds.tangent_step * (abs(self._all_values[name]) or 1.0)
+
+        def mean_of_secants() -> Array:
+            ahead, behind = self.secant(name, step), self.secant(name, -step)
+            return np.where(np.isfinite(behind), (ahead + behind) / 2, ahead)
+
+        return self.run_once(f"tangent {name}", step, mean_of_secants)
 
     def input_tangent(self, column: str) -> Array:
         """Return ∂prediction/∂ln(input), shape (time, wheel)."""
