@@ -28,6 +28,9 @@ Readings = tuple[NDArray[np.int64], tuple[slice, ...]]
 LONGEST_BRIDGE = 4
 """Usual steps between readings that may be left out before a new run begins (a choice: blanks are short)."""
 
+MOST_LATELY = 4
+"""Arrays of shapes that are kept (a choice: the factors of a law, of which a search changes one at a time)."""
+
 
 @dataclass(frozen=True)
 class LeftOut:
@@ -116,6 +119,8 @@ class Problem:
     fed_back: frozenset[str] = frozenset()
     _derived: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
     """What was computed from covariates and readings, by name: a cache, which a copy begins anew."""
+    _lately: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
+    """The same of shapes that were tried last, the latest one last."""
 
     @property
     def time_s(self) -> Array:
@@ -203,6 +208,17 @@ class Problem:
             values = self._derived[name] = derive()
             values.setflags(write=False)  # whoever asks for it gets the same array
         return self._derived[name]
+
+    def lately(self, name: str, derive: Callable[[], Array]) -> Array:
+        """Return the same of what depends on a shape: only the last few are kept, as a search changes one number."""
+        found = self._lately.pop(name, None)
+        if found is None:
+            found = derive()
+            found.setflags(write=False)
+            if len(self._lately) == MOST_LATELY:
+                del self._lately[next(iter(self._lately))]
+        self._lately[name] = found
+        return found
 
     def run_once(self, name: str, step: float, run: Callable[[], Array]) -> Array:
         """Return what takes a run of the simulation, or long, the first time that this name and step are asked for."""
