@@ -281,13 +281,14 @@ def _solve_log_angle(log_load: Array, slip: Array, wheel: Wheel, soil: AnySoil) 
     def excess(log_angle: Array) -> Array:
         return np.log(carried_load(np.exp(log_angle), slip, wheel, soil)) - log_load
 
-    before, now = np.full(log_load.shape, np.log(0.2)), np.full(log_load.shape, np.log(0.3))
+    # The first two angles are the same everywhere: their sines are computed once.
+    before, now = (np.full([1] * log_load.ndim, np.log(angle)) for angle in (0.2, 0.3))
     excess_before, excess_now = excess(before), excess(now)
     for _ in range(_MAX_ITERATIONS):
         moved = now - before
         rise = excess_now - excess_before
         # An element has converged where its last step was zero, or too small for a slope: it stays.
-        step = np.divide(-excess_now * moved, rise, out=np.zeros_like(moved), where=np.abs(rise) > 1e-15)
+        step = np.divide(-excess_now * moved, rise, out=np.zeros_like(rise), where=np.abs(rise) > 1e-15)
         before, excess_before = now, excess_now
         now = np.minimum(now + np.clip(step, -1, 1), np.log(LARGEST_CONTACT_ANGLE_RAD))
         if not step.size or np.max(np.abs(step)) < _TOLERANCE:

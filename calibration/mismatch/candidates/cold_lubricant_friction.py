@@ -107,13 +107,19 @@ class ColdLubricantFriction(Candidate):
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return g(T) sign(ω)|ω|^p; g is 1 at the reference temperature."""
-        drag = along_motion(problem, shape) * self._growth(problem, shape)
-        if float(shape["power"]) and "wheel_speed" in problem.covariates:
-            drag = drag * np.abs(problem.covariates["wheel_speed"]) ** float(shape["power"])
+        drag, power = along_motion(problem, shape) * self._growth(problem, shape), float(shape["power"])
+        if power and "wheel_speed" in problem.covariates:
+            speed = problem.covariates["wheel_speed"]
+            drag = drag * problem.lately(f"speed to the power of {power!r}", lambda: np.abs(speed) ** power)
         return drag[None]
 
     def _growth(self, problem: Problem, shape: Shape) -> Array:
         """Return g(T), shape (time, wheel)."""
+        law = [shape[name] for name in OF_TEMPERATURE if name in shape]
+        return problem.lately(f"the lubricant's drag {law}", lambda: self._growth_anew(problem, shape))
+
+    def _growth_anew(self, problem: Problem, shape: Shape) -> Array:
+        """Return the same, computed."""
         temperature = known_temperature_degC(problem)
         coldest = float(shape["reference_degC"])
         if "scale_K" in shape:
@@ -141,4 +147,8 @@ class ColdLubricantFriction(Candidate):
 
 def _coldest(problem: Problem) -> float:
     """Return the coldest temperature [°C], single readings aside."""
-    return float(np.nanquantile(temperature_degC(problem)[problem.mask], COLDEST_QUANTILE))
+
+    def coldest() -> Array:
+        return np.asarray(np.nanquantile(temperature_degC(problem)[problem.mask], COLDEST_QUANTILE))
+
+    return float(problem.once("coldest temperature", coldest))

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
@@ -46,5 +45,6 @@ def _ahead(factor: Array, values: Array, most: int) -> Array:
     if not count:
         return np.zeros(most + 1)
     held = np.concatenate((values, np.full(most, values[-1])))
-    size = next_fast_len(len(held) + count)
-    return np.asarray(irfft(rfft(held, size) * np.conj(rfft(factor, size)), size)[: most + 1])
+    size = 2 ** int(np.ceil(np.log2(len(held) + count)))
+    product = np.fft.rfft(held, size) * np.conj(np.fft.rfft(factor, size))
+    return np.asarray(np.fft.irfft(product, size)[: most + 1])

@@ -317,20 +317,24 @@ def as_numbers(column: Any) -> Column | None:  # noqa: ANN401
     kind = column.type
     if pa.types.is_null(kind):
         return np.full(len(column), np.nan)
-    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)):
-        if not pa.types.is_boolean(kind):
-            return None
+    if pa.types.is_boolean(kind):
         column = column.cast(pa.uint8())
-    if pa.types.is_integer(column.type):
-        # Not checked for exactness: an integer above 2^53 is rounded.
-        column = column.cast(pa.float64(), safe=False)
-    # Not pyarrow's `to_numpy` or `fill_null`, which load pandas: that takes longer than reading the file.
-    whole = column.cast(pa.float64()).combine_chunks()
+    elif pa.types.is_decimal(kind):
+        column = column.cast(pa.float64())
+    elif not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
+        return None
+    # Not pyarrow's `to_numpy`, `fill_null` or, of what are numbers already, `cast`: they load pandas or all of Arrow's
+    # functions, which takes longer than reading the file.
+    whole = column.combine_chunks()
     if not len(whole):
         return np.zeros(0)
-    blank = np.from_dlpack(whole.is_null().cast(pa.uint8())).astype(bool)
-    values = np.frombuffer(whole.buffers()[1], np.float64)[whole.offset : whole.offset + len(whole)]
-    return np.where(blank, np.nan, values)
+    known, numbers = whole.buffers()
+    here = slice(whole.offset, whole.offset + len(whole))
+    # An integer above 2^53 is rounded.
+    values = np.frombuffer(numbers, whole.type.to_pandas_dtype())[here].astype(np.float64)
+    if known is None:
+        return values
+    return np.where(np.unpackbits(np.frombuffer(known, np.uint8), bitorder="little")[here], values, np.nan)
 
 
 def _as_names(column: Any) -> Column | None:  # noqa: ANN401

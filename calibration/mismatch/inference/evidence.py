@@ -19,7 +19,7 @@ from regolithd.calibration.mismatch.regression.smooth_groups import has_smooth_t
 from regolithd.calibration.mismatch.signal.binning import binned_means, even_edges
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.empirical.found import FoundCurve
     from regolithd.calibration.mismatch.problem.problem import Problem
@@ -134,36 +134,44 @@ def _curves(decision: Decision, before: Array, after: Array) -> tuple[Curve, ...
     couplings = {"offset": np.ones(problem.mask.shape), "gain": np.sign(problem.filled)}
     if "direction" in problem.covariates:
         couplings["drag"] = problem.covariates["direction"]
-    found = [
-        _curve(problem, name, coupling, (before * factor, after * factor), decision.noise, wheels)
+    curves = [
+        curve
         for name in problem.covariates
         if name == "direction" or has_smooth_term(problem, name)
-        for coupling, factor in couplings.items()
+        for curve in _curves_over(problem, name, couplings, (before, after), decision.noise, wheels)
     ]
-    curves = [curve for curve in found if curve is not None]
     return tuple(sorted(curves, key=lambda curve: -float(np.mean((curve.before / curve.standard_error) ** 2))))
 
 
-def _curve(
-    problem: Problem, name: str, coupling: str, residuals: Sequence[Array], noise: NoiseModel, wheels: list[int]
-) -> Curve | None:
-    """Return mean residuals in bins of a covariate; None where there are too few readings or values."""
+def _curves_over(
+    problem: Problem,
+    name: str,
+    couplings: Mapping[str, Array],
+    residuals: tuple[Array, Array],
+    noise: NoiseModel,
+    wheels: list[int],
+) -> list[Curve]:
+    """Return mean residuals in bins of a covariate, by each factor; none where there are too few readings or values."""
     values = problem.covariates[name]
     kept = problem.mask & np.isfinite(values)
     kept[:, [w for w in range(kept.shape[1]) if w not in wheels]] = False
     if kept.sum() < FEWEST_READINGS:
-        return None
+        return []
     edges = even_edges(values[kept], CURVE_BINS)
     if len(edges) < 3:
-        return None
-    binned = binned_means(values[kept], edges, *(residual[kept] for residual in residuals))
-    variance = np.mean(1 / noise.weights[wheels])
-    return Curve(
-        covariate=name,
-        coupling=coupling,
-        at=binned.at,
-        before=binned.means[0],
-        after=binned.means[1],
-        standard_error=float(np.sqrt(variance)) / np.sqrt(binned.count),
-        wheels=tuple(problem.recording.wheels[w] for w in wheels),
-    )
+        return []
+    acting = [residual[kept] * factor[kept] for factor in couplings.values() for residual in residuals]
+    binned = binned_means(values[kept], edges, *acting)
+    deviation = float(np.sqrt(np.mean(1 / noise.weights[wheels])))
+    return [
+        Curve(
+            covariate=name,
+            coupling=coupling,
+            at=binned.at,
+            before=before,
+            after=after,
+            standard_error=deviation / np.sqrt(binned.count),
+            wheels=tuple(problem.recording.wheels[w] for w in wheels),
+        )
+        for coupling, before, after in zip(couplings, binned.means[::2], binned.means[1::2], strict=True)
+    ]

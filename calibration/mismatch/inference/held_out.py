@@ -137,15 +137,17 @@ def _rms(squares: Array, counts: Array) -> float:
 def chosen_effects(train: NormalEquations, entry_threshold: float) -> tuple[Term, ...]:
     """Choose by the same tests on these folds alone, on the grid: forwards, and once among pairs."""
     terms: tuple[Term, ...] = ()
+    first: list[tuple[float, Term]] = []
     for _ in range(LARGEST_SET):
         found = best_of_each_candidate(train, terms)
         if not found:
             break
+        first = first or found
         trials = [(*terms, term) for _, term in found[:TRIED_NEXT]]
         if len(terms) == 1:
             trials += [
                 (one, other)
-                for _, one in best_of_each_candidate(train, ())[:TRIED_FIRST]
+                for _, one in first[:TRIED_FIRST]
                 for _, other in best_of_each_candidate(train, (one,))[:TRIED_SECOND]
             ]
         ranked = sorted((train.fit(trial) for trial in trials), key=train.score, reverse=True)

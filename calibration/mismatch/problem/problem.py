@@ -28,6 +28,9 @@ Readings = tuple[NDArray[np.int64], tuple[slice, ...]]
 LONGEST_BRIDGE = 4
 """Usual steps between readings that may be left out before a new run begins (a choice: blanks are short)."""
 
+MOST_LATELY = 4
+"""Arrays of shapes that are kept (a choice: the factors of a law, of which a search changes one at a time)."""
+
 
 @dataclass(frozen=True)
 class LeftOut:
@@ -118,6 +121,8 @@ class Problem:
     held: frozenset[str] = frozenset()
     _derived: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
     """What was computed from covariates and readings, by name: a cache, which a copy begins anew."""
+    _lately: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
+    """The same of shapes that were tried last, the latest one last."""
 
     @property
     def time_s(self) -> Array:
@@ -182,7 +187,7 @@ class Problem:
         moving = None if direction is None else self.known("direction") != 0
         return estimate_noise(residual, self.mask, self.thresholds, moving)
 
-    @property
+    @cached_property
     def wheel_sets(self) -> tuple[tuple[int, ...], ...]:
         """Sets of wheels, by their indices, that may share an effect beside all and each: a side, a row."""
         return tuple(self.simulation.wheel_sets(self.recording.wheels))
@@ -205,6 +210,17 @@ class Problem:
             values = self._derived[name] = derive()
             values.setflags(write=False)  # whoever asks for it gets the same array
         return self._derived[name]
+
+    def lately(self, name: str, derive: Callable[[], Array]) -> Array:
+        """Return the same of what depends on a shape: only the last few are kept, as a search changes one number."""
+        found = self._lately.pop(name, None)
+        if found is None:
+            found = derive()
+            found.setflags(write=False)
+            if len(self._lately) == MOST_LATELY:
+                del self._lately[next(iter(self._lately))]
+        self._lately[name] = found
+        return found
 
     def run_once(self, name: str, step: float, run: Callable[[], Array]) -> Array:
         """Return what takes a run of the simulation, or long, the first time that this name and step are asked for."""
@@ -240,10 +256,13 @@ class Problem:
 
         By steps to both sides: by one alone, parameters whose products or quotients act would seem to be known each.
         """
-        value = self._all_values[name]
-        step = self.thresholds.tangent_step * (abs(value) or 1.0)
-        ahead, behind = self.secant(name, step), self.secant(name, -step)
-        return np.where(np.isfinite(behind), (ahead + behind) / 2, ahead)
+        step = self.thresholds.tangent_step * (abs(self._all_values[name]) or 1.0)
+
+        def mean_of_secants() -> Array:
+            ahead, behind = self.secant(name, step), self.secant(name, -step)
+            return np.where(np.isfinite(behind), (ahead + behind) / 2, ahead)
+
+        return self.run_once(f"tangent {name}", step, mean_of_secants)
 
     def input_tangent(self, column: str) -> Array:
         """Return ∂prediction/∂ln(input), shape (time, wheel)."""

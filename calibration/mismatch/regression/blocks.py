@@ -30,8 +30,8 @@ def blocks_of_time(problem: Problem, noise: NoiseModel) -> Index:
     shortest, longest = readings[-1] / limits.most_blocks, readings[-1] / (limits.blocks_per_fold * limits.folds)
     length = max(float(np.clip(wanted, shortest, longest)), SHORTEST_BLOCK)
     number = np.floor(readings / length + ROUNDING).astype(np.int64)
-    pairs = np.stack((problem.recording.run, number), axis=1)
-    return np.unique(pairs, axis=0, return_inverse=True)[1].ravel()
+    in_order = problem.recording.run * (number.max() + 1) + number
+    return np.unique(in_order, return_inverse=True)[1].ravel()
 
 
 def folds_of_blocks(problem: Problem, blocks: Index) -> Index:

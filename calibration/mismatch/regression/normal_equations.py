@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.batch import Batch, Left
+from regolithd.calibration.mismatch.regression.gains import Gains
 from regolithd.calibration.mismatch.regression.group import Fit, Term
 from regolithd.calibration.mismatch.regression.penalties import least_penalty, penalty, visible_in_own_channel
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
@@ -141,19 +142,21 @@ class NormalEquations:
         """Return what a term has to gain beyond chance, in Δχ²."""
         return penalty(term, len(self.weights), self.thresholds)
 
-    def largest_score(self, found: Iterable[tuple[float, Term]]) -> tuple[float, Term] | None:
-        """Return the term with the largest Δχ² less penalty, of terms with their Δχ²; None where there is none.
+    def largest_score(self, gains: Gains) -> tuple[float, Term] | None:
+        """Return the term with the largest Δχ² less penalty; None where nothing gains anything.
 
-        No penalty is computed of what would not be the best with the least one; only its own channel's credit is
-        negative.
+        No penalty is computed of what would not be the best with the least one.
         """
+        least = [least_penalty(group, self.thresholds) for group in gains.groups]
+        at, most = np.flatnonzero(gains.values), (gains.values - least).ravel()
         best: tuple[float, Term] | None = None
-        for gain, term in sorted(found, key=lambda pair: -pair[0]):
-            credit = 0.0 if term.group.own_channel is None else self.thresholds.largest_own_channel_credit
-            if best is None or gain - least_penalty(term, self.thresholds) + credit > best[0]:
-                score = gain - self.penalty(term)
-                if best is None or score > best[0]:
-                    best = score, term
+        for place in at[np.argsort(-most[at], kind="stable")].tolist():
+            if best is not None and most[place] <= best[0]:
+                break
+            gain, term = gains.term(place)
+            score = gain - self.penalty(term)
+            if best is None or score > best[0]:
+                best = score, term
         return best
 
     def score(self, fit: Fit) -> float:
@@ -169,8 +172,11 @@ class NormalEquations:
 
     def further(self, given: Iterable[Term], groups: Sequence[Group] | None = None) -> list[tuple[float, Term]]:
         """Return the further Δχ² of every group beside `given`, on each set of wheels that may share it."""
-        wanted = tuple(self.design.groups if groups is None else groups)
-        fitted, sets = self.fit(given), list(self.wheel_sets)
+        return self.gains(given, self.design.groups if groups is None else groups).terms()
+
+    def gains(self, given: Iterable[Term], groups: Sequence[Group]) -> Gains:
+        """Return the same of these groups as a table."""
+        wanted, fitted, sets = tuple(groups), self.fit(given), tuple(self.wheel_sets)
         at = np.array(sorted({column for group in wanted for column in group.columns}), np.int64)
         on = np.array([[float(wheel in wheels) for wheel in self.all_wheels] for wheels in sets])
         cross = np.tensordot(on, self._crosses(fitted.columns, at), axes=1)
@@ -182,11 +188,12 @@ class NormalEquations:
             of_sets, of_groups = np.nonzero(may_share[:, batch.which])
             asked = batch.gains(left, of_sets, of_groups, self.thresholds.least_tolerance)
             gains[of_sets, batch.which[of_groups]] = asked
-        of_sets, of_groups = np.nonzero(gains > 0)
+        for place, group in enumerate(wanted):
+            if group.own_channel is not None:
+                shown = [visible_in_own_channel(Term(group, wheels), self.thresholds) for wheels in sets]
+                gains[:, place] *= shown
         counted = gains * np.array([group.noise_reduction for group in wanted])
-        terms = [Term(wanted[k], sets[of]) for of, k in zip(of_sets.tolist(), of_groups.tolist(), strict=True)]
-        found = zip(counted[of_sets, of_groups].tolist(), terms, strict=True)
-        return [(gain, term) for gain, term in found if visible_in_own_channel(term, self.thresholds)]
+        return Gains(wanted, sets, np.where(gains > 0, counted, 0.0))
 
     def _may_share(self, groups: Sequence[Group]) -> NDArray[np.bool_]:
         """Return which sets of wheels may share which groups, shape (set, group)."""

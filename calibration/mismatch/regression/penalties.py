@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.regression.group import Term
+    from regolithd.calibration.mismatch.regression.group import Group, Term
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
 
@@ -30,11 +30,11 @@ def full_penalty(term: Term, wheel_count: int, thresholds: Thresholds) -> float:
     return total
 
 
-def least_penalty(term: Term, thresholds: Thresholds) -> float:
-    """Return what the full penalty is at least, wherever the term is: quick to compute."""
-    group = term.group
+def least_penalty(group: Group, thresholds: Thresholds) -> float:
+    """Return what the penalty of a group is at least, on any wheels: quick to compute."""
     count = len(group.columns) if group.acting is None else 0
-    return thresholds.coefficient_penalty * float(count) + group.selection_penalty
+    credit = 0.0 if group.own_channel is None else thresholds.largest_own_channel_credit
+    return thresholds.coefficient_penalty * float(count) + group.selection_penalty - credit
 
 
 def own_channel_credit(term: Term, thresholds: Thresholds) -> float:

@@ -8,13 +8,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, relative_size
 from regolithd.calibration.mismatch.selection.law_misfit import explained
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape, shape_profile
+from regolithd.calibration.mismatch.signal.chi_squared import quantile
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from regolithd.calibration.mismatch.regression.gains import Gains
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
@@ -23,60 +27,44 @@ Scored = tuple[float, "Term"]
 
 def best_of_each_candidate(equations: NormalEquations, given: Sequence[Term]) -> list[Scored]:
     """Return each candidate's best shape and wheels beside `given`, with Δχ² less penalty, best first."""
-    taken = [(term.name, set(term.wheels)) for term in given]
-    groups = [group for group in equations.design.groups if group.named]
-    found = equations.further(given, groups)
-    hardly_shared = _that_one_wheel_shows_alone(equations, found)
-    families = [
-        (gain, str(term.group.law), term)
-        for gain, term in found
-        if all(term.group.name != name or wheels.isdisjoint(term.wheels) for name, wheels in taken)
-        and (len(term.wheels) == 1 or id(term.group) not in hardly_shared)
-    ]
-    return _best_of_each(equations, families)
+    gains = equations.gains(given, [group for group in equations.design.groups if group.named])
+    several = [len(wheels) > 1 for wheels in gains.sets]
+    alone = [_one_wheel_shows_alone(equations, gains, place) for place in range(len(gains.groups))]
+    refused = np.outer(several, np.array(alone, np.bool_))
+    for term in given:
+        same = np.array([group.name == term.name for group in gains.groups], np.bool_)
+        refused |= np.outer([not set(wheels).isdisjoint(term.wheels) for wheels in gains.sets], same)
+    return _best_of_each(equations, gains.where(~refused).families(lambda group: group.law))
 
 
-def _that_one_wheel_shows_alone(equations: NormalEquations, found: Sequence[Scored]) -> set[int]:
-    """Return the groups, by identity, of which each wheel has its own coefficients, and only one wheel's are not zero.
+def _one_wheel_shows_alone(equations: NormalEquations, gains: Gains, place: int) -> bool:
+    """Return whether each wheel has its own coefficients of a group, and only one wheel's are not zero.
 
     On several wheels such a law gains a little more than on one, by chance: the others have to show it too.
     """
-    alone: dict[int, float] = {}
-    shared: dict[int, tuple[float, int]] = {}  # with the number of coefficients of all but one wheel
-    for gain, term in found:
-        if term.group.acting is None or "one" not in term.group.sharing:
-            continue
-        key = id(term.group)
-        if len(term.wheels) == 1:
-            alone[key] = max(gain, alone.get(key, 0.0))
-        elif key not in shared or gain > shared[key][0]:
-            own = term.group.acting[:, list(term.wheels)].sum(axis=0)
-            shared[key] = gain, int(own.sum() - own.max())
-    return {
-        key
-        for key, (gain, further) in shared.items()
-        if key in alone and gain - alone[key] < chi2_quantile(equations, further)
-    }
+    group = gains.groups[place]
+    if group.acting is None or "one" not in group.sharing:
+        return False
+    of_sets = list(zip(gains.values[:, place].tolist(), gains.sets, strict=True))
+    alone = max((gain for gain, wheels in of_sets if len(wheels) == 1), default=0.0)
+    shared, on = max(((gain, wheels) for gain, wheels in of_sets if len(wheels) > 1), default=(0.0, gains.sets[0]))
+    own = group.acting[:, list(on)].sum(axis=0)
+    further = int(own.sum() - own.max())  # coefficients of all but one wheel
+    return min(alone, shared, further) > 0 and shared - alone < chi2_quantile(equations, further)
 
 
 def best_of_each_smooth_term(equations: NormalEquations, given: Sequence[Term]) -> list[Scored]:
     """Return the best smooth term of each covariate, coupling and number of wheels, likewise."""
     taken = {(term.name, term.wheels) for term in given}
-    groups = [group for group in equations.design.groups if not group.named]
-    families = [
-        (gain, f"{term.name} {term.group.coupling} {len(term.wheels)}", term)
-        for gain, term in equations.further(given, groups)
-        if (term.name, term.wheels) not in taken
-    ]
-    return _best_of_each(equations, families)
+    gains = equations.gains(given, [group for group in equations.design.groups if not group.named])
+    left = gains.where([[(group.name, wheels) not in taken for group in gains.groups] for wheels in gains.sets])
+    over = left.families(lambda group: (group.name, group.coupling))
+    return _best_of_each(equations, [some for each in over for some in each.by_number_of_wheels()])
 
 
-def _best_of_each(equations: NormalEquations, found: Sequence[tuple[float, str, Term]]) -> list[Scored]:
-    """Return the best term of each family by Δχ² less penalty, best first, of terms with their Δχ² and family."""
-    families: dict[str, list[Scored]] = {}
-    for gain, family, term in found:
-        families.setdefault(family, []).append((gain, term))
-    best = [equations.largest_score(terms) for terms in families.values()]
+def _best_of_each(equations: NormalEquations, families: Sequence[Gains]) -> list[Scored]:
+    """Return the best term of each family by Δχ² less penalty, best first."""
+    best = [equations.largest_score(gains) for gains in families]
     return sorted((each for each in best if each is not None), key=lambda scored: -scored[0])
 
 
@@ -227,6 +215,4 @@ def wheels_of_faulty_sensors(fit: Fit) -> set[int]:
 
 def chi2_quantile(equations: NormalEquations, columns: int) -> float:
     """Return the Δχ² that so many coefficients gain by chance at the level of a single test."""
-    from scipy.special import chdtri  # noqa: PLC0415  # the laptop's; reading a recording must not load SciPy
-
-    return float(chdtri(columns, equations.thresholds.single_test_level))
+    return quantile(columns, equations.thresholds.single_test_level)

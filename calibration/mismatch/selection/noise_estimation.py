@@ -74,7 +74,7 @@ def _most_significant(equations: NormalEquations, most: int, least_score: float)
     ]
     terms: list[Term] = []
     for _ in range(most):
-        found = equations.largest_score(equations.further(terms, limited))
+        found = equations.largest_score(equations.gains(terms, limited))
         if found is None or found[0] <= least_score:
             break
         terms.append(found[1])

@@ -103,7 +103,8 @@ def sign_flipped(scores: Array, draws: int) -> Array:
     """Return moments with the signs of the blocks drawn anew, shape (draw, wheel, column)."""
     generator = np.random.default_rng(0)
     signs = generator.choice([-1.0, 1.0], (draws, *scores.shape[:2]))
-    return np.einsum("dbw,bwc->dwc", signs, scores, optimize=True)
+    of_wheels = signs.transpose(2, 0, 1) @ scores.transpose(1, 0, 2)
+    return of_wheels.transpose(1, 0, 2)
 
 
 def _scores(equations: NormalEquations, groups: Sequence[Group], wheels: tuple[int, ...], drawn: _Draws) -> Array:

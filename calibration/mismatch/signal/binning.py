@@ -37,6 +37,7 @@ def binned_means(values: Array, edges: Array, *quantities: Array) -> BinnedMeans
     A bin without a value, between two that coincide with its edges, is left out.
     """
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
-    _, place, count = np.unique(place, return_inverse=True, return_counts=True)
-    at, *means = (np.bincount(place, quantity) / count for quantity in (values, *quantities))
-    return BinnedMeans(at, count, tuple(means))
+    count = np.bincount(place)
+    held = count > 0
+    at, *means = (np.bincount(place, quantity)[held] / count[held] for quantity in (values, *quantities))
+    return BinnedMeans(at, count[held], tuple(means))

@@ -24,8 +24,12 @@ def hat_functions(values: Array, mask: NDArray[np.bool_], knots: int) -> list[Ar
     if len(at) < FEWEST_KNOTS or at[-1] - at[0] <= 0:
         return []
     clipped = np.clip(np.where(known, values, at[0]), at[0], at[-1])
-    hats = [np.interp(clipped, at, row) for row in np.eye(len(at))]
-    return [np.where(known, hat, 0.0) for hat in hats]
+    left = np.clip(np.searchsorted(at, clipped, side="right") - 1, 0, len(at) - 2)
+    right_share = np.where(clipped < at[-1], (1 / np.diff(at))[left] * (clipped - at[left]), 1.0)
+    hats = np.zeros((len(at), *values.shape))
+    np.put_along_axis(hats, left[None], np.where(known, 1 - right_share, 0.0)[None], axis=0)
+    np.put_along_axis(hats, left[None] + 1, np.where(known, right_share, 0.0)[None], axis=0)
+    return list(hats)
 
 
 def _knots(inside: Array, count: int) -> Array:

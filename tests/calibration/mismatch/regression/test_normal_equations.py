@@ -92,10 +92,10 @@ def test_a_further_gain_is_the_difference_of_two_fits(equations: NormalEquations
 
 def test_the_largest_score_is_that_of_all_terms(equations: NormalEquations) -> None:
     """Of terms in any order, and none of none."""
-    found = equations.further(())
-    gain, term = max(found, key=lambda pair: pair[0] - equations.penalty(pair[1]))
-    assert equations.largest_score(reversed(found)) == (pytest.approx(gain - equations.penalty(term)), term)
-    assert equations.largest_score(()) is None
+    gain, term = max(equations.further(()), key=lambda pair: pair[0] - equations.penalty(pair[1]))
+    found = equations.gains((), equations.design.groups[::-1])
+    assert equations.largest_score(found) == (pytest.approx(gain - equations.penalty(term)), term)
+    assert equations.largest_score(equations.gains((), ())) is None
 
 
 def test_a_wrong_sign_gains_nothing() -> None:

@@ -46,10 +46,10 @@ def test_the_least_penalty_is_not_more_than_any() -> None:
     """On all wheels or on one, with columns that act on some of them or on all."""
     acting = np.array([[True, False], [True, False], [False, True]])
     for group in (GROUP, replace(GROUP, acting=acting), replace(GROUP, acting=acting, sharing=("one",))):
-        assert least_penalty(Term(group, (0,)), THRESHOLDS) >= group.selection_penalty
+        assert least_penalty(group, THRESHOLDS) >= group.selection_penalty
         for wheels in ((0, 1), (0,), (1,)):
-            assert least_penalty(Term(group, wheels), THRESHOLDS) <= full_penalty(Term(group, wheels), 2, THRESHOLDS)
-    assert least_penalty(Term(GROUP, (0, 1)), THRESHOLDS) == full_penalty(Term(GROUP, (0, 1)), 2, THRESHOLDS)
+            assert least_penalty(group, THRESHOLDS) <= full_penalty(Term(group, wheels), 2, THRESHOLDS)
+    assert least_penalty(GROUP, THRESHOLDS) == full_penalty(Term(GROUP, (0, 1)), 2, THRESHOLDS)
 
 
 @pytest.mark.parametrize(("gain", "credit", "visible"), [(10.0, 5.0, False), (40.0, 20.0, True), (1e4, 300.0, True)])
@@ -60,6 +60,7 @@ def test_a_fault_s_own_channel_credits_half_of_its_gain(gain: float, credit: flo
     assert own_channel_credit(term, THRESHOLDS) == credit
     assert visible_in_own_channel(term, THRESHOLDS) is visible
     assert penalty(term, 2, THRESHOLDS) == full_penalty(term, 2, THRESHOLDS) - credit
+    assert least_penalty(group, THRESHOLDS) <= penalty(term, 2, THRESHOLDS)
 
 
 def test_what_has_no_other_channel_is_visible_and_gets_no_credit() -> None:

@@ -55,3 +55,13 @@ def test_what_hardly_varies_has_no_hats(values: np.ndarray) -> None:
     """A constant and what was never measured have none, and two values are at most a line."""
     hats = hat_functions(values, np.ones(values.shape, bool), 2)
     assert hats == []
+
+
+def test_hats_are_straight_lines_between_knots() -> None:
+    """As interpolation from 1 at each one's own knot to 0 at the others; beyond the outer knots they are constant."""
+    hats = hat_functions(VALUES, np.ones(VALUES.shape, bool), 5)
+    inside = VALUES.ravel()
+    low, high = np.quantile(inside, [0.005, 0.995])
+    knots = 0.5 * (np.quantile(inside, np.linspace(0.005, 0.995, 5)) + np.linspace(low, high, 5))
+    for hat, row in zip(hats, np.eye(5), strict=True):
+        np.testing.assert_allclose(hat, np.interp(VALUES, knots, row), atol=1e-12)

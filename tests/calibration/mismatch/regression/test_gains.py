@@ -1,0 +1,35 @@
+"""A table of gains: its entries are the terms that a search asks for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from regolithd.calibration.mismatch.regression.gains import Gains
+from regolithd.calibration.mismatch.regression.group import Group, Term
+
+GROUPS = tuple(Group(name, (k,), (0,), ("all", "one")) for k, name in enumerate(("drag", "time", "drag")))
+SETS = ((0,), (1,), (0, 1))
+GAINS = Gains(GROUPS, SETS, np.array([[3.0, 0.0, 1.0], [0.0, 2.0, 0.0], [5.0, 4.0, 0.0]]))
+
+
+def test_terms_are_those_that_gain_something() -> None:
+    """Each with its own gain, wheel by wheel."""
+    found = [(gain, term.group.columns[0], term.wheels) for gain, term in GAINS.terms()]
+    assert found == [(3.0, 0, (0,)), (1.0, 2, (0,)), (2.0, 1, (1,)), (5.0, 0, (0, 1)), (4.0, 1, (0, 1))]
+    assert GAINS.term(7) == (4.0, Term(GROUPS[1], (0, 1)))
+
+
+def test_what_is_not_allowed_gains_nothing() -> None:
+    """On the other wheels it stays."""
+    left = GAINS.where([[True] * 3, [False] * 3, [True, False, True]])
+    assert [gain for gain, _ in left.terms()] == [3.0, 1.0, 5.0]
+
+
+def test_families_and_numbers_of_wheels_part_the_table() -> None:
+    """Each entry is in one part."""
+    drag, time = GAINS.families(lambda group: group.name)
+    assert [gain for gain, _ in drag.terms()] == [3.0, 1.0, 5.0]
+    assert drag.groups == (GROUPS[0], GROUPS[2])
+    one, both = time.by_number_of_wheels()
+    assert ([gain for gain, _ in one.terms()], [gain for gain, _ in both.terms()]) == ([2.0], [4.0])
+    assert (one.sets, both.sets) == (((0,), (1,)), ((0, 1),))
