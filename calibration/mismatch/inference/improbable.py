@@ -45,14 +45,19 @@ def unexplained_if_improbable(decision: Decision) -> Decision:
 
 
 def _most_probable_with_a_curve(decision: Decision) -> Decision:
-    """Return the other answer that has a curve beside names and is more probable than all others together, if any."""
+    """Return the other answer that has a curve beside names and is more probable than all others together, if any.
+
+    A curve alone is none: no law of its covariate is quite the curve.
+    """
     others = alternatives(decision)
-    curves = tuple(term for other in others[:1] for term in other.terms if not term.group.named)
-    if not curves or probability_of_others(others, decision.equations.thresholds)[0] < EVEN:
+    if not others or probability_of_others(others, decision.equations.thresholds)[0] < EVEN:
         return decision
-    whole = decision.equations.fit(others[0].terms)
-    named = decision.equations.fit([term for term in whole.terms if term.group.named])
-    return replace(decision, named=named, unnamed=curves, whole=whole)
+    names = [term for term in others[0].terms if term.group.named]
+    curves = tuple(term for term in others[0].terms if not term.group.named)
+    if not (names and curves):
+        return decision
+    whole = decision.equations.fit((*names, *curves))
+    return replace(decision, named=decision.equations.fit(names), unnamed=curves, whole=whole)
 
 
 def without_improbable_curves(decision: Decision) -> Decision:
