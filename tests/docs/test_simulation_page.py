@@ -240,3 +240,62 @@ def test_friction_that_heats_a_winding_is_named_in_the_current_alone(recorded: b
     assert answer.effects[0].wheels == (1,)
     assert answer.verdict == verdict
     assert all(rest.channel == "winding_degC" for rest in answer.unexplained)
+
+
+def test_an_effect_is_kept_out_of_one_column_as_the_page_says() -> None:
+    """It is looked for in the other, and in both without that."""
+    code = next(text for text in re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL) if "kept_out_of" in text)
+    names: dict[str, Any] = {}
+    exec(code, names)
+    rng, time_s = np.random.default_rng(3), 0.5 * np.arange(600)
+    load = 2 + np.sin(0.17 * time_s) + 0.5 * np.sin(0.56 * time_s)
+    current = 0.5 * load + rng.normal(0, 0.01, len(time_s))
+    winding = heated(current[:, None], 8.0)[:, 0] + rng.normal(0, 0.1, len(time_s))
+    columns = {"t_s": time_s, "load_Nm": load, "speed_rad_s": np.sin(0.3 * time_s), "motor_current_A": current}
+
+    def looked_for(simulation: Simulation) -> set[str]:
+        answer = compare(columns | {"winding_degC": winding}, simulation).answer
+        shown = [each for each in answer.sensitivity if np.isfinite(each.smallest_detectable)]
+        return {each.channel for each in shown if each.name == "sensor-delay"}
+
+    assert looked_for(Winding(recorded=True)) == {"motor_current_A", "winding_degC"}
+    limited = type("Limited", (Winding,), {"candidates": names["candidates"]})
+    assert looked_for(limited(recorded=True)) == {"motor_current_A"}
+
+
+class Climber(Simulation):
+    """A cart on slopes whose force lacks the weight; a brake holds it where it stands."""
+
+    channel, unit = "force_N", "N"
+    inputs = ("speed_m_s", "pitch_rad", "brake")
+    parameters: ClassVar = {"friction_N": Prior(2.0, 0.1, "N")}
+
+    def __init__(self, covariates: Callable[[Any, Any], dict[str, Array]]) -> None:
+        self._covariates = covariates
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the friction; under the brake the drive has no force."""
+        return np.where(inputs["brake"] > 0, 0.0, values["friction_N"] * np.sign(inputs["speed_m_s"]))
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return speed and pitch."""
+        return self._covariates(self, {**inputs, "speed_rad_s": inputs["speed_m_s"]})
+
+
+def test_a_brake_carries_the_weight_on_a_slope_as_the_page_says() -> None:
+    """The rows under the brake make the weight too small, unless they have no pitch."""
+    code = next(text for text in re.findall(r"```python\n(.*?)```", COVARIATES, flags=re.DOTALL) if "held =" in text)
+    names: dict[str, Any] = {"np": np}
+    exec(code, names)
+    rng, time_s = np.random.default_rng(4), 0.5 * np.arange(3000)
+    speed = np.choose((time_s // 40).astype(int) % 4, [1.0, 0.0, -1.0, 0.0])
+    pitch = np.repeat(rng.uniform(-0.15, 0.15, 150), 20)
+    force = np.where(speed == 0, 0.0, 2 * np.sign(speed) + 10 * np.sin(pitch)) + rng.normal(0, 0.4, len(time_s))
+    columns = {"t_s": time_s, "speed_m_s": speed, "pitch_rad": pitch, "brake": np.float64(speed == 0), "force_N": force}
+    (grade,) = compare(columns, Climber(names["covariates"])).answer.effects
+    assert grade.name == "grade-resistance"
+    assert grade.parameters["grade_current"].low < 10 < grade.parameters["grade_current"].high
+    as_read = compare(
+        columns, Climber(lambda _, inputs: {"wheel_speed": inputs["speed_m_s"], "pitch": inputs["pitch_rad"]})
+    )
+    assert all(each.parameters["grade_current"].high < 9 for each in as_read.answer.effects if each.name == grade.name)

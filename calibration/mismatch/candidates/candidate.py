@@ -196,6 +196,10 @@ class Candidate:
         """Return the words for one shape, where that says more (which channel is late); by default `words`."""
         return self.words
 
+    def words_with(self, shape: Shape, values: Mapping[str, float]) -> str:  # noqa: ARG002  # subclasses look
+        """Return the words for one shape and its fitted coefficients by name; by default `words_for`."""
+        return self.words_for(shape)
+
     def form_of(self, shape: Shape) -> str:  # noqa: ARG002  # subclasses look
         """Return which of `forms` a shape has; empty where the law has only one."""
         return ""

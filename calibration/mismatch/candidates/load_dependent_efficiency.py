@@ -18,7 +18,7 @@ from regolithd.calibration.mismatch.candidates.motion import REVERSAL_KEYS, alon
 from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.problem.problem import Problem
 
@@ -27,6 +27,8 @@ SAME_AS_GAIN = 0.95
 the load drives the motor for a fortieth of the torque's energy at most)."""
 LARGEST_LOSS = 2 / 3
 """Largest share of the stated efficiency that may be lost at any torque (a choice: a third is left)."""
+LESS_THAN_PREDICTED = "less than is predicted, by a share that depends on the transmitted torque"
+"""What a loss below zero is."""
 POWERS, LIGHT_LOADS, SLOPES = (0.0, 0.5, 1.0, 2.0, 3.5), (0.5, 1.0), (-0.2, 0.0, 0.3)
 """Grid of the three forms: powers of torque, decay scales in reference torques, slopes of the efficiency (a choice)."""
 
@@ -42,6 +44,9 @@ class LoadDependentEfficiency(Candidate):
     gain is wrong by more than its stated uncertainty. `light`: the loss decays exponentially with the torque, by a
     factor e over `light` reference torques. `bent`: the efficiency is the stated one at the reference torque and falls
     linearly with the torque above it, so that the current is I/(1 − a x); `bent` is a.
+
+    A `relative_loss` below 0 is that of a machine that needs less than predicted: its loss is smaller than the stated
+    one. Of the linear efficiency it is one that rises with the torque.
     """
 
     name = "load-dependent-efficiency"
@@ -65,6 +70,12 @@ class LoadDependentEfficiency(Candidate):
         **REVERSAL_KEYS,
     }
     coefficients: ClassVar = (Coefficient("relative_loss", "1", 0),)
+
+    def words_with(self, shape: Shape, values: Mapping[str, float]) -> str:
+        """Return what a negative coefficient means, which is no loss."""
+        if values["relative_loss"] >= 0:
+            return self.words_for(shape)
+        return "an efficiency that rises with the transmitted torque" if "bent" in shape else LESS_THAN_PREDICTED
 
     def form_of(self, shape: Shape) -> str:
         """Return what the relative loss, or the efficiency, is as a function of the torque."""

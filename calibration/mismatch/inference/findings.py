@@ -165,7 +165,7 @@ def _effect(problem: Problem, term: Term, parameters: Mapping[str, Parameter], e
     assert candidate is not None  # noqa: S101  # named terms are candidates
     wheels = wheel_names(problem, term.wheels)
     onset = parameters.get(candidate.change_point)
-    words = words_of(candidate, term.group.shape, problem.labels)
+    words = words_of(candidate, term.group.shape, parameters, problem.labels)
     all_wheels = len(problem.recording.wheels)
     return Effect(
         name=term.name,

@@ -77,10 +77,10 @@ def on_wheels(wheels: Sequence[int | str], of: int, kind: str = "wheel") -> str:
     return f", on {words}" if words else ""
 
 
-def words_of(candidate: Candidate, shape: Shape, labels: Mapping[str, str]) -> str:
+def words_of(candidate: Candidate, shape: Shape, parameters: Mapping[str, Parameter], labels: Mapping[str, str]) -> str:
     """Return what an effect is, in the words of the machine, with the form of its law in brackets."""
-    form = candidate.form_of(shape)
-    return in_words(candidate.words_for(shape), labels) + (f" ({form})" if form else "")
+    form, values = candidate.form_of(shape), {name: each.value for name, each in parameters.items()}
+    return in_words(candidate.words_with(shape, values), labels) + (f" ({form})" if form else "")
 
 
 def statement(

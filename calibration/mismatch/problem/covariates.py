@@ -6,6 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
@@ -32,8 +33,9 @@ STANDSTILL_DEVIATIONS = 3.0
 (normal density)."""
 ONE_STD_QUANTILE = 0.6827
 """Quantile of a normal magnitude at one standard deviation."""
-ALTERNATING_MEDIAN = 3.01
-"""Median of |x| + 2|y| + |z| of three normal values, in standard deviations: of second differences that alternate."""
+LEVEL_READINGS = 9
+"""Slow readings one after the other in the middle of which noise is looked for (a choice): those beside fast ones are
+the ends of ramps, which bend by more than the noise where they are sampled coarsely."""
 ALTERNATING_SHARE = 0.15
 """Share of the highest usual speed below which what alternates is noise (a choice: with three standard deviations of a
 noise that reaches further, hardly a start or stop would be left)."""
@@ -72,42 +74,57 @@ def covariates_of(
     return varying, {name: values for name, values in measured.items() if name not in varying}
 
 
-def direction_of(speed: Array) -> Array:
+def direction_of(speed: Array, std: float | None = None) -> Array:
     """Return the sign of a speed (time, wheel); 0 where it is within the noise that the sensor has at standstill.
 
     An axis that stands reads a little more or less than zero. The sign of that is no direction: no friction reverses
-    with it. NaN stays NaN. The noise is estimated from the readings that are given, so give whole recordings.
+    with it. NaN stays NaN. `std` is the noise's standard deviation in the unit of the speed, where it is known. Else it
+    is estimated from the readings that are given, so give whole recordings.
     """
-    directions = [np.where(np.abs(column) > _noise_at_standstill(column), np.sign(column), 0.0) for column in speed.T]
+    directions = [np.where(np.abs(column) > _reach(column, std), np.sign(column), 0.0) for column in speed.T]
     return np.where(np.isfinite(speed), np.stack(directions, axis=1), np.nan)
 
 
+def _reach(speed: Array, std: float | None) -> float:
+    """Return how far from zero a speed (time,) has no sign."""
+    return _noise_at_standstill(speed) if std is None else STANDSTILL_DEVIATIONS * std
+
+
 def _noise_at_standstill(speed: Array) -> float:
-    """Return the reach of a speed's noise (time,) about zero, by its second differences while it is slow.
+    """Return the reach of a speed's noise (time,) about zero, by its second differences while it stays slow.
 
     These are free of a constant speed and of a ramp through zero. Where most of a standstill is exactly 0 (a dead
-    band, a speed that is set to 0 while a brake holds), and where the noise reaches further than what is slow, it is
-    that of what alternates about 0: +, −, +, as only noise does. At most the share of the usual speed in either case.
+    band, a speed that is set to 0 while a brake holds), where it is short, and where the noise reaches further than
+    what is slow, it is that of readings with the other sign than both neighbours: only noise goes +, −, +. The reading
+    in the middle tells it; at a stop of one reading the neighbours are ramps. At most the share of the usual speed.
     """
     known = speed[np.isfinite(speed)]
     usual = float(np.quantile(np.abs(known), USUAL_SPEED_QUANTILE)) if known.size else 0.0
-    second, turned = np.abs(np.diff(speed, 2)), speed[:-1] * speed[1:] < 0
-    slow = _thrice_below(speed, SLOW_SHARE * usual)
     reach = 0.0
-    if slow.any():
-        deviation = float(np.quantile(second[slow], ONE_STD_QUANTILE)) / np.sqrt(6)  # variance 1 + 4 + 1
+    level = _stays_below(speed, SLOW_SHARE * usual, LEVEL_READINGS)
+    if level.any():
+        second = np.abs(np.diff(speed, 2))[level[1:-1]]
+        deviation = float(np.quantile(second, ONE_STD_QUANTILE)) / np.sqrt(6)  # variance 1 + 4 + 1
         reach = min(STANDSTILL_DEVIATIONS * deviation, SLOW_SHARE * usual)
-    alternating = _thrice_below(speed, ALTERNATING_SHARE * usual) & turned[:-1] & turned[1:]
-    if alternating.sum() >= FEWEST_ALTERNATIONS:
-        deviation = float(np.median(second[alternating])) / ALTERNATING_MEDIAN
+    alternating = np.abs(speed[_alternates(speed) & _stays_below(speed, ALTERNATING_SHARE * usual, 3)])
+    if alternating.size >= FEWEST_ALTERNATIONS:
+        deviation = float(np.quantile(alternating, ONE_STD_QUANTILE))
         reach = max(reach, min(STANDSTILL_DEVIATIONS * deviation, ALTERNATING_SHARE * usual))
     return reach
 
 
-def _thrice_below(speed: Array, limit: float) -> NDArray[np.bool_]:
-    """Return where three readings one after the other are slower than a limit, shape (time − 2,)."""
-    below = np.abs(speed) < limit
-    return below[:-2] & below[1:-1] & below[2:]
+def _alternates(speed: Array) -> NDArray[np.bool_]:
+    """Return which readings (time,) have the other sign than the one before and the one after."""
+    turned = np.concatenate(([False], speed[:-1] * speed[1:] < 0, [False]))
+    return turned[:-1] & turned[1:]
+
+
+def _stays_below(speed: Array, limit: float, count: int) -> NDArray[np.bool_]:
+    """Return in the middle of which `count` readings, an odd number, all are slower than a limit, shape (time,)."""
+    found = np.zeros(speed.shape, dtype=bool)
+    if len(speed) >= count:
+        found[count // 2 : len(speed) - count // 2] = sliding_window_view(np.abs(speed) < limit, count).all(axis=1)
+    return found
 
 
 def quantity(channel: str) -> str:

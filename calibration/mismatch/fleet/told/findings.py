@@ -29,7 +29,7 @@ from regolithd.calibration.mismatch.problem.words import in_units
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
     from datetime import datetime
 
     from regolithd.calibration.mismatch.answer import Effect, Verdict
@@ -175,7 +175,7 @@ def _effect(chosen: Chosen, index: int, beside: _Beside, held_out: tuple[Array, 
         covariate=candidate.covariate,
         onset_s=None,
         equation=candidate.equation,
-        statement=_statement(chosen, term, on_wheels(wheels, all_wheels, kind), parameters["relative_size"], errors),
+        statement=_statement(chosen, term, on_wheels(wheels, all_wheels, kind), parameters, errors),
         parameters=parameters,
         rmse_before=errors[0],
         rmse_after=errors[1],
@@ -214,7 +214,13 @@ def _sizes(chosen: Chosen, index: int, beside: _Beside) -> dict[str, Parameter]:
     return {**found, "relative_size": Parameter(size, size * (1 - share), size * (1 + share), "1")}
 
 
-def _statement(chosen: Chosen, term: FleetTerm, wheels: str, size: Parameter, errors: tuple[float, float]) -> str:
+def _statement(
+    chosen: Chosen,
+    term: FleetTerm,
+    wheels: str,
+    parameters: Mapping[str, Parameter],
+    errors: tuple[float, float],
+) -> str:
     """Return one sentence: what, on which wheels of which rovers, since when, how large, and what it costs."""
     names, course = chosen.names, term.course
     rovers = [names.rovers[rover] for rover in term.units.rovers]
@@ -230,8 +236,8 @@ def _statement(chosen: Chosen, term: FleetTerm, wheels: str, size: Parameter, er
         "until": f" until {at}",
         "growing": f" since {at}, growing",
     }[course.kind]
-    words = words_of(term.group.candidate, term.group.shape, chosen.labels)
-    return f"{capital(words)}{wheels}{of}{when}: {size_and_cost(size, errors)}."
+    words = words_of(term.group.candidate, term.group.shape, parameters, chosen.labels)
+    return f"{capital(words)}{wheels}{of}{when}: {size_and_cost(parameters['relative_size'], errors)}."
 
 
 def _of_recording(chosen: Chosen, recording: int, effect: Effect) -> FleetEffect:

@@ -9,6 +9,7 @@ import pytest
 from regolithd.calibration.mismatch.answer import CalibratedParameter, Parameter
 from regolithd.calibration.mismatch.candidates.cold_lubricant_friction import ColdLubricantFriction
 from regolithd.calibration.mismatch.candidates.coulomb_friction import CoulombFriction
+from regolithd.calibration.mismatch.candidates.load_dependent_efficiency import LoadDependentEfficiency
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.inference.statements import (
     beyond_prior_in_words,
@@ -92,11 +93,27 @@ def test_a_law_with_several_forms_tells_which_was_found() -> None:
     """In brackets after what it is, in the machine's own words; a law with one form has none."""
     labels = {"temperature": "oil temperature (°C)"}
     cold: Shape = {"power": 1.0, "no_drag_above_degC": 30.0}
-    assert words_of(SensorDelay(), {"late": "torque_Nm", "filter_s": 0.2}, {}) == (
+    assert words_of(SensorDelay(), {"late": "torque_Nm", "filter_s": 0.2}, {}, {}) == (
         "a delay of torque_Nm (first-order filter)"
     )
-    assert words_of(ColdLubricantFriction(), cold, labels) == ("drag that grows as the oil temperature falls (a line)")
-    assert words_of(CoulombFriction(), {}, {}) == CoulombFriction.words
+    assert (
+        words_of(ColdLubricantFriction(), cold, {}, labels) == "drag that grows as the oil temperature falls (a line)"
+    )
+    assert words_of(CoulombFriction(), {}, {}, {}) == CoulombFriction.words
+
+
+@pytest.mark.parametrize(
+    ("shape", "value", "begins"),
+    [
+        ({"power": 1.0}, 0.1, "a loss that depends on the transmitted torque ("),
+        ({"power": 1.0}, -0.1, "less than is predicted, by a share that depends on the transmitted torque (power"),
+        ({"bent": -0.1}, -0.1, "an efficiency that rises with the transmitted torque (linear"),
+    ],
+)
+def test_a_loss_below_zero_is_none(shape: Shape, value: float, begins: str) -> None:
+    """The machine needs less than predicted; of the linear efficiency it is a rise with the torque."""
+    loss = {"relative_loss": Parameter(value, value - 0.01, value + 0.01, "1")}
+    assert words_of(LoadDependentEfficiency(), shape, loss, {}).startswith(begins)
 
 
 def test_a_parameter_beyond_its_prior_is_told_once() -> None:

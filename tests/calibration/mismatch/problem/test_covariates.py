@@ -68,6 +68,43 @@ def test_of_a_fast_oscillation_hardly_a_reading_is_lost() -> None:
     assert np.mean(direction_of(speed) == 0) < 0.15
 
 
+def short_stops(rng: np.random.Generator) -> NDArray[np.float64]:
+    """Return speeds, four a second, of an axis that moves at 0.06 to 1 rad/s between short stops, shape (time, 1)."""
+    pieces = []
+    for _ in range(150):
+        top, ramp, hold = rng.choice([0.06, 0.15, 0.5, 1.0]), rng.uniform(0.5, 1.4), rng.uniform(1, 8)
+        t = np.arange(0, hold + 2 * ramp, 0.01)
+        inside = np.minimum(np.minimum(t, hold + 2 * ramp - t) / ramp, 1)
+        dwell = np.zeros(int(rng.choice([0, 0, 1.2, 2.5]) / 0.01))
+        pieces += [rng.choice([-1, 1]) * top * np.sin(np.pi / 2 * inside) ** 2, dwell]
+    return np.concatenate(pieces)[::25, None]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_ramps_that_are_sampled_coarsely_are_no_noise(seed: int) -> None:
+    """A steady slow motion keeps its direction; a reading beyond zero at a stop is between those of two ramps."""
+    rng = np.random.default_rng(seed)
+    true = short_stops(rng)
+    found = direction_of(np.where(true == 0, 0.0, true + rng.normal(0, 0.003, true.shape)))
+    np.testing.assert_array_equal(found[np.abs(true) > 0.03], np.sign(true[np.abs(true) > 0.03]))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_shows_beside_ramps_that_are_sampled_coarsely(seed: int) -> None:
+    """Its sign at the stops is no direction, and the rest of the motion keeps its own."""
+    rng = np.random.default_rng(seed)
+    true = short_stops(rng)
+    found = direction_of(true + rng.normal(0, 0.003, true.shape))
+    assert np.mean(found[true == 0] != 0) < 0.02
+    np.testing.assert_array_equal(found[np.abs(true) > 0.03], np.sign(true[np.abs(true) > 0.03]))
+
+
+def test_noise_that_is_known_is_not_estimated() -> None:
+    """Within three standard deviations there is no direction, beyond there is; blanks stay blank."""
+    speed = np.array([[0.0, 0.029, -0.029, 0.031, -0.031, 5.0, np.nan]]).T
+    np.testing.assert_array_equal(direction_of(speed, std=0.01)[:, 0], [0, 0, 0, 1, -1, 1, np.nan])
+
+
 class Belt(Simulation):
     """A belt whose speed is read with an error."""
 
