@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, relative_size
+from regolithd.calibration.mismatch.selection.causality import acts_forwards
 from regolithd.calibration.mismatch.selection.law_misfit import explained
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape, shape_profile
 
@@ -60,7 +61,10 @@ def _that_one_wheel_shows_alone(equations: NormalEquations, found: Sequence[Scor
 
 
 def best_of_each_smooth_term(equations: NormalEquations, given: Sequence[Term]) -> list[Scored]:
-    """Return the best smooth term of each covariate, coupling and number of wheels, likewise."""
+    """Return the best smooth term of each covariate, coupling and number of wheels, likewise.
+
+    Of those over what was before only what acts forwards in time.
+    """
     taken = {(term.name, term.wheels) for term in given}
     groups = [group for group in equations.design.groups if not group.named]
     families = [
@@ -68,7 +72,8 @@ def best_of_each_smooth_term(equations: NormalEquations, given: Sequence[Term]) 
         for gain, term in equations.further(given, groups)
         if (term.name, term.wheels) not in taken
     ]
-    return _best_of_each(equations, families)
+    best = _best_of_each(equations, families)
+    return [(score, term) for score, term in best if acts_forwards(equations, given, term)]
 
 
 def _best_of_each(equations: NormalEquations, found: Sequence[tuple[float, str, Term]]) -> list[Scored]:
