@@ -112,8 +112,8 @@ class Unexplained:
     """A structure in the residual that no candidate explains: its covariate, wheels, time and share of the power.
 
     `range` is where it is confined to a range of the covariate; None: it varies over the whole of it.
-    `curve` is what it looks like over its covariate; None where it is periodic in time. `suggestions` are closed forms
-    that may describe the curve, best first.
+    `curve` is what it looks like over its covariate; None where it is periodic in time, or follows what was before.
+    `suggestions` are closed forms that may describe the curve, best first.
     """
 
     channel: str

@@ -242,7 +242,7 @@ def _without_blanks(problem: Problem, delay_s: float) -> Array:
             recorded = problem.measured[standing.start + late : standing.stop, k]
             if standing.stop - standing.start >= 2 * late and np.isfinite(recorded).any():
                 found[standing, k] = np.nanmedian(recorded)
-    return _bridged(found)
+    return bridged(found)
 
 
 def _standing(direction: Array, first: int, end: int) -> slice:
@@ -287,10 +287,10 @@ def as_shown(problem: Problem, columns: Sequence[Array]) -> Sequence[Array]:
     if problem.late is None:
         return columns
     kind, delay = problem.late
-    return [np.nan_to_num(OF_CHANNEL[kind](problem.recording, _bridged(column), delay)) for column in columns]
+    return [np.nan_to_num(OF_CHANNEL[kind](problem.recording, bridged(column), delay)) for column in columns]
 
 
-def _bridged(values: Array) -> Array:
+def bridged(values: Array) -> Array:
     """Return values (time, wheel) with straight lines across what is not known; as they are where nothing is known."""
     found, rows = np.array(values, np.float64), np.arange(len(values))
     for column in found.T:

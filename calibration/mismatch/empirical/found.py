@@ -21,7 +21,7 @@ from regolithd.calibration.mismatch.empirical.suggestions import (
 from regolithd.calibration.mismatch.empirical.sums import points_beside, profile, squares_on_fold, sums_of
 from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.problem.words import divided, product, unit_in_label, word_for
-from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
+from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.empirical.spline import Spline
@@ -65,10 +65,10 @@ class FoundCurve:
 
 
 def curves_of(decision: Decision) -> tuple[FoundCurve, ...]:
-    """Return the curves of what stays unexplained; a sine over time has none."""
+    """Return the curves of what stays unexplained; a sine over time, and what was before, have none."""
     places: dict[tuple[str, str, tuple[int, ...]], list[Term]] = {}
     for term in decision.unnamed:
-        if term.group.coupling != PERIODIC:
+        if term.group.coupling not in WITHOUT_CURVE:
             places.setdefault((term.name, term.group.coupling, term.wheels), []).append(term)
     return tuple(_found(decision, tuple(terms)) for terms in places.values())
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.empirical.stated import name_of
 from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,7 +27,7 @@ def with_curves(
     ------
     SimulationError
         When what is unexplained follows time, or is in proportion to a channel whose zero means nothing: on another
-        recording that curve means nothing.
+        recording that curve means nothing. When it follows what was before: that is no curve.
     """
     shown = (evidence, *evidence.others)
     found = [fit for each in shown for fit in each.empirical]
@@ -34,6 +35,10 @@ def with_curves(
         raise SimulationError(
             "--empirical: what is unexplained follows time, and a curve over the time of one recording says nothing of "
             "another; leave --empirical out"
+        )
+    if any(place.covariate in LAGGED for place in answer.unexplained):
+        raise SimulationError(
+            "--empirical: what is unexplained follows what was before, and that is no curve; leave --empirical out"
         )
     for each in shown:
         arbitrary = each.problem is not None and each.problem.simulation.arbitrary_zero

@@ -45,7 +45,7 @@ trials curves of physics had 0.4 to 1.5 of it, those of a controller's output 0 
 
 def fed_back(decision: Decision) -> frozenset[str]:
     """Return the covariates of its curves that the residual follows only in what is new of them."""
-    names = {term.name for term in decision.unnamed if term.name not in OF_MOTION}
+    names = {term.name for term in decision.unnamed if term.name not in OF_MOTION and not term.group.later}
     return frozenset(name for name in names if not decision.intermittent and _is_fed_back(decision, name))
 
 

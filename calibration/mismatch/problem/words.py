@@ -24,6 +24,8 @@ COVARIATES = {
     "wheel_angle": "angle of rotation",
     "voltage": "bus voltage",
     "wheel_row": "row",
+    "lagged_prediction": "past of the prediction",
+    "lagged_acceleration": "past of the acceleration",
     "none": "nothing (a constant)",
 }
 """Names of covariates that neither the simulation nor a column gives; the others read well as they are."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time, folds_of_blocks
 from regolithd.calibration.mismatch.regression.candidate_groups import with_candidates
 from regolithd.calibration.mismatch.regression.design_matrix import empty_design
+from regolithd.calibration.mismatch.regression.lagged_groups import with_lagged_terms
 from regolithd.calibration.mismatch.regression.normal_equations import normal_equations
 from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
 from regolithd.calibration.mismatch.regression.reliability import reliability_of
@@ -34,7 +35,7 @@ def smooth_equations(problem: Problem) -> NormalEquations:
     The weights are those of the whole residual; the decision estimates better ones.
     """
     design, nuisance, noise = _free_parameters(problem)
-    return normal_equations(with_smooth_terms(design), nuisance, noise.weights)
+    return normal_equations(with_lagged_terms(with_smooth_terms(design)), nuisance, noise.weights)
 
 
 def with_library(

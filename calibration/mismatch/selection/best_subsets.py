@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, relative_size
+from regolithd.calibration.mismatch.selection.causality import acts_forwards
 from regolithd.calibration.mismatch.selection.law_misfit import explained
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape, shape_profile
 from regolithd.calibration.mismatch.signal.chi_squared import quantile
@@ -54,12 +55,16 @@ def _one_wheel_shows_alone(equations: NormalEquations, gains: Gains, place: int)
 
 
 def best_of_each_smooth_term(equations: NormalEquations, given: Sequence[Term]) -> list[Scored]:
-    """Return the best smooth term of each covariate, coupling and number of wheels, likewise."""
+    """Return the best smooth term of each covariate, coupling and number of wheels, likewise.
+
+    Of those over what was before only what acts forwards in time.
+    """
     taken = {(term.name, term.wheels) for term in given}
     gains = equations.gains(given, [group for group in equations.design.groups if not group.named])
     left = gains.where([[(group.name, wheels) not in taken for group in gains.groups] for wheels in gains.sets])
     over = left.families(lambda group: (group.name, group.coupling))
-    return _best_of_each(equations, [some for each in over for some in each.by_number_of_wheels()])
+    best = _best_of_each(equations, [some for each in over for some in each.by_number_of_wheels()])
+    return [(score, term) for score, term in best if acts_forwards(equations, given, term)]
 
 
 def _best_of_each(equations: NormalEquations, families: Sequence[Gains]) -> list[Scored]:

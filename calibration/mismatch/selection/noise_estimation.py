@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.reliability import reliability_of
 from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.selection.causality import acts_forwards
 from regolithd.calibration.mismatch.signal.noise import NoiseModel
 from regolithd.calibration.mismatch.signal.whitening import estimate_whitening
 
@@ -73,9 +74,12 @@ def _most_significant(equations: NormalEquations, most: int, least_score: float)
         group for group in equations.design.groups if len(group.columns) <= equations.thresholds.noise_term_columns
     ]
     terms: list[Term] = []
-    for _ in range(most):
+    while len(terms) < most:
         found = equations.largest_score(equations.gains(terms, limited))
         if found is None or found[0] <= least_score:
             break
-        terms.append(found[1])
+        if acts_forwards(equations, terms, found[1]):
+            terms.append(found[1])
+        else:
+            limited = [group for group in limited if group is not found[1].group]
     return terms

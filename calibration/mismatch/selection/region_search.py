@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.group import Group, Term
+from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
 from regolithd.calibration.mismatch.regression.range_sums import Ranges, known_values, range_sums
 from regolithd.calibration.mismatch.regression.region import FORMS, GROWTH, Region
 from regolithd.calibration.mismatch.regression.residuals import chi2_of
-from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, acting
+from regolithd.calibration.mismatch.regression.smooth_groups import acting
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -106,7 +107,8 @@ def best_region(equations: NormalEquations, fit: Fit, forms: Forms) -> Found | N
 
 def significant_curves(equations: NormalEquations, fit: Fit) -> list[Term]:
     """Return the best smooth term beside a fit for each covariate and coupling, best first."""
-    groups = [group for group in equations.design.groups if not group.named and group.coupling not in ("", PERIODIC)]
+    none = {"", *WITHOUT_CURVE}
+    groups = [group for group in equations.design.groups if not group.named and group.coupling not in none]
     scored = [(gain - equations.penalty(term), term) for gain, term in equations.further(fit.terms, groups)]
     best: dict[tuple[str, str], Term] = {}
     for score, term in sorted(scored, key=lambda pair: -pair[0]):

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
+from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
 from regolithd.calibration.mismatch.selection.cross_validation import transfer_margin
 from regolithd.calibration.mismatch.selection.region_bounds import with_median_bounds
 from regolithd.calibration.mismatch.selection.region_search import (
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 def in_regions(decision: Decision) -> Decision:
     """Return the decision with regions in the place of the smooth term, where the evidence favours them.
 
-    What recurs, or comes and goes, is in no region.
+    What recurs, follows what was before, or comes and goes, is in no region.
     """
-    if not decision.unnamed or decision.intermittent or decision.unnamed[0].group.coupling == PERIODIC:
+    if not decision.unnamed or decision.intermittent or decision.unnamed[0].group.coupling in WITHOUT_CURVE:
         return decision
     named, curve = decision.named, decision.unnamed[0]
     needed = _curve_score(decision.equations, named, curve)
