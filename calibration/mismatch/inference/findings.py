@@ -27,7 +27,7 @@ from regolithd.calibration.mismatch.inference.not_looked_for import not_looked_f
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
 from regolithd.calibration.mismatch.inference.ranges import range_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
-from regolithd.calibration.mismatch.inference.statements import beyond_prior_in_words, statement, words_of
+from regolithd.calibration.mismatch.inference.statements import notes_on_priors, parameters_found, statement, words_of
 from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.residuals import residual_of
@@ -64,7 +64,8 @@ def findings_of(
     problem = decision.equations.problem
     effects, changes = named_effects(decision, held_out)
     parameters = calibrated_parameters(decision)
-    moved = [each for each in parameters if each.beyond_prior(decision.equations.thresholds)]
+    limits, rest = decision.equations.thresholds, bool(decision.unnamed)
+    moved = parameters_found(parameters, unexplained=rest, thresholds=limits)
     return Findings(
         verdict=verdict_of(decision, moved),
         effects=effects,
@@ -73,7 +74,7 @@ def findings_of(
         parameters=parameters,
         left_out=problem.left_out,
         notes=(
-            *map(beyond_prior_in_words, moved),
+            *notes_on_priors(parameters, unexplained=rest, thresholds=limits),
             *problem.recording.notes,
             *decision.notes,
             *_about_the_mask(problem),

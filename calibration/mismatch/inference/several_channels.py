@@ -8,7 +8,11 @@ from typing import TYPE_CHECKING, TypeVar
 
 from regolithd.calibration.mismatch.answer import Answer, OtherAnswer, std_of_interval
 from regolithd.calibration.mismatch.inference.probability import TOLD
-from regolithd.calibration.mismatch.inference.statements import beyond_prior_in_words, notes_beside_priors
+from regolithd.calibration.mismatch.inference.statements import (
+    notes_beside_priors,
+    notes_on_priors,
+    parameters_found,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,10 +26,10 @@ WORST_FIRST: tuple[Verdict, ...] = ("unexplained", "missing-physics", "consisten
 def merged_answers(answers: Sequence[Answer], parameters: tuple[CalibratedParameter, ...]) -> Answer:
     """Return the findings of all channels, with the parameters as all of them together have them."""
     told = joined(answers)
-    moved = [each for each in parameters if each.beyond_prior()]
-    notes = (*map(beyond_prior_in_words, moved), *notes_beside_priors(told.notes, parameters))
-    named = bool(told.effects or told.changes or moved)
-    verdict: Verdict = "unexplained" if told.verdict == "unexplained" else "missing-physics" if named else "consistent"
+    rest = told.verdict == "unexplained"
+    notes = (*notes_on_priors(parameters, unexplained=rest), *notes_beside_priors(told.notes, parameters))
+    named = bool(told.effects or told.changes or parameters_found(parameters, unexplained=rest))
+    verdict: Verdict = "unexplained" if rest else "missing-physics" if named else "consistent"
     return replace(told, verdict=verdict, parameters=parameters, notes=notes)
 
 
