@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from importlib import resources
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
@@ -56,6 +56,8 @@ class Effect:
     rmse_before, rmse_after: held-out root mean squares on its wheels, without and with the effect
     form: which of the law's forms was found, by its name; empty where it has only one
     shape: the law's shape parameters, as `[[effects]]` of a corrected simulation has them
+    law_std: relative standard deviation of what the law says of another recording, for a corrected simulation; not in
+        the JSON object
     """
 
     name: str
@@ -70,6 +72,7 @@ class Effect:
     rmse_after: float
     form: str = ""
     shape: Mapping[str, float | str] = field(default_factory=dict)
+    law_std: float = field(default=0.0, metadata={"told": False})
 
 
 @dataclass(frozen=True)
@@ -263,6 +266,8 @@ class Answer:
         """Return the JSON object of answer.schema.json: tuples as lists, and null for numbers that are not finite."""
         plain: dict[str, Any] = _plain(asdict(self))
         plain["fits"] = plain["fits"] or [plain["fit"]]
+        untold = [each.name for each in fields(Effect) if not each.metadata.get("told", True)]
+        plain["effects"] = [{k: v for k, v in each.items() if k not in untold} for each in plain["effects"]]
         return {name: plain[name] for name in JSON_KEYS}
 
 

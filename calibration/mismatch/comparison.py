@@ -5,7 +5,7 @@ recording, simulation ─▶ problem ─▶ equations ─▶ decision ─▶ ans
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from regolithd.calibration.mismatch.calibration import (
@@ -27,7 +27,12 @@ from regolithd.calibration.mismatch.inference.feedback import fed_back, notes_of
 from regolithd.calibration.mismatch.inference.findings import Findings, answer_of, findings_of
 from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, earned
 from regolithd.calibration.mismatch.inference.improbable import without_improbable_curves
-from regolithd.calibration.mismatch.inference.several_channels import merged_answers, priors_from_others
+from regolithd.calibration.mismatch.inference.joint_parameters import information_of, joint_posterior
+from regolithd.calibration.mismatch.inference.several_channels import (
+    merged_answers,
+    nothing_else_is_wrong,
+    priors_from_others,
+)
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.equations import smooth_equations, with_library
@@ -45,6 +50,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.changes import Stated
     from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.inference.joint_parameters import Information, JointPosterior
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Group
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
@@ -58,11 +64,15 @@ LATE_SEARCHES = 2
 
 @dataclass(frozen=True)
 class Comparison:
-    """The answer, the arrays behind it, and the simulation; a notebook shows it as the report."""
+    """The answer, the arrays behind it, and the simulation; a notebook shows it as the report.
+
+    `information` is what the readings of the one channel know of the parameters; None: of several channels.
+    """
 
     answer: Answer
     evidence: Evidence
     simulation: Simulation
+    information: Information | None = field(default=None, repr=False)
 
     def to_json(self) -> dict[str, Any]:
         """Return what `regolithd mismatch --json` writes."""
@@ -117,7 +127,7 @@ class Decided:
             covariate_labels=problem.labels,
             wheel_column=simulation.wheel_column,
         )
-        return Comparison(answer, evidence, simulation)
+        return Comparison(answer, evidence, simulation, information_of(self.decision))
 
 
 def compare(
@@ -151,18 +161,38 @@ def compare(
             one = OneChannel(simulation, channel, known)
             return _labelled(compare(recorded, one, effects=own, thresholds=thresholds, progress=progress), channel)
 
-        alone = {channel: of_channel(channel, {}) for channel in simulation.channels}
-        found = dict(alone)
-        for channel, one in alone.items():
-            others = [other.answer for name, other in alone.items() if name != channel]
-            if known := priors_from_others(one.answer, others):
-                found[channel] = of_channel(channel, known)
-        return merged(list(found.values()), simulation)
+        return _of_channels(simulation, of_channel)
     chosen = decided(recorded, simulation, effects=effects, thresholds=thresholds, progress=progress)
     comparison = chosen.told(simulation)
     if chosen.decision.unnamed:
         progress("fitting a curve to what stays unexplained")
     return with_curves(comparison, chosen.decision)
+
+
+def _of_channels(simulation: Simulation, of_channel: _OfChannel) -> Comparison:
+    """Return the comparison of all channels, each posed by itself first.
+
+    Where all channels together contradict a stated parameter, they are compared again with it as they have it. If that
+    is not all that is wrong, a channel that pulls a parameter out of its prior is told what the others know of it.
+    """
+    alone = {channel: of_channel(channel, {}) for channel in simulation.channels}
+    answers = [each.answer for each in alone.values()]
+    if restated := _joint(list(alone.values()), simulation).restated(simulation.parameters):
+        again = [of_channel(channel, restated) for channel in simulation.channels]
+        if nothing_else_is_wrong(answers, [each.answer for each in again]):
+            return merged(again, simulation)
+    found = dict(alone)
+    for channel, one in alone.items():
+        others = [other.answer for name, other in alone.items() if name != channel]
+        if known := priors_from_others(one.answer, others):
+            found[channel] = of_channel(channel, known)
+    return merged(list(found.values()), simulation, may_release=False)
+
+
+def _joint(comparisons: Sequence[Comparison], simulation: Simulation, *, may_release: bool = True) -> JointPosterior:
+    """Return the parameters' posterior from all channels."""
+    informations = [each.information for each in comparisons if each.information]
+    return joint_posterior(simulation.parameters, informations, may_release=may_release)
 
 
 def with_curves(comparison: Comparison, decision: Decision) -> Comparison:
@@ -229,6 +259,12 @@ def _decided(
         decision, held_out = earned(search.decision, search.grid)
     decision = without_improbable_curves(in_regions(decision))
     return Decided(decision, held_out, search.candidates, search.applicable)
+
+
+class _OfChannel(Protocol):
+    """The comparison of one channel, with these means and standard deviations of parameters instead of the stated."""
+
+    def __call__(self, channel: str, known: Mapping[str, tuple[float, float]], /) -> Comparison: ...
 
 
 class _Pose(Protocol):
@@ -316,9 +352,13 @@ def _labelled(comparison: Comparison, channel: str) -> Comparison:
     return replace(comparison, evidence=replace(evidence, contributions=terms, empirical=fits))
 
 
-def merged(comparisons: Sequence[Comparison], simulation: Simulation) -> Comparison:
-    """Return one comparison of all channels of a simulation: every finding, and the evidence of each channel."""
-    answer = merged_answers([each.answer for each in comparisons])
+def merged(comparisons: Sequence[Comparison], simulation: Simulation, *, may_release: bool = True) -> Comparison:
+    """Return one comparison of all channels of a simulation: every finding, and the evidence of each channel.
+
+    `may_release`: whether the channels' parameters may leave priors that they contradict.
+    """
+    posterior = _joint(comparisons, simulation, may_release=may_release)
+    answer = merged_answers([each.answer for each in comparisons], posterior.parameters(simulation.parameters))
     first, *others = (each.evidence for each in comparisons)
     # As in one channel: the terms of named effects, then those of changes.
     named = [term for each in comparisons for term in each.evidence.contributions[: len(each.answer.effects)]]

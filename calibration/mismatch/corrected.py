@@ -140,10 +140,12 @@ def _within_three_std(simulation: Simulation, values: Mapping[str, float]) -> di
 def _with_stds(term: Contribution, effect: Effect) -> Contribution:
     """Return an effect's term with the standard deviations of its size and of its law, from its 90 % intervals.
 
-    Those of the law are of what it says anywhere, as a power of the speed; when the effect began is of one recording.
+    The size is known no better than the law as another recording has it, without the discrepancy of this one. Those of
+    the law are of what it says anywhere, as a power of the speed; when the effect began is of one recording.
     """
     size = effect.parameters.get("relative_size")
     relative_std = 0.0 if size is None or size.value == 0 else std_of_interval(size.low, size.high) / size.value
+    relative_std = max(relative_std, effect.law_std)
     told = {
         name: each for name, each in effect.parameters.items() if name in term.shape and name != Candidate.change_point
     }

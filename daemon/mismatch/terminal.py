@@ -13,6 +13,7 @@ from regolithd.calibration.mismatch.inference.statements import (
     beyond_prior_in_words,
     notes_beside_priors,
     on_wheels,
+    parameters_found,
 )
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def _wrapped(line: str, width: int) -> str:
 
 def _lines(answer: Answer, labels: Labels, wheels: Sequence[int | str]) -> list[str]:
     several = len(answer.fits) > 1
-    moved = [each for each in answer.parameters if each.beyond_prior()]
+    moved = parameters_found(answer.parameters, unexplained=answer.verdict == "unexplained")
     return [
         *(line for effect in answer.effects for line in _effect(effect, several=several)),
         *(f"changed{f' in {change.channel}' if several else ''}: {change.statement}" for change in answer.changes),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,13 +21,13 @@ from regolithd.calibration.mismatch.experiments.drives import DIRECTION
 from regolithd.calibration.mismatch.inference.alternatives import alternatives
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values, wheel_names
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
-from regolithd.calibration.mismatch.inference.intervals import parameters_of
+from regolithd.calibration.mismatch.inference.intervals import drawn_from, law_stds_of, parameters_of
 from regolithd.calibration.mismatch.inference.located import share_of_residual, spell_of
 from regolithd.calibration.mismatch.inference.not_looked_for import not_looked_for
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
 from regolithd.calibration.mismatch.inference.ranges import range_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
-from regolithd.calibration.mismatch.inference.statements import beyond_prior_in_words, statement, words_of
+from regolithd.calibration.mismatch.inference.statements import notes_on_priors, parameters_found, statement, words_of
 from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.residuals import residual_of
@@ -64,7 +64,8 @@ def findings_of(
     problem = decision.equations.problem
     effects, changes = named_effects(decision, held_out)
     parameters = calibrated_parameters(decision)
-    moved = [each for each in parameters if each.beyond_prior(decision.equations.thresholds)]
+    limits, rest = decision.equations.thresholds, bool(decision.unnamed)
+    moved = parameters_found(parameters, unexplained=rest, thresholds=limits)
     return Findings(
         verdict=verdict_of(decision, moved),
         effects=effects,
@@ -73,7 +74,7 @@ def findings_of(
         parameters=parameters,
         left_out=problem.left_out,
         notes=(
-            *map(beyond_prior_in_words, moved),
+            *notes_on_priors(parameters, unexplained=rest, thresholds=limits),
             *problem.recording.notes,
             *decision.notes,
             *_about_the_mask(problem),
@@ -127,7 +128,8 @@ def named_effects(decision: Decision, held_out: HeldOutErrors) -> tuple[tuple[Ef
     named, equations = decision.named, decision.equations
     if not named.terms:
         return (), ()
-    parameters = parameters_of(equations, named, blocks_of_time(equations.problem, decision.noise))
+    drawn = drawn_from(equations, named, blocks_of_time(equations.problem, decision.noise))
+    parameters, stds = parameters_of(equations, named, drawn), law_stds_of(named, drawn)
     effects: list[Effect] = []
     changes: list[Change] = []
     for index, (term, of_term) in enumerate(zip(named.terms, parameters, strict=True)):
@@ -135,7 +137,7 @@ def named_effects(decision: Decision, held_out: HeldOutErrors) -> tuple[tuple[Ef
             changes += changes_of(term.group.candidate, of_term, equations.problem)
         else:
             errors = held_out.without[index], held_out.with_it[index]
-            effects.append(_effect(equations.problem, term, of_term, errors))
+            effects.append(replace(_effect(equations.problem, term, of_term, errors), law_std=stds[index]))
     return tuple(effects), tuple(changes)
 
 

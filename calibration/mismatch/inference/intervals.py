@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,18 +27,56 @@ Index = NDArray[np.int64]
 UNIT_OF_ENDING = {"_rad_s": ANGULAR_SPEED, "_degC": "degC", "_K": "K", "_s": "s"}
 
 
-def parameters_of(equations: NormalEquations, fit: Fit, blocks: Index) -> list[dict[str, Parameter]]:
-    """Return each term's parameters with bounds that hold them nine times in ten."""
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """Draws of everything uncertain in a fit.
+
+    Attributes
+    ----------
+    linearisation: what the columns of `moved` are
+    moved: how far each went from where the fit stands, shape (draw, column)
+    """
+
+    linearisation: Linearisation
+    moved: Array
+
+
+def drawn_from(equations: NormalEquations, fit: Fit, blocks: Index) -> Drawn:
+    """Return draws from the density of a fit's coefficients, shapes and discrepancies."""
     linearisation = linearised(equations, fit)
     step, covariance, inverse = sandwich(equations, fit, linearisation, blocks)
     moved = step + normal_draws(covariance, equations.thresholds.interval_draws)
     for stated in linearisation.shares:
         moved = stated.at_most_one(moved, inverse)
+    return Drawn(linearisation, moved)
+
+
+def parameters_of(equations: NormalEquations, fit: Fit, drawn: Drawn) -> list[dict[str, Parameter]]:
+    """Return each term's parameters with bounds that hold them nine times in ten."""
+    linearisation, moved = drawn.linearisation, drawn.moved
     found = []
     for index in range(len(fit.terms)):
         at = linearisation.of_term(fit, index)
         size = relative_size_interval(equations, fit, index, linearisation.columns[at], moved[:, at])
         found.append(_of_term(equations, fit, index, moved, linearisation) | {"relative_size": size})
+    return found
+
+
+def law_stds_of(fit: Fit, drawn: Drawn) -> list[float]:
+    """Return the relative standard deviation of each term's law as it is carried to another recording.
+
+    In this recording a law's discrepancy stands for a part of what the law says, so that both together are known better
+    than the law; another recording has a discrepancy of its own. It is of how far the law moves along itself: a
+    coefficient and a shape parameter that make up for each other leave it where it is.
+    """
+    found = []
+    for index in range(len(fit.terms)):
+        of_law = drawn.linearisation.of_law(fit, index)
+        columns = drawn.linearisation.columns[of_law].reshape(len(of_law), -1)
+        coefficients = fit.coefficients[fit.of_term(index)]
+        law = coefficients @ columns[: len(coefficients)]
+        along = columns @ law / max(float(law @ law), 1e-300)
+        found.append(float(np.std(drawn.moved[:, of_law] @ along)))
     return found
 
 

@@ -100,9 +100,13 @@ class Linearisation:
 
     def of_term(self, fit: Fit, index: int) -> list[int]:
         """Return the places of all columns of a term: its coefficients', slopes and discrepancies."""
+        return [*self.of_law(fit, index), *range(self.ends[index], self.ends[index + 1])]
+
+    def of_law(self, fit: Fit, index: int) -> list[int]:
+        """Return the places of the columns of a term's law: its coefficients' and slopes."""
         coefficients = fit.of_term(index)
         shapes = [len(fit.columns) + place for place, slope in enumerate(self.slopes) if slope.term == index]
-        return [*range(coefficients.start, coefficients.stop), *shapes, *range(self.ends[index], self.ends[index + 1])]
+        return [*range(coefficients.start, coefficients.stop), *shapes]
 
 
 def linearised(equations: NormalEquations, fit: Fit) -> Linearisation:

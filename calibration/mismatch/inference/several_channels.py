@@ -6,8 +6,13 @@ from dataclasses import replace
 from math import prod
 from typing import TYPE_CHECKING, TypeVar
 
-from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, Answer, OtherAnswer, std_of_interval
+from regolithd.calibration.mismatch.answer import Answer, OtherAnswer, std_of_interval
 from regolithd.calibration.mismatch.inference.probability import TOLD
+from regolithd.calibration.mismatch.inference.statements import (
+    notes_beside_priors,
+    notes_on_priors,
+    parameters_found,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,9 +23,14 @@ AnyAnswer = TypeVar("AnyAnswer", bound=Answer)
 WORST_FIRST: tuple[Verdict, ...] = ("unexplained", "missing-physics", "consistent")
 
 
-def merged_answers(answers: Sequence[Answer]) -> Answer:
-    """Return the findings of all channels, and each parameter's posterior from all of them."""
-    return replace(joined(answers), parameters=tuple(map(combined, *(answer.parameters for answer in answers))))
+def merged_answers(answers: Sequence[Answer], parameters: tuple[CalibratedParameter, ...]) -> Answer:
+    """Return the findings of all channels, with the parameters as all of them together have them."""
+    told = joined(answers)
+    rest = told.verdict == "unexplained"
+    notes = (*notes_on_priors(parameters, unexplained=rest), *notes_beside_priors(told.notes, parameters))
+    named = bool(told.effects or told.changes or parameters_found(parameters, unexplained=rest))
+    verdict: Verdict = "unexplained" if rest else "missing-physics" if named else "consistent"
+    return replace(told, verdict=verdict, parameters=parameters, notes=notes)
 
 
 def joined(answers: Sequence[AnyAnswer]) -> AnyAnswer:
@@ -107,30 +117,10 @@ def priors_from_others(answer: Answer, others: Sequence[Answer]) -> dict[str, tu
     return found
 
 
-def combined(*found: CalibratedParameter) -> CalibratedParameter:
-    """Return a parameter's posterior from independent channels: precisions add, the stated prior's counted once.
-
-    Each channel's prior is the stated one, or a narrower one from another channel. Where a channel shows that its prior
-    is wrong, it was left, and the value is that channel's own.
-    """
-    stated = max(found, key=lambda each: each.prior_std)
-    left = [each for each in found if each.beyond_prior()]
-    if left:
-        best = min(left, key=_std)
-        return replace(best, prior=stated.prior, prior_std=stated.prior_std)
-    if stated.prior_std == 0 or min(map(_std, found)) == 0:
-        return stated
-    # Each channel's posterior is its prior's and its own data's mean, weighted by precision.
-    data = [max(1 / _std(each) ** 2 - 1 / each.prior_std**2, 0.0) for each in found]
-    means = [
-        each.value + (each.value - each.prior) / each.prior_std**2 / weight if weight > 0 else each.prior
-        for each, weight in zip(found, data, strict=True)
-    ]
-    prior = 1 / stated.prior_std**2
-    total = prior + sum(data)
-    value = (prior * stated.prior + sum(w * mean for w, mean in zip(data, means, strict=True))) / total
-    reach = NINETY_PERCENT_STDS / total**0.5
-    return replace(stated, value=value, low=value - reach, high=value + reach)
+def nothing_else_is_wrong(before: Sequence[Answer], after: Sequence[Answer]) -> bool:
+    """Return whether channels leave nothing unexplained, and name nothing new, beside a parameter stated otherwise."""
+    new = [set(told_names(now)) - set(told_names(answer)) for answer, now in zip(before, after, strict=True)]
+    return not any(new) and all(answer.verdict != "unexplained" for answer in after)
 
 
 def _std(parameter: CalibratedParameter) -> float:

@@ -62,12 +62,16 @@ def _over_kinds_of_shape(equations: NormalEquations, fit: Fit, index: int, sizes
 
 
 def _best_of_each_kind(equations: NormalEquations, term: Term, others: tuple[Term, ...]) -> list[tuple[float, Term]]:
-    """Return the best shape, with its Δχ², of each kind: of each combination of parameters that are not continuous."""
+    """Return the best shape of each kind, with its Δχ² less its prior's.
+
+    A kind is a combination of parameters that are not continuous.
+    """
     family = [group for group in equations.design.groups if group.named and group.law == term.group.law]
     free = term.group.candidate.free if term.group.candidate else {}
     found: dict[str, tuple[float, Term]] = {}
-    for gain, other in equations.further(others, family):
+    for further, other in equations.further(others, family):
+        gain = further - other.group.selection_penalty
         kind = str({name: value for name, value in other.group.shape.items() if name not in free})
-        if other.wheels == term.wheels and gain > (found[kind][0] if kind in found else 0.0):
+        if other.wheels == term.wheels and (kind not in found or gain > found[kind][0]):
             found[kind] = gain, other
     return list(found.values())

@@ -7,12 +7,14 @@ from math import floor, isfinite, log10
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.problem.words import in_words
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.answer import CalibratedParameter, Parameter
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.thresholds import Thresholds
 
 
 NOUNS = """
@@ -140,9 +142,42 @@ def beyond_prior_in_words(parameter: CalibratedParameter) -> str:
     )
 
 
+def parameters_found(
+    parameters: Sequence[CalibratedParameter], *, unexplained: bool, thresholds: Thresholds = THRESHOLDS
+) -> list[CalibratedParameter]:
+    """Return the parameters whose distance from their priors is a finding.
+
+    Beside something `unexplained` a parameter takes up what of it acts as the parameter does: it is a finding there
+    only where it is clearly beyond its prior.
+    """
+    least = thresholds.clear_prior_stds if unexplained else 0.0
+    return [each for each in parameters if each.beyond_prior(thresholds) and each.prior_stds_away > least]
+
+
+def notes_on_priors(
+    parameters: Sequence[CalibratedParameter], *, unexplained: bool, thresholds: Thresholds = THRESHOLDS
+) -> list[str]:
+    """Return a note on each parameter beyond its prior: a finding, or what may stand for something unexplained."""
+    found = parameters_found(parameters, unexplained=unexplained, thresholds=thresholds)
+    beyond = [each for each in parameters if each.beyond_prior(thresholds)]
+    return [beyond_prior_in_words(each) if each in found else _may_stand_for_it(each) for each in beyond]
+
+
+def _may_stand_for_it(parameter: CalibratedParameter) -> str:
+    return (
+        f"{beside_what_stays_unexplained(parameter.name)} {parameter.prior_stds_away:.1f} standard deviations from its "
+        "prior. It may stand for a part of that: this is no finding."
+    )
+
+
+def beside_what_stays_unexplained(name: str) -> str:
+    """Return how each text begins about a parameter beyond its prior that is no finding."""
+    return f"Beside what stays unexplained {name} is"
+
+
 def notes_beside_priors(notes: Sequence[str], moved: Sequence[CalibratedParameter]) -> list[str]:
     """Return the notes without those about parameters beyond their priors: each channel has a value of its own."""
-    told = [had_to_leave_its_prior(each.name) for each in moved]
+    told = [text(each.name) for each in moved for text in (had_to_leave_its_prior, beside_what_stays_unexplained)]
     return [note for note in notes if not any(each in note for each in told)]
 
 

@@ -53,6 +53,10 @@ class Predictor(Protocol):
         """Names of candidates that this machine hardly has."""
 
     @property
+    def motor_constant_at_degC(self) -> float | None:
+        """The temperature [°C] at which the torque constant is as stated; None: not said."""
+
+    @property
     def sensors(self) -> Mapping[str, SensorError]:
         """The errors of the recorded inputs, by column."""
 

@@ -138,6 +138,21 @@ class NormalEquations:
             delta_chi2 -= float(moment[:base] @ np.linalg.solve(matrix[:base, :base], moment[:base]))
         return Fit(terms, columns, solved, inverse, delta_chi2)
 
+    def information(self, terms: Iterable[Term], kept: Sequence[int]) -> tuple[Array, Array]:
+        """Return the information matrix and vector of some free parameters beside terms and all other parameters.
+
+        They are of the readings alone, without these parameters' own priors; `kept` are their places.
+        """
+        matrix, moment = self._normal(self._columns(tuple(terms)))
+        own, rest = np.array(kept, np.int64), np.setdiff1d(np.arange(len(matrix)), kept)
+        precision = self.nuisance.precision[own]
+        matrix[own, own] -= precision
+        moment[own] -= precision * self.nuisance.centre[own]
+        cross = matrix[np.ix_(rest, own)]
+        inverse = pseudo_inverse(matrix[np.ix_(rest, rest)], SINGULAR)
+        left = schur_complement(matrix[np.ix_(own, own)], cross, inverse)
+        return left, moment[own] - cross.T @ inverse @ moment[rest]
+
     def penalty(self, term: Term) -> float:
         """Return what a term has to gain beyond chance, in Δχ²."""
         return penalty(term, len(self.weights), self.thresholds)

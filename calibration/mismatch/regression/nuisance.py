@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
     from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.thresholds import Thresholds
 
 Array = NDArray[np.float64]
 
@@ -55,24 +56,35 @@ class Nuisance:
         return np.asarray(np.abs(fitted - self.centre) * np.sqrt(self.precision))
 
     def contradicting_their_priors(self, fit: Fit, problem: Problem) -> NDArray[np.int64]:
-        """Return the places of the simulation's own parameters whose priors the readings contradict in a fit.
-
-        Where the readings know a parameter no better than its prior does, the prior holds it half way back. A shift
-        from the prior has the prior's variance less the posterior's, if the prior is right (Box 1980); of the
-        posterior's variance at most half the prior's counts: readings that say less contradict nothing.
-        """
-        count = len(self.columns)
-        known = np.clip(np.diag(fit.covariance)[:count] * self.precision, 0.0, LEAST_KNOWN)
-        return self._own_beyond(self.prior_stds_away(fit) / np.sqrt(1 - known), problem)
+        """Return the places of the simulation's own parameters whose priors the readings contradict in a fit."""
+        variance = np.diag(fit.covariance)[: len(self.columns)] * self.precision
+        return self._own(beyond_prior_predictive(self.prior_stds_away(fit), variance, problem.thresholds), problem)
 
     def leaving_their_priors(self, fit: Fit, problem: Problem) -> NDArray[np.int64]:
         """Return the places of the simulation's own parameters that are beyond their priors in a fit."""
-        return self._own_beyond(self.prior_stds_away(fit), problem)
+        return self._own(self.prior_stds_away(fit) > problem.thresholds.furthest_prior_stds, problem)
 
-    def _own_beyond(self, away: Array, problem: Problem) -> NDArray[np.int64]:
+    def _own(self, beyond: NDArray[np.bool_], problem: Problem) -> NDArray[np.int64]:
+        """Return the places of those that are the simulation's own parameters, and told."""
         parameters = problem.simulation.parameters
         own = [name in parameters and parameters[name].told for name in self.names]
-        return np.flatnonzero((away > problem.thresholds.furthest_prior_stds) & np.array(own, bool))
+        return np.flatnonzero(beyond & np.array(own, bool))
+
+
+def beyond_prior_predictive(away: Array, variance: Array, thresholds: Thresholds) -> NDArray[np.bool_]:
+    """Return which parameters' priors the readings contradict.
+
+    Where the readings know a parameter no better than its prior does, the prior holds it half way back. A shift
+    from the prior has the prior's variance less the posterior's, if the prior is right (Box 1980); of the
+    posterior's variance at most half the prior's counts: readings that say less contradict nothing.
+
+    Parameters
+    ----------
+    away: how far each posterior mean is from its prior's, in the prior's standard deviations, shape (parameter,)
+    variance: of each posterior over that of its prior, shape (parameter,)
+    """
+    known = np.clip(variance, 0.0, LEAST_KNOWN)
+    return np.asarray(away / np.sqrt(1 - known) > thresholds.furthest_prior_stds)
 
 
 def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:

@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.inference.statements import (
     had_to_leave_its_prior,
     listed,
     noun_of,
+    parameters_found,
     plural,
     wheels_in_words,
 )
@@ -137,8 +138,8 @@ def verdict_sentence(answer: Answer, labels: Labels | None = None) -> str:
         return "Simulation and recording agree to within the noise."
     left_out = _left_out_sentence(answer, labels)
     changed = [f"{capital(labels.effect(change.name))} is {_than_corrected(change)}." for change in answer.changes]
-    beyond = [each.name for each in answer.parameters if each.beyond_prior()]
-    moved = [f"The parameter {had_to_leave_its_prior(name)}." for name in beyond]
+    found = parameters_found(answer.parameters, unexplained=answer.verdict == "unexplained")
+    moved = [f"The parameter {had_to_leave_its_prior(each.name)}." for each in found]
     return " ".join(sentence for sentence in (left_out, *dict.fromkeys(changed), *moved) if sentence)
 
 

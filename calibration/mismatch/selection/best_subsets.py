@@ -137,9 +137,9 @@ def optimised_shapes(equations: NormalEquations, terms: Sequence[Term]) -> tuple
 
 
 def _largest_of_worthwhile_kind(equations: NormalEquations, others: Sequence[Term], found: Sequence[Scored]) -> Term:
-    """Return the shape with the largest Δχ² of a kind in which the effect is large enough, if there is one."""
+    """Return the shape with most Δχ² less its prior's, of a kind in which the effect is large enough, if any is."""
     kinds: dict[frozenset[str], Term] = {}
-    for _, term in sorted(found, key=lambda pair: -pair[0]):
+    for _, term in sorted(found, key=lambda pair: pair[1].group.selection_penalty - pair[0]):
         kinds.setdefault(frozenset(term.group.shape), term)
     best = list(kinds.values())
     for term in best if len(best) > 1 else ():

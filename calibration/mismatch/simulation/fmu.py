@@ -49,7 +49,7 @@ TABLES = ("simulation", "variables", "covariates", "parameters", SENSORS, "effec
 """Tables of an FMU's SIM.toml."""
 PREDICTED = ("output", "local")
 """What variables are, that can be compared with a recorded column."""
-OF_SIMULATION = ("model", "path", "wheel_column", "one_way", "without_effects")
+OF_SIMULATION = ("model", "path", "wheel_column", "one_way", "motor_constant_at_degC", "without_effects")
 """Keys of its `[simulation]`."""
 KEPT_RESULTS = 64
 """Simulated results that are kept (a choice: what one comparison asks for)."""

@@ -91,6 +91,7 @@ def _loaded(
     made.corrected_effects, made.empirical_curves = stated_effects(tables), stated_curves(tables)
     made.source = source
     made.without_effects = (*made.without_effects, *_without_effects(table.get("without_effects", [])))
+    made.motor_constant_at_degC = _stated_temperature(table, made.motor_constant_at_degC)
     return checked(made)
 
 
@@ -108,6 +109,14 @@ def _of_model(model: str, tables: Mapping[str, Any], folder: Path, announce: Cal
     if model.count(":") != 1:
         raise SimulationError(f"[simulation] {MODELS}, not {model!r}", ("simulation", "model"))
     return _made(_imported(model, folder), tables)
+
+
+def _stated_temperature(table: Mapping[str, Any], default: float | None) -> float | None:
+    name = "motor_constant_at_degC"
+    value = table.get(name, default)
+    if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
+        raise SimulationError(f"[simulation] {name} must be a number, not {value!r}", ("simulation", name))
+    return value
 
 
 def _without_effects(names: object) -> list[str]:

@@ -42,6 +42,7 @@ class OneChannel(Simulation):
             "covariate_labels",
             "unloaded_experiment",
             "one_way",
+            "motor_constant_at_degC",
             "experiment_spans",
             "between_readings",
             "undefined_at_times",

@@ -45,6 +45,7 @@ class SimulationTable(Table):
 
     model: str = "rover-wheel"
     slip_without_ground_speed: float = Field(default=0.025, gt=-1, lt=1)
+    motor_constant_at_degC: float | None = None
     without_effects: tuple[str, ...] = ()
 
 

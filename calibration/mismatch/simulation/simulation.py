@@ -75,6 +75,9 @@ class Simulation:
     """How to run the machine without its load, as an instruction: what free parameters of the load hide shows there."""
     one_way: bool | None = None
     """Whether the machine runs one way only (a pump, a fan): then no experiment asks for a reversal. None: not said."""
+    motor_constant_at_degC: float | None = None
+    """The temperature at which the torque constant is what the simulation states; None: as data sheets have it.
+    SIM.toml's `[simulation] motor_constant_at_degC` replaces it."""
     experiment_spans: ClassVar[Mapping[str, float]] = {}
     """How far from its usual value, each way, an experiment can move a covariate: {"temperature": 15.0, "pitch": 0.1}.
     Where nothing is said, a speed, load, torque or slip is varied from half to one and a half times the usual one, and

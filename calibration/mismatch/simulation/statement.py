@@ -38,6 +38,9 @@ def _mistakes(simulation: Simulation) -> Iterator[str]:
             yield f"{name} must be text, not {getattr(simulation, name)!r}"
     if not isinstance(simulation.one_way, bool | None):
         yield f"one_way must be True or False, not {simulation.one_way!r}"
+    at_degC = simulation.motor_constant_at_degC
+    if at_degC is not None and (isinstance(at_degC, bool) or not isinstance(at_degC, int | float)):
+        yield f"motor_constant_at_degC must be a number, or None, not {at_degC!r}"
     for name in ("inputs", "own_tables", "without_effects"):
         found = getattr(simulation, name)
         if not isinstance(found, tuple | list) or not all(isinstance(each, str) for each in found):

@@ -111,6 +111,22 @@ def test_a_torque_constant_is_bent_by_its_own_coefficient(problem: Problem, true
     assert fitted == pytest.approx(true, rel=0.03)
 
 
+def test_a_torque_constant_refers_to_the_stated_temperature(problem: Problem) -> None:
+    """Else to that of data sheets, unless another gains much more; the words say to which."""
+    candidate = next(c for c in library() if c.name == "torque-constant-temperature")
+    shapes = candidate.shapes(problem)
+    charged = {shape["reference_degC"]: candidate.prior_penalty(problem, shape) for shape in shapes}
+    assert charged[25.0] == charged[20.0] < charged[0.0]
+    told = simulation()
+    told.motor_constant_at_degC = 18.0
+    stated = replace(problem, simulation=told)
+    (shape,) = candidate.shapes(stated)
+    assert shape["reference_degC"] == 18.0
+    assert candidate.prior_penalty(stated, shape) == charged[25.0]
+    assert candidate.words_for(shape).endswith("above 18 °C")
+    assert candidate.words_for({}) == candidate.words
+
+
 def test_an_efficiency_that_falls_with_torque_bends_the_current(problem: Problem) -> None:
     """η (1 − a x), x the torque above its mean: the current is I/(1 − a x), and a is found."""
     candidate = next(c for c in library() if c.name == "load-dependent-efficiency")

@@ -11,7 +11,13 @@ from linear_machine import NOISE, Power, equations_of, problem_of, table, term_o
 
 from regolithd.calibration.mismatch import Prior, Simulation, from_columns
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
-from regolithd.calibration.mismatch.inference.intervals import normal_draws, parameters_of, unit_of
+from regolithd.calibration.mismatch.inference.intervals import (
+    drawn_from,
+    law_stds_of,
+    normal_draws,
+    parameters_of,
+    unit_of,
+)
 from regolithd.calibration.mismatch.inference.parameter_interval import interval
 from regolithd.calibration.mismatch.inference.sandwich import StatedShare, block_sums, linearised, sandwich
 from regolithd.calibration.mismatch.inference.size_interval import _over_kinds_of_shape, _rms
@@ -26,6 +32,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from regolithd.calibration.mismatch.answer import Parameter
+    from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
     Array = NDArray[np.float64]
@@ -64,13 +72,40 @@ def test_the_sandwich_of_white_noise_is_the_inverse_information() -> None:
     np.testing.assert_allclose(inverse[:2, :2], fit.covariance, rtol=0.01)
 
 
+def intervals(equations: NormalEquations, fit: Fit, noise: NoiseModel) -> list[dict[str, Parameter]]:
+    """Return the intervals of the terms of a fit."""
+    return parameters_of(equations, fit, drawn_from(equations, fit, blocks_of_time(equations.problem, noise)))
+
+
+def test_a_law_is_carried_to_another_recording_as_its_coefficient_is_known() -> None:
+    """The discrepancy that makes up for it here is another one there: its size is known better than the law."""
+    equations = equations_of(problem_of(table(drag=0.3)))
+    fit = equations.fit([term_of(equations, "drag")])
+    drawn = drawn_from(equations, fit, blocks_of_time(equations.problem, WHITE))
+    (found,), (std,) = parameters_of(equations, fit, drawn), law_stds_of(fit, drawn)
+    drag, size = found["drag"], found["relative_size"]
+    assert std == pytest.approx((drag.high - drag.low) / (2 * 1.645 * drag.value), rel=0.1)
+    assert std > 1.2 * (size.high - size.low) / (2 * 1.645 * size.value)
+
+
+def test_a_coefficient_and_a_power_that_make_up_for_each_other_leave_the_law() -> None:
+    """It is known better than its coefficient."""
+    equations = exact_law(equations_of(problem_of(table(factor=0.8, power=1.5))))
+    equations, term = optimised_shape(equations, (), term_of(equations, "power"))
+    fit = equations.fit([term])
+    drawn = drawn_from(equations, fit, blocks_of_time(equations.problem, WHITE))
+    (found,), (std,) = parameters_of(equations, fit, drawn), law_stds_of(fit, drawn)
+    factor = next(each for name, each in found.items() if name not in {"power", "relative_size"})
+    assert std < 0.7 * (factor.high - factor.low) / (2 * 1.645 * factor.value)
+
+
 def test_nine_in_ten_intervals_hold_the_truth() -> None:
     """On simulated linear data, over forty seeds."""
     held = 0
     for seed in range(40):
         equations = exact_law(equations_of(problem_of(table(drag=0.3, seed=seed))))
         fit = equations.fit([term_of(equations, "drag")])
-        (found,) = parameters_of(equations, fit, blocks_of_time(equations.problem, WHITE))
+        (found,) = intervals(equations, fit, WHITE)
         held += found["drag"].low <= 0.3 <= found["drag"].high
         assert found["drag"].low < found["drag"].value < found["drag"].high
     assert 31 <= held <= 40
@@ -94,9 +129,7 @@ def test_a_law_may_be_wrong_by_a_share_at_each_knot_and_on_each_axis() -> None:
 def test_relative_size_is_the_effect_over_the_mean_reading() -> None:
     """A drag of 0.3 at a mean of about 2."""
     equations = equations_of(problem_of(table(drag=0.3)))
-    (found,) = parameters_of(
-        equations, equations.fit([term_of(equations, "drag")]), blocks_of_time(equations.problem, WHITE)
-    )
+    (found,) = intervals(equations, equations.fit([term_of(equations, "drag")]), WHITE)
     size = found["relative_size"]
     assert size.value == pytest.approx(0.3 / float(np.mean(np.abs(equations.problem.measured))), rel=0.1)
     assert size.low < size.value < size.high
@@ -106,9 +139,7 @@ def test_relative_size_is_the_effect_over_the_mean_reading() -> None:
 def test_no_size_is_known_better_than_the_common_discrepancy() -> None:
     """With hardly any noise its coefficient is known to a thousandth, its size is not."""
     equations = equations_of(problem_of(table(drag=0.3, noise=0.001)))
-    (found,) = parameters_of(
-        equations, equations.fit([term_of(equations, "drag")]), blocks_of_time(equations.problem, WHITE)
-    )
+    (found,) = intervals(equations, equations.fit([term_of(equations, "drag")]), WHITE)
     size = found["relative_size"]
     assert (size.high - size.low) / (2 * 1.645 * size.value) > 0.95 * THRESHOLDS.size_discrepancy_std
 
@@ -117,7 +148,7 @@ def test_a_shape_parameter_has_its_interval() -> None:
     """The power of a curve of power 1.5."""
     equations = equations_of(problem_of(table(factor=0.8, power=1.5)))
     equations, term = optimised_shape(equations, (), term_of(equations, "power"))
-    (found,) = parameters_of(equations, equations.fit([term]), blocks_of_time(equations.problem, WHITE))
+    (found,) = intervals(equations, equations.fit([term]), WHITE)
     assert found["power"].low <= 1.5 <= found["power"].high
     assert found["power"].high - found["power"].low < 0.6
 
@@ -159,7 +190,7 @@ def test_a_delay_whose_change_is_in_proportion_to_it_has_its_interval() -> None:
         recording = from_columns({"t_s": t_s, "level_V": level, "reading_V": recorded})
         equations = exact_law(equations_of(build_problem(recording, Slow()), (SensorDelay(),)))
         equations, term = optimised_shape(equations, (), term_of(equations, "sensor-delay", (0,)))
-        (found,) = parameters_of(equations, equations.fit([term]), blocks_of_time(equations.problem, ONE))
+        (found,) = intervals(equations, equations.fit([term]), ONE)
         delay = found["delay_s"]
         held += delay.low <= 2.0 <= delay.high
         widths.append(delay.high - delay.low)
@@ -191,7 +222,7 @@ def test_an_onset_has_bounds_on_both_sides_within_the_recording() -> None:
     columns["reading_V"] = columns["reading_V"] + 0.5 * (columns["t_s"] >= 231)
     equations = equations_of(problem_of(columns))
     equations, term = optimised_shape(equations, (), term_of(equations, "step", place=5))
-    (found,) = parameters_of(equations, equations.fit([term]), blocks_of_time(equations.problem, WHITE))
+    (found,) = intervals(equations, equations.fit([term]), WHITE)
     onset = found["onset_s"]
     assert 0 <= onset.low <= 231 <= onset.high <= equations.problem.length_s
     assert 0.1 < onset.high - onset.low < 10

@@ -10,13 +10,15 @@ import pytest
 from sample_answer import ANSWER
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
-from regolithd.calibration.mismatch.answer import CalibratedParameter
+from regolithd.calibration.mismatch.answer import CalibratedParameter, std_of_interval
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.inference.several_channels import combined, notes_of, priors_from_others
+from regolithd.calibration.mismatch.inference.several_channels import notes_of, priors_from_others
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from regolithd.calibration.mismatch.answer import Answer
 
 
 class Propeller(Simulation):
@@ -109,29 +111,6 @@ def test_another_channel_is_asked_where_a_parameter_left_its_prior() -> None:
     assert not priors_from_others(left, [replace(sharp, parameters=(posterior(2.3, 0.2),))])
 
 
-def test_a_channel_with_a_narrower_prior_adds_what_its_own_readings_say() -> None:
-    """The prior that it had from another channel is not counted again."""
-    sharp = posterior(2.3, 0.05)
-    told = posterior(2.3 + 0.1 * 0.05**2 / (0.05**2 + 0.3**2), (1 / 0.05**2 + 1 / 0.3**2) ** -0.5, 2.3, 0.05)
-    both = combined(sharp, told)
-    assert (both.prior, both.prior_std) == (2.0, 0.5)
-    assert (both.high - both.low) / 2 == pytest.approx(1.645 * (1 / 0.05**2 + 1 / 0.3**2) ** -0.5, rel=1e-3)
-    assert both.value == pytest.approx(told.value, rel=1e-3)
-
-
-def test_two_channels_that_say_the_same_of_a_parameter_say_it_more_surely() -> None:
-    """Precisions add, and the prior's is counted once."""
-    once = posterior(2.2, 0.3)
-    both = combined(once, once)
-    data = 1 / 0.3**2 - 1 / 0.5**2
-    mean = 2.2 + (2.2 - 2.0) / 0.5**2 / data
-    total = 1 / 0.5**2 + 2 * data
-    assert both.value == pytest.approx((2.0 / 0.5**2 + 2 * data * mean) / total)
-    assert (both.high - both.low) / 2 == pytest.approx(1.645 / total**0.5)
-    untold = posterior(2.0, 0.5)
-    assert combined(once, untold).value == pytest.approx(2.2)
-
-
 def test_a_note_of_one_channel_is_told_with_the_channel() -> None:
     """And a note of all channels once, as it is."""
     current = replace(ANSWER, notes=("a gap", "no speed"), fit=replace(ANSWER.fit, channel="current_A"))
@@ -169,3 +148,55 @@ def test_a_parameter_that_both_channels_show_to_be_wrong_is_told_from_its_stated
     assert (answer.verdict, gain.prior, gain.prior_std) == ("missing-physics", 2.0, 0.05)
     assert gain.beyond_prior()
     assert gain.value == pytest.approx(2.3, abs=0.02)
+
+
+class Chained(Simulation):
+    """Two channels that show two sums of two parameters; neither knows any parameter by itself."""
+
+    channels: ClassVar = {"sum_V": "V", "first_V": "V"}
+    inputs = ("speed_rad_s",)
+    parameters: ClassVar = {"a": Prior(2.0, 0.05), "b": Prior(1.0, 0.05)}
+
+    def predict(self, inputs: Mapping[str, Any], values: Mapping[str, float]) -> Any:
+        """Return the sum of both, and the first one with a third of the second."""
+        speed = inputs["speed_rad_s"]
+        return {
+            "sum_V": (values["a"] + values["b"]) * speed,
+            "first_V": (values["a"] + 0.3 * values["b"]) * speed,
+        }
+
+    def covariates(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the time."""
+        return {"time": inputs["t_s"]}
+
+
+def chained(b: float) -> Answer:
+    """Compare what has this second parameter."""
+    generator, time_s = np.random.default_rng(3), 0.1 * np.arange(2400)
+    speed = 3 + np.sin(time_s / 9)
+    columns = {
+        "sum_V": (2.0 + b) * speed + generator.normal(0, 0.4, len(time_s)),
+        "first_V": (2.0 + 0.3 * b) * speed + generator.normal(0, 0.4, len(time_s)),
+    }
+    return compare(from_columns({"t_s": time_s, "speed_rad_s": speed, **columns}), Chained()).answer
+
+
+def test_channels_together_show_that_a_parameter_was_stated_wrongly() -> None:
+    """The sum is 5 deviations too large, of which each parameter takes a half; both channels know whose it is."""
+    answer = chained(1.25)
+    first, second = answer.parameters
+    assert (answer.verdict, answer.effects, answer.unexplained) == ("missing-physics", (), ())
+    assert second.beyond_prior()
+    assert not first.beyond_prior()
+    assert second.low < 1.25 < second.high
+    assert first.low < 2.0 < first.high
+    assert answer.notes[0].startswith("b had to leave its prior")
+
+
+def test_channels_together_know_what_each_knows_in_combination() -> None:
+    """A parameter within its prior has an interval narrower than any channel's, and nothing is told."""
+    answer = chained(1.05)
+    _, second = answer.parameters
+    assert answer.verdict == "consistent"
+    assert second.low < 1.05 < second.high
+    assert std_of_interval(second.low, second.high) < 0.02

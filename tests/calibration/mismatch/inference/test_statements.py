@@ -14,8 +14,10 @@ from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.inference.statements import (
     beyond_prior_in_words,
     notes_beside_priors,
+    notes_on_priors,
     noun_of,
     on_wheels,
+    parameters_found,
     plural,
     statement,
     told,
@@ -126,3 +128,24 @@ def test_a_parameter_beyond_its_prior_is_told_once() -> None:
     notes = ["It rained.", f"level_m: {told}", beyond_prior_in_words(gain)]
     assert notes_beside_priors(notes, [loss]) == ["It rained.", notes[2]]
     assert notes_beside_priors(notes, []) == notes
+
+
+def moved_by(stds: float) -> CalibratedParameter:
+    """Return an outlet that is so many deviations of its prior away."""
+    return CalibratedParameter("outlet", "m", 40.0, 2.0, 40.0 + 2 * stds, 39.0 + 2 * stds, 41.0 + 2 * stds)
+
+
+def test_beside_something_unexplained_only_a_clear_distance_from_the_prior_is_a_finding() -> None:
+    """Less is told in a note, as what may stand for a part of the unknown; alone it is a finding."""
+    inside, beyond, clear = moved_by(2.5), moved_by(3.2), moved_by(6.5)
+    parameters = [inside, beyond, clear]
+    assert parameters_found(parameters, unexplained=False) == [beyond, clear]
+    assert parameters_found(parameters, unexplained=True) == [clear]
+    assert [note.split(" ", 1)[0] for note in notes_on_priors(parameters, unexplained=False)] == ["outlet", "outlet"]
+    about, found = notes_on_priors([beyond, clear], unexplained=True)
+    assert about == (
+        "Beside what stays unexplained outlet is 3.2 standard deviations from its prior. It may stand for a part of "
+        "that: this is no finding."
+    )
+    assert found.startswith("outlet had to leave its prior")
+    assert notes_beside_priors([about, found, "a gap"], [beyond]) == ["a gap"]

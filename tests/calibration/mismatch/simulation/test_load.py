@@ -67,6 +67,7 @@ def test_a_key_has_a_line(keys: tuple[str, ...], line: int | None) -> None:
             "SIM.toml, line {line}: [parameters]: the simulation has no parameter",
         ),
         ("class", "# path =", "without_effects = 'x' #", "line {line}: [simulation] without_effects must be a list of"),
+        ("class", "# path =", "motor_constant_at_degC = 'x' #", "[simulation] motor_constant_at_degC must be a number"),
         ("class", "[parameters.v", "[effects]\n[parameters.v", "effects are tables, [[effects]]"),
         ("rover-wheel", "cohesion_Pa =", "cohesion_kPa =", "did you mean cohesion_Pa?"),
         ("rover-wheel", "[soil]", "[ground]", "soil: Field required"),
@@ -84,6 +85,16 @@ def test_a_mistake_is_told_with_its_line(kind: str, old: str, new: str, told: st
         load_simulation(path)
     assert str(caught.value).startswith(str(path))
     assert told.format(line=before.count("\n") + 1) in str(caught.value)
+
+
+@pytest.mark.parametrize("kind", ["class", "rover-wheel"])
+def test_the_temperature_of_the_motor_constant_is_stated_by_the_file(kind: str, tmp_path: Path) -> None:
+    """`[simulation] motor_constant_at_degC`, whatever the kind of simulation; by default nothing is said."""
+    write_templates(kind, tmp_path)
+    path = tmp_path / "SIM.toml"
+    assert load_simulation(path).motor_constant_at_degC is None
+    path.write_text(path.read_text().replace("[simulation]", "[simulation]\nmotor_constant_at_degC = 22", 1))
+    assert load_simulation(path).motor_constant_at_degC == 22
 
 
 @pytest.mark.parametrize("content", [b"\xff\xfe[\x00", b"[simulation]\nmodel = '\xe9'\n"])

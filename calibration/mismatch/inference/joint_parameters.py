@@ -1,0 +1,174 @@
+"""The simulation's parameters from several channels together: one likelihood, and the stated priors once.
+
+Each channel says what its readings know of all parameters: the information matrix and vector of its normal equations
+beside all that was found there. Intervals of single parameters lose how they depend on each other, by which channels
+that each know a combination of them know every one. Informations of channels with independent noise add.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, CalibratedParameter
+from regolithd.calibration.mismatch.regression.nuisance import beyond_prior_predictive
+from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
+from regolithd.calibration.mismatch.selection.released_parameters import WRONG_STATEMENT_PENALTY
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from regolithd.calibration.mismatch.problem.prior import Prior
+    from regolithd.calibration.mismatch.selection.decision import Decision
+
+Array = NDArray[np.float64]
+
+SINGULAR = 1e-12
+"""Relative eigenvalue below which a direction counts as undetermined (double precision; the priors are in the sum)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """What the readings of one channel know of the simulation's parameters, without any prior of these.
+
+    Their log likelihood is −½ xᵀ M x + vᵀ x, with x the parameters in their own units.
+
+    Attributes
+    ----------
+    names: of the parameters
+    matrix: M, shape (parameter, parameter)
+    vector: v, shape (parameter,)
+    held: those that the comparison held at a value because of their bounds
+    """
+
+    names: tuple[str, ...]
+    matrix: Array
+    vector: Array
+    held: Mapping[str, float]
+
+
+def information_of(decision: Decision) -> Information:
+    """Return what a channel's readings know of the parameters, beside all that was found in it."""
+    equations, problem = decision.equations, decision.equations.problem
+    nuisance, priors = equations.nuisance, problem.simulation.parameters
+    kept = [place for place, name in enumerate(nuisance.names) if name in priors]
+    names = tuple(nuisance.names[place] for place in kept)
+    matrix, moment = equations.information(decision.whole.terms, kept)
+    scale = equations.design.scale[[nuisance.columns[place] for place in kept]]
+    matrix, moment = matrix * np.outer(scale, scale), moment * scale
+    at = np.array([problem.values[name] for name in names], np.float64)
+    held = {name: problem.values[name] for name in problem.held}
+    return Information(names, matrix, moment + matrix @ at, held)
+
+
+@dataclass(frozen=True, eq=False)
+class JointPosterior:
+    """Where all channels together have the parameters.
+
+    Attributes
+    ----------
+    names: of the parameters
+    shifts, stds: from the stated values, and their standard deviations, in those of the stated priors
+    evidence: minus the χ² of readings and priors, less what parameters outside of their priors are charged, but for a
+        constant
+    held: values of parameters that a channel's comparison held because of their bounds
+    released: the parameters whose stated priors the readings contradict, and do not hold them
+    """
+
+    names: tuple[str, ...]
+    shifts: Array
+    stds: Array
+    evidence: float
+    held: Mapping[str, float]
+    released: tuple[str, ...] = ()
+
+    @property
+    def too_far(self) -> bool:
+        """Whether a released parameter goes further than a wrong statement explains."""
+        far = np.abs(self.shifts) > THRESHOLDS.furthest_linearisation_stds
+        return any(name in self.released for name, beyond in zip(self.names, far, strict=True) if beyond)
+
+    def restated(self, priors: Mapping[str, Prior]) -> dict[str, tuple[float, float]]:
+        """Return mean and standard deviation of the released parameters, had they been stated where they are."""
+        shifts = dict(zip(self.names, self.shifts.tolist(), strict=True))
+        return {
+            name: (priors[name].value + shifts[name] * priors[name].std, priors[name].std) for name in self.released
+        }
+
+    def parameters(self, priors: Mapping[str, Prior]) -> tuple[CalibratedParameter, ...]:
+        """Return the told parameters; those that are exact or held have no width."""
+        places = {name: place for place, name in enumerate(self.names)}
+        found = []
+        for name, prior in priors.items():
+            value, std = self.held.get(name, prior.value), 0.0
+            if name in places:
+                value = prior.value + float(self.shifts[places[name]]) * prior.std
+                std = float(self.stds[places[name]]) * prior.std
+            reach = NINETY_PERCENT_STDS * std
+            if prior.told:
+                found.append(
+                    CalibratedParameter(name, prior.unit, prior.value, prior.std, value, value - reach, value + reach)
+                )
+        return tuple(found)
+
+
+def joint_posterior(
+    priors: Mapping[str, Prior], informations: Sequence[Information], *, may_release: bool = True
+) -> JointPosterior:
+    """Return the posterior of the parameters from all channels and their stated priors.
+
+    Where the channels together contradict a prior, it is released as in one channel: if the evidence is larger even
+    after what a wrong statement is charged, and no parameter goes further than a wrong statement explains. Of
+    parameters that could stand for each other the one with most evidence is released, or all together.
+    """
+    likelihood = _Likelihood.of(priors, informations)
+    within = likelihood.posterior(())
+    if not may_release:
+        return within
+    beyond = beyond_prior_predictive(np.abs(within.shifts), within.stds**2, THRESHOLDS)
+    contradicted = np.flatnonzero(beyond & np.array([priors[name].told for name in within.names], bool)).tolist()
+    sets = dict.fromkeys([*((place,) for place in contradicted), tuple(contradicted)])
+    found = [likelihood.posterior(places) for places in sets if places]
+    plausible = [each for each in found if not each.too_far]
+    return max((within, *plausible), key=lambda each: each.evidence)
+
+
+@dataclass(frozen=True, eq=False)
+class _Likelihood:
+    """The channels' informations together, of shifts from the stated values in standard deviations of the priors."""
+
+    names: tuple[str, ...]
+    matrix: Array
+    vector: Array
+    held: Mapping[str, float]
+
+    @classmethod
+    def of(cls, priors: Mapping[str, Prior], informations: Sequence[Information]) -> _Likelihood:
+        """Return the sum; a parameter that a channel holds at a value has it in all."""
+        held = {name: value for each in informations for name, value in each.held.items()}
+        names = tuple(name for name, prior in priors.items() if prior.std > 0 and name not in held)
+        matrix, vector = np.zeros((len(names), len(names))), np.zeros(len(names))
+        for each in informations:
+            kept = [place for place, name in enumerate(each.names) if name in names]
+            at = [names.index(each.names[place]) for place in kept]
+            std = np.array([priors[names[place]].std for place in at])
+            about = np.array([held.get(name, priors[name].value) for name in each.names])
+            matrix[np.ix_(at, at)] += each.matrix[np.ix_(kept, kept)] * np.outer(std, std)
+            vector[at] += (each.vector - each.matrix @ about)[kept] * std
+        return cls(names, matrix, vector, held)
+
+    def posterior(self, released: Sequence[int]) -> JointPosterior:
+        """Return the posterior with the priors of some parameters as wide as a wrong statement goes."""
+        precision = np.ones(len(self.names))
+        precision[list(released)] = THRESHOLDS.furthest_linearisation_stds**-2
+        covariance = pseudo_inverse(self.matrix + np.diag(precision), SINGULAR)
+        shifts = covariance @ self.vector
+        away = np.delete(shifts, list(released))
+        chi2 = shifts @ self.matrix @ shifts - 2 * self.vector @ shifts + away @ away
+        evidence = -float(chi2) - WRONG_STATEMENT_PENALTY * len(released)
+        stds, names = np.sqrt(np.maximum(np.diag(covariance), 0.0)), tuple(self.names[place] for place in released)
+        return JointPosterior(self.names, shifts, stds, evidence, self.held, names)
