@@ -5,6 +5,9 @@ is switched by a hidden Markov chain (Hamilton, 1989), is compared with those of
 autoregression of any memory, and an autoregression whose size switches. Neither spells of equal length nor few of them
 are needed, and noise that is as slow as the spells has its own likelihood. Other wheels tell how much slow noise there
 is: that one wheel has far more of it than its peers is less probable than that it has spells.
+
+A machine with a state follows what comes and goes, and then forgets it. So the same is asked of what is new in each
+reading beside the one before, of which the mean switches then (a switching intercept; Hamilton, 1994, 22.4).
 """
 
 from __future__ import annotations
@@ -43,6 +46,8 @@ RATIOS, RATIO_SHARES, RATIO_DURATIONS = (1.7, 2.5, 4.0), (0.1, 0.25, 0.5, 0.75),
 """The same of noise whose size switches by a ratio."""
 REFINEMENTS = (1.0, 0.5)
 """Steps about the best of a grid, in its own steps."""
+MOST_BY_REFINEMENT = 6.0
+"""Log likelihood that a refinement adds at most (a choice: in 400 courses it added up to 4)."""
 STEPS = (0.2, 0.3, 0.45)
 """Steps of a grid for its refinement, in logarithms."""
 LARGEST_SHARE, SHORTEST, LONGEST = 0.6, 3.0, 200.0
@@ -56,12 +61,14 @@ class SwitchingMean:
     Attributes
     ----------
     block: readings in a block
-    amplitude: the second level above the first
+    forgets: factor by which the course follows its own last block; 0: it is asked for its levels as they are
+    amplitude: the second level above the first, once the course has followed it
     share, duration: of the time, and mean duration of a spell [blocks], in which the second level holds
     gain: twice the logarithm of the likelihood ratio to noise alone, less what the free numbers cost
     """
 
     block: int
+    forgets: float
     amplitude: float
     share: float
     duration: float
@@ -74,8 +81,8 @@ class SwitchingMean:
 
     def acting(self, course: Array) -> Array:
         """Return the probability that the second level holds in each block of the course, shape (block,)."""
-        values, size = _standardised(block_means(course, self.block))
-        model = np.array([[self.amplitude / size, self.share, self.duration]])
+        values, size = _standardised(_new_in(block_means(course, self.block), self.forgets))
+        model = np.array([[self.amplitude * (1 - self.forgets) / size, self.share, self.duration]])
         _, chains, first, after = _switching_densities(values, model)
         return chains.second_state(first, after)
 
@@ -89,24 +96,50 @@ def switching_mean(
     """
     if len(course) < thresholds.fewest_blocks or not np.ptp(course) > 0:
         return None
-    lengths = {max(len(course) // blocks, 1) for blocks in BLOCKS}
-    best = max((_of_blocks(course, peers, length) for length in lengths), key=lambda found: found.gain)
-    return best if best.gain > thresholds.switching_entry else None
+    found = []
+    for length in {max(len(course) // blocks, 1) for blocks in BLOCKS}:
+        means, others = block_means(course, length), [block_means(peer, length) for peer in peers]
+        for forgets in (0.0, _persistence(means)):
+            switching = _switching(_new_in(means, forgets), [_new_in(each, forgets) for each in others], thresholds)
+            if switching is not None:
+                (amplitude, share, duration), gain = switching
+                found.append(SwitchingMean(length, forgets, amplitude / (1 - forgets), share, duration, gain))
+    return max(found, key=lambda each: each.gain, default=None)
 
 
-def _of_blocks(course: Array, peers: Sequence[Array], length: int) -> SwitchingMean:
-    values, size = _standardised(block_means(course, length))
-    unlike = _unlike_peers([block_means(peer, length) for peer in peers])
+def _persistence(values: Array) -> float:
+    """Return the correlation of values with the one before."""
+    centred = values - values.mean()
+    return float(np.clip(centred[:-1] @ centred[1:] / max(float(centred @ centred), 1e-300), 0, HIGHEST_CORRELATION))
 
-    def switching(models: Array) -> Array:
-        return _switching_likelihood(values, models) - unlike(size**2 * _noise_variance(models))
 
-    amplitudes = (*AMPLITUDES, *(-each for each in AMPLITUDES))
-    (amplitude, share, duration), most = _maximised(switching, _grid(amplitudes, SHARES, DURATIONS))
+def _new_in(values: Array, forgets: float) -> Array:
+    """Return values less so much of the one before; the values themselves where that is nothing."""
+    return values[1:] - forgets * values[:-1] if forgets else values
+
+
+def _switching(
+    course: Array, peers: Sequence[Array], thresholds: Thresholds
+) -> tuple[tuple[float, float, float], float] | None:
+    """Return amplitude, share and duration of a switching mean of blocks, and its gain; None: not beyond chance."""
+    values, size = _standardised(course)
+    unlike = _unlike_peers(peers)
+
+    def likelihood(models: Array) -> Array:
+        return _switching_likelihood(values, models) - unlike(size**2 * _noise_variance(models)) - FREE
+
+    def least(of_noise: float) -> float:
+        return of_noise - float(unlike(np.array(size**2))) + thresholds.switching_entry / 2
+
+    amplitudes, needed = (*AMPLITUDES, *(-each for each in AMPLITUDES)), least(_autoregression_likelihood(values))
+    (amplitude, *spells), most = _maximised(likelihood, _grid(amplitudes, SHARES, DURATIONS), needed)
+    if most <= needed:
+        return None
     resizing = _grid(RATIOS, RATIO_SHARES, RATIO_DURATIONS)
-    _, resized = _maximised(lambda models: _resized_likelihood(values, models), resizing)
-    of_noise = max(_autoregression_likelihood(values), resized - FREE) - float(unlike(np.array(size**2)))
-    return SwitchingMean(length, amplitude * size, share, duration, 2 * (most - FREE - of_noise))
+    _, resized = _maximised(lambda models: _resized_likelihood(values, models) - FREE, resizing, -np.inf)
+    needed = max(needed, least(resized))
+    gain = 2 * (most - needed) + thresholds.switching_entry
+    return ((amplitude * size, spells[0], spells[1]), gain) if most > needed else None
 
 
 def _unlike_peers(peers: Sequence[Array]) -> Callable[[Array], Array]:
@@ -134,11 +167,18 @@ def _grid(*axes: tuple[float, ...]) -> Array:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
 
 
-def _maximised(likelihood: Callable[[Array], Array], models: Array) -> tuple[tuple[float, float, float], float]:
-    """Return the model of the highest log likelihood, from a grid and its refinements, and that likelihood."""
+def _maximised(
+    likelihood: Callable[[Array], Array], models: Array, needed: float
+) -> tuple[tuple[float, float, float], float]:
+    """Return the model of the highest log likelihood, from a grid and its refinements, and that likelihood.
+
+    A grid that is far from what is needed is not refined.
+    """
     best, highest = models[0], -np.inf
     steps = _grid(*[(-1.0, 0.0, 1.0)] * 3) * STEPS
     for factor in (None, *REFINEMENTS):
+        if factor is not None and highest < needed - MOST_BY_REFINEMENT:
+            break
         tried = models if factor is None else _limited(best * np.exp(factor * steps))
         found = likelihood(tried)
         if found.max() > highest:
