@@ -222,7 +222,7 @@ class RoverWheel(Simulation):
 
     def corrected_tables(self, values: Mapping[str, float]) -> dict[str, Any]:
         """Return the tables with the calibrated gain, cohesion and friction angle."""
-        tables = self.tables.model_dump()
+        tables = self.tables.model_dump(exclude_none=True)
         drivetrain, soil = tables["drivetrain"], tables["soil"]
         drivetrain["gain_factor"] = [
             before * (values["gain_factor"] + values.get(own_name("gain_factor", wheel), 0.0))
