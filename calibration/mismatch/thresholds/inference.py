@@ -41,10 +41,10 @@ class InferenceThresholds:
     )
     # What comes and goes
     switching_entry: float = threshold(
-        10.0,
+        12.0,
         "Gain (twice the log likelihood ratio) by which a mean that switches has to be likelier than noise.",
-        f"{TRIALS}: of 400 courses of ten kinds of noise at most 5, of 240 residuals of a rover, an AGV and an arm "
-        "without spells at most 8.4; seven spells of 1 to 1.5 times the noise, on one of six wheels, gain 8 to 110",
+        f"{TRIALS}: of 400 courses of ten kinds of noise at most 9, of 400 residuals of a rover, an AGV and an arm "
+        "without spells at most 11; seven spells of 1 to 1.5 times the noise, on one of six wheels, gain 8 to 110",
     )
     noise_size_readings: int = threshold(
         32,
