@@ -99,6 +99,8 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         ),
         *("Decided", "_Search"),
         "AsRead",
+        *("_BetweenReadings", "MarkovChains", "SwitchingMean"),
+        *("Gains", "JointPosterior", "_Likelihood", "Drawn", "Information"),
         *("NormalTruths", "NormalTruth", "MixingDensity", "Windows", "JumpChain", "Estimate", "Combination"),
         *("Batch", "Left"),
         "Whitening",

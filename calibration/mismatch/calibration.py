@@ -61,6 +61,16 @@ def out_of_bounds(equations: NormalEquations, fit: Fit) -> frozenset[str]:
     return frozenset(name for name, at in _fitted(equations, fit).items() if priors[name].out_of_bounds(at))
 
 
+def beyond_their_doubt(equations: NormalEquations, fit: Fit) -> frozenset[str]:
+    """Return what a corrected effect's uncertainty leaves open of it and a fit moves further: it has changed.
+
+    A change is looked for beside what the uncertainty allows, and would hardly be seen beside it.
+    """
+    nuisance, furthest = equations.nuisance, equations.thresholds.furthest_prior_stds
+    away = zip(nuisance.names, nuisance.prior_stds_away(fit), strict=True)
+    return frozenset(name for name, stds in away if name in nuisance.stated and stds > furthest)
+
+
 def _fitted(equations: NormalEquations, fit: Fit) -> dict[str, float]:
     """Return the values of the free parameters in a fit."""
     problem, nuisance = equations.problem, equations.nuisance

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from regolithd.calibration.mismatch.calibration import (
     bent,
+    beyond_their_doubt,
     late_otherwise,
     linearised_where_it_fits,
     moved_values,
@@ -235,7 +236,8 @@ def decided(
 
     found = _decided(candidates, stated, pose, progress)
     while True:
-        further, out = fed_back(found.decision), out_of_bounds(found.decision.equations, found.decision.whole)
+        further, decision = fed_back(found.decision), found.decision
+        out = out_of_bounds(decision.equations, decision.whole) | beyond_their_doubt(decision.equations, decision.named)
         if not further | out:
             break
         fed, held = fed | further, held | out

@@ -61,7 +61,7 @@ def information_of(decision: Decision) -> Information:
     scale = equations.design.scale[[nuisance.columns[place] for place in kept]]
     matrix, moment = matrix * np.outer(scale, scale), moment * scale
     at = np.array([problem.values[name] for name in names], np.float64)
-    held = {name: problem.values[name] for name in problem.held}
+    held = {name: problem.values[name] for name in problem.held & set(problem.values)}
     return Information(names, matrix, moment + matrix @ at, held)
 
 

@@ -94,7 +94,8 @@ class Problem:
     late: how the predicted channel is late, by `sensor_delay.OF_CHANNEL`, and by how much [s]: what acts on the machine
         shows so much later; None: it is not, or it is not known yet
     fed_back: covariates that follow the channel's noise: no curve over them explains anything
-    held: parameters that stay at their values, as the recording would move them out of their bounds
+    held: parameters that stay at their values, as the recording would move them out of their bounds; and, by the names
+        that `tangents` gives it, what stays as it is of corrected effects
     """
 
     recording: Recording

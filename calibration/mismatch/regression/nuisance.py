@@ -119,14 +119,14 @@ def tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
             names += [own_name(name, wheel) for wheel in wheels]
             stds += [problem.thresholds.own_share * free[name]] * len(wheels)
             found += [np.where(np.array(wheels) == wheel, of_parameter[name], 0.0) for wheel in wheels]
-    uncertain = [effect for effect in problem.stated if effect.relative_std > 0]
-    names += [stated_name(effect.name) for effect in uncertain]
-    stds += [effect.relative_std for effect in uncertain]
-    found += [effect.column for effect in uncertain]
     for effect in problem.stated:
-        names += [f"{stated_name(effect.name)}, {number}" for number in range(1, len(effect.deviations) + 1)]
-        stds += [1.0] * len(effect.deviations)
-        found += effect.deviations
+        about = stated_name(effect.name)
+        of_effect = [(about, effect.relative_std, effect.column)] if effect.relative_std > 0 else []
+        of_effect += [(f"{about}, {number}", 1.0, column) for number, column in enumerate(effect.deviations, 1)]
+        free_of_effect = [each for each in of_effect if each[0] not in problem.held]
+        names += [name for name, _, _ in free_of_effect]
+        stds += [std for _, std, _ in free_of_effect]
+        found += [column for _, _, column in free_of_effect]
     return names, stds, found
 
 
