@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -88,6 +89,18 @@ def test_what_has_changed_since_is_a_change(now_A: float, word: str, new: Path) 
     assert (answer.effects, change.name, change.wheels) == ((), "bearing-drag", (2,))
     assert change.low < now_A < change.high
     assert f"bearing-drag is {word}" in change.statement
+
+
+@pytest.mark.parametrize("relative_std", [0.08, 0.2])
+def test_a_drag_that_was_known_badly_is_gone_all_the_same(relative_std: float, new: Path) -> None:
+    """The readings say far more than that uncertainty: it must not take up the change."""
+    text = re.sub(r"(?m)^relative_std = .*$", f"relative_std = {relative_std}", new.read_text())
+    doubtful = new.with_name(f"{relative_std}.toml")
+    doubtful.write_text(text)
+    answer = _answer(_recording(2, 0.0), doubtful)
+    (change,) = answer.changes
+    assert (answer.effects, change.name) == ((), "bearing-drag")
+    assert change.low < 0 < change.high
 
 
 def test_what_is_new_is_named_beside_what_stays(new: Path) -> None:
