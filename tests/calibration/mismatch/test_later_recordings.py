@@ -33,7 +33,7 @@ STEP = {"onset_s": ONSET_S, "rise_s": 0.0}
 
 
 def _recording(
-    seed: int, drag_A: float, onset_s: float = 0.0, offset_A: float = 0.0, clock_s: float = 0.0
+    seed: int, drag_A: float, onset_s: float = 0.0, offset_A: float = 0.0, clock_s: float = 0.0, noise_A: float = 0.3
 ) -> Recording:
     """Return 20 minutes of a winch whose second drum drags from a time on; its clock begins anywhere."""
     generator = np.random.default_rng(seed)
@@ -41,7 +41,7 @@ def _recording(
     phase = time_s / 20 + np.array([0.0, 1.0]) + generator.uniform(0, 6)
     speed, pull = np.sin(phase) + 0.5 * np.sin(2.7 * phase), 40 + 15 * np.sin(phase / 3)
     current = 0.02 * pull + drag_A * np.sign(speed) * (time_s >= onset_s) * ON + offset_A * (1 - ON)
-    columns = {"current_A": current + generator.normal(0, 0.3, speed.shape), "speed": speed, "pull_N": pull}
+    columns = {"current_A": current + generator.normal(0, noise_A, speed.shape), "speed": speed, "pull_N": pull}
     table = {"t_s": clock_s + np.repeat(time_s, 2), "drum": np.tile([1.0, 2.0], ROWS)}
     return from_columns({**table, **{name: values.ravel() for name, values in columns.items()}}, unit="drum")
 
@@ -97,7 +97,7 @@ def test_a_drag_that_was_known_badly_is_gone_all_the_same(relative_std: float, n
     text = re.sub(r"(?m)^relative_std = .*$", f"relative_std = {relative_std}", new.read_text())
     doubtful = new.with_name(f"{relative_std}.toml")
     doubtful.write_text(text)
-    answer = _answer(_recording(2, 0.0), doubtful)
+    answer = _answer(_recording(2, 0.0, noise_A=0.03), doubtful)
     (change,) = answer.changes
     assert (answer.effects, change.name) == ((), "bearing-drag")
     assert change.low < 0 < change.high
