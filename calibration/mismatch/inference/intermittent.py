@@ -2,7 +2,8 @@
 
 A cable that rubs now and then, a valve that sticks three times, or an hour of tail wind adds to some readings alone.
 Its mean resembles a constant friction or offset; its spells lengthen the noise's memory, in which they would be lost.
-They are told from noise by their two levels (`signal/switching_mean.py`).
+They are told from noise by their two levels (`signal/switching_mean.py`); few large ones, of any course, by their
+skewness (`signal/skewness.py`).
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
 from regolithd.calibration.mismatch.selection.decision import Intermittent
 from regolithd.calibration.mismatch.selection.smooth_terms import drop_what_a_curve_explains
 from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
-from regolithd.calibration.mismatch.signal.spells import spells_in
+from regolithd.calibration.mismatch.signal.skewness import skewed_lengths
+from regolithd.calibration.mismatch.signal.spells import skewed_spells, switching_spells
 from regolithd.calibration.mismatch.signal.switching_mean import switching_mean
 
 if TYPE_CHECKING:
@@ -105,11 +107,17 @@ class _Courses:
         peers = [
             of_wheel for wheel, (of_wheel, _) in enumerate(self._of_wheel) if len(wheels) == 1 and wheel not in wheels
         ]
-        switching = switching_mean(course, peers, limits)
-        if switching is None or switching.power < limits.form_misfit * np.mean(beside**2):
+        switching, time_s = (
+            switching_mean(course, peers, limits),
+            problem.time_s[self._read[:, list(wheels)].any(axis=1), 0],
+        )
+        if switching and switching.power > limits.form_misfit * np.mean(beside**2):
+            gain, spells = switching.gain, switching_spells(course, switching)
+        elif lengths := skewed_lengths(course, beside, limits):
+            gain, spells = 0.0, skewed_spells(course, lengths)
+        else:
             return None
-        spells, time_s = spells_in(course, switching), problem.time_s[self._read[:, list(wheels)].any(axis=1), 0]
-        return switching.gain, (float(time_s[spells.first]), float(time_s[spells.last]), spells.share)
+        return gain, (float(time_s[spells.first]), float(time_s[spells.last]), spells.share)
 
     def _of(self, wheels: tuple[int, ...]) -> tuple[Array, Array]:
         on = list(wheels)

@@ -1,4 +1,4 @@
-"""When something comes and goes that switches the mean of a course, and how much of the power it is."""
+"""When something comes and goes in a course of readings, and how much of the power it is."""
 
 from __future__ import annotations
 
@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.signal.means import running_mean
+from regolithd.calibration.mismatch.signal.skewness import third_cumulant
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from regolithd.calibration.mismatch.signal.switching_mean import SwitchingMean
 
 Array = NDArray[np.float64]
@@ -31,7 +36,7 @@ class Spells:
     share: float
 
 
-def spells_in(course: Array, switching: SwitchingMean) -> Spells:
+def switching_spells(course: Array, switching: SwitchingMean) -> Spells:
     """Return the spells of a course (reading,) whose mean switches so."""
     probability = switching.acting(course)
     blocks = np.flatnonzero(probability > MORE_PROBABLY_THAN_NOT)
@@ -42,3 +47,41 @@ def spells_in(course: Array, switching: SwitchingMean) -> Spells:
     whole = max(float(np.mean((course - between) ** 2)), 1e-300)
     last = (int(blocks[-1]) + 1) * switching.block - 1
     return Spells(int(blocks[0]) * switching.block, last, float(np.clip(power / whole, 0.0, 1.0)))
+
+
+def skewed_spells(course: Array, lengths: Sequence[int]) -> Spells:
+    """Return the spells in a course (time,) of which running means of these lengths are skewed, in ascending order.
+
+    The longest means have the least noise, and show when it acts: a spell begins about in the middle of the first mean
+    that has risen. The shortest lose least of a spell's height.
+    """
+    level, acting = _between_spells(_upwards(course, lengths[-1]))
+    own = _upwards(course, lengths[0])
+    about = own - _between_spells(own)[0]
+    # Noise has as much power above its level as below.
+    power = float(np.sum(about * np.abs(about))) / len(about)
+    whole = float(np.mean(course**2)) + level**2
+    middle = (lengths[-1] - 1) // 2
+    share = float(np.clip(power / max(whole, 1e-300), 0.0, 1.0))
+    return Spells(int(acting[0]) + middle, int(acting[-1]) + middle, share)
+
+
+def _upwards(course: Array, length: int) -> Array:
+    """Return running means, of the sign in which they are skewed."""
+    means = running_mean(course, length)
+    return means * (1.0 if third_cumulant(means) >= 0 else -1.0)
+
+
+def _between_spells(means: Array) -> tuple[float, NDArray[np.int64]]:
+    """Return the level between spells, which add to it, and the indices of means in which they act.
+
+    Noise is symmetric: what is further above the level than the lowest mean is below it is in a spell. What is not in
+    a spell has the level as its median.
+    """
+    acting = np.zeros(len(means), bool)
+    while True:
+        level = float(np.median(means[~acting]))
+        above = means > 2 * level - np.min(means)
+        if not np.any(above & ~acting):
+            return level, np.flatnonzero(acting if acting.any() else means == np.max(means))
+        acting |= above

@@ -5,9 +5,6 @@ is switched by a hidden Markov chain (Hamilton, 1989), is compared with those of
 autoregression of any memory, and an autoregression whose size switches. Neither spells of equal length nor few of them
 are needed, and noise that is as slow as the spells has its own likelihood. Other wheels tell how much slow noise there
 is: that one wheel has far more of it than its peers is less probable than that it has spells.
-
-A machine with a state follows what comes and goes, and then forgets it. So the same is asked of what is new in each
-reading beside the one before, of which the mean switches then (a switching intercept; Hamilton, 1994, 22.4).
 """
 
 from __future__ import annotations
@@ -61,14 +58,12 @@ class SwitchingMean:
     Attributes
     ----------
     block: readings in a block
-    forgets: factor by which the course follows its own last block; 0: it is asked for its levels as they are
-    amplitude: the second level above the first, once the course has followed it
+    amplitude: the second level above the first
     share, duration: of the time, and mean duration of a spell [blocks], in which the second level holds
     gain: twice the logarithm of the likelihood ratio to noise alone, less what the free numbers cost
     """
 
     block: int
-    forgets: float
     amplitude: float
     share: float
     duration: float
@@ -81,8 +76,8 @@ class SwitchingMean:
 
     def acting(self, course: Array) -> Array:
         """Return the probability that the second level holds in each block of the course, shape (block,)."""
-        values, size = _standardised(_new_in(block_means(course, self.block), self.forgets))
-        model = np.array([[self.amplitude * (1 - self.forgets) / size, self.share, self.duration]])
+        values, size = _standardised(block_means(course, self.block))
+        model = np.array([[self.amplitude / size, self.share, self.duration]])
         _, chains, first, after = _switching_densities(values, model)
         return chains.second_state(first, after)
 
@@ -98,12 +93,10 @@ def switching_mean(
         return None
     found = []
     for length in {max(len(course) // blocks, 1) for blocks in BLOCKS}:
-        means, others = block_means(course, length), [block_means(peer, length) for peer in peers]
-        for forgets in (0.0, _persistence(means)):
-            switching = _switching(_new_in(means, forgets), [_new_in(each, forgets) for each in others], thresholds)
-            if switching is not None:
-                (amplitude, share, duration), gain = switching
-                found.append(SwitchingMean(length, forgets, amplitude / (1 - forgets), share, duration, gain))
+        switching = _switching(block_means(course, length), [block_means(peer, length) for peer in peers], thresholds)
+        if switching is not None:
+            (amplitude, share, duration), gain = switching
+            found.append(SwitchingMean(length, amplitude, share, duration, gain))
     return max(found, key=lambda each: each.gain, default=None)
 
 
@@ -111,11 +104,6 @@ def _persistence(values: Array) -> float:
     """Return the correlation of values with the one before."""
     centred = values - values.mean()
     return float(np.clip(centred[:-1] @ centred[1:] / max(float(centred @ centred), 1e-300), 0, HIGHEST_CORRELATION))
-
-
-def _new_in(values: Array, forgets: float) -> Array:
-    """Return values less so much of the one before; the values themselves where that is nothing."""
-    return values[1:] - forgets * values[:-1] if forgets else values
 
 
 def _switching(
@@ -126,10 +114,12 @@ def _switching(
     unlike = _unlike_peers(peers)
 
     def likelihood(models: Array) -> Array:
-        return _switching_likelihood(values, models) - unlike(size**2 * _noise_variance(models)) - FREE
+        beside = unlike(size**2 * _noise_variance(models), _noise_correlation(values, models))
+        return _switching_likelihood(values, models) - beside - FREE
 
     def least(of_noise: float) -> float:
-        return of_noise - float(unlike(np.array(size**2))) + thresholds.switching_entry / 2
+        beside = unlike(np.array(size**2), np.array(_persistence(values)))
+        return of_noise - float(beside) + thresholds.switching_entry / 2
 
     amplitudes, needed = (*AMPLITUDES, *(-each for each in AMPLITUDES)), least(_autoregression_likelihood(values))
     (amplitude, *spells), most = _maximised(likelihood, _grid(amplitudes, SHARES, DURATIONS), needed)
@@ -142,18 +132,32 @@ def _switching(
     return ((amplitude * size, spells[0], spells[1]), gain) if most > needed else None
 
 
-def _unlike_peers(peers: Sequence[Array]) -> Callable[[Array], Array]:
-    """Return by how much a variance is improbable beside those of peers (block,), in log likelihood below the highest.
+def _unlike_peers(peers: Sequence[Array]) -> Callable[[Array, Array], Array]:
+    """Return by how much variance and correlation of noise are improbable beside those of peers (block,).
 
-    The logarithms of variances are normally distributed over wheels, so that another one has Student's distribution
-    (Gelman et al., 2013, 3.2); fewer than two peers say nothing.
+    In log likelihood below the highest. Fewer than two peers say nothing. Logarithms of variances, and Fisher's
+    transforms of correlations, scatter at least as those of so many blocks do by chance: with variances of
+    2 (1 + ρ²) / (1 − ρ²) over their number (Bartlett, 1946), and of one over it.
     """
-    logs = np.log([variance for peer in peers if peer.size and (variance := float(np.var(peer))) > 0])
-    if len(logs) < 2 or not np.ptp(logs) > 0:  # a scatter needs two
-        return lambda variance: np.zeros(np.shape(variance))
-    scale = float(np.var(logs, ddof=1)) * (1 + 1 / len(logs))
-    centre, count = float(np.mean(logs)), len(logs)
-    return lambda variance: count / 2 * np.log1p((np.log(variance) - centre) ** 2 / (scale * (count - 1)))
+    known = [peer for peer in peers if peer.size and np.ptp(peer) > 0]
+    if len(known) < 2:  # a scatter needs two
+        return lambda variance, correlation: np.zeros(np.shape(variance))  # noqa: ARG005  # of both
+    correlations, blocks = np.array([_persistence(peer) for peer in known]), np.array([len(peer) for peer in known])
+    by_chance = 2 * (1 + correlations**2) / (1 - correlations**2) / blocks
+    of_variance = _unlike(np.log([np.var(peer) for peer in known]), float(np.mean(by_chance)))
+    of_correlation = _unlike(np.arctanh(correlations), float(np.mean(1 / blocks)))
+    return lambda variance, correlation: of_variance(np.log(variance)) + of_correlation(np.arctanh(correlation))
+
+
+def _unlike(of_peers: Array, least: float) -> Callable[[Array], Array]:
+    """Return by how much a value is improbable beside those of peers, which scatter by this variance at least.
+
+    They are normally distributed over wheels, so that another one has Student's distribution (Gelman et al., 2013,
+    3.2).
+    """
+    count, centre = len(of_peers), float(np.mean(of_peers))
+    scale = max(float(np.var(of_peers, ddof=1)), least) * (1 + 1 / count) * (count - 1)
+    return lambda value: count / 2 * np.log1p((value - centre) ** 2 / scale)
 
 
 def _standardised(values: Array) -> tuple[Array, float]:
@@ -213,6 +217,14 @@ def _noise_variance(models: Array) -> Array:
     return np.asarray(np.maximum(1 - amplitude**2 * share * (1 - share), LEAST_NOISE))
 
 
+def _noise_correlation(values: Array, models: Array) -> Array:
+    """Return the correlation from one block to the next that the spells of each model leave to the noise."""
+    amplitude, share, duration = models.T
+    of_spells = amplitude**2 * share * (1 - share)
+    lagged = float(values[:-1] @ values[1:]) / len(values) - of_spells * MarkovChains(share, duration).memory
+    return np.asarray(np.clip(lagged / _noise_variance(models), 0, HIGHEST_CORRELATION))
+
+
 def _switching_likelihood(values: Array, models: Array) -> Array:
     """Return the log likelihood of each model (amplitude, share, duration), shape (model,)."""
     possible, chains, first, after = _switching_densities(values, models)
@@ -228,8 +240,7 @@ def _switching_densities(values: Array, models: Array) -> tuple[NDArray[np.bool_
     chains = MarkovChains(share, duration)
     of_spells = amplitude**2 * share * (1 - share)
     noise = _noise_variance(models)
-    lagged = float(values[:-1] @ values[1:]) / len(values)
-    correlation = np.clip((lagged - of_spells * chains.memory) / noise, 0, HIGHEST_CORRELATION)
+    correlation = _noise_correlation(values, models)
     levels = np.stack((-amplitude * share, amplitude * (1 - share)), axis=-1)
     innovation = (noise * (1 - correlation**2))[:, None, None, None]
     means = levels[:, None, :] - correlation[:, None, None] * levels[:, :, None]

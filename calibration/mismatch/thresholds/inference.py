@@ -41,10 +41,22 @@ class InferenceThresholds:
     )
     # What comes and goes
     switching_entry: float = threshold(
-        12.0,
+        22.0,
         "Gain (twice the log likelihood ratio) by which a mean that switches has to be likelier than noise.",
-        f"{TRIALS}: of 400 courses of ten kinds of noise at most 9, of 400 residuals of a rover, an AGV and an arm "
-        "without spells at most 11; seven spells of 1 to 1.5 times the noise, on one of six wheels, gain 8 to 110",
+        f"{TRIALS}: of 400 courses of ten kinds of noise at most 9, of 54 blind recordings and 28 of strangers without "
+        "spells at most 21; seven spells of 1 to 1.5 times the noise, on one of six wheels, gain 19 and 56 (medians)",
+    )
+    most_skewness_errors: float = threshold(
+        4.0,
+        "Standard errors of the skewness of running means beyond which a residual is skewed.",
+        "standard: 6e-5 on both sides of a normal distribution, thus about one in a thousand sound recordings at some "
+        "of their lengths, axes and directions",
+    )
+    least_skewness: float = threshold(
+        0.8,
+        "Skewness below which it is no finding: laws and sensors are not quite linear.",
+        f"{TRIALS}: in 94 recordings of twelve machines with nothing, or what was found, left out, it was at most 0.6 "
+        "where it was beyond 2.5 standard errors; with drag in spells, a sticking valve or slipstream 0.9 to 1.7",
     )
     noise_size_readings: int = threshold(
         32,
@@ -55,6 +67,11 @@ class InferenceThresholds:
         40,
         "Readings below which it is not asked for what comes and goes.",
         f"{CHOICE}: ten spells of the shortest duration that is tried, with as much time between them",
+    )
+    fewest_means: int = threshold(
+        40,
+        "Running means that do not overlap, below which their skewness is not asked for.",
+        f"{CHOICE}: the skewness of 40 normal values is known to sqrt(6/40) = 0.4",
     )
     # Identifiability
     confusion_rate: float = threshold(

@@ -1,0 +1,149 @@
+"""What comes and goes is told from noise that is as often above its mean as below."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
+from regolithd.calibration.mismatch.signal.skewness import skewed_lengths, skewness_error, third_cumulant
+from regolithd.calibration.mismatch.signal.spells import skewed_spells
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.random import Generator
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+READINGS, RECORDINGS = 4000, 40
+
+
+def with_memory(random: Generator, readings: float) -> Array:
+    """Return noise of size 1 whose autocorrelation falls to 1/e in so many readings."""
+    decay = np.exp(-np.arange(int(6 * readings)) / readings)
+    long = np.convolve(random.normal(size=READINGS + len(decay) - 1), decay, "valid")
+    return np.asarray(long / np.sqrt(np.sum(decay**2)))
+
+
+def partly(random: Generator, readings: float, slow: float = 0.25) -> Array:
+    """Return noise of size 1 with this share of its variance in a memory, the rest in single readings."""
+    return np.asarray(np.sqrt(1 - slow) * random.normal(size=READINGS) + np.sqrt(slow) * with_memory(random, readings))
+
+
+def of_load(random: Generator, readings: int) -> Array:
+    """Return noise that grows with a load, which stays for so many readings."""
+    load = random.choice([0.3, 0.5, 1.0, 2.0], READINGS // readings)
+    return np.asarray(np.repeat(load, readings) * partly(random, 9))
+
+
+NOISE: dict[str, Callable[[Generator], Array]] = {
+    "white": lambda random: random.normal(size=READINGS),
+    "memory of 1 s at 5 Hz": lambda random: with_memory(random, 5),
+    "memory of 15 s at 5 Hz": lambda random: with_memory(random, 75),
+    "partly with a memory of 15 s": lambda random: partly(random, 75, 0.5),
+    "quantised": lambda random: np.round(partly(random, 9) / 0.5) * 0.5,
+    "heavy tails": lambda random: random.standard_t(3, READINGS),
+    "skewed single readings": lambda random: random.exponential(size=READINGS) - 1,
+    "grows with load": lambda random: of_load(random, 100),
+    "grows with load for long": lambda random: of_load(random, 400),
+    "of slowly changing size": lambda random: np.exp(0.5 * with_memory(random, 100)) * random.normal(size=READINGS),
+}
+
+
+def lengths_of(noise: Array) -> tuple[int, ...]:
+    """Return the lengths at which one course of readings is skewed."""
+    one = np.ones((len(noise), 1))
+    left = (noise - noise.mean())[:, None]
+    return skewed_lengths(*of_usual_noise(left, 0 * left, one > 0, one))
+
+
+def in_spells(random: Generator, rms: float) -> tuple[Array, Array]:
+    """Return a drag of 40 to 125 readings with this rms now and then, and whether it acts."""
+    acting, at = np.zeros(READINGS, bool), int(random.uniform(50, 250))
+    drag = np.zeros(READINGS)
+    while at < READINGS:
+        length = int(random.uniform(40, 125))
+        part = slice(at, min(at + length, READINGS))
+        drag[part], acting[part] = random.uniform(0.5, 1.5), True
+        at += length + int(random.uniform(125, 450))
+    return drag * rms / np.sqrt(np.mean(drag**2)), acting
+
+
+@pytest.mark.parametrize("noise", NOISE.values(), ids=NOISE)
+def test_symmetric_noise_hardly_ever_comes_and_goes(noise: Callable[[Generator], Array]) -> None:
+    """White, with a memory, quantised, with single readings that are skewed, and where its size changes."""
+    assert sum(bool(lengths_of(noise(np.random.default_rng(seed)))) for seed in range(RECORDINGS)) <= RECORDINGS / 20
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("rms", "rate"), [(0.7, 0.6), (1.0, 0.9)])
+def test_spells_are_seen_whichever_way_they_pull(rms: float, rate: float, sign: float) -> None:
+    """A belt that rubs a dozen times, as strongly over all readings as this share of the noise."""
+    seen = 0
+    for seed in range(RECORDINGS):
+        random = np.random.default_rng(seed)
+        seen += bool(lengths_of(sign * in_spells(random, rms)[0] + partly(random, 9)))
+    assert seen >= rate * RECORDINGS
+
+
+def test_spells_of_all_axes_are_seen_together() -> None:
+    """Each axis has noise of its own and of another size, of which half is left in the sum of four."""
+    alone = together = 0
+    for seed in range(RECORDINGS):
+        random = np.random.default_rng(seed)
+        noise = np.stack([partly(random, 9) for _ in range(4)], axis=1)
+        left = (in_spells(random, 0.5)[0][:, None] + noise) * np.array([1.0, 2.0, 5.0, 0.1])
+        left -= left.mean(axis=0)
+        one = np.ones(left.shape)
+        together += bool(skewed_lengths(*of_usual_noise(left, 0 * left, one > 0, one)))
+        alone += bool(lengths_of(left[:, 0]))
+    assert together >= 0.9 * RECORDINGS
+    assert alone < 0.3 * RECORDINGS
+
+
+def test_what_named_effects_explain_is_no_spell() -> None:
+    """A tenth of a large effect is the misfit of its law."""
+    random = np.random.default_rng(2)
+    drag, _ = in_spells(random, 2.0)
+    left = drag + partly(random, 9)
+    assert skewed_lengths(left - left.mean(), 0 * left)
+    assert not skewed_lengths(left - left.mean(), 10 * left)
+
+
+def test_spells_are_located_and_measured() -> None:
+    """From the first to the last, and their share of the power, most of it: in the median over recordings."""
+    first, last, shares = [], [], []
+    for seed in range(RECORDINGS):
+        random = np.random.default_rng(seed)
+        drag, acting = in_spells(random, 0.9)
+        left = drag + partly(random, 9)
+        if lengths := lengths_of(left):
+            spells, at = skewed_spells(left - left.mean(), lengths), np.flatnonzero(acting)
+            first.append(spells.first - at[0])
+            last.append(spells.last - at[-1])
+            shares.append(spells.share)
+    assert abs(np.median(first)) < READINGS / 40
+    assert abs(np.median(last)) < READINGS / 40
+    assert np.median(shares) == pytest.approx(0.9**2 / (1 + 0.9**2), abs=0.1)
+
+
+def test_without_any_reading_above_the_mirrored_lowest_the_highest_mean_is_the_spell() -> None:
+    """Means that are hardly skewed have a place as well."""
+    course = np.array([-1.0, -0.5, -0.5, 0.0, 0.0, 0.2, 1.0])
+    assert (skewed_spells(course, (1,)).first, skewed_spells(course, (1,)).last) == (6, 6)
+
+
+def test_the_standard_error_is_that_of_autocorrelated_noise() -> None:
+    """Over many draws the skewness spreads as its standard error says."""
+    random = np.random.default_rng(1)
+    found = []
+    for _ in range(200):
+        noise = np.convolve(random.normal(size=2000), 0.8 ** np.arange(20))[:2000]
+        found.append((third_cumulant(noise) / np.std(noise) ** 3, skewness_error(noise)))
+    skewness, errors = np.array(found).T
+    assert np.std(skewness) == pytest.approx(errors.mean(), rel=0.15)
+    assert skewness_error(np.zeros(50)) == float("inf")
