@@ -13,6 +13,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.regression.equations import free_parameter_equations, smooth_equations
+from regolithd.calibration.mismatch.regression.nuisance import stated_name
 from regolithd.calibration.mismatch.selection.noise_estimation import fit_of_significant_terms
 
 if TYPE_CHECKING:
@@ -62,13 +63,14 @@ def out_of_bounds(equations: NormalEquations, fit: Fit) -> frozenset[str]:
 
 
 def beyond_their_doubt(equations: NormalEquations, fit: Fit) -> frozenset[str]:
-    """Return what a corrected effect's uncertainty leaves open of it and a fit moves further: it has changed.
+    """Return the sizes of corrected effects that a fit moves further than their uncertainty: they have changed.
 
     A change is looked for beside what the uncertainty allows, and would hardly be seen beside it.
     """
     nuisance, furthest = equations.nuisance, equations.thresholds.furthest_prior_stds
+    sizes = {stated_name(effect.name) for effect in equations.problem.stated}
     away = zip(nuisance.names, nuisance.prior_stds_away(fit), strict=True)
-    return frozenset(name for name, stds in away if name in nuisance.stated and stds > furthest)
+    return frozenset(name for name, stds in away if name in sizes and stds > furthest)
 
 
 def _fitted(equations: NormalEquations, fit: Fit) -> dict[str, float]:

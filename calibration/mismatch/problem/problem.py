@@ -95,7 +95,7 @@ class Problem:
         shows so much later; None: it is not, or it is not known yet
     fed_back: covariates that follow the channel's noise: no curve over them explains anything
     held: parameters that stay at their values, as the recording would move them out of their bounds; and, by the names
-        that `tangents` gives it, what stays as it is of corrected effects
+        that `tangents` gives them, sizes of corrected effects
     """
 
     recording: Recording

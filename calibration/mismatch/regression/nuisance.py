@@ -121,12 +121,11 @@ def tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
             found += [np.where(np.array(wheels) == wheel, of_parameter[name], 0.0) for wheel in wheels]
     for effect in problem.stated:
         about = stated_name(effect.name)
-        of_effect = [(about, effect.relative_std, effect.column)] if effect.relative_std > 0 else []
-        of_effect += [(f"{about}, {number}", 1.0, column) for number, column in enumerate(effect.deviations, 1)]
-        free_of_effect = [each for each in of_effect if each[0] not in problem.held]
-        names += [name for name, _, _ in free_of_effect]
-        stds += [std for _, std, _ in free_of_effect]
-        found += [column for _, _, column in free_of_effect]
+        if effect.relative_std > 0 and about not in problem.held:
+            names, stds, found = [*names, about], [*stds, effect.relative_std], [*found, effect.column]
+        names += [f"{about}, {number}" for number in range(1, len(effect.deviations) + 1)]
+        stds += [1.0] * len(effect.deviations)
+        found += effect.deviations
     return names, stds, found
 
 
