@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
 from regolithd.calibration.mismatch.selection.decision import Intermittent
-from regolithd.calibration.mismatch.selection.smooth_terms import drop_what_a_curve_explains
+from regolithd.calibration.mismatch.selection.smooth_terms import drop_what_gains_little
 from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
 from regolithd.calibration.mismatch.signal.skewness import skewed_lengths
 from regolithd.calibration.mismatch.signal.spells import skewed_spells, switching_spells
@@ -54,7 +54,7 @@ def unexplained_if_intermittent(decision: Decision) -> Decision:
     told = {wheel for term in curves for wheel in term.wheels}
     named = equations.fit([term for term in decision.named.terms if not _constant_on(term, told)])
     for curve in curves:
-        named = drop_what_a_curve_explains(equations, named, curve)
+        named = drop_what_gains_little(equations, named, curve)
     unnamed = (*decision.unnamed, *curves)
     whole = equations.fit((*named.terms, *unnamed))
     return replace(decision, named=named, unnamed=unnamed, whole=whole, intermittent=found)

@@ -152,17 +152,18 @@ def drop_what_a_curve_explains(equations: NormalEquations, named: Fit, curve: Te
     These are effects of the curve's own covariate, which are a part of one unknown law, and those that gain little
     beside a curve that gains much.
     """
+    kept = drop_what_gains_little(equations, named, curve).terms
+    return equations.fit([term for term in kept if not _same_quantity(equations.problem, term, curve)])
+
+
+def drop_what_gains_little(equations: NormalEquations, named: Fit, curve: Term) -> Fit:
+    """Leave out effects that gain little beside a curve that gains much."""
     both = equations.fit((*named.terms, curve))
-    unknown = both.delta_chi2 - named.delta_chi2
-    kept = []
-    for index, term in enumerate(named.terms):
-        without = equations.fit((*named.without(index), curve))
-        gain = both.delta_chi2 - without.delta_chi2
-        if not _same_quantity(equations.problem, term, curve) and (
-            gain >= equations.thresholds.beside_smooth_share * unknown
-        ):
-            kept.append(term)
-    return equations.fit(kept)
+    least = equations.thresholds.beside_smooth_share * (both.delta_chi2 - named.delta_chi2)
+    gains = [
+        both.delta_chi2 - equations.fit((*named.without(index), curve)).delta_chi2 for index in range(len(named.terms))
+    ]
+    return equations.fit([term for term, gain in zip(named.terms, gains, strict=True) if gain >= least])
 
 
 def _same_quantity(problem: Problem, term: Term, curve: Term) -> bool:
