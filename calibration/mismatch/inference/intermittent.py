@@ -104,19 +104,16 @@ class _Courses:
         """Return the spells in the sum of these wheels, with their gain; small ones are the misfit of a named law."""
         problem, limits = self._problem, self._problem.thresholds
         course, beside = self._of(wheels) if len(wheels) > 1 else self._of_wheel[wheels[0]]
-        peers = [
-            of_wheel for wheel, (of_wheel, _) in enumerate(self._of_wheel) if len(wheels) == 1 and wheel not in wheels
-        ]
-        switching, time_s = (
-            switching_mean(course, peers, limits),
-            problem.time_s[self._read[:, list(wheels)].any(axis=1), 0],
-        )
+        others = [wheel for wheel in range(len(self._of_wheel)) if wheel not in wheels]
+        switching = switching_mean(course, [self._of_wheel[wheel][0] for wheel in others], limits)
         if switching and switching.power > limits.form_misfit * np.mean(beside**2):
             gain, spells = switching.gain, switching_spells(course, switching)
         elif lengths := skewed_lengths(course, beside, limits):
-            gain, spells = 0.0, skewed_spells(course, lengths)
+            spells = skewed_spells(course, lengths)
+            gain = spells.share  # less than any two levels gain
         else:
             return None
+        time_s = problem.time_s[self._read[:, list(wheels)].any(axis=1), 0]
         return gain, (float(time_s[spells.first]), float(time_s[spells.last]), spells.share)
 
     def _of(self, wheels: tuple[int, ...]) -> tuple[Array, Array]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from noise_courses import NOISE, READINGS, RECORDINGS, in_spells, partly
 
 from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
 from regolithd.calibration.mismatch.signal.skewness import skewed_lengths, skewness_error, third_cumulant
@@ -19,58 +20,12 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-READINGS, RECORDINGS = 4000, 40
-
-
-def with_memory(random: Generator, readings: float) -> Array:
-    """Return noise of size 1 whose autocorrelation falls to 1/e in so many readings."""
-    decay = np.exp(-np.arange(int(6 * readings)) / readings)
-    long = np.convolve(random.normal(size=READINGS + len(decay) - 1), decay, "valid")
-    return np.asarray(long / np.sqrt(np.sum(decay**2)))
-
-
-def partly(random: Generator, readings: float, slow: float = 0.25) -> Array:
-    """Return noise of size 1 with this share of its variance in a memory, the rest in single readings."""
-    return np.asarray(np.sqrt(1 - slow) * random.normal(size=READINGS) + np.sqrt(slow) * with_memory(random, readings))
-
-
-def of_load(random: Generator, readings: int) -> Array:
-    """Return noise that grows with a load, which stays for so many readings."""
-    load = random.choice([0.3, 0.5, 1.0, 2.0], READINGS // readings)
-    return np.asarray(np.repeat(load, readings) * partly(random, 9))
-
-
-NOISE: dict[str, Callable[[Generator], Array]] = {
-    "white": lambda random: random.normal(size=READINGS),
-    "memory of 1 s at 5 Hz": lambda random: with_memory(random, 5),
-    "memory of 15 s at 5 Hz": lambda random: with_memory(random, 75),
-    "partly with a memory of 15 s": lambda random: partly(random, 75, 0.5),
-    "quantised": lambda random: np.round(partly(random, 9) / 0.5) * 0.5,
-    "heavy tails": lambda random: random.standard_t(3, READINGS),
-    "skewed single readings": lambda random: random.exponential(size=READINGS) - 1,
-    "grows with load": lambda random: of_load(random, 100),
-    "grows with load for long": lambda random: of_load(random, 400),
-    "of slowly changing size": lambda random: np.exp(0.5 * with_memory(random, 100)) * random.normal(size=READINGS),
-}
-
 
 def lengths_of(noise: Array) -> tuple[int, ...]:
     """Return the lengths at which one course of readings is skewed."""
     one = np.ones((len(noise), 1))
     left = (noise - noise.mean())[:, None]
     return skewed_lengths(*of_usual_noise(left, 0 * left, one > 0, one))
-
-
-def in_spells(random: Generator, rms: float) -> tuple[Array, Array]:
-    """Return a drag of 40 to 125 readings with this rms now and then, and whether it acts."""
-    acting, at = np.zeros(READINGS, bool), int(random.uniform(50, 250))
-    drag = np.zeros(READINGS)
-    while at < READINGS:
-        length = int(random.uniform(40, 125))
-        part = slice(at, min(at + length, READINGS))
-        drag[part], acting[part] = random.uniform(0.5, 1.5), True
-        at += length + int(random.uniform(125, 450))
-    return drag * rms / np.sqrt(np.mean(drag**2)), acting
 
 
 @pytest.mark.parametrize("noise", NOISE.values(), ids=NOISE)

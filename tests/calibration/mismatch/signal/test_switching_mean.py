@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from noise_courses import NOISE, READINGS, RECORDINGS, in_spells, partly, with_memory
 
 from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
 from regolithd.calibration.mismatch.signal.spells import switching_spells
@@ -19,40 +20,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-READINGS, RECORDINGS = 4000, 40
-
-
-def with_memory(random: Generator, readings: float) -> Array:
-    """Return noise of size 1 whose autocorrelation falls to 1/e in so many readings."""
-    decay = np.exp(-np.arange(int(6 * readings)) / readings)
-    long = np.convolve(random.normal(size=READINGS + len(decay) - 1), decay, "valid")
-    return np.asarray(long / np.sqrt(np.sum(decay**2)))
-
-
-def partly(random: Generator, readings: float, slow: float = 0.25) -> Array:
-    """Return noise of size 1 with this share of its variance in a memory, the rest in single readings."""
-    return np.asarray(np.sqrt(1 - slow) * random.normal(size=READINGS) + np.sqrt(slow) * with_memory(random, readings))
-
-
-def of_load(random: Generator, readings: int) -> Array:
-    """Return noise that grows with a load, which stays for so many readings."""
-    load = random.choice([0.3, 0.5, 1.0, 2.0], READINGS // readings)
-    return np.asarray(np.repeat(load, readings) * partly(random, 9))
-
-
-NOISE: dict[str, Callable[[Generator], Array]] = {
-    "white": lambda random: random.normal(size=READINGS),
-    "memory of 1 s at 5 Hz": lambda random: with_memory(random, 5),
-    "memory of 15 s at 5 Hz": lambda random: with_memory(random, 75),
-    "partly with a memory of 15 s": lambda random: partly(random, 75, 0.5),
-    "quantised": lambda random: np.round(partly(random, 9) / 0.5) * 0.5,
-    "heavy tails": lambda random: random.standard_t(3, READINGS),
-    "skewed single readings": lambda random: random.exponential(size=READINGS) - 1,
-    "grows with load": lambda random: of_load(random, 100),
-    "grows with load for long": lambda random: of_load(random, 400),
-    "of slowly changing size": lambda random: np.exp(0.5 * with_memory(random, 100)) * random.normal(size=READINGS),
-}
-
 
 def over_its_noise(course: Array) -> Array:
     """Return one course of readings over the size of its noise."""
@@ -63,18 +30,6 @@ def over_its_noise(course: Array) -> Array:
 def found_in(course: Array, peers: Sequence[Array] = ()) -> SwitchingMean | None:
     """Return the two levels of a course, if it has them."""
     return switching_mean(over_its_noise(course), [over_its_noise(peer) for peer in peers])
-
-
-def in_spells(random: Generator, rms: float) -> tuple[Array, Array]:
-    """Return a drag of 40 to 125 readings with this rms now and then, and whether it acts."""
-    acting, at = np.zeros(READINGS, bool), int(random.uniform(50, 250))
-    drag = np.zeros(READINGS)
-    while at < READINGS:
-        length = int(random.uniform(40, 125))
-        part = slice(at, min(at + length, READINGS))
-        drag[part], acting[part] = random.uniform(0.5, 1.5), True
-        at += length + int(random.uniform(125, 450))
-    return drag * rms / np.sqrt(np.mean(drag**2)), acting
 
 
 @pytest.mark.parametrize("noise", NOISE.values(), ids=NOISE)
