@@ -213,15 +213,20 @@ def _autoregression_likelihood(values: Array) -> float:
 
 def _noise_variance(models: Array) -> Array:
     """Return the variance that the spells of each model (amplitude, share, duration) leave of 1 to the noise."""
+    return np.asarray(np.maximum(1 - _spells_variance(models), LEAST_NOISE))
+
+
+def _spells_variance(models: Array) -> Array:
+    """Return the variance that the spells of each model add, of 1."""
     amplitude, share, _ = models.T
-    return np.asarray(np.maximum(1 - amplitude**2 * share * (1 - share), LEAST_NOISE))
+    return np.asarray(amplitude**2 * share * (1 - share))
 
 
 def _noise_correlation(values: Array, models: Array) -> Array:
     """Return the correlation from one block to the next that the spells of each model leave to the noise."""
-    amplitude, share, duration = models.T
-    of_spells = amplitude**2 * share * (1 - share)
-    lagged = float(values[:-1] @ values[1:]) / len(values) - of_spells * MarkovChains(share, duration).memory
+    _, share, duration = models.T
+    memory = MarkovChains(share, duration).memory
+    lagged = float(values[:-1] @ values[1:]) / len(values) - _spells_variance(models) * memory
     return np.asarray(np.clip(lagged / _noise_variance(models), 0, HIGHEST_CORRELATION))
 
 
@@ -238,7 +243,6 @@ def _switching_densities(values: Array, models: Array) -> tuple[NDArray[np.bool_
     """
     amplitude, share, duration = models.T
     chains = MarkovChains(share, duration)
-    of_spells = amplitude**2 * share * (1 - share)
     noise = _noise_variance(models)
     correlation = _noise_correlation(values, models)
     levels = np.stack((-amplitude * share, amplitude * (1 - share)), axis=-1)
@@ -247,7 +251,7 @@ def _switching_densities(values: Array, models: Array) -> tuple[NDArray[np.bool_
     new = (values[1:] - correlation[:, None] * values[:-1])[:, :, None, None] - means[:, None]
     after = -0.5 * (new**2 / innovation + np.log(innovation))
     first = -0.5 * ((values[0] - levels) ** 2 / noise[:, None] + np.log(noise[:, None]))
-    possible = (of_spells <= 1 - LEAST_NOISE) & (chains.leaving[0] < 0.5)  # else it is the usual state
+    possible = (_spells_variance(models) <= 1 - LEAST_NOISE) & (chains.leaving[0] < 0.5)  # else it is the usual state
     return possible, chains, first, after
 
 
@@ -255,7 +259,7 @@ def _resized_likelihood(values: Array, models: Array) -> Array:
     """Return the log likelihood of noise whose size switches, of each model (ratio, share, duration), (model,)."""
     ratio, share, duration = models.T
     chains = MarkovChains(share, duration)
-    correlation = float(np.clip(values[:-1] @ values[1:] / (values @ values), 0, HIGHEST_CORRELATION))
+    correlation = _persistence(values)
     new = values[1:] - correlation * values[:-1]
     smaller = np.mean(new**2) / (1 - share + share * ratio**2)
     variance = np.stack((smaller, smaller * ratio**2), axis=-1)
