@@ -3,7 +3,8 @@
 No clock is read here. A SYNC opens a window, and readings fill it. It closes
 
 - at the next SYNC, or
-- as soon as every PDO that came in one of the last three windows has come in this one, none of them ambiguous.
+- as soon as every PDO that came in one of the last three windows has come in this one, none of them ambiguous. A PDO
+  that starts to come, since its node has booted, is not waited for yet: its first answer may be late.
 
 A PDO does not say which SYNC it answers, and a node that was delayed may answer an old SYNC after the next has been
 sent. So the answers of each PDO are counted: each SYNC makes one more outstanding, each answer one fewer.

@@ -70,6 +70,17 @@ def test_a_lost_node_delays_three_snapshots_and_no_more_and_is_taken_up_again_wh
     assert not np.isnan(again[-1].motor_current_A).any()
 
 
+def test_the_first_answer_of_a_node_may_come_after_the_others_have_closed_the_window() -> None:
+    """Node 1 boots before the others: window 1 closes with its answer, and the first answers of 2 to 6 are late."""
+    taken = acquisition()
+    window(taken, 0, nodes=(1,))
+    (_, second) = window(taken, 1)
+    assert np.isfinite(second.motor_current_A).tolist() == [True] + [False] * 5
+    assert taken.counters.late == 5
+    (third,) = window(taken, 2)
+    assert np.isfinite(third.motor_current_A).all()
+
+
 def test_an_answer_that_comes_after_the_next_sync_is_never_taken_for_a_fresh_one() -> None:
     """Node 6 answers SYNC 2 after SYNC 3, then SYNC 3, and the second answer is accepted."""
     taken = acquisition()
