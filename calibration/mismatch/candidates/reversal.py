@@ -105,7 +105,8 @@ class _Beside:
     problem: the recording's
     whitening, deviation: of that noise; its standard deviation has the shape (wheel,)
     independent: as many independent readings know as much as all whitened ones
-    free, residual: the free parameters' columns and the residual, shapes (column, reading) and (1, reading)
+    free: columns of the free parameters, and of what else acts about reversals, shape (column, reading)
+    residual: shape (1, reading)
     """
 
     problem: Problem
@@ -122,8 +123,8 @@ class _Beside:
 
 
 def _beside_a_step(problem: Problem) -> _Beside:
-    free = [problem.tangent(name) for name, prior in problem.simulation.parameters.items() if prior.std > 0]
-    free = list(as_shown(problem, free))
+    parameters = [problem.tangent(name) for name, prior in problem.simulation.parameters.items() if prior.std > 0]
+    free = list(as_shown(problem, [*parameters, *_about_reversals(problem)]))
     residual = problem.residual
     ones = np.ones(residual.shape[1])
     as_read = _in_order(problem, [residual, *free, *_laws(problem, {})], NOT_WHITENED, ones)
@@ -149,6 +150,15 @@ def _beside_a_step(problem: Problem) -> _Beside:
         _in_order(problem, free, whitening, deviation),
         _in_order(problem, [residual], whitening, deviation),
     )
+
+
+def _about_reversals(problem: Problem) -> list[Array]:
+    """Return what acts about reversals too: the inertia's acceleration, and the change of a prediction that is late.
+
+    Each resembles friction that follows the displacement, where there is no friction.
+    """
+    acceleration = [problem.known("wheel_acceleration")] if problem.has("wheel_acceleration") else []
+    return [*acceleration, np.nan_to_num(problem.recording.rate_of_change(problem.filled))]
 
 
 def _laws(problem: Problem, shape: Shape) -> list[Array]:

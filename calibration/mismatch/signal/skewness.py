@@ -16,6 +16,9 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 Array = NDArray[np.float64]
 
+FEWEST_TO_SCORE = 8
+"""Readings from which on the distribution of their skewness is known (D'Agostino, 1970)."""
+
 
 def skewed_lengths(left: Array, explained: Array, thresholds: Thresholds = THRESHOLDS) -> tuple[int, ...]:
     """Return the lengths [readings] at which running means of what is left (time,) are skewed by more than chance.
@@ -38,9 +41,24 @@ def _is_skewed(means: Array, of_independent: float, thresholds: Thresholds) -> b
     """Return whether means are skewed by more than chance, and by more than those of independent readings are."""
     third, std = third_cumulant(means), float(np.std(means))
     # Faults that recur regularly have less of it in means than independent readings have: that is no spell.
-    beyond = float(np.median((0.0, third, third - of_independent)))
-    least = max(thresholds.least_skewness, thresholds.most_skewness_errors * skewness_error(means, thresholds))
-    return abs(beyond) > least * std**3 > 0
+    beyond = abs(float(np.median((0.0, third, third - of_independent))))
+    if not beyond > thresholds.least_skewness * std**3 > 0:
+        return False
+    score = normal_score(beyond / std**3, 6 / skewness_error(means, thresholds) ** 2)
+    return score > thresholds.most_skewness_deviates
+
+
+def normal_score(skewness: float, readings: float) -> float:
+    """Return the standard normal deviate that is as improbable as this skewness of so many normal readings.
+
+    The skewness of few readings is not normally distributed: four of its standard errors are less improbable than four
+    deviations are (D'Agostino, 1970).
+    """
+    n = max(readings, FEWEST_TO_SCORE)
+    kurtosis = 3 * (n**2 + 27 * n - 70) * (n + 1) * (n + 3) / ((n - 2) * (n + 5) * (n + 7) * (n + 9))
+    square = np.sqrt(2 * (kurtosis - 1)) - 1
+    scaled = skewness * np.sqrt((n + 1) * (n + 3) / (6 * (n - 2))) / np.sqrt(2 / (square - 1))
+    return float(np.arcsinh(scaled) / np.sqrt(0.5 * np.log(square)))
 
 
 def third_cumulant(values: Array) -> float:

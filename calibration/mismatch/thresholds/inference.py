@@ -46,9 +46,9 @@ class InferenceThresholds:
         f"{TRIALS}: of 400 courses of ten kinds of noise at most 9, of 54 blind recordings and 28 of strangers without "
         "spells at most 21; seven spells of 1 to 1.5 times the noise, on one of six wheels, gain 19 and 56 (medians)",
     )
-    most_skewness_errors: float = threshold(
+    most_skewness_deviates: float = threshold(
         4.0,
-        "Standard errors of the skewness of running means beyond which a residual is skewed.",
+        "Standard normal deviate of the skewness of running means beyond which a residual is skewed.",
         "standard: 6e-5 on both sides of a normal distribution, thus about one in a thousand sound recordings at some "
         "of their lengths, axes and directions",
     )

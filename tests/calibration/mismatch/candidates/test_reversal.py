@@ -60,6 +60,17 @@ def test_without_friction_there_is_no_transition() -> None:
     assert reversal_of(problem_of(table())) == {}
 
 
+@pytest.mark.parametrize("period", [12, 40])
+def test_inertia_is_no_friction_that_follows_the_displacement(period: int) -> None:
+    """A machine that turns round within some readings: its inertia acts about reversals alone."""
+    columns = table(noise=0.05)
+    triangle = np.arcsin(np.sin(2 * np.pi * np.arange(len(columns["t_s"]) // AXES) / period))
+    speed = FASTEST * np.clip(triangle, -1, 1)
+    inertia = np.repeat(0.3 * np.gradient(speed, STEP_S), AXES)
+    recorded = {"speed_rad_s": np.repeat(speed, AXES), "reading_V": columns["reading_V"] + inertia}
+    assert reversal_of(problem_of({**columns, **recorded})) == {}
+
+
 def test_a_drive_that_was_simulated_without_noise_has_none() -> None:
     """A proposed experiment's readings are its prediction: there is nothing to explain."""
     assert reversal_of(problem_of(table(noise=0.0))) == {}
