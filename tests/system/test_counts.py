@@ -202,8 +202,8 @@ async def test_no_snapshot_is_lost_and_none_is_stale(tmp_path: Path) -> None:
     assert len(snapshots) >= 0.9 * RATE_HZ * SECONDS, told
 
     # Nothing lost: every load that was on the bus in its window is in its snapshot, except where a preceding late one
-    # made it ambiguous which SYNC it answers, or where the window did not wait for it: of a PDO that came in none of the
-    # windows before (its node boots, or paused), the first answer may come when all others have closed the window.
+    # made it ambiguous which SYNC it answers, or where the window did not wait for it: of a PDO that came in none of
+    # the windows before (its node boots, or paused), the first answer may come when all others have closed the window.
     ambiguous = {
         (sync + later, wheel) for sync, wheel in late for later in range(max(AWAITED_WINDOWS, RATE_HZ // 2) + 1)
     }
