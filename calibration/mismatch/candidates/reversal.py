@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.candidates.motion import PRESLIDING, TRANSITION, along_motion, displacement_of
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.problem.covariates import USUAL_SPEED_QUANTILE
+from regolithd.calibration.mismatch.signal.chi_squared import quantile
 from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED, Whitening, estimate_whitening
 
 if TYPE_CHECKING:
@@ -68,7 +69,9 @@ def _best_reversal(problem: Problem) -> Shape:
     of_kind = {next(iter(shape)): shape for shape in sorted(tried, key=beside.squares_left, reverse=True)}
     best, left = min((_refined(beside, shape) for shape in of_kind.values()), key=lambda pair: pair[1])
     gain = beside.independent * (1 - left / step)
-    return best if gain > LEAST_GAIN else {}
+    of_friction = beside.independent * (beside.squares_without_friction / left - 1)
+    is_there = of_friction > quantile(len(_laws(problem, {})), problem.thresholds.single_test_level)
+    return best if is_there and gain > LEAST_GAIN else {}
 
 
 def _shapes(problem: Problem) -> Iterator[Shape]:
@@ -116,6 +119,11 @@ class _Beside:
     free: Array
     residual: Array
 
+    @property
+    def squares_without_friction(self) -> float:
+        """Return the sum of squares that the free parameters alone leave."""
+        return float(np.sum(_left(self.free, self.residual) ** 2))
+
     def squares_left(self, shape: Shape) -> float:
         """Return the sum of squares that the free parameters and friction of any usual law leave, with this shape."""
         laws = _in_order(self.problem, _laws(self.problem, shape), self.whitening, self.deviation)
@@ -162,13 +170,17 @@ def _about_reversals(problem: Problem) -> list[Array]:
 
 
 def _laws(problem: Problem, shape: Shape) -> list[Array]:
-    """Return friction that does not depend on speed, grows with its root, with it, and with the load.
+    """Return friction that is constant, grows with the root of speed, with it, or the load, or changes slowly.
 
-    A late channel shows it late: on time, it would seem to reverse with the displacement.
+    The first three change with the temperature and with time: they would seem to reverse with a long displacement. A
+    late channel shows friction late: on time, it would seem to reverse with the displacement.
     """
     direction, speed = along_motion(problem, shape), np.abs(problem.known("wheel_speed"))
-    laws = [direction, direction * np.sqrt(speed), direction * speed, direction * np.abs(problem.filled)]
-    return list(as_shown(problem, laws))
+    slow = [np.ones(speed.shape), problem.time_s / problem.length_s]
+    if problem.has("temperature"):
+        slow.append(problem.known("temperature"))
+    factors = [of_speed * each for of_speed in (1.0, np.sqrt(speed), speed) for each in slow]
+    return list(as_shown(problem, [direction * factor for factor in (*factors, np.abs(problem.filled))]))
 
 
 def _in_order(problem: Problem, columns: Sequence[Array], whitening: Whitening, deviation: Array) -> Array:
