@@ -41,7 +41,7 @@ def with_curves(
             "--empirical: what is unexplained follows what was before, and that is no curve; leave --empirical out"
         )
     for each in shown:
-        arbitrary = each.problem is not None and each.problem.simulation.arbitrary_zero
+        arbitrary = each.problem is not None and each.problem.arbitrary_zero
         if arbitrary and any(fit.curve.curve.coupling == "gain" for fit in each.empirical):
             raise SimulationError(
                 f"--empirical: the curve is in proportion to {each.channel}, whose zero means nothing; leave it out"

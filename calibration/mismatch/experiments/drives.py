@@ -131,7 +131,7 @@ def _problem(of: Problem, recording: Recording, unloaded: NDArray[np.bool_]) -> 
     simulation, inputs = of.simulation, complete_inputs(recording)
     predicted = simulation.predict(inputs, {**simulation.variants(), **of.values})
     prediction = np.where(unloaded, 0.0, predicted)
-    varying, constants = covariates_of(recording, simulation, inputs, prediction)
+    varying, constants = covariates_of(recording, simulation, inputs, prediction, arbitrary_zero=of.arbitrary_zero)
     return Problem(
         recording=recording,
         simulation=simulation,

@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.problem import Problem
 from regolithd.calibration.mismatch.problem.simulated import Inputs, inputs_of, put_on_time, simulated
 from regolithd.calibration.mismatch.problem.words import labels_of
+from regolithd.calibration.mismatch.problem.zero import note_on_zero, zero_is_arbitrary
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
@@ -61,9 +62,16 @@ def build_problem(
     residual = np.where(compared, measured - prediction, np.nan)
     outliers = isolated_outliers(residual, recording.run, thresholds)
     as_read = None if run.as_read is prepared else complete_inputs(run.as_read)
-    found, constants = covariates_of(prepared, simulation, complete_inputs(prepared), prediction, as_read)
+    found, constants = covariates_of(
+        prepared,
+        simulation,
+        complete_inputs(prepared),
+        prediction,
+        as_read,
+        arbitrary_zero=zero_is_arbitrary(simulation, measured),
+    )
     found, notes = without_the_reading_itself(found, measured, simulation.channel)
-    prepared = prepared.with_notes(*notes)
+    prepared = prepared.with_notes(*notes, *note_on_zero(simulation, measured))
     covariates, blanks = blanks_of(found, simulation.undefined_at_times, compared, thresholds)
     mask = compared & ~outliers
     for blank in blanks.values():

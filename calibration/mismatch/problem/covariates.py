@@ -51,14 +51,17 @@ def covariates_of(
     inputs: Mapping[str, Array],
     prediction: Array,
     as_read: Mapping[str, Array] | None = None,
+    *,
+    arbitrary_zero: bool = False,
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Return what was measured and varies, with what follows from it; and what was measured but is one number.
 
-    `as_read` are the inputs before they were smoothed, where they were: a smoothed speed is never quite zero.
+    `as_read` are the inputs before they were smoothed, where they were: a smoothed speed is never quite zero. A
+    prediction with an `arbitrary_zero` is no covariate.
     """
     found = dict(simulation.covariates(inputs))
     found["time"] = np.broadcast_to(_elapsed(recording)[:, None], recording.shape)
-    if not simulation.arbitrary_zero:
+    if not arbitrary_zero:
         # Torque is what something that turns carries; of anything else the prediction is the quantity that it is.
         found.setdefault("torque" if "wheel_speed" in found else quantity(simulation.channel), np.abs(prediction))
     if "wheel_speed" in found and np.isfinite(found["wheel_speed"]).any():

@@ -65,8 +65,8 @@ class Predictor(Protocol):
         """What to do between the readings of a channel that is sampled less often than the rows."""
 
     @property
-    def arbitrary_zero(self) -> bool:
-        """Whether the predicted channel's zero means nothing: then nothing is in proportion to it."""
+    def zero_means_nothing(self) -> bool | None:
+        """Whether nothing is in proportion to the predicted channel; None: not said."""
 
     @property
     def undefined_at_times(self) -> frozenset[str]:

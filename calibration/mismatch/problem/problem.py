@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
+from regolithd.calibration.mismatch.problem.zero import zero_is_arbitrary
 from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
@@ -136,13 +137,18 @@ class Problem:
         return float(self.time_s[-1, 0] - self.time_s[0, 0])
 
     @cached_property
+    def arbitrary_zero(self) -> bool:
+        """Whether nothing is in proportion to the predicted channel."""
+        return zero_is_arbitrary(self.simulation, self.measured)
+
+    @cached_property
     def mean_size(self) -> float:
         """The predicted channel's mean magnitude: what effects are measured against.
 
         Of a channel with an arbitrary zero, a temperature in °C or K, it is the mean magnitude about each wheel's mean.
         """
         known = np.where(self.mask, self.measured, np.nan)[:, self.mask.any(axis=0)]
-        centre = np.nanmean(known, axis=0) if self.simulation.arbitrary_zero else 0.0
+        centre = np.nanmean(known, axis=0) if self.arbitrary_zero else 0.0
         return float(np.nanmean(np.abs(known - centre)))
 
     @cached_property

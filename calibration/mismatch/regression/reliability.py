@@ -57,7 +57,7 @@ def noise_size_of(equations: NormalEquations, fit: Fit) -> Array | None:
     physics that is left out hardly shows.
     """
     design, problem = equations.design, equations.problem
-    if problem.simulation.arbitrary_zero:
+    if problem.arbitrary_zero:
         return None
     left = design.in_folds(residual_of(equations, fit))
     left = left * _by_doubt(design, left)[0]

@@ -68,7 +68,7 @@ def couplings_of(problem: Problem) -> dict[str, Array]:
     """Return the factors, shape (time, wheel), by which a smooth function may act on the prediction."""
     found = {
         "offset": np.ones(problem.mask.shape),
-        "gain": problem.filled - (np.mean(problem.filled, axis=0) if problem.simulation.arbitrary_zero else 0.0),
+        "gain": problem.filled - (np.mean(problem.filled, axis=0) if problem.arbitrary_zero else 0.0),
     }
     if "direction" in problem.covariates:
         found["drag"] = motion_of(problem)

@@ -40,9 +40,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-TEMPERATURE_UNITS = frozenset({"K", "degC", "°C", "C", "degF", "°F", "F"})
-
-
 class Simulation:
     """A simulation: derive from it, and define `channel`, `parameters` and `predict`."""
 
@@ -86,7 +83,8 @@ class Simulation:
     """What to do between the readings of a column that is sampled less often than the rows: `linear` (the default),
     `hold` or `blank`."""
     zero_means_nothing: ClassVar[bool | None] = None
-    """Whether the zero of the predicted channel is arbitrary; None: it is for a temperature, by its unit."""
+    """Whether the zero of the predicted channel is arbitrary, so that effects are measured against how far it moves.
+    None: of a temperature, and of a voltage, pressure or length that is far from zero (`problem/zero.py`)."""
     undefined_at_times: ClassVar[frozenset[str]] = frozenset()
     """Covariates whose NaN means that they do not apply (the slip of a wheel that stands), not that they are blank."""
     own_tables: ClassVar[tuple[str, ...]] = ()
@@ -158,11 +156,6 @@ class Simulation:
     def variants(self) -> Mapping[str, float]:
         """Return parameters outside the priors that candidates may move, with their neutral values."""
         return {}
-
-    @property
-    def arbitrary_zero(self) -> bool:
-        """Whether the predicted channel's zero means nothing: then no effect is in proportion to the channel."""
-        return self.unit in TEMPERATURE_UNITS if self.zero_means_nothing is None else self.zero_means_nothing
 
     def stated_effects(self) -> Sequence[Contribution]:
         """Return effects of the library that `predict` has already, so that a change of them is called by its name."""

@@ -167,7 +167,7 @@ class SelectionThresholds:
     single_test_level: float = threshold(
         1e-3,
         "Level of a test that is not one of many: that a change comes and goes, by a curve over time beside it; that a "
-        "law of which each wheel has its own coefficients acts on more than one wheel; that there is friction which may "
-        "reverse gradually.",
+        "law of which each wheel has its own coefficients acts on more than one wheel; that there is friction which "
+        "may reverse gradually.",
         f"{CHOICE}: one test for each effect that is named",
     )
