@@ -86,11 +86,10 @@ class JointPosterior:
     held: Mapping[str, float]
     released: tuple[str, ...] = ()
 
-    @property
-    def too_far(self) -> bool:
-        """Whether a released parameter goes further than a wrong statement explains."""
-        far = np.abs(self.shifts) > THRESHOLDS.furthest_linearisation_stds
-        return any(name in self.released for name, beyond in zip(self.names, far, strict=True) if beyond)
+    def too_far(self, priors: Mapping[str, Prior]) -> bool:
+        """Return whether a released parameter goes further than a wrong statement explains."""
+        shifts = dict(zip(self.names, np.abs(self.shifts).tolist(), strict=True))
+        return any(shifts[name] > _reach(priors[name]) for name in self.released)
 
     def restated(self, priors: Mapping[str, Prior]) -> dict[str, tuple[float, float]]:
         """Return mean and standard deviation of the released parameters, had they been stated where they are."""
@@ -133,7 +132,7 @@ def joint_posterior(
     contradicted = np.flatnonzero(beyond & np.array([priors[name].told for name in within.names], bool)).tolist()
     sets = dict.fromkeys([*((place,) for place in contradicted), tuple(contradicted)])
     found = [likelihood.posterior(places) for places in sets if places]
-    plausible = [each for each in found if not each.too_far]
+    plausible = [each for each in found if not each.too_far(priors)]
     return max((within, *plausible), key=lambda each: each.evidence)
 
 
@@ -145,6 +144,7 @@ class _Likelihood:
     matrix: Array
     vector: Array
     held: Mapping[str, float]
+    reach: Array
 
     @classmethod
     def of(cls, priors: Mapping[str, Prior], informations: Sequence[Information]) -> _Likelihood:
@@ -159,12 +159,12 @@ class _Likelihood:
             about = np.array([held.get(name, priors[name].value) for name in each.names])
             matrix[np.ix_(at, at)] += each.matrix[np.ix_(kept, kept)] * np.outer(std, std)
             vector[at] += (each.vector - each.matrix @ about)[kept] * std
-        return cls(names, matrix, vector, held)
+        return cls(names, matrix, vector, held, np.array([_reach(priors[name]) for name in names]))
 
     def posterior(self, released: Sequence[int]) -> JointPosterior:
         """Return the posterior with the priors of some parameters as wide as a wrong statement goes."""
         precision = np.ones(len(self.names))
-        precision[list(released)] = THRESHOLDS.furthest_linearisation_stds**-2
+        precision[list(released)] = self.reach[list(released)] ** -2.0
         covariance = pseudo_inverse(self.matrix + np.diag(precision), SINGULAR)
         shifts = covariance @ self.vector
         away = np.delete(shifts, list(released))
@@ -172,3 +172,8 @@ class _Likelihood:
         evidence = -float(chi2) - WRONG_STATEMENT_PENALTY * len(released)
         stds, names = np.sqrt(np.maximum(np.diag(covariance), 0.0)), tuple(self.names[place] for place in released)
         return JointPosterior(self.names, shifts, stds, evidence, self.held, names)
+
+
+def _reach(prior: Prior) -> float:
+    """Return how far a parameter may be off [standard deviations of its prior]."""
+    return prior.reach(THRESHOLDS.furthest_linearisation_stds)

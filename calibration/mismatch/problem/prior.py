@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
+RUNS_WITHIN = 0.2
+"""Share of a parameter's value within which any simulation can be run, however well the value is said to be known (a
+choice)."""
+
 
 @dataclass(frozen=True)
 class Prior:
@@ -21,9 +25,14 @@ class Prior:
     bounds: tuple[float, float] = (-inf, inf)
 
     def near(self, value: float, stds: float) -> float:
-        """Return a value as far as it may be from the prior: within its bounds and so many standard deviations."""
+        """Return a value as far as it may be from the prior: within its bounds and its reach."""
         low, high = self.bounds
-        return min(max(value, self.value - stds * self.std, low), self.value + stds * self.std, high)
+        furthest = self.reach(stds) * self.std
+        return min(max(value, self.value - furthest, low), self.value + furthest, high)
+
+    def reach(self, stds: float) -> float:
+        """Return how far the value may be off [standard deviations]: so many, or a fifth of it if that is further."""
+        return max(stds, RUNS_WITHIN * abs(self.value) / self.std) if self.std > 0 else stds
 
     def out_of_bounds(self, value: float) -> bool:
         """Return whether a fitted value is out of the bounds by more than noise: by half of their width."""

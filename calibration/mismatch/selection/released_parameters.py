@@ -60,15 +60,21 @@ def _with_wide_priors(equations: NormalEquations, places: Sequence[int]) -> Norm
     """Return equations with these parameters' priors widened as far as a wrong statement goes."""
     wider = equations.nuisance
     for place in places:
-        wide = wider.precision[place] / equations.thresholds.furthest_linearisation_stds**2
-        wider = wider.with_precision(place, float(wide))
+        wide = float(wider.precision[place]) / _reach(equations, place) ** 2
+        wider = wider.with_precision(place, wide)
     return equations.with_nuisance(wider)
+
+
+def _reach(equations: NormalEquations, place: int) -> float:
+    """Return how far one of the simulation's own parameters may be off [standard deviations of its prior]."""
+    prior = equations.problem.simulation.parameters[equations.nuisance.names[place]]
+    return prior.reach(equations.thresholds.furthest_linearisation_stds)
 
 
 def _is_all_that_is_wrong(equations: NormalEquations, freed: NormalEquations, fit: Fit, places: Sequence[int]) -> bool:
     """Return whether no released parameter goes too far, and nothing significant is left beside them."""
-    away = equations.nuisance.prior_stds_away(fit)[list(places)]
-    too_far = bool(np.any(away > equations.thresholds.furthest_linearisation_stds))
+    away = equations.nuisance.prior_stds_away(fit)
+    too_far = any(away[place] > _reach(equations, place) for place in places)
     return not too_far and unexplained_beside(freed, fit, tolerated=0.0) is None
 
 

@@ -39,7 +39,7 @@ class Heated(Simulation):
         return found
 
 
-def answer(loss_W_K: float, leak_W: float = 0.0, noise_K: float = 12.0) -> Answer:
+def answer(loss_W_K: float, leak_W: float = 0.0, noise_K: float = 12.0, machine: Simulation | None = None) -> Answer:
     """Compare with a body whose loss is this, from half of the time on with a further constant loss."""
     generator = np.random.default_rng(4)
     time_s = np.arange(ROWS, dtype=float)
@@ -49,7 +49,8 @@ def answer(loss_W_K: float, leak_W: float = 0.0, noise_K: float = 12.0) -> Answe
     )[:, 0]
     noise = np.convolve(generator.normal(0, 1, ROWS + 11), np.ones(12) / np.sqrt(12), "valid")
     return compare(
-        from_columns({"t_s": time_s, "power_W": power, "body_temperature_degC": true + noise_K * noise}), Heated()
+        from_columns({"t_s": time_s, "power_W": power, "body_temperature_degC": true + noise_K * noise}),
+        machine or Heated(),
     ).answer
 
 
@@ -60,6 +61,23 @@ def test_a_parameter_six_deviations_off_is_told_with_its_value_and_nothing_else(
     assert (found.verdict, found.effects, found.unexplained) == ("missing-physics", (), ())
     assert loss.value == pytest.approx(3.4, abs=0.1)
     assert loss.low < 3.4 < loss.high
+
+
+class FirmlyStated(Heated):
+    """The same body, whose loss is said to be known to 1 %."""
+
+    parameters: ClassVar = {**Heated.parameters, "loss_W_K": Prior(4.0, 0.04, "W/K")}
+
+
+def test_a_fifth_of_its_value_is_no_limit_however_firmly_it_was_stated() -> None:
+    """It is 15 standard deviations away, further than a parameter goes that is known less well."""
+    found = answer(3.4, machine=FirmlyStated())
+    (loss,) = (each for each in found.parameters if each.name == "loss_W_K")
+    assert (found.verdict, found.effects, found.unexplained) == ("missing-physics", (), ())
+    assert loss.low < 3.4 < loss.high
+    assert Prior(4.0, 0.04).reach(8.0) == pytest.approx(20.0)
+    assert Prior(4.0, 0.4).reach(8.0) == 8.0
+    assert Prior(4.0).reach(8.0) == 8.0
 
 
 def test_what_no_parameter_explains_stays_unexplained() -> None:
