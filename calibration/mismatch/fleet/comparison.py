@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.data.recording import as_recording
 from regolithd.calibration.mismatch.errors import MismatchError, RecordingError
 from regolithd.calibration.mismatch.fleet.catalogue import CatalogueRow, catalogue_rows, write_catalogue
 from regolithd.calibration.mismatch.fleet.choice.chance import entry_threshold
+from regolithd.calibration.mismatch.fleet.choice.earned import earned
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, Level, fleet_equations
 from regolithd.calibration.mismatch.fleet.choice.search import places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
@@ -274,7 +275,8 @@ def _of_channel(
     work.progress("searching", len(kept), len(kept))
     places = places_of(equations)
     chooser = Chooser(equations, places, entry_threshold(equations, places))
-    return Chosen(chooser, chooser.chosen(), names, tuple(results[n] for n in kept), simulation)
+    of_recordings = tuple(results[n] for n in kept)
+    return Chosen(chooser, earned(chooser, chooser.chosen(), of_recordings), names, of_recordings, simulation)
 
 
 def _names(members: Sequence[Member]) -> Names:

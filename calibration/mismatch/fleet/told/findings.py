@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, FitImprovement, Parameter, Sensitivity
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm
+from regolithd.calibration.mismatch.fleet.choice.held_out import HeldOutSquares, held_out_squares
+from regolithd.calibration.mismatch.fleet.choice.intervals import onset_places, size_stds
+from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
 from regolithd.calibration.mismatch.fleet.choice.search import penalty
-from regolithd.calibration.mismatch.fleet.choice.selection import Chooser, folds_of, relative_size, without
+from regolithd.calibration.mismatch.fleet.choice.selection import Chooser, relative_size
 from regolithd.calibration.mismatch.fleet.told.answer import (
     FleetAnswer,
     FleetEffect,
@@ -19,8 +22,6 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
     FleetUnexplained,
     RoverOfFleet,
 )
-from regolithd.calibration.mismatch.fleet.told.intervals import onset_places, size_stds
-from regolithd.calibration.mismatch.fleet.told.recordings import shown_beside
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
 from regolithd.calibration.mismatch.inference.intervals import unit_of
 from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost, words_of
@@ -101,8 +102,8 @@ class _Beside:
 def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
     """Return the answer of one channel."""
     equations, fit, simulation = chosen.equations, chosen.fit, chosen.simulation
-    held_out = _held_out(chosen.chooser, fit)
-    shown = shown_beside(equations, fit, chosen.found, chosen.names.recordings)
+    held_out = held_out_squares(equations, fit)
+    shown = shown_beside(equations, fit, chosen.found)
     beside = _Beside.of(equations, fit, shown.terms)
     effects = tuple(_effect(chosen, index, beside, held_out) for index in range(len(fit.terms)))
     single = tuple(_of_recording(chosen, i, effect) for i, effect in shown.effects)
@@ -112,7 +113,7 @@ def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
     verdict: Verdict = "unexplained" if rest else "missing-physics" if named else "consistent"
     floor = _noise_floor(chosen)
     counts = equations.counts
-    before, after = (_rms(squares, counts) for squares in held_out[:2])
+    before, after = (_rms(squares, counts) for squares in (held_out.before, held_out.after))
     return FleetAnswer(
         verdict=verdict,
         effects=(*effects, *single),
@@ -134,34 +135,17 @@ def _rover(chosen: Chosen, rover: int) -> RoverOfFleet:
     )
 
 
-def _held_out(chooser: Chooser, fit: FleetFit) -> tuple[Array, Array, list[Array]]:
-    """Return squares on recordings that did not fit the effects, shape (recording, wheel); all recordings chose them.
-
-    Without any effect, with the answer's names as the other recordings fit them, and with all of these but one.
-    """
-    equations = chooser.equations
-    shape = equations.counts.shape
-    before, after, but_one = np.zeros(shape), np.zeros(shape), [np.zeros(shape) for _ in fit.terms]
-    for fold in folds_of(equations):
-        used, out = 1.0 - fold if fold.min() == 0 else fold, fold > 0
-        before[out] = equations.squares(equations.fit((), used))[out]
-        chosen = equations.fit(fit.terms, used)
-        after[out] = equations.squares(chosen)[out]
-        for index, squares in enumerate(but_one):
-            squares[out] = equations.squares(equations.fit(without(fit, index), used))[out]
-    return before, after, but_one
-
-
 def _rms(squares: Array, counts: Array) -> float:
     return float(np.sqrt(max(float(squares.sum()), 0.0) / max(float(counts.sum()), 1.0)))
 
 
-def _effect(chosen: Chosen, index: int, beside: _Beside, held_out: tuple[Array, Array, list[Array]]) -> FleetEffect:
+def _effect(chosen: Chosen, index: int, beside: _Beside, held_out: HeldOutSquares) -> FleetEffect:
     equations, fit, names = chosen.equations, chosen.fit, chosen.names
     term = fit.terms[index]
     candidate, acting = term.group.candidate, equations.factors(term).any(axis=0)
     where = acting & (equations.counts > 0)
-    errors = _rms(held_out[2][index][where], equations.counts[where]), _rms(held_out[1][where], equations.counts[where])
+    counts = equations.counts[where]
+    errors = _rms(held_out.without[index][where], counts), _rms(held_out.after[where], counts)
     wheels = tuple(equations.wheels[w] for w in term.units.wheels if where[:, w].any())
     since = term.course.kind in {"since", "growing"}
     first, last = onset_places(equations, fit, index) if since else (0, 0)
