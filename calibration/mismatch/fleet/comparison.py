@@ -165,7 +165,7 @@ def compare_fleet(
         row for chosen, answer in zip(compared, answers, strict=True) for row in catalogue_rows(chosen, answer)
     )
     answer = answers[0] if len(answers) == 1 else joined(answers)
-    return FleetComparison(replace(answer, notes=(*answer.notes, *work.notes)), rows)
+    return FleetComparison(replace(answer, notes=(*answer.notes, *dict.fromkeys(work.notes))), rows)
 
 
 @dataclass
