@@ -23,10 +23,9 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
     RoverOfFleet,
 )
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
-from regolithd.calibration.mismatch.inference.intervals import unit_of
+from regolithd.calibration.mismatch.fleet.told.sizes import mean_sizes, parameters_of
 from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost, words_of
 from regolithd.calibration.mismatch.problem.problem import LeftOut
-from regolithd.calibration.mismatch.problem.words import in_units
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -88,6 +87,7 @@ class Chosen:
 class _Beside:
     """Parameters and effects, fitted with what single recordings show beside them, and their standard deviations."""
 
+    equations: FleetEquations
     fit: FleetFit
     stds: Array
 
@@ -96,7 +96,7 @@ class _Beside:
         """Return them from the equations in which what is shown, by recording and place, takes up what it can."""
         rest = equations.beside(shown)
         again = rest.fit(fit.terms)
-        return cls(again, size_stds(rest, again))
+        return cls(rest, again, size_stds(rest, again))
 
 
 def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
@@ -175,24 +175,11 @@ def _effect(chosen: Chosen, index: int, beside: _Beside, held_out: HeldOutSquare
 
 
 def _sizes(chosen: Chosen, index: int, beside: _Beside) -> dict[str, Parameter]:
-    """Return coefficients and relative size with their intervals; of a size of each rover's own, the mean."""
-    fit = beside.fit
-    term, span = fit.terms[index], fit.spans[index]
-    count = len(term.group.columns)
-    stds = beside.stds[span].reshape(-1, count)
-    values = fit.coefficients[span].reshape(-1, count)
-    weights = 1 / np.maximum(stds, 1e-300) ** 2
-    mean = np.sum(weights * values, axis=0) / np.sum(weights, axis=0)
-    std = np.maximum(1 / np.sqrt(np.sum(weights, axis=0)), np.std(values, axis=0))
-    found = {}
-    unit, labels = chosen.simulation.unit, chosen.labels
-    for coefficient, value, spread in zip(term.group.candidate.coefficients, mean, std, strict=False):
-        reach = NINETY_PERCENT_STDS * spread
-        told = in_units(coefficient.unit, unit, labels)
-        found[coefficient.name] = Parameter(float(value), float(value - reach), float(value + reach), told)
-    for name, value in term.group.shape.items():
-        if name in term.group.candidate.free and name != term.group.candidate.change_point:
-            found[name] = Parameter(float(value), float("nan"), float("nan"), unit_of(name, labels))
+    """Return coefficients, shape parameters and relative size with their intervals."""
+    fit, stds, simulation = beside.fit, beside.stds, chosen.simulation
+    found = parameters_of(beside.equations, fit, stds, index, simulation.unit, chosen.labels)
+    span, count = fit.spans[index], len(fit.terms[index].group.columns)
+    mean, std = mean_sizes(fit.coefficients[span], stds[span], count)
     size = relative_size(chosen.equations, fit, index)
     share = NINETY_PERCENT_STDS * float(np.max(std / np.maximum(np.abs(mean), 1e-300)))
     return {**found, "relative_size": Parameter(size, size * (1 - share), size * (1 + share), "1")}
