@@ -16,6 +16,7 @@ from regolithd.calibration.mismatch.fleet.catalogue import CatalogueRow, catalog
 from regolithd.calibration.mismatch.fleet.choice.chance import entry_threshold
 from regolithd.calibration.mismatch.fleet.choice.earned import earned
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, Level, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.released import with_released
 from regolithd.calibration.mismatch.fleet.choice.search import places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
@@ -276,7 +277,9 @@ def _of_channel(
     places = places_of(equations)
     chooser = Chooser(equations, places, entry_threshold(equations, places))
     of_recordings = tuple(results[n] for n in kept)
-    return Chosen(chooser, earned(chooser, chooser.chosen(), of_recordings), names, of_recordings, simulation)
+    fit = earned(chooser, chooser.chosen(), of_recordings)
+    chooser = replace(chooser, equations=with_released(equations, fit, of_recordings, simulation.parameters))
+    return Chosen(chooser, chooser.equations.fit(fit.terms), names, of_recordings, simulation)
 
 
 def _names(members: Sequence[Member]) -> Names:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -97,7 +98,7 @@ class FleetEquations:
     groups: the candidates of the grid; their columns come after the tangents
     level: whose the parameters are
     gram, moment: weighted, shape (recording, wheel, column, column), (recording, wheel, column)
-    used: whether each recording is fitted, shape (recording,)
+    released: places, among the coefficients, of parameters whose priors are widened as far as a wrong statement goes
     """
 
     sums: tuple[Sums, ...]
@@ -111,6 +112,7 @@ class FleetEquations:
     gram: Array = field(repr=False)
     moment: Array = field(repr=False)
     weights: Array = field(repr=False)
+    released: frozenset[int] = frozenset()
 
     @property
     def count(self) -> int:
@@ -154,7 +156,9 @@ class FleetEquations:
                 factors.append(np.repeat((owners == owner)[:, None], len(self.wheels), axis=1).astype(np.float64))
         shape = (0, self.count, len(self.wheels))
         stacked = np.stack(factors) if factors else np.zeros(shape)
-        return np.array(columns, np.int64), stacked, 1 / self.prior_stds[columns] ** 2 if columns else np.zeros(0)
+        precision = 1 / self.prior_stds[columns] ** 2 if columns else np.zeros(0)
+        precision[list(self.released)] /= THRESHOLDS.furthest_linearisation_stds**2
+        return np.array(columns, np.int64), stacked, precision
 
     def fit(self, terms: Iterable[FleetTerm], used: Array | None = None) -> FleetFit:
         """Fit terms and free parameters together, to all recordings or those with `used` (recording,) of 1."""
