@@ -183,6 +183,11 @@ class CalibratedParameter:
     high: float
 
     @property
+    def told_name(self) -> str:
+        """What it is called in a sentence."""
+        return self.name
+
+    @property
     def prior_stds_away(self) -> float:
         """How far it is from its prior, in the prior's standard deviations; 0 where the prior is exact."""
         return abs(self.value - self.prior) / self.prior_std if self.prior_std > 0 else 0.0

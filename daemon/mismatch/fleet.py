@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.answer import Answer
     from regolithd.calibration.mismatch.fleet.choice.equations import Level
+    from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer
     from regolithd.daemon.mismatch.files import Outputs
 
 RoverFrom = Literal["column", "metadata", "folder"]
@@ -66,11 +67,15 @@ class FleetOptions:
 
 @dataclass(frozen=True, slots=True)
 class RoverFile:
-    """A file, or the rows of one rover in it; `rover` is empty where nothing says whose it is."""
+    """A file, or the rows of one rover in it; `rover` is empty where nothing says whose it is.
+
+    What is `damaged` cannot be read: whoever reads it is told why.
+    """
 
     path: Path
     rover: str
     of_column: bool = False
+    damaged: bool = False
 
 
 def files_of_rovers(paths: Sequence[Path], rover_from: RoverFrom | None) -> list[RoverFile]:
@@ -82,7 +87,7 @@ def files_of_rovers(paths: Sequence[Path], rover_from: RoverFrom | None) -> list
         When a recording does not say whose it is, and was to.
     """
     found = [each for path in paths for each in _rovers_of(path, rover_from)]
-    if rover_from and (silent := [str(each.path) for each in found if not each.rover]):
+    if rover_from and (silent := [str(each.path) for each in found if not each.rover and not each.damaged]):
         raise RecordingError(f"{silent[0]} does not say whose it is: it has no {rover_from} that names a rover")
     return found
 
@@ -94,7 +99,10 @@ def _rovers_of(path: Path, rover_from: RoverFrom | None) -> list[RoverFile]:
         return [RoverFile(path, path.resolve().parent.name)]
     if path.suffix == ".mcap":
         return [RoverFile(path, "" if rover_from == "column" else _in_metadata(path))]
-    names = () if rover_from == "metadata" else rovers_in(path)
+    try:
+        names = () if rover_from == "metadata" else rovers_in(path)
+    except RecordingError:
+        return [RoverFile(path, "", damaged=True)]
     return [RoverFile(path, name, of_column=True) for name in names] or [RoverFile(path, "")]
 
 
@@ -134,9 +142,25 @@ def members_of(files: Sequence[RoverFile], unit: str) -> list[Member]:
             read=partial(read_one, path, unit, file.rover if file.of_column else None),
             digest=sha256(digest.encode()).hexdigest(),
         )
-        long = not file.of_column and rows_in(path) > LONGEST_AT_ONCE
-        found += [_of_stretch(whole, path, unit, each) for each in stretches_of(path)] if long else [whole]
+        stretches = () if file.of_column or _rows_of(path) <= LONGEST_AT_ONCE else _stretches_of(path)
+        found += [_of_stretch(whole, path, unit, each) for each in stretches] or [whole]
     return found
+
+
+def _rows_of(path: Path) -> int:
+    """Return the number of rows of a Parquet file; 0 of any other, or a damaged one: whoever reads it is told why."""
+    try:
+        return rows_in(path)
+    except RecordingError:
+        return 0
+
+
+def _stretches_of(path: Path) -> tuple[Stretch, ...]:
+    """Return the stretches of a Parquet file; none of any other, or a damaged one."""
+    try:
+        return stretches_of(path) if path.suffix == ".parquet" else ()
+    except RecordingError:
+        return ()
 
 
 def _of_stretch(whole: Member, path: Path, unit: str, stretch: Stretch) -> Member:
@@ -153,9 +177,8 @@ def _of_stretch(whole: Member, path: Path, unit: str, stretch: Stretch) -> Membe
 
 def too_long_at_once(files: Sequence[RoverFile]) -> bool:
     """Return whether the recordings are so long that they are compared stretch by stretch."""
-    return sum(rows_in(file.path) for file in files) > LONGEST_AT_ONCE and all(
-        file.path.suffix == ".parquet" and stretches_of(file.path) for file in files
-    )
+    paths = [file.path for file in files]
+    return sum(map(_rows_of, paths)) > LONGEST_AT_ONCE and all(map(_stretches_of, paths))
 
 
 def run_fleet(files: Sequence[RoverFile], simulation: Path, outputs: Outputs, options: FleetOptions) -> Answer:
@@ -186,14 +209,27 @@ def run_fleet(files: Sequence[RoverFile], simulation: Path, outputs: Outputs, op
             key=_digest_of(simulation),
             progress=lambda step, done, of: bar.update(task, description=step, completed=done, total=of),
         )
+    answer = replace(found.answer, notes=(*found.answer.notes, *_notes_of_nameless(found.answer, files)))
     if outputs.json:
-        write_json(outputs.json, found.answer)
+        write_json(outputs.json, answer)
     if options.catalogue:
         found.write_catalogue(options.catalogue)
     corrected = frozenset(effect.name for effect in (*simulated.corrected_effects, *simulated.stated_effects()))
     labels = Labels(noun_of(simulated.wheel_column), simulated.covariate_labels, corrected=corrected)
-    print_answer(Console(), found.answer, labels)
-    return found.answer
+    print_answer(Console(), answer, labels)
+    return answer
+
+
+def _notes_of_nameless(answer: FleetAnswer, files: Sequence[RoverFile]) -> list[str]:
+    """Return a note of the recordings that do not say whose they are, where others do, and that were compared."""
+    if not any(file.rover for file in files) or all(file.rover for file in files):
+        return []
+    return [
+        f"{', '.join(rover.recordings)}: nothing says whose this is, while other recordings do. It is compared as of a "
+        f"further rover, called {ONLY_ROVER}. Add a column rover, or tell rovers apart by --rover-from folder."
+        for rover in answer.rovers
+        if rover.name == ONLY_ROVER
+    ]
 
 
 def _bar() -> Progress:

@@ -40,7 +40,7 @@ def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs, options:
     """
     outputs.check()
     files = files_of_rovers(recordings, options.rover_from)
-    if options.asked_for or len({file.rover for file in files}) > 1 or too_long_at_once(files):
+    if options.asked_for or len({file.rover for file in files if not file.damaged}) > 1 or too_long_at_once(files):
         return run_fleet(files, simulation, outputs, options)
     simulated = load_simulation(simulation, announce=partial(typer.echo, err=True))
     with Console(stderr=True).status("reading") as status:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from math import isfinite
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
@@ -91,11 +92,12 @@ def _effect(effect: Effect, *, several: bool) -> list[str]:
     """Return the line about an effect, and those with its parameters that the line does not tell, indented."""
     line = f"{effect.name}{f' in {effect.channel}' if several else ''}: {effect.statement}"
     numbers = {name: each for name, each in effect.parameters.items() if name not in TOLD_IN_THE_STATEMENT}
-    return [line, *(f"  {_value(name, each)} (90 % sure: {_interval(each)})" for name, each in numbers.items())]
+    return [line, *(f"  {_value(name, each)}{_interval(each)}" for name, each in numbers.items())]
 
 
 def _interval(parameter: Parameter) -> str:
-    return f"{parameter.low:.4g} to {parameter.high:.4g}"
+    """Return a parameter's interval in brackets; nothing where it is not known."""
+    return f" (90 % sure: {parameter.low:.4g} to {parameter.high:.4g})" if isfinite(parameter.low) else ""
 
 
 def _not_distinguished(found: Indistinguishable, answer: Answer, labels: Labels) -> str:

@@ -152,6 +152,8 @@ class Candidate:
     free: ClassVar[Mapping[str, tuple[float, float]]] = {}
     """Continuous shape parameters with their least and greatest value. The ending of the name is the unit: `_s`, `_K`,
     `_degC`, `_rad_s`; without one of these it has none."""
+    scaled_by: ClassVar[str] = ""
+    """The shape parameter that multiplies the columns, where there is one: a coefficient makes up for it."""
     shape_keys: ClassVar[Mapping[str, str]] = {}
     """What each key of its shapes means, for the documentation: `shape` of the answer and of `[[effects]]`."""
     shape_priors: ClassVar[Mapping[str, tuple[float, float]]] = {}

@@ -81,6 +81,8 @@ class SensorDelay(Candidate):
     }
     free: ClassVar = {"secant_s": (0.0, float("inf")), "filter_s": (0.0, float("inf")), OF_INPUT: (0.0, float("inf"))}
 
+    scaled_by = PASSED
+
     def words_for(self, shape: Shape) -> str:
         """Return which column is late."""
         return f"a delay of {shape['late']}" if "late" in shape else self.words

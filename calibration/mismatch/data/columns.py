@@ -180,7 +180,8 @@ def parquet_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except (pa.ArrowException, OSError, ValueError, KeyError, MemoryError, OverflowError) as error:
-        raise RecordingError(f"{path} is not a whole Parquet file: {_first_line(error)}") from error
+        why = _first_line(error).removesuffix(".")
+        raise RecordingError(f"{path} is not a whole Parquet file: {why}. Copy or export it again.") from error
 
 
 def _parquet_table(path: Path) -> Any:  # noqa: ANN401  # pyarrow has no types

@@ -11,7 +11,8 @@ from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS
-from regolithd.calibration.mismatch.fleet.told.estimates import estimates_of
+from regolithd.calibration.mismatch.fleet.told.estimates import estimates_of, parameter_alone
+from regolithd.calibration.mismatch.inference.statements import parameters_found
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -32,10 +33,12 @@ class CatalogueRow:
     verdict: of this recording alone
     wheel: its name as text
     effect, covariate, channel: what; empty where nothing was found
-    found: "fleet" for an effect of the fleet, "recording" for one that this recording alone shows, "unexplained"
-    acts: whether the effect acts in this recording, as the fleet's answer has it
-    parameter, unit: the first coefficient of its law
-    value, low, high: of that coefficient in this recording alone, with a 90 % interval
+    found: "fleet" for an effect of the fleet, "recording" for one that this recording alone shows, "unexplained", or
+        "parameter" for a parameter of the simulation that had to leave its prior
+    acts: whether the effect acts in this recording, as the fleet's answer has it; of a parameter, whether the stated
+        value is outside of its interval in this recording
+    parameter, unit: the first coefficient of its law, or the parameter of the simulation
+    value, low, high: of that in this recording alone, with a 90 % interval
     """
 
     rover: str
@@ -57,7 +60,11 @@ class CatalogueRow:
 
 def catalogue_rows(chosen: Chosen, answer: FleetAnswer) -> list[CatalogueRow]:
     """Return the rows of one channel, recording by recording in the order of their names' list."""
-    rows = [*_rows_of_fleet(chosen, answer), *_rows_of_recordings(chosen, answer)]
+    rows = [
+        *_rows_of_fleet(chosen, answer),
+        *_rows_of_recordings(chosen, answer),
+        *_rows_of_parameters(chosen, answer),
+    ]
     with_rows = {row.recording for row in rows}
     empty = [_row(chosen, i) for i, name in enumerate(chosen.names.recordings) if name not in with_rows]
     return sorted((*rows, *empty), key=lambda row: chosen.names.recordings.index(row.recording))
@@ -110,6 +117,28 @@ def _rows_of_recordings(chosen: Chosen, answer: FleetAnswer) -> Iterator[Catalog
         for wheel in rest.wheels:
             told = {"covariate": rest.covariate, "channel": rest.channel}
             yield _row(chosen, recording, wheel=str(wheel), found="unexplained", acts=True, **told)
+
+
+def _rows_of_parameters(chosen: Chosen, answer: FleetAnswer) -> Iterator[CatalogueRow]:
+    """Yield each parameter that had to leave its prior in each recording of its rovers, as that alone has it."""
+    found = parameters_found(answer.parameters, unexplained=answer.verdict == "unexplained")
+    for moved in (each for each in answer.parameters if each in found):
+        alone = parameter_alone(chosen.equations, chosen.fit, chosen.found, moved.name)
+        for recording, (shift, std) in enumerate(alone):
+            value, reach = moved.prior + shift, NINETY_PERCENT_STDS * std
+            if chosen.names.rovers[int(chosen.equations.rover[recording])] in moved.rovers:
+                yield _row(
+                    chosen,
+                    recording,
+                    channel=chosen.simulation.channel,
+                    found="parameter",
+                    acts=abs(shift) > reach,
+                    parameter=moved.name,
+                    value=value,
+                    low=value - reach,
+                    high=value + reach,
+                    unit=moved.unit,
+                )
 
 
 def _first(effect: FleetEffect) -> dict[str, object]:

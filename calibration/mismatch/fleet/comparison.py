@@ -14,7 +14,9 @@ from regolithd.calibration.mismatch.data.recording import as_recording
 from regolithd.calibration.mismatch.errors import MismatchError, RecordingError
 from regolithd.calibration.mismatch.fleet.catalogue import CatalogueRow, catalogue_rows, write_catalogue
 from regolithd.calibration.mismatch.fleet.choice.chance import entry_threshold
+from regolithd.calibration.mismatch.fleet.choice.earned import earned
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, Level, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.released import with_released
 from regolithd.calibration.mismatch.fleet.choice.search import places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
@@ -164,7 +166,7 @@ def compare_fleet(
         row for chosen, answer in zip(compared, answers, strict=True) for row in catalogue_rows(chosen, answer)
     )
     answer = answers[0] if len(answers) == 1 else joined(answers)
-    return FleetComparison(replace(answer, notes=(*answer.notes, *work.notes)), rows)
+    return FleetComparison(replace(answer, notes=(*answer.notes, *dict.fromkeys(work.notes))), rows)
 
 
 @dataclass
@@ -274,7 +276,10 @@ def _of_channel(
     work.progress("searching", len(kept), len(kept))
     places = places_of(equations)
     chooser = Chooser(equations, places, entry_threshold(equations, places))
-    return Chosen(chooser, chooser.chosen(), names, tuple(results[n] for n in kept), simulation)
+    of_recordings = tuple(results[n] for n in kept)
+    fit = earned(chooser, chooser.chosen(), of_recordings)
+    chooser = replace(chooser, equations=with_released(equations, fit, of_recordings, simulation.parameters))
+    return Chosen(chooser, chooser.equations.fit(fit.terms), names, of_recordings, simulation)
 
 
 def _names(members: Sequence[Member]) -> Names:

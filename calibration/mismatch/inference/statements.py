@@ -135,9 +135,10 @@ def had_to_leave_its_prior(name: str) -> str:
 
 def beyond_prior_in_words(parameter: CalibratedParameter) -> str:
     """Return what is told of a parameter beyond its prior: where it is, how far away, and what to do."""
+    begins, away = had_to_leave_its_prior(parameter.told_name), parameter.prior_stds_away
     return (
-        f"{had_to_leave_its_prior(parameter.name)}: {parameter.value:.4g}{after_number(parameter.unit)} instead of "
-        f"{parameter.prior:.4g} ± {parameter.prior_std:.2g}, {parameter.prior_stds_away:.1f} standard deviations away. "
+        f"{begins}: {parameter.value:.4g}{after_number(parameter.unit)} instead of "
+        f"{parameter.prior:.4g} ± {parameter.prior_std:.2g}, {away:.1f} standard deviations away. "
         "Check the stated value and its standard deviation, or look for physics that acts as this parameter does."
     )
 
@@ -164,9 +165,9 @@ def notes_on_priors(
 
 
 def _may_stand_for_it(parameter: CalibratedParameter) -> str:
+    begins, away = beside_what_stays_unexplained(parameter.told_name), parameter.prior_stds_away
     return (
-        f"{beside_what_stays_unexplained(parameter.name)} {parameter.prior_stds_away:.1f} standard deviations from its "
-        "prior. It may stand for a part of that: this is no finding."
+        f"{begins} {away:.1f} standard deviations from its prior. It may stand for a part of that: this is no finding."
     )
 
 

@@ -156,6 +156,50 @@ def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> No
     assert (alone.name, alone.rover) == ("drive.csv", "rover")
 
 
+def test_damaged_files_of_a_fleet_are_left_out(two: list[Path], tmp_path: Path) -> None:
+    """Each with one note of the file, the cause and the cure, while the others are compared."""
+    whole, out = two[1].read_bytes(), tmp_path / "out.json"
+    damaged = {
+        "cut.csv": (whole[: whole.rindex(b",")], "Complete the line or remove it"),
+        "bytes.csv": (whole.replace(b"bruno", b"bru\xffo", 1), "Save the file as UTF-8"),
+        "half.parquet": (b"PAR1" + whole[:1000], "Copy or export it again"),
+    }
+    for name, (content, _) in damaged.items():
+        (tmp_path / name).write_bytes(content)
+    paths = [*two, *(tmp_path / name for name in damaged)]
+    done = call(*paths, "--simulation", fleet_arm.write_simulation(tmp_path), "--json", out)
+    assert done.exit_code == 0, done.output
+    answer = json.loads(out.read_text())
+    assert [rover["name"] for rover in answer["rovers"]] == ["asper", "bruno"]
+    for name, (_, cure) in damaged.items():
+        (note,) = [note for note in answer["notes"] if name in note]
+        assert note.startswith(f"{name} is left out: ")
+        assert cure in note
+
+
+def test_a_damaged_file_of_one_rover_is_an_error(two: list[Path], tmp_path: Path) -> None:
+    """Its recordings are runs of one recording, which is not compared without one of them."""
+    damaged = tmp_path / "cut.csv"
+    damaged.write_bytes(two[0].read_bytes().rsplit(b",", 1)[0])
+    done = call(two[0], damaged, "--simulation", fleet_arm.write_simulation(tmp_path))
+    assert done.exit_code == 65
+    assert "cut.csv, line" in done.output.replace("\n", "")
+
+
+def test_a_recording_that_does_not_say_whose_it_is_among_those_that_do_is_noted(
+    two: list[Path], tmp_path: Path
+) -> None:
+    """It is compared as one of a further rover."""
+    out = tmp_path / "out.json"
+    silent = fleet_arm.write_recording(tmp_path / "silent.csv", fleet_arm.columns(3))
+    done = call(*two, silent, "--simulation", fleet_arm.write_simulation(tmp_path), "--json", out)
+    assert done.exit_code == 0, done.output
+    answer = json.loads(out.read_text())
+    assert [rover["name"] for rover in answer["rovers"]] == ["asper", "bruno", "rover"]
+    (note,) = [note for note in answer["notes"] if "whose" in note]
+    assert note.startswith("silent.csv: ")
+
+
 @pytest.mark.parametrize(("name", "told"), [("absent.csv", "is not there"), ("folder", "is not a file")])
 def test_what_is_no_file_is_one_message(name: str, told: str, tmp_path: Path) -> None:
     """Before anything is read."""

@@ -31,6 +31,7 @@ LEFT = (
 
 FRICTION = {
     "coulomb_current": Parameter(0.03712, 0.03, 0.044, "A"),
+    "power": Parameter(0.75, float("nan"), float("nan"), "1"),
     "onset_s": Parameter(3.0, 1.0, 9.0, "s"),
     "relative_size": Parameter(0.2, 0.1, 0.3, "1"),
 }
@@ -83,6 +84,7 @@ def test_mismatch_prints_the_answer() -> None:
         "effects",
         "  coulomb-friction: 37 mA",
         "    coulomb_current = 0.03712 A (90 % sure: 0.03 to 0.044)",
+        "    power = 0.75",
         "  changed: viscous-friction is larger than the corrected simulation has it.",
         f"  parameter loss had to leave its prior: {LEFT}",
         "  unexplained: 12 % of the residual follows time periodically, on zones 1 and 4, 3 to 100 s",

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -97,7 +98,7 @@ class FleetEquations:
     groups: the candidates of the grid; their columns come after the tangents
     level: whose the parameters are
     gram, moment: weighted, shape (recording, wheel, column, column), (recording, wheel, column)
-    used: whether each recording is fitted, shape (recording,)
+    released: places, among the coefficients, of parameters whose priors are widened as far as a wrong statement goes
     """
 
     sums: tuple[Sums, ...]
@@ -111,6 +112,7 @@ class FleetEquations:
     gram: Array = field(repr=False)
     moment: Array = field(repr=False)
     weights: Array = field(repr=False)
+    released: frozenset[int] = frozenset()
 
     @property
     def count(self) -> int:
@@ -154,7 +156,9 @@ class FleetEquations:
                 factors.append(np.repeat((owners == owner)[:, None], len(self.wheels), axis=1).astype(np.float64))
         shape = (0, self.count, len(self.wheels))
         stacked = np.stack(factors) if factors else np.zeros(shape)
-        return np.array(columns, np.int64), stacked, 1 / self.prior_stds[columns] ** 2 if columns else np.zeros(0)
+        precision = 1 / self.prior_stds[columns] ** 2 if columns else np.zeros(0)
+        precision[list(self.released)] /= THRESHOLDS.furthest_linearisation_stds**2
+        return np.array(columns, np.int64), stacked, precision
 
     def fit(self, terms: Iterable[FleetTerm], used: Array | None = None) -> FleetFit:
         """Fit terms and free parameters together, to all recordings or those with `used` (recording,) of 1."""
@@ -197,11 +201,8 @@ class FleetEquations:
 
         Their columns are free on each wheel by itself, and eliminated: what is left is outside their span.
         """
-        of: dict[int, list[int]] = {}
-        for recording, place in terms:
-            of.setdefault(recording, []).extend(self.sums[recording].own[place])
         gram, moment = self.gram.copy(), self.moment.copy()
-        for i, free in of.items():
+        for i, free in _columns_by_recording(self.sums, terms).items():
             sums = self.sums[i]
             own, fleet = column_map(sums, self.tangents, self.groups)
             for w, name in enumerate(sums.wheels):
@@ -211,6 +212,36 @@ class FleetEquations:
                 gram[i, k][np.ix_(fleet, fleet)] -= weight * cross @ products[np.ix_(free, own)]
                 moment[i, k][fleet] -= weight * cross @ sums.moment[w, free]
         return replace(self, gram=gram, moment=moment)
+
+    def explained(self, fit: FleetFit, beside: Iterable[tuple[int, int]]) -> float:
+        """Return by how much a fit's coefficients, and these terms of `own`, lower χ² when fitted together.
+
+        A term of one recording, by recording and place, has the same coefficients on all of its wheels.
+        """
+        base, count = len(self.parameter_factors[0]), len(fit.columns)
+        matrix, moment = self._normal(fit.columns, fit.factors, np.ones(self.count))
+        matrix[range(base), range(base)] += self.parameter_factors[2]
+        for recording, free in _columns_by_recording(self.sums, beside).items():
+            energy, cross, own = self._with_own(fit, recording, free)
+            size = len(matrix)
+            matrix = np.pad(matrix, (0, len(free)))
+            matrix[size:, size:], matrix[size:, :count], matrix[:count, size:] = energy, cross.T, cross
+            moment = np.append(moment, own)
+        return float(moment @ pseudo_inverse(matrix, SINGULAR) @ moment)
+
+    def _with_own(self, fit: FleetFit, recording: int, free: Sequence[int]) -> tuple[Array, Array, Array]:
+        """Return the energy of a recording's own columns, their products with a fit's columns, and their moment."""
+        sums = self.sums[recording]
+        energy, own = np.zeros((len(free), len(free))), np.zeros(len(free))
+        cross = np.zeros((len(fit.columns), len(free)))
+        places, fleet = column_map(sums, self.tangents, self.groups)
+        for w, name in enumerate(sums.wheels):
+            energy += sums.weights[w] * sums.gram[w][np.ix_(free, free)]
+            own += sums.weights[w] * sums.moment[w, list(free)]
+            products = np.zeros((self.gram.shape[-1], len(free)))
+            products[fleet] = sums.weights[w] * sums.gram[w][np.ix_(places, free)]
+            cross += fit.factors[:, recording, self.wheels.index(name), None] * products[fit.columns]
+        return energy, cross, own
 
     def left_moment(self, fit: FleetFit) -> Array:
         """Return the moments of all columns with what a fit leaves, shape (recording, wheel, column)."""
@@ -244,6 +275,14 @@ class FleetEquations:
         for i, sums in enumerate(self.sums):
             found[i, [self.wheels.index(name) for name in sums.wheels]] = values[i]
         return found
+
+
+def _columns_by_recording(sums: Sequence[Sums], terms: Iterable[tuple[int, int]]) -> dict[int, list[int]]:
+    """Return the columns of terms that recordings show by themselves, each given by recording and place."""
+    found: dict[int, list[int]] = {}
+    for recording, place in terms:
+        found.setdefault(recording, []).extend(sums[recording].own[place])
+    return found
 
 
 def column_map(sums: Sums, tangents: Sequence[str], groups: Sequence[GridGroup]) -> tuple[list[int], list[int]]:

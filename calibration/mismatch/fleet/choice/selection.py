@@ -83,9 +83,10 @@ class Chooser:
     def acceptable(self, fit: FleetFit) -> bool:
         """Return whether every coefficient has its sign, every effect is large enough, and each law has one shape."""
         one_shape = all(_one_shape(*pair) for pair in combinations(fit.terms, 2))
-        return one_shape and all(self._acceptable_term(fit, index) for index in range(len(fit.terms)))
+        return one_shape and all(self.acceptable_term(fit, index) for index in range(len(fit.terms)))
 
-    def _acceptable_term(self, fit: FleetFit, index: int) -> bool:
+    def acceptable_term(self, fit: FleetFit, index: int) -> bool:
+        """Return whether an effect has its signs, is large enough, and on each rover whose size is its own certain."""
         term, span = fit.terms[index], fit.spans[index]
         signs, count = term.group.signs, len(term.group.columns)
         sizes = fit.coefficients[span].reshape(-1, count)

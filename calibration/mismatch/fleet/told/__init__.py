@@ -1,1 +1,1 @@
-"""What is told of a choice: the answer, with intervals, rivals and what single recordings show."""
+"""What is told of a choice: the answer, with sizes, intervals and rivals."""

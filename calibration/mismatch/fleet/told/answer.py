@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from regolithd.calibration.mismatch.answer import Answer, CalibratedParameter, Effect, Unexplained, answer_schema
+from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,12 @@ class FleetParameter(CalibratedParameter):
 
     rovers: tuple[str, ...] = ()
 
+    @property
+    def told_name(self) -> str:
+        """With the rover, where it is of one that has a name."""
+        of_one = len(self.rovers) == 1 and self.rovers[0] != ONLY_ROVER
+        return f"{self.name} of {self.rovers[0]}" if of_one else self.name
+
 
 @dataclass(frozen=True)
 class RoverOfFleet:
@@ -61,6 +68,7 @@ class FleetAnswer(Answer):
 
     effects: tuple[FleetEffect, ...]
     unexplained: tuple[FleetUnexplained, ...]
+    parameters: tuple[FleetParameter, ...]
     rovers: tuple[RoverOfFleet, ...] = ()
 
     def to_json(self) -> dict[str, Any]:

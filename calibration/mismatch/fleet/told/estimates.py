@@ -1,16 +1,19 @@
-"""The size of an effect of the fleet in each single recording: what a course over dates is seen from."""
+"""The size of an effect or a parameter in each single recording: what a course over dates is seen from."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.work.found import Found
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,21 @@ def estimates_of(equations: FleetEquations, fit: FleetFit, index: int) -> dict[i
         further = _further(left[i][:, at], size, wheels) / energy
         found[i] = Estimate(wheels, factor != 0, float(size[0]) * (factor + further), abs(float(size[0])) / energy**0.5)
     return found
+
+
+def parameter_alone(
+    equations: FleetEquations, fit: FleetFit, found: Sequence[Found], name: str
+) -> list[tuple[float, float]]:
+    """Return how far a parameter is from its stated value in each recording alone, with its standard deviation.
+
+    Its prior is widened, as where it was stated wrongly; other parameters are each recording's own, within theirs.
+    """
+    place, count = equations.tangents.index(name), len(equations.tangents)
+    released = frozenset(place + count * recording for recording in range(equations.count))
+    shown = shown_beside(equations, fit, found).terms
+    alone = replace(equations, level="recording", released=released).beside(shown).fit(fit.terms)
+    stds = np.sqrt(np.maximum(np.diag(alone.covariance), 0.0))
+    return [(float(alone.coefficients[at]), float(stds[at])) for at in sorted(released)]
 
 
 def _further(left: np.ndarray, size: np.ndarray, wheels: Sequence[int]) -> float:

@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, FitImprovement, Parameter, Sensitivity
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm
+from regolithd.calibration.mismatch.fleet.choice.held_out import HeldOutSquares, held_out_squares
+from regolithd.calibration.mismatch.fleet.choice.intervals import onset_places, size_stds
+from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
 from regolithd.calibration.mismatch.fleet.choice.search import penalty
-from regolithd.calibration.mismatch.fleet.choice.selection import Chooser, folds_of, relative_size, without
+from regolithd.calibration.mismatch.fleet.choice.selection import Chooser, relative_size
 from regolithd.calibration.mismatch.fleet.told.answer import (
     FleetAnswer,
     FleetEffect,
@@ -19,13 +22,10 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
     FleetUnexplained,
     RoverOfFleet,
 )
-from regolithd.calibration.mismatch.fleet.told.intervals import onset_places, size_stds
-from regolithd.calibration.mismatch.fleet.told.recordings import shown_beside
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
-from regolithd.calibration.mismatch.inference.intervals import unit_of
+from regolithd.calibration.mismatch.fleet.told.sizes import mean_sizes, parameters_of
 from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost, words_of
 from regolithd.calibration.mismatch.problem.problem import LeftOut
-from regolithd.calibration.mismatch.problem.words import in_units
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -87,6 +87,7 @@ class Chosen:
 class _Beside:
     """Parameters and effects, fitted with what single recordings show beside them, and their standard deviations."""
 
+    equations: FleetEquations
     fit: FleetFit
     stds: Array
 
@@ -95,14 +96,14 @@ class _Beside:
         """Return them from the equations in which what is shown, by recording and place, takes up what it can."""
         rest = equations.beside(shown)
         again = rest.fit(fit.terms)
-        return cls(again, size_stds(rest, again))
+        return cls(rest, again, size_stds(rest, again))
 
 
 def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
     """Return the answer of one channel."""
     equations, fit, simulation = chosen.equations, chosen.fit, chosen.simulation
-    held_out = _held_out(chosen.chooser, fit)
-    shown = shown_beside(equations, fit, chosen.found, chosen.names.recordings)
+    held_out = held_out_squares(equations, fit)
+    shown = shown_beside(equations, fit, chosen.found)
     beside = _Beside.of(equations, fit, shown.terms)
     effects = tuple(_effect(chosen, index, beside, held_out) for index in range(len(fit.terms)))
     single = tuple(_of_recording(chosen, i, effect) for i, effect in shown.effects)
@@ -112,7 +113,7 @@ def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
     verdict: Verdict = "unexplained" if rest else "missing-physics" if named else "consistent"
     floor = _noise_floor(chosen)
     counts = equations.counts
-    before, after = (_rms(squares, counts) for squares in held_out[:2])
+    before, after = (_rms(squares, counts) for squares in (held_out.before, held_out.after))
     return FleetAnswer(
         verdict=verdict,
         effects=(*effects, *single),
@@ -134,34 +135,17 @@ def _rover(chosen: Chosen, rover: int) -> RoverOfFleet:
     )
 
 
-def _held_out(chooser: Chooser, fit: FleetFit) -> tuple[Array, Array, list[Array]]:
-    """Return squares on recordings that did not fit the effects, shape (recording, wheel); all recordings chose them.
-
-    Without any effect, with the answer's names as the other recordings fit them, and with all of these but one.
-    """
-    equations = chooser.equations
-    shape = equations.counts.shape
-    before, after, but_one = np.zeros(shape), np.zeros(shape), [np.zeros(shape) for _ in fit.terms]
-    for fold in folds_of(equations):
-        used, out = 1.0 - fold if fold.min() == 0 else fold, fold > 0
-        before[out] = equations.squares(equations.fit((), used))[out]
-        chosen = equations.fit(fit.terms, used)
-        after[out] = equations.squares(chosen)[out]
-        for index, squares in enumerate(but_one):
-            squares[out] = equations.squares(equations.fit(without(fit, index), used))[out]
-    return before, after, but_one
-
-
 def _rms(squares: Array, counts: Array) -> float:
     return float(np.sqrt(max(float(squares.sum()), 0.0) / max(float(counts.sum()), 1.0)))
 
 
-def _effect(chosen: Chosen, index: int, beside: _Beside, held_out: tuple[Array, Array, list[Array]]) -> FleetEffect:
+def _effect(chosen: Chosen, index: int, beside: _Beside, held_out: HeldOutSquares) -> FleetEffect:
     equations, fit, names = chosen.equations, chosen.fit, chosen.names
     term = fit.terms[index]
     candidate, acting = term.group.candidate, equations.factors(term).any(axis=0)
     where = acting & (equations.counts > 0)
-    errors = _rms(held_out[2][index][where], equations.counts[where]), _rms(held_out[1][where], equations.counts[where])
+    counts = equations.counts[where]
+    errors = _rms(held_out.without[index][where], counts), _rms(held_out.after[where], counts)
     wheels = tuple(equations.wheels[w] for w in term.units.wheels if where[:, w].any())
     since = term.course.kind in {"since", "growing"}
     first, last = onset_places(equations, fit, index) if since else (0, 0)
@@ -191,24 +175,11 @@ def _effect(chosen: Chosen, index: int, beside: _Beside, held_out: tuple[Array, 
 
 
 def _sizes(chosen: Chosen, index: int, beside: _Beside) -> dict[str, Parameter]:
-    """Return coefficients and relative size with their intervals; of a size of each rover's own, the mean."""
-    fit = beside.fit
-    term, span = fit.terms[index], fit.spans[index]
-    count = len(term.group.columns)
-    stds = beside.stds[span].reshape(-1, count)
-    values = fit.coefficients[span].reshape(-1, count)
-    weights = 1 / np.maximum(stds, 1e-300) ** 2
-    mean = np.sum(weights * values, axis=0) / np.sum(weights, axis=0)
-    std = np.maximum(1 / np.sqrt(np.sum(weights, axis=0)), np.std(values, axis=0))
-    found = {}
-    unit, labels = chosen.simulation.unit, chosen.labels
-    for coefficient, value, spread in zip(term.group.candidate.coefficients, mean, std, strict=False):
-        reach = NINETY_PERCENT_STDS * spread
-        told = in_units(coefficient.unit, unit, labels)
-        found[coefficient.name] = Parameter(float(value), float(value - reach), float(value + reach), told)
-    for name, value in term.group.shape.items():
-        if name in term.group.candidate.free and name != term.group.candidate.change_point:
-            found[name] = Parameter(float(value), float("nan"), float("nan"), unit_of(name, labels))
+    """Return coefficients, shape parameters and relative size with their intervals."""
+    fit, stds, simulation = beside.fit, beside.stds, chosen.simulation
+    found = parameters_of(beside.equations, fit, stds, index, simulation.unit, chosen.labels)
+    span, count = fit.spans[index], len(fit.terms[index].group.columns)
+    mean, std = mean_sizes(fit.coefficients[span], stds[span], count)
     size = relative_size(chosen.equations, fit, index)
     share = NINETY_PERCENT_STDS * float(np.max(std / np.maximum(np.abs(mean), 1e-300)))
     return {**found, "relative_size": Parameter(size, size * (1 - share), size * (1 + share), "1")}

@@ -149,6 +149,22 @@ def test_what_is_told_of_the_fit_is_on_recordings_that_did_not_fit_it(season: Ch
     assert nothing.held_out_rmse_after == pytest.approx(nothing.noise_floor_rmse, rel=0.05)
 
 
+def test_whose_parameter_left_its_prior_and_since_when_is_in_the_catalogue() -> None:
+    """With its value in each recording of that rover alone, and whether that excludes the stated value."""
+    shifted = {(0, 0): 1.6, (0, 1): 1.6}
+    drives = [drive(n, shifted if n in {5, 7} else {}) for n in range(8)]
+    one = chosen(equations_of(drives, ROVER), (), [found()] * 8)
+    answer = answer_of_fleet(one)
+    assert [each.told_name for each in answer.parameters if each.beyond_prior()] == ["gain of rover 1"]
+    rows = [row for row in catalogue_rows(one, answer) if row.found == "parameter"]
+    assert [(row.rover, row.recording, row.acts) for row in rows] == [
+        ("rover 1", f"drive {n}", n in {5, 7}) for n in (1, 3, 5, 7)
+    ]
+    for row in rows:
+        assert row.parameter == "gain"
+        assert row.value == pytest.approx(1.5 + (1.6 if row.acts else 0.0), abs=0.05)
+
+
 @pytest.mark.parametrize(
     ("level", "owners"),
     [("shared", [("rover 0", "rover 1")]), ("rover", [("rover 0",), ("rover 1",)]), ("recording", [])],

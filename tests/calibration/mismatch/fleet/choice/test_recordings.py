@@ -12,7 +12,7 @@ from synthetic_fleet import DEVIATION, DRAG, GROUPS, PRIOR_STD, WAVE, Drive, dri
 
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
 from regolithd.calibration.mismatch.fleet.choice.equations import fleet_equations
-from regolithd.calibration.mismatch.fleet.told.recordings import gain_beside, shown_beside
+from regolithd.calibration.mismatch.fleet.choice.recordings import gain_beside, shown_beside
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -90,7 +90,7 @@ def test_a_finding_must_gain_what_was_asked_there_and_for_the_choice_among_recor
     named = shown("viscous-friction", named=True, penalty=asked - 10.0)
     curve = shown("voltage", named=False, penalty=asked - THRESHOLDS.smooth_term_entry)
     for of_recording, part in ((named, "effects"), (curve, "unexplained")):
-        result = shown_beside(of, fit, [found(), found(of_recording), found()], ["a", "b", "c"])
+        result = shown_beside(of, fit, [found(), found(of_recording), found()])
         assert len(getattr(result, part)) == (margin > 0)
 
 
@@ -99,7 +99,7 @@ def test_a_finding_is_told_as_its_recording_tells_it() -> None:
     of = with_own(drive(1, {**on_both(OWN, 0.2), **on_both(OWN - 1, 0.2)}), count=2)
     fit = of.fit(())
     of_recording = found(shown("viscous-friction", named=True), shown("voltage", named=False))
-    result = shown_beside(of, fit, [found(), of_recording, found()], ["a", "b", "c"])
+    result = shown_beside(of, fit, [found(), of_recording, found()])
     assert result.effects == ((1, FINDINGS.effects[1]),)
     assert result.unexplained == ((1, FINDINGS.unexplained[0]),)
     assert result.terms == ((1, 0), (1, 1))
@@ -111,4 +111,4 @@ def test_what_the_fleet_has_is_not_told_again_of_a_recording() -> None:
     own = found(shown("steady-drag", named=True))
     for first, told in ((1, ()), (2, ((1, 0),))):
         fit = of.fit((term(DRAG, Course("since", first)),))
-        assert shown_beside(of, fit, [found(), own, found()], ["a", "b", "c"]).terms == told
+        assert shown_beside(of, fit, [found(), own, found()]).terms == told

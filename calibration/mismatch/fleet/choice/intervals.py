@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def size_stds(equations: FleetEquations, fit: FleetFit) -> Array:
-    """Return the standard deviations of the coefficients, shape (coefficient,).
+def size_stds(equations: FleetEquations, fit: FleetFit, along: Array | None = None) -> Array:
+    """Return the standard deviations of the coefficients, or of sums of them, `along` (sum, coefficient).
 
     The larger of that from the noise and of the sandwich estimator (White, 1980) over recordings, which counts what
     differs from one recording to the next.
@@ -30,7 +30,9 @@ def size_stds(equations: FleetEquations, fit: FleetFit) -> Array:
         scores[i] = np.einsum("jw,wj->j", fit.factors[:, i], left[i][:, fit.columns])
     correction = equations.count / max(equations.count - 1, 1)
     sandwich = correction * fit.covariance @ (scores.T @ scores) @ fit.covariance
-    return np.sqrt(np.maximum(np.diag(sandwich), np.diag(fit.covariance)))
+    ways = np.eye(len(fit.columns)) if along is None else along
+    variances = [np.einsum("sj,jk,sk->s", ways, each, ways) for each in (sandwich, fit.covariance)]
+    return np.asarray(np.sqrt(np.maximum(*variances)), np.float64)
 
 
 def onset_places(equations: FleetEquations, fit: FleetFit, index: int) -> tuple[int, int]:

@@ -27,30 +27,35 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Shown:
-    """Findings with the places of their recordings, and the terms, by recording and place, that they are of."""
+    """Findings with the places of their recordings, and the terms, by recording and place, that they are of.
+
+    `curves` are those of the terms that have no name.
+    """
 
     effects: tuple[tuple[int, Effect], ...]
     unexplained: tuple[tuple[int, Unexplained], ...]
     terms: tuple[tuple[int, int], ...]
+    curves: tuple[tuple[int, int], ...]
 
 
-def shown_beside(equations: FleetEquations, fit: FleetFit, found: Sequence[Found], names: Sequence[str]) -> Shown:
+def shown_beside(equations: FleetEquations, fit: FleetFit, found: Sequence[Found]) -> Shown:
     """Return the effects and structures that recordings show beside the fit."""
-    effects, rest, own = [], [], []
+    effects, rest, own, curves = [], [], [], []
     for i, of_recording in enumerate(found):
         terms = of_recording.terms
         named = [term for term in terms if term.named]
         for k, term in enumerate(terms):
             needed = of_recording.entry_threshold if term.named else THRESHOLDS.smooth_term_entry
-            needed += term.penalty + 2 * float(np.log(len(names)))
+            needed += term.penalty + 2 * float(np.log(len(found)))
             if _is_of_the_fleet(equations, fit, i, term) or gain_beside(equations, fit, i, k) <= needed:
                 continue
             own.append((i, k))
             if term.named:
                 effects += [(i, each) for each in of_recording.findings.effects if each.name == term.name][:1]
             else:
+                curves.append((i, k))
                 rest += [(i, each) for each in of_recording.findings.unexplained[k - len(named) : k - len(named) + 1]]
-    return Shown(tuple(effects), tuple(rest), tuple(own))
+    return Shown(tuple(effects), tuple(rest), tuple(own), tuple(curves))
 
 
 def _is_of_the_fleet(equations: FleetEquations, fit: FleetFit, recording: int, term: FoundTerm) -> bool:

@@ -9,7 +9,7 @@ import pytest
 from synthetic_fleet import DRAG, WAVE, WEAR, drive, equations_of, on_both, term
 
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
-from regolithd.calibration.mismatch.fleet.told.intervals import onset_places, size_stds
+from regolithd.calibration.mismatch.fleet.choice.intervals import onset_places, size_stds
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 

@@ -1,0 +1,140 @@
+"""Sizes and shapes of a fleet's effects, with 90 % intervals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, Parameter
+from regolithd.calibration.mismatch.fleet.choice.intervals import size_stds
+from regolithd.calibration.mismatch.inference.intervals import unit_of
+from regolithd.calibration.mismatch.problem.words import in_units
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """A shape, and the coefficients that an effect has with it, with their standard deviations."""
+
+    shape: Shape
+    sizes: Array
+    spread: Array
+
+
+def mean_sizes(values: Array, stds: Array, count: int) -> tuple[Array, Array]:
+    """Return an effect's `count` coefficients with standard deviations; of a size of each rover's, mean and spread."""
+    values, stds = values.reshape(-1, count), stds.reshape(-1, count)
+    weights = 1 / np.maximum(stds, 1e-300) ** 2
+    mean = np.sum(weights * values, axis=0) / np.sum(weights, axis=0)
+    return mean, np.maximum(1 / np.sqrt(np.sum(weights, axis=0)), np.std(values, axis=0))
+
+
+def parameters_of(
+    equations: FleetEquations, fit: FleetFit, stds: Array, index: int, unit: str, labels: Mapping[str, str]
+) -> dict[str, Parameter]:
+    """Return what a single recording's answer tells of an effect, by name: coefficients and shape parameters.
+
+    A value is at the fit's own shape. Its interval holds that and where other shapes of the grid move it; it is not a
+    number where none tells how the effect changes with the parameter.
+    """
+    group, span = fit.terms[index].group, fit.spans[index]
+    candidate = group.candidate
+    own = Law(group.shape, *mean_sizes(fit.coefficients[span], stds[span], len(group.columns)))
+    moved = {name: moved_law(equations, fit, index, name) for name in _free(group)}
+    wide = {name: np.nan if found is None else found[1] for name, found in moved.items()}
+    laws = [own, *(found[0] for found in moved.values() if found is not None)]
+    ranges = [_ranges(candidate, law, wide) for law in laws]
+    units = {each.name: in_units(each.unit, unit, labels) for each in candidate.coefficients}
+    found = {}
+    for name, value in candidate.parameters(own.shape, own.sizes.tolist()).items():
+        if name != candidate.change_point:
+            ends = np.clip([value, *(end for each in ranges for end in each[name])], *candidate.free.get(name, ANY))
+            told = units.get(name) or unit_of(name, labels)
+            found[name] = Parameter(float(value), float(np.min(ends)), float(np.max(ends)), told)
+    return found
+
+
+ANY = (-np.inf, np.inf)
+"""Bounds of what may have any value."""
+
+
+def _ranges(candidate: Candidate, law: Law, wide: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+    """Return the 90 % interval of each parameter about a law; `wide` are the shape parameters' standard deviations."""
+
+    def told(sizes: Array, **shape: float) -> dict[str, float]:
+        return candidate.parameters({**law.shape, **shape}, sizes.tolist())
+
+    centre = told(law.sizes)
+    moved = [told(sizes) for sizes in law.sizes + np.diag(law.spread)]
+    moved += [told(law.sizes, **{name: float(law.shape[name]) + std}) for name, std in wide.items()]
+    reach = {
+        name: NINETY_PERCENT_STDS * float(np.sqrt(sum((each[name] - at) ** 2 for each in moved)))
+        for name, at in centre.items()
+    }
+    return {name: (at - reach[name], at + reach[name]) for name, at in centre.items()}
+
+
+def moved_law(equations: FleetEquations, fit: FleetFit, index: int, name: str) -> tuple[Law, float] | None:
+    """Return the law with a free shape parameter where the recordings have it, and its standard deviation.
+
+    An effect of two shapes s and s', of sizes c and d, is to first order one of the shape s + (s' − s) d / (c + d) and
+    of the size c + d. Of all shapes of the grid that differ in this parameter alone, that is taken which explains most
+    beside the fit's own; None where there is none.
+    """
+    term = fit.terms[index]
+    others = [group for group in equations.groups if _differs_in(group, term.group, name)]
+    if not others:
+        return None
+    both = max((equations.fit((*fit.terms, replace(term, group=each))) for each in others), key=_gained)
+    at, other = term.group.shape, both.terms[-1].group.shape
+    scale = _scale(term.group.candidate, other) / _scale(term.group.candidate, at)
+    total = both.coefficients[both.spans[index]] + scale * both.coefficients[both.spans[-1]]
+    energy = max(float(total @ total), 1e-300)
+    share = scale * float(both.coefficients[both.spans[-1]] @ total) / energy
+    stds = size_stds(equations, both, _along(both, index, total / energy, share, scale))
+    step = float(other[name]) - float(at[name])
+    sizes = mean_sizes(total, stds[1:], len(term.group.columns))
+    return Law({**at, name: float(at[name]) + share * step}, *sizes), abs(step) * float(stds[0])
+
+
+def _along(both: FleetFit, index: int, total: Array, share: float, scale: float) -> Array:
+    """Return how the share of the last term, and the size of each coefficient with it, change with all coefficients."""
+    count = len(total)
+    along = np.zeros((1 + count, len(both.coefficients)))
+    own, added = both.spans[index], both.spans[-1]
+    along[0, own], along[0, added] = -share * total, (1 - share) * scale * total
+    along[1:, own], along[1:, added] = np.eye(count), scale * np.eye(count)
+    return along
+
+
+def _gained(fit: FleetFit) -> float:
+    return fit.delta_chi2
+
+
+def _scale(candidate: Candidate, shape: Shape) -> float:
+    return float(shape.get(candidate.scaled_by, 1.0))
+
+
+def _free(group: GridGroup) -> list[str]:
+    """Return the shape parameters that are continuous; what begins within a recording is no shape of a fleet's."""
+    return [name for name in group.shape if name in group.candidate.free and name != group.candidate.change_point]
+
+
+def _differs_in(group: GridGroup, other: GridGroup, name: str) -> bool:
+    """Return whether two shapes of a candidate differ in one parameter alone, beside their scale."""
+    if group.candidate.name != other.candidate.name or name not in group.shape:
+        return False
+    left_out = {name, group.candidate.scaled_by}
+    one, two = ({key: value for key, value in each.shape.items() if key not in left_out} for each in (group, other))
+    return one == two and group.shape[name] != other.shape[name]

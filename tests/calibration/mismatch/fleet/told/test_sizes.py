@@ -1,0 +1,80 @@
+"""Intervals of an effect's sizes and shapes: values between the shapes of the grid are in them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+from synthetic_fleet import GROUPS, WAVE, Drag, drive, term
+
+from regolithd.calibration.mismatch.fleet.choice.courses import Course
+from regolithd.calibration.mismatch.fleet.choice.equations import fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.intervals import size_stds
+from regolithd.calibration.mismatch.fleet.told.sizes import moved_law, parameters_of
+from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.answer import Parameter
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+
+SIZE, POWER = 0.3, 0.86
+
+
+class Power(Drag):
+    """A drag that grows with a power of the speed; a factor in its shape multiplies its column."""
+
+    scaled_by = "factor"
+    free: ClassVar = {"power": (0.5, 1.5)}
+
+
+def season(factor: float = 1.0, *, alone: bool = False) -> tuple[FleetEquations, FleetFit]:
+    """Return the fit of the grid's power of 0.75 where 0.86 acts, beside a column of 1.0; `alone` without that."""
+    sums = []
+    for n in range(6):
+        plain = drive(n)
+        speed = 1.0 + np.abs(plain.columns[1])
+        columns = plain.columns.copy()
+        columns[1], columns[2] = speed**0.75, factor * speed
+        sums.append(replace(plain, columns=columns, residual=plain.residual + SIZE * speed**POWER).sums())
+    first = GridGroup(Power(), {"power": 0.75, "factor": 1.0}, (1,), 2)
+    second = GridGroup(Power(), {"power": 1.0, "factor": factor}, (2,), 2)
+    groups = [first, GROUPS[1] if alone else second, WAVE]
+    of = fleet_equations(sums, (0,) * 6, range(6), groups, "rover")
+    return of, of.fit((term(first, Course("always")),))
+
+
+def told(of: FleetEquations, fit: FleetFit) -> dict[str, Parameter]:
+    """Return what is told of the one effect."""
+    return parameters_of(of, fit, size_stds(of, fit), 0, "A", {})
+
+
+def test_an_interval_holds_the_value_and_the_truth_between_two_shapes() -> None:
+    """Of the shape, and of the size that goes with it; the value is that of the grid."""
+    of, fit = season()
+    found = told(of, fit)
+    assert found["power"].value == 0.75
+    assert found["power"].low <= 0.75 < POWER < found["power"].high < 1.2
+    assert found["drag"].low < SIZE < found["drag"].value < found["drag"].high
+
+
+def test_the_law_moves_to_where_the_recordings_have_it() -> None:
+    """To first order; what multiplies a shape's column does not matter."""
+    of, fit = season()
+    law, std = moved_law(of, fit, 0, "power") or pytest.fail("no other shape")
+    assert law.shape["power"] == pytest.approx(POWER, abs=2 * std)
+    assert law.sizes[0] == pytest.approx(SIZE, abs=2 * float(law.spread[0]))
+    scaled, same = moved_law(*season(4.0), 0, "power") or pytest.fail("no other shape")
+    assert scaled.shape["power"] == pytest.approx(law.shape["power"])
+    assert (scaled.sizes[0], same) == pytest.approx((law.sizes[0], std))
+
+
+def test_a_shape_without_another_one_has_no_interval() -> None:
+    """The value is told, and the size's interval is that at this shape."""
+    of, fit = season(alone=True)
+    found = told(of, fit)
+    assert found["power"].value == 0.75
+    assert np.isnan([found["power"].low, found["power"].high]).all()
+    reach = 1.6449 * size_stds(of, fit)[fit.spans[0]][0]
+    assert found["drag"].high - found["drag"].value == pytest.approx(reach, rel=1e-3)
