@@ -81,7 +81,8 @@ def _as_without_its_covariate(
     They are not named, since they gain nothing by it: the same drag at any temperature, say. Nothing speaks against
     them either. What their many shapes cost is no evidence, so that Δχ² is compared.
     """
-    term, others, best = named.terms[index], named.without(index), {}
+    term, others = named.terms[index], named.without(index)
+    best: dict[str, tuple[float, Term]] = {}
     groups = [group for group in equations.design.groups if group.name not in known and _has_law_without(group)]
     for gain, rival in equations.further(others, groups):
         if rival.wheels == term.wheels and gain > best.get(rival.name, (0.0, term))[0]:
