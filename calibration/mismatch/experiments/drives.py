@@ -41,7 +41,8 @@ class Drive:
 
     Attributes
     ----------
-    problem: its recording without noise, and the simulation's prediction of it
+    problem: its recording without noise, and the simulation's prediction of it; its mask has the readings at which the
+        prediction and its tangents are defined, with load or without (at a standstill they need not be)
     loaded: 1 where the machine carries its load, 0 where it does not, shape (time, 1)
     tangents: ∂prediction/∂parameter of each free parameter, shape (parameter, time, wheel)
     """
@@ -88,8 +89,10 @@ class Drives:
         problem = _problem(self.problem, recording, unloaded)
         problem = replace(problem, covariates={**problem.covariates, **self._acceleration(varied, problem.mask.shape)})
         loaded = (~unloaded).astype(np.float64)
-        _, _, found = tangents(problem)
-        return Drive(problem, loaded, np.array(found).reshape(-1, *problem.mask.shape) * loaded)
+        with np.errstate(all="ignore"):  # as in `_problem`
+            found = np.array(tangents(problem)[2]).reshape(-1, *problem.mask.shape)
+        known = problem.mask & np.isfinite(found).all(axis=0)
+        return Drive(replace(problem, mask=known), loaded, np.where(known, found, 0.0) * loaded)
 
     def _recording(self, varied: frozenset[str], unloaded: NDArray[np.bool_]) -> Recording:
         """Return the inputs of the drive as a recording."""
@@ -129,8 +132,9 @@ class Drives:
 def _problem(of: Problem, recording: Recording, unloaded: NDArray[np.bool_]) -> Problem:
     """Return the problem of a drive whose readings are the prediction."""
     simulation, inputs = of.simulation, complete_inputs(recording)
-    predicted = simulation.predict(inputs, {**simulation.variants(), **of.values})
-    prediction = np.where(unloaded, 0.0, predicted)
+    with np.errstate(all="ignore"):  # a prediction may be undefined at these inputs
+        predicted = simulation.predict(inputs, {**simulation.variants(), **of.values})
+    prediction = np.where(unloaded & np.isfinite(predicted), 0.0, predicted)
     varying, constants = covariates_of(recording, simulation, inputs, prediction, arbitrary_zero=of.arbitrary_zero)
     return Problem(
         recording=recording,
@@ -138,7 +142,7 @@ def _problem(of: Problem, recording: Recording, unloaded: NDArray[np.bool_]) -> 
         values=of.values,
         measured=prediction,
         prediction=prediction,
-        mask=np.isfinite(prediction),
+        mask=np.isfinite(predicted),  # without load too: what cannot be predicted at these inputs has no tangents
         covariates={**constants, **varying},
         side=of.side,
         row=of.row,

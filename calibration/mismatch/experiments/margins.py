@@ -122,9 +122,11 @@ class Expected:
     def margins(self, duration_s: float) -> dict[Pair, float]:
         """Return the Δχ² that is expected of such a duration between every two effects, or an effect and parameters.
 
-        It is the mean of the two cases, since nobody knows which of the two is true.
+        It is the mean of the two cases, since nobody knows which of the two is true; 0 where the sums overflow.
         """
-        left = np.stack([self._left_by(other, duration_s) for other in range(len(self.hypotheses))])
+        count = len(self.hypotheses)
+        finite = bool(np.isfinite(self.gram).all() and np.isfinite(self.precision).all())
+        left = np.stack([self._left_by(k, duration_s) for k in range(count)]) if finite else np.zeros((count, count))
         names = [one.name for one in self.hypotheses]
         # That a parameter is wrong by more than its prior allows is an answer where there is one effect alone.
         effects = [place for place, one in enumerate(self.hypotheses) if one.term is not None]
@@ -185,7 +187,9 @@ def expected_of(
     weights = np.sqrt(information_per_s / np.maximum(known.sum(axis=0), 1))
     # Single precision of the recording's own columns is not needed here: there are few rows.
     stacked = (np.where(known, np.stack(columns), 0.0) * weights).reshape(len(columns), -1)
-    return Expected(stacked @ stacked.T, precision, given_at, tuple(of_law), tuple(predicted), tuple(hypotheses))
+    with np.errstate(over="ignore"):
+        gram = stacked @ stacked.T
+    return Expected(gram, precision, given_at, tuple(of_law), tuple(predicted), tuple(hypotheses))
 
 
 def precisions(equations: NormalEquations) -> Array:
@@ -212,7 +216,8 @@ def _columns(drive: Drive, term: Term, shape: Shape) -> Array:
     """Return a law's columns on a drive, 0 on other wheels and where the law has no part without load."""
     candidate = _candidate(term)
     with np.errstate(all="ignore"):  # a law may be undefined where there is no load
-        found = np.nan_to_num(np.asarray(candidate.columns(drive.problem, shape), np.float64))
+        found = np.asarray(candidate.columns(drive.problem, shape), np.float64)
+    found = np.where(np.isfinite(found), found, 0.0)
     on = np.zeros(drive.problem.mask.shape[1])
     on[list(term.wheels)] = 1.0
     return found * on * (1.0 if candidate.acts_unloaded else drive.loaded)

@@ -178,5 +178,7 @@ def _ends(problem: Problem, name: str, values: Array) -> tuple[float, float] | N
     if name in MAGNITUDES:
         low, high = min(low, SMALLEST * middle), max(high, LARGEST * middle)
     span = float(problem.simulation.experiment_spans.get(name, 0.0))
-    low, high = min(low, middle - span), max(high, middle + span)
+    high = max(high, middle + span)
+    if name not in MAGNITUDES or middle > span:  # a size below 0 is none, and one of 0 is a standstill
+        low = min(low, middle - span)
     return (low, high) if high - low > ROUNDING * max(abs(low), abs(high)) else None

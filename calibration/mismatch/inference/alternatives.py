@@ -131,8 +131,14 @@ def _evidence(decision: Decision, fit: Fit) -> float:
 
 
 def _neighbours(decision: Decision) -> Iterator[tuple[Term, ...]]:
-    """Yield the sets of terms with one less, one more, or one in another's place."""
-    terms = decision.whole.terms
+    """Yield the sets of terms with one less, one more, or one in another's place; of the names alone, too.
+
+    A curve may hold what the wrong name beside it leaves: the right name needs none.
+    """
+    terms, named = decision.whole.terms, tuple(term for term in decision.whole.terms if term.group.named)
+    for index in range(len(named)) if len(named) < len(terms) else ():
+        rest = (*named[:index], *named[index + 1 :])
+        yield from ((*rest, other) for other in _further(decision, rest))
     yield from ((*terms, more) for more in _further(decision, terms))
     for index in range(len(terms)):
         rest = (*terms[:index], *terms[index + 1 :])

@@ -14,15 +14,16 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_candidate,
     optimised_shapes,
+    physically_plausible,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Collection, Iterator, Sequence
 
     from regolithd.calibration.mismatch.answer import Indistinguishable
     from regolithd.calibration.mismatch.experiments.choice import Experimenter
     from regolithd.calibration.mismatch.inference.alternatives import Alternative
-    from regolithd.calibration.mismatch.regression.group import Fit, Term
+    from regolithd.calibration.mismatch.regression.group import Fit, Group, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 
@@ -68,7 +69,41 @@ def _in_its_place(equations: NormalEquations, named: Fit, index: int) -> tuple[N
         fit = equations.fit(terms)
         if acceptable(equations, fit) and _could_be_true(equations, named, fit, index):
             members.append(rival)
-    return equations, members
+    known = {member.name for member in members}
+    return equations, [*members, *_as_without_its_covariate(equations, named, index, known)]
+
+
+def _as_without_its_covariate(
+    equations: NormalEquations, named: Fit, index: int, known: Collection[str]
+) -> Iterator[Term]:
+    """Yield laws that explain as much as a named effect because their covariate hardly varied here.
+
+    They are not named, since they gain nothing by it: the same drag at any temperature, say. Nothing speaks against
+    them either. What their many shapes cost is no evidence, so that Δχ² is compared.
+    """
+    term, others = named.terms[index], named.without(index)
+    best: dict[str, tuple[float, Term]] = {}
+    groups = [group for group in equations.design.groups if group.name not in known and _has_law_without(group)]
+    for gain, rival in equations.further(others, groups):
+        if rival.wheels == term.wheels and gain > best.get(rival.name, (0.0, term))[0]:
+            best[rival.name] = gain, rival
+    for _, rival in best.values():
+        fit = equations.fit((*others, rival))
+        place = len(fit.terms) - 1
+        large = relative_size(equations, fit, place) >= equations.thresholds.smallest_effect
+        if large and physically_plausible(equations, fit, place) and _gains_as_much(equations, named, fit, index):
+            yield rival
+
+
+def _has_law_without(group: Group) -> bool:
+    return group.candidate is not None and group.candidate.without_covariate(group.shape) is not None
+
+
+def _gains_as_much(equations: NormalEquations, named: Fit, rival: Fit, index: int) -> bool:
+    """Return whether the rival, were it true, would gain this much less than the named effect often enough."""
+    limits, apart = equations.thresholds, _energy_beside(equations, named, rival, index)
+    behind = max(named.delta_chi2 - rival.delta_chi2, 0.0)
+    return apart <= 1e-9 or wrong_choice_rate(behind, apart) > limits.confusion_rate
 
 
 def _takes_over(equations: NormalEquations, named: Fit, index: int) -> tuple[NormalEquations, list[Term]]:
@@ -99,12 +134,17 @@ def _could_be_true(equations: NormalEquations, named: Fit, rival: Fit, index: in
     # What speaks against a rival beforehand is not what the recording says against it.
     beforehand = implausibility(equations.problem, candidate, own.group.shape) if candidate else 0.0
     lead = max(equations.score(named) - equations.score(rival) - beforehand - limits.lead_margin, 0.0)
-    _, complement = equations.own_and_complement((*named.without(index), named.terms[index]), own)
-    values = rival.coefficients[rival.of_term(len(rival.terms) - 1)]
-    apart = float(values @ complement @ values)
+    apart = _energy_beside(equations, named, rival, index)
     if apart <= 1e-9 or named.delta_chi2 - rival.delta_chi2 < limits.equal_gain:
         return True
     return wrong_choice_rate(lead, apart) > limits.confusion_rate
+
+
+def _energy_beside(equations: NormalEquations, named: Fit, rival: Fit, index: int) -> float:
+    """Return the energy of a rival's last term outside the span of the named effect and all else."""
+    _, complement = equations.own_and_complement((*named.without(index), named.terms[index]), rival.terms[-1])
+    values = rival.coefficients[rival.of_term(len(rival.terms) - 1)]
+    return float(values @ complement @ values)
 
 
 def wrong_choice_rate(lead: float, apart: float) -> float:

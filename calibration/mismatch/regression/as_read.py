@@ -50,6 +50,20 @@ def columns_on_wheels(equations: NormalEquations, fit: Fit) -> Array:
     return np.asarray(columns * on[:, :, None], np.float64)
 
 
+def left_beside(equations: NormalEquations, fit: Fit, series: Array) -> Array:
+    """Return what a fit's columns, held by the priors, leave of other courses, shape (series, time, wheel) as these.
+
+    Where a course is missing from the prediction, this is what the fit leaves of the readings: free parameters take up
+    the rest of it (Frisch, Waugh and Lovell).
+    """
+    design, courses = equations.design, equations.design.in_folds(np.where(equations.problem.mask, series, 0.0))
+    on = membership(fit.columns, len(equations.weights))[:, :, None]
+    columns = design.columns([column for column, _ in fit.columns]) * on
+    moment = np.einsum("cwt,swt,w->cs", columns, design.whitened(courses), equations.weights, optimize=True)
+    taken_up = np.einsum("cs,cwt->swt", fit.covariance @ moment, columns_on_wheels(equations, fit), optimize=True)
+    return np.asarray(design.in_time(courses - taken_up))
+
+
 def long_run_weights(equations: NormalEquations, fit: Fit) -> Array:
     """Return one over the long-run variance of what a fit leaves, shape (wheel,); the weights, where not whitened."""
     if equations.design.whitening is NOT_WHITENED:

@@ -89,3 +89,46 @@ def test_what_follows_the_duty_itself_stays_unexplained(acts_on_noise: float) ->
         found = compare(heated(seed, acts_on_noise, offset_K=2.0), Chamber()).answer
         assert found.verdict == "unexplained"
         assert "duty" in {place.covariate for place in found.unexplained}
+
+
+class Cart(Simulation):
+    """The current of a cart that goes to and fro: its idle current and rolling resistance take up any constant drag."""
+
+    channel, unit = "current_A", "A"
+    inputs = ("speed_rad_s", "load_N")
+    parameters: ClassVar = {
+        "idle_A": Prior(0.30, 0.03, "A"),
+        "rolling_A_N": Prior(0.004, 0.0004, "A/N"),
+    }
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the drag against the motion."""
+        drag = values["idle_A"] + values["rolling_A_N"] * inputs["load_N"]
+        return drag * np.sign(inputs["speed_rad_s"])
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return speed, load and roll."""
+        return {"wheel_speed": inputs["speed_rad_s"], "load": inputs["load_N"], "roll": inputs["roll_rad"]}
+
+
+def rolling(seed: int) -> Recording:
+    """Return a recording of a cart whose drag grows with the square of its roll, which nobody controls."""
+    random, count = np.random.default_rng(seed), 1600
+    shocks, noise, way = random.normal(size=(2, count)), 0.2 * random.normal(size=count), np.zeros(count)
+    slow = np.zeros((2, count))
+    for k in range(1, count):
+        slow[:, k] = 0.9 * slow[:, k - 1] + np.sqrt(1 - 0.9**2) * shocks[:, k]
+        noise[k] += 0.5 * noise[k - 1]
+    way[:] = np.where(np.arange(count) % 400 < 300, 1.0, -1.0)
+    roll, load = 0.05 * slow[0], 100 + 10 * slow[1]
+    current = (0.31 + 0.0041 * load + 40 * roll**2) * way + noise
+    columns = {"t_s": 1.0 * np.arange(count), "speed_rad_s": 3 * way, "load_N": load, "roll_rad": roll}
+    return from_columns({**columns, "current_A": current})
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_parameters_take_up_of_a_curve_is_no_sign_of_feedback(seed: int) -> None:
+    """A drag by the roll is there in what the roll's past predicts too, less what idle current and resistance hold."""
+    found = compare(rolling(seed), Cart()).answer
+    assert "roll" in {place.covariate for place in found.unexplained}
+    assert not [note for note in found.notes if "controller" in note]

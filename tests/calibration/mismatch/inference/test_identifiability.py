@@ -25,6 +25,9 @@ from regolithd.calibration.mismatch.inference.sensitivity import sensitivities, 
 from regolithd.calibration.mismatch.selection.best_subsets import acceptable
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch import Problem, Shape
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 THRESHOLD = 8.0
@@ -108,6 +111,40 @@ def test_a_clear_effect_has_no_rivals() -> None:
     assert (
         rivals(equations, equations.fit([term_of(equations, "drag")]), experimenter_of(equations, THRESHOLD))[1] == ()
     )
+
+
+class Cooling(Drag):
+    """A drag that falls as the recording warms from 0 to 1, by a share or not at all."""
+
+    name = "cooling"
+    falls = 0.02
+
+    def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
+        """Return the law."""
+        return [{"falls": self.falls}]
+
+    def without_covariate(self, shape: Shape) -> Shape:
+        """Return the same drag at any temperature."""
+        return {**shape, "falls": 0.0}
+
+    def columns(self, problem: Problem, shape: Shape) -> np.ndarray:
+        """Return sign(ω), less a share that grows with the warmth."""
+        warmth = problem.time_s / problem.length_s
+        return super().columns(problem, shape) * (1 - float(shape["falls"]) * warmth)
+
+
+class QuicklyCooling(Cooling):
+    """A drag that nearly vanishes over the same warmth."""
+
+    name, falls = "quickly-cooling", 0.9
+
+
+def test_a_law_whose_covariate_hardly_varied_is_a_rival_though_it_gains_nothing_by_it() -> None:
+    """It cannot be named, and nothing speaks against it; where the covariate would have shown, the law is refuted."""
+    equations = equations_of(problem_of(table(drag=0.3)), (Drag(), Cooling(), QuicklyCooling()))
+    assert not acceptable(equations, equations.fit([term_of(equations, "cooling")]))
+    _, (found,) = rivals(equations, equations.fit([term_of(equations, "drag")]), experimenter_of(equations, THRESHOLD))
+    assert found.effects == ("drag", "cooling")
 
 
 class HalfTheTime(Drag):
