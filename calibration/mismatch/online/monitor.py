@@ -37,13 +37,14 @@ class Reported:
     ----------
     place: what is told of it; of one without a name, its wheels and its onset
     at_s: when it was reported first
-    possible: the laws and wheels, by their indices, that have explained it nearly as well ever since
+    possible: the laws and wheels, by their indices, that have explained it nearly as well ever since; empty: all are
+        refuted
     named: whether one law explains it: once that is refuted, it stays unnamed
     """
 
     place: Place
     at_s: float
-    possible: frozenset[tuple[int, int]] = frozenset()
+    possible: frozenset[tuple[int, int]]
     named: bool = True
 
 
@@ -206,7 +207,7 @@ class SequentialTest:
             return replace(each, place=place, possible=each.possible & (self._within_lead(near) | {_pair(place)}))
         possible = each.possible & self._within_lead(near)
         if not possible:
-            return replace(each, named=False)
+            return replace(each, possible=possible)
         law, wheels = max(possible, key=lambda pair: near[pair[1], pair[0]])
         return replace(each, place=found.best_of(Place(law, wheels, place.onset_s)), possible=possible)
 
@@ -223,7 +224,7 @@ class SequentialTest:
 
     def _nameless(self, index: int) -> bool:
         """Return whether no single law explains a reported change."""
-        if self._same_wheels_and_time(index):
+        if not self.reported[index].possible or self._same_wheels_and_time(index):
             return True
         place, found, together = self.reported[index].place, self.scores_beside(index), self.unnamed_beside(index)
         at = found.at(place)
