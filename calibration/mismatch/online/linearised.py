@@ -54,6 +54,7 @@ class Linearised:
     sets: of wheels, by indices
     search: what may be where
     left_out: names of candidates that are not searched for
+    covariates: names of those that the beginning had
     usual: how the readings were at the beginning
     limits: the numbers that decide
     """
@@ -66,6 +67,7 @@ class Linearised:
     sets: tuple[tuple[int, ...], ...]
     search: Search
     left_out: tuple[str, ...]
+    covariates: tuple[str, ...]
     usual: Usual
     limits: OnlineThresholds
 
@@ -95,8 +97,13 @@ class Linearised:
         return [self._of(problem, recording, elapsed, stays, piece) for piece in pieces]
 
     def pose(self, recording: Recording, elapsed: Array) -> Problem:
-        """Return the problem at the values, with the covariates that are constant in this piece."""
-        return _posed(recording, elapsed, self.simulation, self.values, self.stated)
+        """Return the problem at the values, with the covariates that are constant in this piece.
+
+        One that the beginning had and this piece lacks is blank: what depends on it is not looked for here.
+        """
+        problem = _posed(recording, elapsed, self.simulation, self.values, self.stated)
+        blank = np.full(problem.mask.shape, np.nan)
+        return replace(problem, covariates={**dict.fromkeys(self.covariates, blank), **problem.covariates})
 
     def _of(self, problem: Problem, recording: Recording, elapsed: Array, stays: Mask, piece: Piece) -> Interval:
         here = (elapsed >= piece.start_s) & (elapsed < piece.end_s)
@@ -178,8 +185,8 @@ def learned(
     )
     names = dict.fromkeys(law.name for law in laws)
     left_out = tuple(dict.fromkeys(each.name for each in candidates if each.name not in names))
-    usual = usual_of(problem)
-    found = Linearised(simulation, stated, problem.values, wheels, laws, sets, search, left_out, usual, limits)
+    known, usual = tuple(problem.covariates), usual_of(problem)
+    found = Linearised(simulation, stated, problem.values, wheels, laws, sets, search, left_out, known, usual, limits)
     _check_memory(found, problem, pieces)
     return found, found.intervals(problem, recording, elapsed, pieces)
 

@@ -15,7 +15,7 @@ class OnlineThresholds:
         25.0,
         "Δχ² of the best law, wheels and onset together, above which a change is reported.",
         "simulation (`make online`): of 100 sound drives, 183 h, two pass it, and the tail of their largest statistics "
-        "gives 25.3 ± 1.1 for one false report in 100 h",
+        "gives 25.2 ± 1.1 for one false report in 100 h",
     )
     interval_s: float = threshold(
         60.0,

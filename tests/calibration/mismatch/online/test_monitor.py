@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from regolithd.calibration.mismatch import Candidate
+    from regolithd.calibration.mismatch import Candidate, Problem, Shape
     from regolithd.calibration.mismatch.online.report import Report
 
     Columns = dict[str, NDArray[np.float64]]
@@ -189,6 +189,38 @@ def test_what_is_not_compared_counts_nowhere() -> None:
     for interval, nowhere in zip(intervals, blank, strict=True):
         assert not np.any(interval.columns[:, nowhere])
         assert not np.any(interval.residual[nowhere])
+
+
+class Warm(Drag):
+    """An offset that grows with a temperature."""
+
+    name, covariate = "warm", "heat"
+
+    def columns(self, problem: Problem, shape: Shape) -> NDArray[np.float64]:  # noqa: ARG002
+        """Return the temperature."""
+        return np.asarray(problem.covariates["heat"])[None]
+
+
+class WithHeat(Level):
+    """The level, and a temperature where it is read."""
+
+    def covariates(self, inputs: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+        """Return speed, time and temperature."""
+        return {**super().covariates(inputs), "heat": inputs["heat_degC"]}
+
+    def candidates(self, library: Sequence[Candidate]) -> Sequence[Candidate]:
+        """Return the law of temperature as well."""
+        return (*super().candidates(library), Warm())
+
+
+def test_a_covariate_that_ends_ends_nothing_else() -> None:
+    """What depends on it is not looked for; a change that begins later is reported."""
+    columns = recorded(offset=0.4)
+    heat = 20.0 + 5.0 * np.sin(columns["t_s"] / 50)
+    columns["heat_degC"] = np.where(columns["t_s"] < 160, heat, np.nan)
+    reports = followed(columns, WithHeat())
+    assert not any(report.not_compared for report in reports)
+    assert [change.wheels for change in reports[-1].changes] == [(2,)]
 
 
 class Slope(Level):
