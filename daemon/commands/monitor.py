@@ -60,16 +60,16 @@ def monitor(
 def _tell(every: Iterator[Told], simulation: Path, json: Path | None, publish: Path | None) -> None:
     from regolithd.daemon.mismatch.online.monitoring import identities, line_of, lines_of
 
-    before: frozenset[tuple[str, str]] = frozenset()
+    before: Told | None = None
     for told in every:
         for line in lines_of(told, before):
             typer.echo(line)
         if json:
             with json.open("a", encoding="utf-8") as file:
                 file.write(line_of(told) + "\n")
-        if publish and identities(told) != before:
+        if publish and identities(told) != identities(before):
             _publish(told, simulation, publish)
-        before = identities(told)
+        before = told
 
 
 def _publish(told: Told, simulation: Path, config: Path) -> None:

@@ -33,7 +33,11 @@ def temperature_degC(problem: Problem) -> NDArray[np.float64]:
     ending = _unit_of_column(problem, temperature)
     if ending == "degF":
         return (temperature - 32.0) / 1.8
-    in_kelvin = float(np.nanmin(temperature[problem.mask])) > LOWEST_IN_KELVIN if ending is None else ending == "K"
+    in_kelvin = (
+        float(np.min(temperature[problem.mask & np.isfinite(temperature)], initial=np.inf)) > LOWEST_IN_KELVIN
+        if ending is None
+        else ending == "K"
+    )
     return temperature - ICE_POINT_K if in_kelvin else temperature
 
 

@@ -99,12 +99,12 @@ def _one_shape(problem: Problem, candidate: Candidate) -> Shape | None:
 
 
 def law_columns(problem: Problem, laws: Sequence[Law]) -> Array:
-    """Return the column of each law, shape (law, time, wheel), 0 where nothing is compared."""
+    """Return each law's column, shape (law, time, wheel), 0 where nothing is compared or its covariate is blank."""
     made: dict[str, Array] = {}
     for law in laws:
         if law.name not in made:
             made[law.name] = np.asarray(law.candidate.columns(problem, law.shape), np.float64)
-    return np.stack([np.where(problem.mask, made[law.name][law.part], 0.0) for law in laws])
+    return np.stack([np.where(problem.mask, np.nan_to_num(made[law.name][law.part]), 0.0) for law in laws])
 
 
 def wheel_sets_of(problem: Problem) -> tuple[tuple[int, ...], ...]:

@@ -13,9 +13,18 @@ from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, with_changes
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.online.laws import Law, allowed, law_columns, laws_of, wheel_sets_of
+from regolithd.calibration.mismatch.online.left_out import (
+    Usual,
+    left_out_of,
+    reasons_of,
+    since_before,
+    stuck,
+    usual_of,
+)
 from regolithd.calibration.mismatch.online.pieces import together
 from regolithd.calibration.mismatch.online.scores import Search
 from regolithd.calibration.mismatch.online.sums import Interval
+from regolithd.calibration.mismatch.online.thresholds import ONLINE_THRESHOLDS, OnlineThresholds
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.nuisance import tangents
 
@@ -29,6 +38,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +54,9 @@ class Linearised:
     sets: of wheels, by indices
     search: what may be where
     left_out: names of candidates that are not searched for
+    covariates: names of those that the beginning had
+    usual: how the readings were at the beginning
+    limits: the numbers that decide
     """
 
     simulation: Simulation
@@ -54,6 +67,9 @@ class Linearised:
     sets: tuple[tuple[int, ...], ...]
     search: Search
     left_out: tuple[str, ...]
+    covariates: tuple[str, ...]
+    usual: Usual
+    limits: OnlineThresholds
 
     def interval(self, piece: Piece, before: Piece | None) -> Interval:
         """Return what is compared in a piece; the rows of the piece before it lead up to it.
@@ -65,33 +81,49 @@ class Linearised:
         """
         pieces = [each for each in (before, piece) if each is not None]
         recording, elapsed = together(pieces, self.wheels)
-        return self._of(self.pose(recording, elapsed), elapsed, piece.start_s, piece.end_s)
+        problem = self.pose(recording, elapsed)
+        stays = stuck(problem, elapsed, self.usual, self.limits)
+        earlier = stays[elapsed < piece.start_s] if before else stays[:0]
+        found = self._of(problem, recording, elapsed, stays, piece)
+        if not earlier.any():
+            return found
+        return replace(found, stuck_before=earlier, left_out=since_before(found.left_out, earlier, elapsed))
 
-    def intervals(self, problem: Problem, elapsed: Array, pieces: Sequence[Piece]) -> list[Interval]:
+    def intervals(
+        self, problem: Problem, recording: Recording, elapsed: Array, pieces: Sequence[Piece]
+    ) -> list[Interval]:
         """Return what is compared in each of the pieces that a problem was posed of together."""
-        return [self._of(problem, elapsed, piece.start_s, piece.end_s) for piece in pieces]
+        stays = stuck(problem, elapsed, self.usual, self.limits)
+        return [self._of(problem, recording, elapsed, stays, piece) for piece in pieces]
 
     def pose(self, recording: Recording, elapsed: Array) -> Problem:
-        """Return the problem at the values, with the covariates that are constant in this piece."""
-        return _posed(recording, elapsed, self.simulation, self.values, self.stated)
+        """Return the problem at the values, with the covariates that are constant in this piece.
 
-    def _of(self, problem: Problem, elapsed: Array, start_s: float, end_s: float) -> Interval:
-        here = (elapsed >= start_s) & (elapsed < end_s)
-        mask = problem.mask & here[:, None]
+        One that the beginning had and this piece lacks is blank: what depends on it is not looked for here.
+        """
+        problem = _posed(recording, elapsed, self.simulation, self.values, self.stated)
+        blank = np.full(problem.mask.shape, np.nan)
+        return replace(problem, covariates={**dict.fromkeys(self.covariates, blank), **problem.covariates})
+
+    def _of(self, problem: Problem, recording: Recording, elapsed: Array, stays: Mask, piece: Piece) -> Interval:
+        here = (elapsed >= piece.start_s) & (elapsed < piece.end_s)
+        mask = problem.mask & here[:, None] & ~stays
         names, _, beside = tangents(problem)
         parameters = self.simulation.parameters
         residual = problem.measured - problem.filled
         for name, column in zip(names, beside, strict=True):
             if name in parameters:  # measured from the stated values, where the priors are centred
                 residual = residual + (self.values[name] - parameters[name].value) * column
+        instants = here & np.isfinite(problem.prediction).any(axis=1)
         columns = np.concatenate((np.stack(np.broadcast_arrays(*beside, mask)[:-1]), law_columns(problem, self.laws)))
         return Interval(
-            start_s,
-            end_s,
+            piece.start_s,
+            piece.end_s,
             columns=np.where(mask, columns, 0.0)[:, here],
             residual=np.where(mask, residual, 0.0)[here],
             mask=mask[here],
             size=float(np.sum(np.abs(problem.measured[mask]))),
+            left_out=left_out_of(reasons_of(problem, recording, stays), mask, instants, elapsed),
         )
 
 
@@ -121,7 +153,9 @@ def check_comparable(piece: Piece, simulation: Simulation) -> None:
     build_problem(recording, simulation)
 
 
-def learned(pieces: Sequence[Piece], simulation: Simulation) -> tuple[Linearised, list[Interval]]:
+def learned(
+    pieces: Sequence[Piece], simulation: Simulation, limits: OnlineThresholds = ONLINE_THRESHOLDS
+) -> tuple[Linearised, list[Interval]]:
     """Linearise a simulation of one channel on the first pieces; return it with their intervals.
 
     Raises
@@ -151,9 +185,10 @@ def learned(pieces: Sequence[Piece], simulation: Simulation) -> tuple[Linearised
     )
     names = dict.fromkeys(law.name for law in laws)
     left_out = tuple(dict.fromkeys(each.name for each in candidates if each.name not in names))
-    found = Linearised(simulation, stated, problem.values, wheels, laws, sets, search, left_out)
+    known, usual = tuple(problem.covariates), usual_of(problem)
+    found = Linearised(simulation, stated, problem.values, wheels, laws, sets, search, left_out, known, usual, limits)
     _check_memory(found, problem, pieces)
-    return found, found.intervals(problem, elapsed, pieces)
+    return found, found.intervals(problem, recording, elapsed, pieces)
 
 
 def _check_memory(found: Linearised, problem: Problem, pieces: Sequence[Piece]) -> None:

@@ -26,6 +26,10 @@ class NoiseHistory:
         """Add what coefficients, shape (column, wheel), leave of an interval."""
         self._kept.append((interval.left_by(coefficients), interval.mask))
 
+    def drop_last(self) -> None:
+        """Forget the interval that was added last."""
+        self._kept.pop()
+
     def clear(self) -> None:
         """Forget all of them."""
         self._kept.clear()

@@ -15,9 +15,14 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from regolithd.calibration.mismatch.online.left_out import LeftOutReadings
     from regolithd.calibration.mismatch.online.linearised import Linearised
     from regolithd.calibration.mismatch.online.scores import Place, Scores
+    from regolithd.calibration.mismatch.online.unnamed import Unnamed
 
+UNNAMED = "unexplained"
+"""The name of a change that no single law explains."""
+UNNAMED_WORDS = "something has begun, not known what: no single effect explains it"
 WHOLE_DECIDES = "Sequential test while the recording grows; the comparison of the whole recording decides"
 """Ends each statement: names need the whole recording."""
 
@@ -36,9 +41,10 @@ class Change:
 
     Attributes
     ----------
+    name: the law's, or `UNNAMED`
     onset_s: when it began; None: it was there from the start
     onset_low_s, onset_high_s: 90 % interval of that
-    size, low, high: of the law's coefficient, with a 90 % interval, in `unit`
+    size, low, high: of the law's coefficient, with a 90 % interval, in `unit`; without a name, the root mean square
     statistic: Δχ²
     first_reported_s: when it was reported first
     rivals: other names or wheels that explain it nearly as well
@@ -73,6 +79,7 @@ class Report:
     leading: the largest Δχ² of what is not reported, to be held against `alarm`
     left_out: candidates that are not looked for: the beginning of the recording did not show what they depend on, or
         they need the whole recording
+    left_out_readings: of wheels that are not compared while others are, with the reason
     """
 
     time_s: float
@@ -83,6 +90,7 @@ class Report:
     alarm: float
     changes: tuple[Change, ...]
     left_out: tuple[str, ...]
+    left_out_readings: tuple[LeftOutReadings, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return a JSON object."""
@@ -118,6 +126,33 @@ def change_of(found: Linearised, place: Place, beside: Scores, at_s: float, inte
     return replace(change, statement=_statement(change, found, words))
 
 
+def unnamed_change(found: Linearised, wheels: int, together: Unnamed, at_s: float, interval_s: float) -> Change:
+    """Return a reported change that has no name, on a set of wheels; its size is a root mean square."""
+    segment = int(np.argmax(together.score))
+    statistic, information = float(together.statistic[segment]), max(float(together.information[segment]), 1e-300)
+    size, reach = np.sqrt(statistic / information), NINETY_PERCENT_STDS / np.sqrt(information)
+    near = together.score > together.score[segment] - THRESHOLDS.onset_fall
+    low_s, high_s = _interval(together.starts_s, near, segment, interval_s)
+    begun = segment > 0
+    change = Change(
+        name=UNNAMED,
+        wheels=_names(found, wheels),
+        onset_s=float(together.starts_s[segment]) if begun else None,
+        onset_low_s=low_s if begun else None,
+        onset_high_s=high_s if begun else None,
+        parameter="root_mean_square",
+        size=float(size),
+        low=float(max(size - reach, 0.0)),
+        high=float(size + reach),
+        unit=found.simulation.unit,
+        statistic=statistic,
+        first_reported_s=at_s,
+        rivals=(),
+        statement="",
+    )
+    return replace(change, statement=_statement(change, found, UNNAMED_WORDS))
+
+
 def _statement(change: Change, found: Linearised, words: str) -> str:
     where = on_wheels(change.wheels, len(found.wheels), found.simulation.wheel_column)
     since = (
@@ -128,6 +163,7 @@ def _statement(change: Change, found: Linearised, words: str) -> str:
     names = ", ".join(dict.fromkeys(rival.name for rival in change.rivals if rival.name != change.name))
     return (
         f"{words[:1].upper()}{words[1:]}{where}, {since}: {change.size:.3g} {change.unit} "
+        f"{'root mean square ' if change.name == UNNAMED else ''}"
         f"(90 % sure: {change.low:.3g} to {change.high:.3g})"
         f"{f'; or {names}, which explains it nearly as well' if names else ''}. {WHOLE_DECIDES}."
     )

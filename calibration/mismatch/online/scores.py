@@ -10,7 +10,7 @@ each weighted by one over the long-run variance of the noise, as in the comparis
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -76,6 +76,20 @@ class Scores:
         segment, wheels, law = np.unravel_index(int(np.argmax(self.statistic)), self.statistic.shape)
         return Place(int(law), int(wheels), float(self.starts_s[segment]))
 
+    def best_of(self, place: Place) -> Place:
+        """Return the best onset of a place's law on its wheels."""
+        segment = int(np.argmax(self.statistic[:, place.wheels, place.law]))
+        return replace(place, onset_s=float(self.starts_s[segment]))
+
+    def near(self, place: Place, member: Array, within_s: float) -> Array:
+        """Return the largest Δχ² about a place's onset on sets that share a wheel with it, shape (set, law).
+
+        `member` is whether a wheel is in a set, shape (set, wheel).
+        """
+        about = np.abs(self.starts_s - place.onset_s) <= within_s
+        sharing = (member @ member[place.wheels]) > 0
+        return np.where(sharing[:, None], self.statistic[about].max(axis=0), 0.0)
+
     def at(self, place: Place) -> tuple[int, int, int]:
         """Return the indices of a place."""
         return int(np.flatnonzero(self.starts_s == place.onset_s)[0]), place.wheels, place.law
@@ -85,11 +99,10 @@ def scores(sums: Suffixes, weights: Array, search: Search, beside: Sequence[Plac
     """Return the scores of every law beside the tangents and the places given; `weights` has shape (wheel,)."""
     count = len(search.precision)
     gram, moment = sums.gram * weights[:, None, None], sums.moment * weights[:, None]
-    others = _beside(sums.starts_s, gram, moment, search, beside)
-    inverse = _inverse(others.information)
-    fitted = inverse @ others.target
+    others = fitted_with(sums, weights, search, beside)
+    inverse, fitted = others.inverse, others.fitted
     own = np.einsum("sw,ewkk->esk", search.member, gram[:, :, count:, count:])
-    together = np.einsum("sw,ewkp->eskp", search.member, others.products)
+    together = np.einsum("sw,ewkp->eskp", search.member, others.products[:, :, count:])
     left = own - np.einsum("eskp,eskp->esk", together @ inverse, together)
     known = left > search.least_tolerance * own
     left = np.where(known, left, np.inf)
@@ -100,32 +113,28 @@ def scores(sums: Suffixes, weights: Array, search: Search, beside: Sequence[Plac
     return Scores(sums.starts_s, np.where(counted, statistic, 0.0), size, 1 / np.sqrt(left))
 
 
-def fitted_beside(sums: Suffixes, weights: Array, search: Search, beside: Sequence[Place]) -> Array:
-    """Return the coefficients of the tangents and of the places given, fitted to all that is there."""
-    found = _beside(sums.starts_s, sums.gram * weights[:, None, None], sums.moment * weights[:, None], search, beside)
-    return _inverse(found.information) @ found.target
-
-
 @dataclass(frozen=True, eq=False)
-class _Beside:
-    """What is fitted beside every law: tangents, then places.
+class Beside:
+    """What is fitted beside a column: tangents, then places.
 
     Attributes
     ----------
-    information: with the priors, shape (coefficient, coefficient)
-    target: products with the residual, shape (coefficient,)
-    products: with the laws, from each segment's start on, shape (segment, wheel, law, coefficient)
+    inverse: of the information with the priors, shape (coefficient, coefficient)
+    fitted: the coefficients without that column, shape (coefficient,)
+    products: with all columns, from each segment's start on, shape (segment, wheel, column, coefficient)
     """
 
-    information: Array
-    target: Array
+    inverse: Array
+    fitted: Array
     products: Array
 
 
-def _beside(starts_s: Array, gram: Array, moment: Array, search: Search, places: Sequence[Place]) -> _Beside:
+def fitted_with(sums: Suffixes, weights: Array, search: Search, places: Sequence[Place]) -> Beside:
+    """Fit the tangents and the places given to all that is there."""
+    gram, moment = sums.gram * weights[:, None, None], sums.moment * weights[:, None]
     count = len(search.precision)
     columns = [count + place.law for place in places]
-    at = [int(np.flatnonzero(starts_s == place.onset_s)[0]) for place in places]
+    at = [int(np.flatnonzero(sums.starts_s == place.onset_s)[0]) for place in places]
     on = [search.member[place.wheels] for place in places]
     information = np.zeros((count + len(places),) * 2)
     information[:count, :count] = gram[0].sum(axis=0)[:count, :count] + np.diag(search.precision)
@@ -136,11 +145,12 @@ def _beside(starts_s: Array, gram: Array, moment: Array, search: Search, places:
             information[count + i, count + j] = (on[i] * on[j]) @ both[:, column, other]
     with_places = [on[i] @ moment[at[i]][:, column] for i, column in enumerate(columns)]
     later = [np.maximum(np.arange(len(gram)), first) for first in at]
-    products = [gram[later[i]][:, :, count:, column] * on[i][:, None] for i, column in enumerate(columns)]
-    return _Beside(
-        information,
-        np.array([*moment[0].sum(axis=0)[:count], *with_places]),
-        np.concatenate((gram[:, :, count:, :count], *(each[..., None] for each in products)), axis=-1),
+    products = [gram[later[i]][:, :, :, column] * on[i][:, None] for i, column in enumerate(columns)]
+    inverse = _inverse(information)
+    return Beside(
+        inverse,
+        inverse @ np.array([*moment[0].sum(axis=0)[:count], *with_places]),
+        np.concatenate((gram[:, :, :, :count], *(each[..., None] for each in products)), axis=-1),
     )
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Sequence
+
+    from regolithd.calibration.mismatch.online.left_out import LeftOutHere
 
 Array = NDArray[np.float64]
 
@@ -25,6 +27,9 @@ class Interval:
     residual: measured less the stated simulation, shape (time, wheel), 0 where nothing is compared
     mask: where readings are compared, shape (time, wheel)
     size: sum of the channel's magnitudes over them
+    left_out: readings that are not compared
+    stuck_before: where a reading of the interval before is found to be stuck now, shape (time, wheel) of that; None:
+        nowhere
     """
 
     start_s: float
@@ -33,6 +38,20 @@ class Interval:
     residual: Array
     mask: NDArray[np.bool_]
     size: float
+    left_out: tuple[LeftOutHere, ...] = ()
+    stuck_before: NDArray[np.bool_] | None = None
+
+    def without(self, where: NDArray[np.bool_]) -> Interval:
+        """Return the interval without readings, shape (time, wheel) or what broadcasts to it."""
+        mask = self.mask & ~where
+        share = mask.sum() / max(self.mask.sum(), 1)
+        return replace(
+            self,
+            columns=np.where(mask, self.columns, 0.0),
+            residual=np.where(mask, self.residual, 0.0),
+            mask=mask,
+            size=self.size * float(share),
+        )
 
     def left_by(self, coefficients: Array) -> Array:
         """Return the residual less the columns at coefficients of shape (column, wheel)."""
@@ -105,6 +124,18 @@ class Suffixes:
     acting: Array
     mean_size: float
 
+    def without(self, wheels: Sequence[int], onset_s: float) -> Suffixes:
+        """Return the sums without the readings of some wheels from the start of a segment on."""
+        first = int(np.flatnonzero(self.starts_s == onset_s)[0])
+        later = np.maximum(np.arange(len(self.starts_s)), first)
+
+        def before(sums: Array) -> Array:
+            found = sums.copy()
+            found[:, list(wheels)] -= sums[later][:, list(wheels)]
+            return found
+
+        return replace(self, gram=before(self.gram), moment=before(self.moment), acting=before(self.acting))
+
 
 @dataclass
 class Course:
@@ -127,6 +158,11 @@ class Course:
             at = int(np.argmin(shares)) + 1
             before, after = self.segments[at - 1 : at + 1]
             self.segments[at - 1 : at + 1] = [Segment(before.start_s, before.sums + after.sums)]
+
+    def replace_last(self, sums: Sums) -> None:
+        """Put other sums in the place of the interval that was appended last."""
+        self._suffixes = None
+        self.segments[-1] = Segment(self.segments[-1].start_s, sums)
 
     def _share_of_age(self, at: int, kept_s: Collection[float]) -> float:
         """Return the length of a segment and the one before it over their age; infinite where they stay apart."""

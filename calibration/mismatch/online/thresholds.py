@@ -15,7 +15,7 @@ class OnlineThresholds:
         25.0,
         "Δχ² of the best law, wheels and onset together, above which a change is reported.",
         "simulation (`make online`): of 100 sound drives, 183 h, two pass it, and the tail of their largest statistics "
-        "gives 25.3 ± 1.1 for one false report in 100 h",
+        "gives 25.2 ± 1.1 for one false report in 100 h",
     )
     interval_s: float = threshold(
         60.0,
@@ -48,6 +48,45 @@ class OnlineThresholds:
         "choice: a report that needs the threshold again each minute would come and go",
     )
     most_changes: int = threshold(6, "Changes that are reported at once.", "choice: more is another machine")
+    name_lead: float = threshold(
+        10.0,
+        "Lead in Δχ² of another name or other wheels from which those that were told are refuted.",
+        "choice: odds of 150 to 1 by the likelihoods; a name is looked at again each minute",
+    )
+    inexact_share: float = threshold(
+        0.1,
+        "Share of a law's Δχ² that all columns together, on its wheels from its onset on, may gain beyond chance; with "
+        "more, what has begun has no name.",
+        "choice, ten times `further_share` of the whole comparison, which fits the shapes of laws: here each has one",
+    )
+    together_s: float = threshold(
+        300.0,
+        "Time within which two changes that begin on the same wheel are one, which no single name explains [s].",
+        "choice: five intervals, as far as the onset of a small change may be off",
+    )
+    mostly_share: float = threshold(
+        0.5, "Share of an interval's readings from which a wheel is mostly not compared.", "choice: the greater part"
+    )
+    lasting_intervals: int = threshold(
+        3,
+        "Intervals one after the other in which a wheel is mostly not compared, after which it is told.",
+        "choice: three minutes; a bus that drops out for less is counted, and not told",
+    )
+    stuck_s: float = threshold(
+        20.0,
+        "Time for which a reading stays exactly the same, from which it may be stuck [s].",
+        "choice: columns that are recorded less often are held for seconds",
+    )
+    stuck_range: float = threshold(
+        2.0,
+        "Standard deviations of the residual by which the prediction changes meanwhile, from which it is.",
+        "choice: what stays the same then differs from the prediction somewhere by one of them",
+    )
+    stuck_level: float = threshold(
+        1e-6,
+        "Probability of as many repeats, by their share at the beginning, below which it is.",
+        "choice: thousands of hours of a reading of two a second that repeats by chance",
+    )
 
     def table(self) -> tuple[Threshold, ...]:
         """Return every threshold with its value here, its meaning and how it was found."""

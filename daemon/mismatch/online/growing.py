@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from io import BytesIO
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, BinaryIO, Protocol
 
 import numpy as np
 
@@ -60,7 +60,7 @@ def growing(path: Path, unit: str, note: Callable[[str], None]) -> Growing:
     Parameters
     ----------
     unit: the column that tells wheels apart
-    note: called with a text for what is damaged and left out
+    note: called with a text for what is damaged and left out, and for a file that is begun anew
 
     Raises
     ------
@@ -73,7 +73,7 @@ def growing(path: Path, unit: str, note: Callable[[str], None]) -> Growing:
         return GrowingFolder(path, note)
     if path.suffix == ".mcap":
         return GrowingMcap(path, note)
-    return GrowingCsv(path, unit) if path.suffix == ".csv" else WholeFile(path, unit)
+    return GrowingCsv(path, unit, note) if path.suffix == ".csv" else WholeFile(path, unit)
 
 
 class GrowingMcap:
@@ -160,12 +160,19 @@ def _number(path: Path) -> tuple[int, str]:
 
 
 class GrowingCsv:
-    """The complete lines of a CSV file."""
+    """The complete lines of a CSV file, and of the one that takes its name when it is renamed or emptied.
 
-    def __init__(self, path: Path, unit: str) -> None:
-        self._path, self._unit = path, unit
-        self._offset = 0
+    The old file is read to its end first, as `tail -F` does. The new one has a header of its own.
+    """
+
+    def __init__(self, path: Path, unit: str, note: Callable[[str], None]) -> None:
+        self._path, self._unit, self._note = path, unit, note
+        self._file: BinaryIO = path.open("rb")
         self._header = b""
+        self._offset = 0
+
+    def __del__(self) -> None:
+        self._file.close()
 
     @property
     def name(self) -> str:
@@ -179,18 +186,39 @@ class GrowingCsv:
 
     def read(self) -> Iterator[Rows]:
         """Yield the rows of the lines that have come."""
-        while text := self._lines():
-            if not self._header:
-                self._header, _, text = text.partition(b"\n")
-            if text.strip():
-                yield self._parsed(text)
+        while True:
+            following = self._following()
+            while text := self._lines():
+                if not self._header:
+                    self._header, _, text = text.partition(b"\n")
+                if text.strip():
+                    yield self._parsed(text)
+            if following is None:
+                return
+            self._go_on(following)
+
+    def _following(self) -> BinaryIO | None:
+        """Return the file that has the name now, where that is another one or was emptied; None: it is the same.
+
+        Between its renaming and the new file there may be none.
+        """
+        try:
+            file = self._path.open("rb")
+        except FileNotFoundError:
+            return None
+        if os.path.sameopenfile(file.fileno(), self._file.fileno()) and self._offset <= os.fstat(file.fileno()).st_size:
+            file.close()
+            return None
+        return file
+
+    def _go_on(self, following: BinaryIO) -> None:
+        self._note(f"{self._path} was begun anew; the new file is followed from its start")
+        self._file.close()
+        self._file, self._header, self._offset = following, b"", 0
 
     def _lines(self) -> bytes:
-        with self._path.open("rb") as file:
-            if self._offset > os.fstat(file.fileno()).st_size:
-                raise RecordingError(f"{self._path} has become shorter: it was written anew. Begin again")
-            file.seek(self._offset)
-            text = file.read(CSV_BATCH)
+        self._file.seek(self._offset)
+        text = self._file.read(CSV_BATCH)
         whole = text[: text.rfind(b"\n") + 1]
         self._offset += len(whole)
         return whole

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from regolithd.calibration.mismatch.errors import counted
+from regolithd.calibration.mismatch.inference.statements import capital
 from regolithd.calibration.mismatch.online.channels import monitors_of
 from regolithd.calibration.mismatch.online.pieces import Cutter
 from regolithd.calibration.mismatch.online.thresholds import ONLINE_THRESHOLDS, OnlineThresholds
@@ -35,11 +36,13 @@ class Told:
     recording: the file that is read now
     reports: by channel
     notes: rows that came too late, a clock that was set back
+    wheel_column: the column that tells wheels apart
     """
 
     recording: str
     reports: Mapping[str, Report]
     notes: tuple[str, ...]
+    wheel_column: str = "wheel"
 
     @property
     def changes(self) -> tuple[Change, ...]:
@@ -54,7 +57,10 @@ class Told:
     def to_json(self) -> dict[str, Any]:
         """Return the object of one line."""
         channels = {channel: report.to_json() for channel, report in self.reports.items()}
-        return {"recording": self.recording, "time_s": self.time_s, "channels": channels, "notes": list(self.notes)}
+        return {"recording": self.recording, "time_s": self.time_s, "channels": channels, "notes": self._all_notes()}
+
+    def _all_notes(self) -> list[str]:
+        return [*self.notes, *(f"{capital(text)}." for _, text in _lasting(self))]
 
 
 def monitored(
@@ -86,7 +92,7 @@ def monitored(
     monitors = monitors_of(simulated, thresholds)
     for piece in _pieces(source, cutter, follow=follow, sleep=sleep):
         reports = {channel: monitor.add(piece) for channel, monitor in monitors.items()}
-        yield Told(source.name, reports, _notes(cutter))
+        yield Told(source.name, reports, _notes(cutter), simulated.wheel_column)
 
 
 def _pieces(source: Growing, cutter: Cutter, *, follow: bool, sleep: Callable[[float], None]) -> Iterator[Piece]:
@@ -115,19 +121,33 @@ def line_of(told: Told) -> str:
     return json.dumps(told.to_json(), ensure_ascii=False)
 
 
-def lines_of(told: Told, before: frozenset[tuple[str, str]]) -> list[str]:
-    """Return the lines for the terminal: what is new, what was withdrawn, and why an interval was not compared."""
+def lines_of(told: Told, before: Told | None) -> list[str]:
+    """Return the lines for the terminal: what is new, what was withdrawn, and what is not compared and why."""
     at = f"{told.time_s / 60:7.1f} min  "
-    now = identities(told)
+    known, now = identities(before), identities(told)
+    left_out, left_out_before = _lasting(told), _lasting(before)
     return [
         *(f"{at}{name}: not compared: {each.not_compared}" for name, each in told.reports.items() if each.not_compared),
+        *(f"{at}{channel}: {text}" for channel, text in left_out if (channel, text) not in left_out_before),
+        *(f"{at}{channel}: over: {text}" for channel, text in left_out_before if (channel, text) not in left_out),
         *(
             f"{at}{channel}: {change.name}: {change.statement}"
             for channel, report in told.reports.items()
             for change in report.changes
-            if identity(channel, change) not in before
+            if identity(channel, change) not in known
         ),
-        *(f"{at}{channel}: withdrawn: {name}" for channel, name in sorted(before - now)),
+        *(f"{at}{channel}: withdrawn: {name}" for channel, name in sorted(known - now)),
+    ]
+
+
+def _lasting(told: Told | None) -> list[tuple[str, str]]:
+    """Return the channel and the words of each wheel that is not compared for longer."""
+    reports = told.reports.items() if told else ()
+    return [
+        (channel, each.statement(told.wheel_column))
+        for channel, report in reports
+        for each in report.left_out_readings
+        if told and each.since_s is not None
     ]
 
 
@@ -136,6 +156,7 @@ def identity(channel: str, change: Change) -> tuple[str, str]:
     return channel, f"{change.name} on {', '.join(map(str, change.wheels))}"
 
 
-def identities(told: Told) -> frozenset[tuple[str, str]]:
-    """Return those of all changes."""
-    return frozenset(identity(channel, change) for channel, report in told.reports.items() for change in report.changes)
+def identities(told: Told | None) -> frozenset[tuple[str, str]]:
+    """Return those of all changes; none of None."""
+    reports = told.reports.items() if told else ()
+    return frozenset(identity(channel, change) for channel, report in reports for change in report.changes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from regolithd.calibration.mismatch.online.report import UNNAMED
 from regolithd.daemon.messages.mismatch import ComparisonResult, EffectReport
 
 if TYPE_CHECKING:
@@ -16,10 +17,11 @@ if TYPE_CHECKING:
 def monitoring_result(told: Told, simulation: Path) -> ComparisonResult:
     """Return the message's content; there is no report, since the recording has not ended."""
     changes = told.changes
+    named = any(change.name != UNNAMED for change in changes)
     names = ", ".join(dict.fromkeys(change.name for change in changes))
     text = f"Begun while driving: {names}" if changes else "What had begun while driving has not lasted"
     return ComparisonResult(
-        verdict="missing-physics" if changes else "consistent",
+        verdict="missing-physics" if named else "unexplained" if changes else "consistent",
         text=f"{text} (sequential test; the comparison of the whole recording decides).",
         effects=tuple(_effect(change) for change in changes),
         changes=(),

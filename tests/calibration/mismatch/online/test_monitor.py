@@ -10,9 +10,11 @@ from linear_machine import STEP_S, Drag, Level, table
 
 from regolithd.calibration.mismatch import SimulationError
 from regolithd.calibration.mismatch.online.channels import monitors_of
+from regolithd.calibration.mismatch.online.left_out import LeftOutCount, LeftOutHere
 from regolithd.calibration.mismatch.online.linearised import learned
 from regolithd.calibration.mismatch.online.monitor import Monitor
 from regolithd.calibration.mismatch.online.pieces import Cutter
+from regolithd.calibration.mismatch.online.report import UNNAMED
 from regolithd.calibration.mismatch.online.thresholds import ONLINE_THRESHOLDS, OnlineThresholds
 
 if TYPE_CHECKING:
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from regolithd.calibration.mismatch import Candidate
+    from regolithd.calibration.mismatch import Candidate, Problem, Shape
     from regolithd.calibration.mismatch.online.report import Report
 
     Columns = dict[str, NDArray[np.float64]]
@@ -88,6 +90,30 @@ def test_a_change_that_does_not_last_is_withdrawn() -> None:
     reports = followed(columns, OnlyDrag())
     assert [change.name for change in reports[4].changes] == ["drag"]
     assert not reports[-1].changes
+
+
+def test_what_no_law_explains_alone_has_no_name() -> None:
+    """An offset and a drag that begin together are one change, told once, on its axis since its onset."""
+    columns = recorded(offset=0.6)
+    late = (columns["t_s"] >= ONSET_S) & (columns["axis"] == 2)
+    columns["reading_V"] = columns["reading_V"] - 0.5 * late * np.sign(columns["speed_rad_s"])
+    reports = followed(columns)
+    names = [change.name for report in reports for change in report.changes]
+    assert names.count(UNNAMED) >= len(names) - 1
+    (change,) = reports[-1].changes
+    assert (change.name, change.wheels, change.onset_s) == (UNNAMED, (2,), ONSET_S)
+    assert "not known what" in change.statement
+    assert change.size == pytest.approx(np.hypot(0.6, 0.5), rel=0.3)
+
+
+def test_a_change_beside_one_without_a_name_is_still_reported() -> None:
+    """On the other axis, with its name."""
+    columns = recorded(offset=0.6)
+    sign, axis = np.sign(columns["speed_rad_s"]), columns["axis"]
+    columns["reading_V"] = columns["reading_V"] - 0.5 * ((columns["t_s"] >= ONSET_S) & (axis == 2)) * sign
+    columns["reading_V"] = columns["reading_V"] + 0.5 * ((columns["t_s"] >= 280.0) & (axis == 1)) * sign
+    told = {change.wheels: change.name for change in followed(columns)[-1].changes}
+    assert told == {(2,): UNNAMED, (1,): "drag"}
 
 
 def test_a_gap_is_told_and_bridged() -> None:
@@ -163,3 +189,99 @@ def test_what_is_not_compared_counts_nowhere() -> None:
     for interval, nowhere in zip(intervals, blank, strict=True):
         assert not np.any(interval.columns[:, nowhere])
         assert not np.any(interval.residual[nowhere])
+
+
+class Warm(Drag):
+    """An offset that grows with a temperature."""
+
+    name, covariate = "warm", "heat"
+
+    def columns(self, problem: Problem, shape: Shape) -> NDArray[np.float64]:  # noqa: ARG002
+        """Return the temperature."""
+        return np.asarray(problem.covariates["heat"])[None]
+
+
+class WithHeat(Level):
+    """The level, and a temperature where it is read."""
+
+    def covariates(self, inputs: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+        """Return speed, time and temperature."""
+        return {**super().covariates(inputs), "heat": inputs["heat_degC"]}
+
+    def candidates(self, library: Sequence[Candidate]) -> Sequence[Candidate]:
+        """Return the law of temperature as well."""
+        return (*super().candidates(library), Warm())
+
+
+def test_a_covariate_that_ends_ends_nothing_else() -> None:
+    """What depends on it is not looked for; a change that begins later is reported."""
+    columns = recorded(offset=0.4)
+    heat = 20.0 + 5.0 * np.sin(columns["t_s"] / 50)
+    columns["heat_degC"] = np.where(columns["t_s"] < 160, heat, np.nan)
+    reports = followed(columns, WithHeat())
+    assert not any(report.not_compared for report in reports)
+    assert [change.wheels for change in reports[-1].changes] == [(2,)]
+
+
+class Slope(Level):
+    """A reading that grows with the speed."""
+
+    def predict(self, inputs: Mapping[str, NDArray[np.float64]], values: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return the level and twice the speed."""
+        return values["level"] + 2.0 * inputs["speed_rad_s"]
+
+
+def test_a_wheel_without_an_input_is_told_when_it_has_lasted() -> None:
+    """With its input, since when, and how many readings; not in its first interval."""
+    columns = recorded()
+    blank = (columns["t_s"] >= ONSET_S) & (columns["axis"] == 2)
+    columns["speed_rad_s"] = np.where(blank, np.nan, columns["speed_rad_s"])
+    reports = followed(columns)
+    told = {report.time_s: report.left_out_readings for report in reports}
+    assert told[200.0] == ()
+    assert [each.since_s for each in told[240.0]] == [None]
+    (last,) = reports[-1].left_out_readings
+    assert (last.wheel, last.reason, last.since_s) == (2, "speed_rad_s was not measured", ONSET_S)
+    assert last.readings == blank.sum()
+    assert last.statement("axis") == "axis 2 is not compared since 200 s: speed_rad_s was not measured"
+
+
+def test_a_wheel_without_readings_is_told() -> None:
+    """Also when its rows are no longer there."""
+    columns = recorded()
+    kept = (columns["t_s"] < ONSET_S) | (columns["axis"] == 1)
+    reports = followed({name: values[kept] for name, values in columns.items()})
+    (last,) = reports[-1].left_out_readings
+    assert (last.wheel, last.reason, last.since_s) == (2, "reading_V was not measured", ONSET_S)
+
+
+@pytest.mark.parametrize("since_s", [ONSET_S, 236.0])
+def test_a_reading_that_stays_the_same_is_told_as_that(since_s: float) -> None:
+    """Not as an effect: also where it begins too late in an interval to be seen there."""
+    columns = recorded()
+    moving = columns["speed_rad_s"] * 2.0
+    columns["reading_V"] = columns["reading_V"] + moving
+    late = (columns["t_s"] >= since_s) & (columns["axis"] == 2)
+    columns["reading_V"] = np.where(late, 0.0, columns["reading_V"])
+    reports = followed(columns, Slope())
+    assert not reports[-1].changes
+    (last,) = reports[-1].left_out_readings
+    assert "stays exactly the same" in last.reason
+    assert last.since_s == since_s
+
+
+def test_a_coarse_reading_is_not_stuck() -> None:
+    """One in steps as large as its noise, which often repeats."""
+    columns = recorded()
+    columns["reading_V"] = np.round(columns["reading_V"])
+    assert not any(report.left_out_readings for report in followed(columns))
+
+
+def test_what_is_over_is_counted_and_not_lasting() -> None:
+    """After an interval in which the wheel is compared."""
+    count = LeftOutCount(("a",), LIMITS)
+    for _ in range(3):
+        count.add([LeftOutHere(0, "blank", 50, 0.9, 7.0)])
+    assert [each.since_s for each in count.table()] == [7.0]
+    count.add([])
+    assert [(each.since_s, each.readings) for each in count.table()] == [(None, 150)]

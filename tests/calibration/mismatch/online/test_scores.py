@@ -7,13 +7,15 @@ import pytest
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.online.scores import Place, Scores, Search, scores
-from regolithd.calibration.mismatch.online.sums import Course, Interval, sums_of
+from regolithd.calibration.mismatch.online.sums import Course, Interval, Suffixes, sums_of
+from regolithd.calibration.mismatch.online.unnamed import Unnamed, lacks_fit, unnamed
 
 Array = NDArray[np.float64]
 WHEELS, INSTANTS, PARTS = 2, 30, 6
 WEIGHTS = np.array([0.7, 1.9])
 MEMBER = np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
 PRECISION = np.array([3.0])
+LEVEL = 1e-3
 
 
 def machine(signs: tuple[float, float] = (0.0, 0.0), smallest: float = 0.0) -> tuple[Search, list[Interval], Array]:
@@ -97,3 +99,44 @@ def test_what_is_too_small_to_matter_scores_nothing() -> None:
     """Below the least share of the channel's mean magnitude, which is 1 here."""
     search, parts, _ = machine(smallest=3.0)
     assert scored(search, parts, []).statistic.max() == 0.0
+
+
+def sums() -> Suffixes:
+    """Return the sums of the random intervals."""
+    course = Course(100)
+    for part in machine()[1]:
+        course.add(part.start_s, sums_of(part))
+    return course.suffixes()
+
+
+@pytest.mark.parametrize("beside", [[], [Place(0, 0, 120.0)]])
+def test_the_statistic_is_that_of_all_columns(beside: list[Place]) -> None:
+    """Both laws and the tangent on one wheel, from each onset, by least squares."""
+    search, parts, columns = machine()
+    found = unnamed(sums(), WEIGHTS, search, beside, 1, LEVEL)
+    without = chi2(parts, columns, beside)
+    for segment in range(1, len(parts)):
+        onset_s = 60.0 * segment
+        every = [Place(law, 1, onset_s) for law in (-1, 0, 1)]  # −1: the tangent, which is before the laws
+        assert found.statistic[segment] == pytest.approx(without - chi2(parts, columns, [*beside, *every]), abs=1e-6)
+        assert found.rank[segment] == 3
+    assert found.onset_s() == 180.0
+    assert len(PRECISION) == 1
+
+
+def test_readings_are_left_out_of_the_sums() -> None:
+    """Those of one wheel from a segment on, and no others."""
+    whole = sums()
+    less = whole.without([1], 180.0)
+    np.testing.assert_array_equal(less.gram[:, 0], whole.gram[:, 0])
+    np.testing.assert_allclose(less.gram[3:, 1], 0.0)
+    np.testing.assert_allclose(less.moment[0, 1], whole.moment[0, 1] - whole.moment[3, 1])
+    assert MEMBER[1, 1] == 1.0
+
+
+@pytest.mark.parametrize(("together", "lacks"), [(110.0, False), (125.0, False), (150.0, True)])
+def test_a_law_lacks_fit_beyond_chance_and_its_inexact_shape(together: float, lacks: bool) -> None:
+    """Of a Δχ² of 100, with three further coefficients (16.3 by chance) and a tenth of it."""
+    one = np.array([together])
+    found = Unnamed(np.zeros(1), one, np.array([4]), one, np.ones(1))
+    assert lacks_fit(100.0, found, 0, LEVEL, 0.1) is lacks

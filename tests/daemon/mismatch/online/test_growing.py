@@ -109,15 +109,31 @@ def test_a_csv_file_is_read_line_by_line(tmp_path: Path) -> None:
     assert rows["current_A"].tolist() == [2.5]
 
 
-def test_a_csv_file_that_is_written_anew_is_an_error(tmp_path: Path) -> None:
-    """What was read before is no longer there."""
-    path = tmp_path / "bench.csv"
+def test_a_csv_file_that_is_renamed_is_read_to_its_end_and_then_the_new_one(tmp_path: Path) -> None:
+    """Also while there is none of the name; the new one has its own header, and half a line at the end is dropped."""
+    path, old, told = tmp_path / "bench.csv", tmp_path / "bench.csv.1", list[str]()
     path.write_text("t_s,wheel\n0,1\n1,1\n")
-    source = growing(path, "wheel", nothing)
-    assert len(list(source.read())) == 1
-    path.write_text("t_s\n")
-    with pytest.raises(RecordingError, match="written anew"):
-        list(source.read())
+    source = growing(path, "wheel", told.append)
+    assert times(source) == [0.0, 1.0]
+    path.rename(old)
+    with old.open("a") as file:
+        file.write("2,1\n3,")
+    assert times(source) == [2.0]
+    path.write_text("wheel,t_s\n1,4\n")
+    assert times(source) == [4.0]
+    assert not source.ended
+    assert [text.endswith("is followed from its start") for text in told] == [True]
+
+
+def test_a_csv_file_that_is_emptied_is_read_from_its_start(tmp_path: Path) -> None:
+    """A rotation that copies it away and goes on in the same file."""
+    path, told = tmp_path / "bench.csv", list[str]()
+    path.write_text("t_s,wheel\n0,1\n1,1\n")
+    source = growing(path, "wheel", told.append)
+    assert times(source) == [0.0, 1.0]
+    path.write_text("t_s,wheel\n2,1\n")
+    assert times(source) == [2.0]
+    assert len(told) == 1
 
 
 @pytest.mark.parametrize(("name", "said"), [("none.mcap", "is not there"), ("empty", "has no rover-")])

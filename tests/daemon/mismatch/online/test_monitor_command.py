@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,8 @@ from recorded_traverse import NO_LOAD_A, ROVER, daemon
 from subscriber import Subscriber, listening, until
 from typer.testing import CliRunner
 
-from regolithd.calibration.mismatch.online.report import Change, Report
+from regolithd.calibration.mismatch.online.left_out import LeftOutReadings
+from regolithd.calibration.mismatch.online.report import UNNAMED, Change, Report
 from regolithd.calibration.mismatch.online.thresholds import OnlineThresholds
 from regolithd.calibration.parameters import Drivetrain
 from regolithd.daemon.cli import app
@@ -19,7 +21,7 @@ from regolithd.daemon.closed_loop.simulated_drive import START_NS, estimates, si
 from regolithd.daemon.closed_loop.speed_profile import shuttle
 from regolithd.daemon.commands.compare import publish_result
 from regolithd.daemon.config.reader import read_configuration
-from regolithd.daemon.mismatch.online.monitoring import Told, identities, line_of, lines_of, monitored
+from regolithd.daemon.mismatch.online.monitoring import Told, line_of, lines_of, monitored
 from regolithd.daemon.mismatch.online.result import monitoring_result
 from regolithd.daemon.mismatch.traverse import simulation_toml
 from regolithd.daemon.pipeline.onnx_models import load_models
@@ -102,7 +104,7 @@ def test_a_drag_is_reported_while_the_drive_is_recorded(tmp_path: Path) -> None:
     assert change.onset_low_s <= ONSET_S <= change.onset_high_s
 
 
-def told(*changes: Change, not_compared: str = "") -> Told:
+def told(*changes: Change, not_compared: str = "", left_out: tuple[LeftOutReadings, ...] = ()) -> Told:
     """Return what is known after twelve minutes."""
     report = Report(
         720.0,
@@ -113,18 +115,39 @@ def told(*changes: Change, not_compared: str = "") -> Told:
         alarm=20.0,
         changes=changes,
         left_out=(),
+        left_out_readings=left_out,
     )
     return Told("rover.mcap", {"motor_current_A": report}, ())
 
 
 def test_the_terminal_shows_what_is_new() -> None:
     """A change once, its withdrawal, and why a minute was not compared."""
-    (line,) = lines_of(told(CHANGE), frozenset())
+    (line,) = lines_of(told(CHANGE), None)
     assert line == "   12.0 min  motor_current_A: bearing-drag: Drag that was not there before"
-    known = identities(told(CHANGE))
-    assert lines_of(told(CHANGE), known) == []
-    assert lines_of(told(), known) == ["   12.0 min  motor_current_A: withdrawn: bearing-drag on 4"]
-    assert lines_of(told(not_compared="it stands"), frozenset())[0].endswith("not compared: it stands")
+    assert lines_of(told(CHANGE), told(CHANGE)) == []
+    assert lines_of(told(), told(CHANGE)) == ["   12.0 min  motor_current_A: withdrawn: bearing-drag on 4"]
+    assert lines_of(told(not_compared="it stands"), None)[0].endswith("not compared: it stands")
+
+
+def test_a_wheel_that_is_left_out_is_told_once() -> None:
+    """When it has lasted, when it is over, and in the notes of the JSON; brief blanks are in the table alone."""
+    brief = told(left_out=(LeftOutReadings(3, "load_N was not measured", 40, None),))
+    lasting = told(left_out=(LeftOutReadings(3, "load_N was not measured", 240, 600.0),))
+    said = "wheel 3 is not compared since 600 s: load_N was not measured"
+    assert lines_of(brief, None) == []
+    assert lines_of(lasting, brief) == [f"   12.0 min  motor_current_A: {said}"]
+    assert lines_of(lasting, lasting) == []
+    assert lines_of(brief, lasting) == [f"   12.0 min  motor_current_A: over: {said}"]
+    assert json.loads(line_of(lasting))["notes"] == [f"W{said[1:]}."]
+    (row,) = json.loads(line_of(brief))["channels"]["motor_current_A"]["left_out_readings"]
+    assert row == {"wheel": 3, "reason": "load_N was not measured", "readings": 40, "since_s": None}
+
+
+def test_what_has_no_name_is_unexplained() -> None:
+    """In the verdict of the message."""
+    nameless = replace(CHANGE, name=UNNAMED)
+    assert monitoring_result(told(nameless), Path("SIM.toml")).verdict == "unexplained"
+    assert monitoring_result(told(nameless, CHANGE), Path("SIM.toml")).verdict == "missing-physics"
 
 
 def test_each_interval_is_a_line_of_json() -> None:
