@@ -30,9 +30,9 @@ LARGEST_LOSS = 2 / 3
 LESS_THAN_PREDICTED = "less than is predicted, by a share that depends on the transmitted torque"
 """What a loss below zero is."""
 POWERS, LIGHT_LOADS, SLOPES = (0.0, 0.5, 1.0, 2.0), (0.5, 1.0), (-0.2, 0.0, 0.3)
-"""Grid of the three forms: powers of torque, decay scales in reference torques, slopes of the efficiency (a choice). What
-is lost grows with the cube of the torque at most: teeth and bearings lose in proportion to it, a motor's winding with
-its square, and a steeper law is that of a threshold, such as a tyre that gives way."""
+"""Grid of the three forms: powers of torque, decay scales in reference torques, slopes of the efficiency (a choice).
+What is lost grows with the cube of the torque at most: teeth and bearings lose in proportion to it, a motor's winding
+with its square, and a steeper law is that of a threshold, such as a tyre that gives way."""
 
 
 class LoadDependentEfficiency(Candidate):
