@@ -77,14 +77,9 @@ def without_improbable_curves(decision: Decision) -> Decision:
 
 
 def _curve_like(decision: Decision, other: Alternative) -> Term | None:
-    """Return the curve that can hold another answer's effect: over its covariate and on its wheels, or the best one.
-
-    It is the best one, if that leads by more than chance gives.
-    """
-    scored = best_of_each_smooth_term(decision.equations, ())
+    """Return the curve that can hold another answer's effect: over its covariate, on its wheels, if there is one."""
+    curves = [term for _, term in best_of_each_smooth_term(decision.equations, ())]
     candidate = other.terms[0].group.candidate
     over = candidate.imitated_over if candidate else other.terms[0].name
-    least = max((score for score, _ in scored), default=0.0) - decision.equations.thresholds.lead_margin
-    curves = [term for score, term in scored if score >= least]
     alike = [term for term in curves if term.name == over and term.wheels == other.terms[0].wheels]
     return next(iter((*alike, *curves)), None)
