@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, field, fields
 from importlib import resources
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,16 +22,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Verdict = Literal["consistent", "missing-physics", "unexplained"]
-Floats = TypeVar("Floats", float, Array)
-
-
-NINETY_PERCENT_STDS = 1.645
-"""Half the width of a 90 % interval of a normal density, in standard deviations."""
-
-
-def std_of_interval(low: Floats, high: Floats) -> Floats:
-    """Return the standard deviation of the normal density that has this 90 % interval."""
-    return (high - low) / (2 * NINETY_PERCENT_STDS)
 
 
 @dataclass(frozen=True)

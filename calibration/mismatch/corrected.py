@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import std_of_interval
 from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.empirical.written import summed, with_changed_sizes, with_curves
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.prior import own_name
+from regolithd.calibration.mismatch.signal.normal_interval import std_of_interval
 from regolithd.calibration.mismatch.simulation.corrected_curves import TABLE, entry_of, stated_curves
 from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects as stated_effects  # noqa: PLC0414  # for its users
 from regolithd.calibration.mismatch.simulation.load import model_folder, read_tables

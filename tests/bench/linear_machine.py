@@ -101,6 +101,7 @@ class Level(Simulation):
     inputs = ("speed_rad_s",)
     parameters: Mapping[str, Prior] = {"level": Prior(2.0, 0.5, "V")}
     parameter_effects: ClassVar = {"level": "level-error"}
+    zero_means_nothing: ClassVar[bool | None] = False
 
     def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
         """Return the level."""

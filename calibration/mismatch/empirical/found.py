@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, Parameter, Suggestion
+from regolithd.calibration.mismatch.answer import Parameter, Suggestion
 from regolithd.calibration.mismatch.empirical.spline import KNOTS, TIME_KNOTS, fit_spline, knots_of
 from regolithd.calibration.mismatch.empirical.suggestions import (
     SUGGESTED,
@@ -22,6 +22,7 @@ from regolithd.calibration.mismatch.empirical.sums import points_beside, profile
 from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.problem.words import divided, product, unit_in_label, word_for
 from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
+from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.empirical.spline import Spline

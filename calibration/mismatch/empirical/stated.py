@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import std_of_interval
 from regolithd.calibration.mismatch.candidates.candidate import Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.regression.smooth_groups import acting
+from regolithd.calibration.mismatch.signal.normal_interval import std_of_interval
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING
 
-from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.fleet.told.estimates import estimates_of, parameter_alone
 from regolithd.calibration.mismatch.inference.statements import parameters_found
+from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import (
-    NINETY_PERCENT_STDS,
     Answer,
     CalibratedParameter,
     Effect,
@@ -31,6 +30,7 @@ from regolithd.calibration.mismatch.inference.statements import notes_on_priors,
 from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, CalibratedParameter
+from regolithd.calibration.mismatch.answer import CalibratedParameter
 from regolithd.calibration.mismatch.regression.nuisance import beyond_prior_predictive
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
 from regolithd.calibration.mismatch.selection.released_parameters import WRONG_STATEMENT_PENALTY
+from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:

@@ -6,13 +6,14 @@ from dataclasses import replace
 from math import prod
 from typing import TYPE_CHECKING, TypeVar
 
-from regolithd.calibration.mismatch.answer import Answer, OtherAnswer, std_of_interval
+from regolithd.calibration.mismatch.answer import Answer, OtherAnswer
 from regolithd.calibration.mismatch.inference.probability import TOLD
 from regolithd.calibration.mismatch.inference.statements import (
     notes_beside_priors,
     notes_on_priors,
     parameters_found,
 )
+from regolithd.calibration.mismatch.signal.normal_interval import std_of_interval
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.inference.statements import on_wheels
 from regolithd.calibration.mismatch.problem.words import in_words
+from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, FitImprovement, Parameter, Sensitivity
+from regolithd.calibration.mismatch.answer import FitImprovement, Parameter, Sensitivity
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm
 from regolithd.calibration.mismatch.fleet.choice.held_out import HeldOutSquares, held_out_squares
 from regolithd.calibration.mismatch.fleet.choice.intervals import onset_places, size_stds
@@ -26,6 +26,7 @@ from regolithd.calibration.mismatch.fleet.told.rivals import rivals
 from regolithd.calibration.mismatch.fleet.told.sizes import mean_sizes, parameters_of
 from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost, words_of
 from regolithd.calibration.mismatch.problem.problem import LeftOut
+from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import NINETY_PERCENT_STDS, Parameter
+from regolithd.calibration.mismatch.answer import Parameter
 from regolithd.calibration.mismatch.fleet.choice.intervals import size_stds
 from regolithd.calibration.mismatch.inference.intervals import unit_of
 from regolithd.calibration.mismatch.problem.words import in_units
+from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -10,10 +10,11 @@ import pytest
 from sample_answer import ANSWER
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
-from regolithd.calibration.mismatch.answer import CalibratedParameter, std_of_interval
+from regolithd.calibration.mismatch.answer import CalibratedParameter
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.inference.several_channels import notes_of, priors_from_others
+from regolithd.calibration.mismatch.signal.normal_interval import std_of_interval
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
