@@ -70,7 +70,7 @@ def _best_reversal(problem: Problem) -> Shape:
     best, left = min((_refined(beside, shape) for shape in of_kind.values()), key=lambda pair: pair[1])
     gain = beside.independent * (1 - left / step)
     of_friction = beside.independent * (beside.squares_without_friction / left - 1)
-    is_there = of_friction > quantile(len(_laws(problem, {})), problem.thresholds.single_test_level)
+    is_there = of_friction > quantile(beside.laws, problem.thresholds.single_test_level)
     return best if is_there and gain > LEAST_GAIN else {}
 
 
@@ -110,6 +110,7 @@ class _Beside:
     independent: as many independent readings know as much as all whitened ones
     free: columns of the free parameters, and of what else acts about reversals, shape (column, reading)
     residual: shape (1, reading)
+    laws: how many friction may follow
     """
 
     problem: Problem
@@ -118,6 +119,7 @@ class _Beside:
     independent: float
     free: Array
     residual: Array
+    laws: int
 
     @property
     def squares_without_friction(self) -> float:
@@ -135,7 +137,8 @@ def _beside_a_step(problem: Problem) -> _Beside:
     free = list(as_shown(problem, [*parameters, *_about_reversals(problem)]))
     residual = problem.residual
     ones = np.ones(residual.shape[1])
-    as_read = _in_order(problem, [residual, *free, *_laws(problem, {})], NOT_WHITENED, ones)
+    laws = _laws(problem, {})
+    as_read = _in_order(problem, [residual, *free, *laws], NOT_WHITENED, ones)
     left = _left(as_read[1:], as_read[:1])[0]
     ends = np.cumsum([len(rows) for rows, _ in problem.courses])[:-1]
     parts = np.split(left, ends)
@@ -157,6 +160,7 @@ def _beside_a_step(problem: Problem) -> _Beside:
         float(problem.mask.sum()) / problem.noise_of(white).autocorrelation_time,
         _in_order(problem, free, whitening, deviation),
         _in_order(problem, [residual], whitening, deviation),
+        len(laws),
     )
 
 

@@ -30,19 +30,21 @@ def zero_is_arbitrary(simulation: Predictor, measured: Array) -> bool:
     """
     if simulation.zero_means_nothing is not None:
         return simulation.zero_means_nothing
-    if simulation.unit in TEMPERATURES:
-        return True
-    return simulation.unit in POTENTIALS and is_far_from_zero(measured)
+    return simulation.unit in TEMPERATURES or _shown_by_readings(simulation, measured)
 
 
 def note_on_zero(simulation: Predictor, measured: Array) -> tuple[str, ...]:
     """Return a note where the readings, and no statement or temperature, made the zero arbitrary."""
-    said = simulation.zero_means_nothing is not None or simulation.unit in TEMPERATURES
-    if said or not zero_is_arbitrary(simulation, measured):
+    if not _shown_by_readings(simulation, measured):
         return ()
     measured_against = "effects are measured against how far it moves from its mean"
     otherwise = "Where its zero does mean something, state `zero_means_nothing = False`"
     return (f"{simulation.channel} is far from 0 throughout: {measured_against}. {otherwise}.",)
+
+
+def _shown_by_readings(simulation: Predictor, measured: Array) -> bool:
+    """Return whether the readings, and no statement, say that the zero is arbitrary."""
+    return simulation.zero_means_nothing is None and simulation.unit in POTENTIALS and is_far_from_zero(measured)
 
 
 def is_far_from_zero(measured: Array) -> bool:

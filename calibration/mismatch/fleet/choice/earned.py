@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 Own = tuple[int, int]
 """A term that a recording shows by itself, by recording and place."""
+FEWEST_HELD_OUT = 2
+"""Recordings in which a size acts, of which one can be held out: a single one has no other to fit it."""
 
 
 def earned(chooser: Chooser, fit: FleetFit, found: Sequence[Found]) -> FleetFit:
@@ -108,10 +110,6 @@ class _Names:
         if factors.any(axis=2).sum(axis=1).max() < FEWEST_HELD_OUT:
             return True
         return _gain(self.chooser.equations, self.fit, index) > 0 and _gain(chooser.equations, beside, index) > 0
-
-
-FEWEST_HELD_OUT = 2
-"""Recordings in which a size acts, of which one can be held out: a single one has no other to fit it."""
 
 
 def _gain(equations: FleetEquations, fit: FleetFit, index: int) -> float:

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+ANY = (-np.inf, np.inf)
+"""Bounds of what may have any value."""
+
 
 @dataclass(frozen=True, eq=False)
 class Law:
@@ -64,10 +67,6 @@ def parameters_of(
             told = units.get(name) or unit_of(name, labels)
             found[name] = Parameter(float(value), float(np.min(ends)), float(np.max(ends)), told)
     return found
-
-
-ANY = (-np.inf, np.inf)
-"""Bounds of what may have any value."""
 
 
 def _ranges(candidate: Candidate, law: Law, wide: Mapping[str, float]) -> dict[str, tuple[float, float]]:
