@@ -43,8 +43,9 @@ LARGEST_CONTACT_ANGLE_RAD = np.pi / 2
 
 _MAX_ITERATIONS = 30
 """Secant steps in `contact_angle`; loads that a soil can carry need fewer than ten."""
-_TOLERANCE = 1e-13
-"""Largest change of ln θ_C in the last secant step: the contact angle is then exact to its last digits."""
+_TOLERANCE = 1e-8
+"""Largest change of ln θ_C in the last secant step. What is left is about its product with the step before, of about
+1e-5 and less: 4e-15 at most in 80 000 angles of four soils."""
 
 
 def sinkage_at_peak_stress(contact_angle_rad: Array, wheel: Wheel) -> Array:

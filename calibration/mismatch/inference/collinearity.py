@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Indistinguishable
     from regolithd.calibration.mismatch.experiments.choice import Experimenter
     from regolithd.calibration.mismatch.inference.alternatives import Alternative
-    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.group import Fit, Group
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 
@@ -60,14 +61,23 @@ def _mutual(name: str, like: dict[str, set[str]]) -> list[str]:
 
 
 def representatives(equations: NormalEquations) -> dict[str, list[Term]]:
-    """Return every shape of each candidate that all wheels may share, if it has few columns."""
+    """Return every shape of each candidate's grid that all wheels may share, if it has few columns.
+
+    Shapes between the points of a grid are left out: which there are depends on what was searched for before.
+    """
     found: dict[str, list[Term]] = {}
     most = equations.thresholds.most_imitating_columns
     for group in equations.design.groups:
         shared = "all" in group.sharing or len(equations.weights) == 1
-        if group.named and shared and len(group.columns) <= most:
+        if group.named and shared and len(group.columns) <= most and _is_of_grid(equations.problem, group):
             found.setdefault(group.name, []).append(Term(group, equations.all_wheels))
     return found
+
+
+def _is_of_grid(problem: Problem, group: Group) -> bool:
+    """Return whether a candidate's shape is one of its grid, or was proposed where it has none."""
+    grid = group.candidate.shapes(problem) if group.candidate else ()
+    return not grid or group.shape in grid
 
 
 def energy_apart(equations: NormalEquations, given: Sequence[Term], term: Term) -> float:

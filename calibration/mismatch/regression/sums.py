@@ -28,8 +28,8 @@ LONGEST_PART = 8192
 """Instants of all columns that are in memory at once (a choice: about 25 MiB)."""
 LONGEST_PIECE = 512
 """Instants that are multiplied at once (a choice: of shorter pieces a product of matrices takes longer for each)."""
-ROOM = 96
-"""Later columns for which room is made at once (a choice: half of what most comparisons need)."""
+ROOM = 192
+"""Later columns for which room is made at once (a choice: twice that costs more memory, half of it more time)."""
 
 
 class Sums:

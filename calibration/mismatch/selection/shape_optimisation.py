@@ -24,10 +24,20 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
 
-GOLDEN_RATIO = (np.sqrt(5) - 1) / 2
+Point = tuple[float, float]
+"""Argument and value of a function."""
+
+GOLDEN_RATIO = (5**0.5 - 1) / 2
 SCAN_POINTS = 7
-GOLDEN_STEPS = 14
-"""Narrows the interval by a factor of 0.618^14 = 1/840."""
+CLOSEST = 1 / 840
+"""Share of the interval around the best of a scan to which a shape parameter is narrowed down (a choice: far less than
+its standard error)."""
+MOST_STEPS = 30
+"""Steps of that, at most; most take five."""
+MISFORESEEN = 0.5
+"""Share of a parabola's gain by which a smooth function may differ from it (a choice: it shrinks with each step)."""
+LEAST_GAIN = 0.05
+"""Gain of Δχ² below which that is no matter (a choice: a fifth of a standard error gains so much)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,33 +224,51 @@ def _reshaped(equations: NormalEquations, term: Term, shape: Shape) -> tuple[Nor
 
 
 def maximise(function: Callable[[float], float], low: float, high: float) -> tuple[float, float]:
-    """Return argument and value of the largest of a coarse scan, then of golden sections around it.
+    """Return argument and value of the largest of a coarse scan, then of parabolas around it.
 
-    `scipy.optimize.minimize_scalar` has no scan before its bounded search, and stops elsewhere: published answers
-    would change in their last digits.
+    `scipy.optimize.minimize_scalar` has no scan before its bounded search, and does not start from what was scanned.
     """
-    points = np.linspace(low, high, SCAN_POINTS)
-    values = [function(float(x)) for x in points]
+    points = np.linspace(low, high, SCAN_POINTS).tolist()
+    values = [function(x) for x in points]
     top = int(np.argmax(values))
-    ends = float(points[max(top - 1, 0)]), float(points[min(top + 1, SCAN_POINTS - 1)])
-    best, value = float(points[top]), values[top]
-    for x, found in golden_section(function, *ends):
-        if found > value:
-            best, value = x, found
-    return best, value
+    bracket = [(points[k], values[k]) for k in (max(top - 1, 0), top, min(top + 1, SCAN_POINTS - 1))]
+    return peak_within(function, *bracket)
 
 
-def golden_section(function: Callable[[float], float], low: float, high: float) -> tuple[tuple[float, float], ...]:
-    """Return the last two inner points and their values after narrowing an interval around a maximum."""
-    left, right = high - GOLDEN_RATIO * (high - low), low + GOLDEN_RATIO * (high - low)
-    at_left, at_right = function(left), function(right)
-    for _ in range(GOLDEN_STEPS):
-        if at_left > at_right:
-            high, right, at_right = right, left, at_left
-            left = high - GOLDEN_RATIO * (high - low)
-            at_left = function(left)
+def peak_within(function: Callable[[float], float], left: Point, best: Point, right: Point) -> Point:
+    """Return the maximum between two points, from one of them or between them that is at least as high as both.
+
+    Parabolas through the three while they halve what is left and foresee the values (Brent, 1973, chapter 5), else
+    golden sections: the gain of an onset has a kink at each reading.
+    """
+    closest, widths, smooth = (right[0] - left[0]) * CLOSEST, [float("inf")] * 2, True
+    for _ in range(MOST_STEPS):
+        before, after = best[0] - left[0], right[0] - best[0]
+        if max(before, after) <= closest * (1 + 1e-9):
+            break
+        halves = before + after <= widths[-2] / 2
+        widths.append(before + after)
+        vertex = _vertex(left, best, right) if smooth and halves and min(before, after) > 0 else None
+        golden = (1 - GOLDEN_RATIO) * (after if after > before else -before)
+        step = vertex[0] if vertex else golden
+        if min(before, after) <= 0 or abs(step) < closest:  # an end of the range, or all but found
+            step = closest if after > before else -closest
+        new = best[0] + step, function(best[0] + step)
+        if vertex and step == vertex[0]:
+            smooth = abs(new[1] - best[1] - vertex[1]) <= MISFORESEEN * max(vertex[1], LEAST_GAIN)
+        if new[1] > best[1]:
+            left, best, right = (best, new, right) if step > 0 else (left, new, best)
         else:
-            low, left, at_left = left, right, at_right
-            right = low + GOLDEN_RATIO * (high - low)
-            at_right = function(right)
-    return (left, at_left), (right, at_right)
+            left, right = (left, new) if step > 0 else (new, right)
+    return best
+
+
+def _vertex(left: Point, best: Point, right: Point) -> Point | None:
+    """Return the way from the best of three points to their parabola's vertex, and the gain; None: none is between."""
+    before, after = best[0] - left[0], right[0] - best[0]
+    falls = (best[1] - left[1]) / before, (best[1] - right[1]) / after
+    if not 0 < sum(falls) < float("inf"):  # level, or a value that is not finite
+        return None
+    step = (falls[0] * after - falls[1] * before) / (2 * sum(falls))
+    curvature = sum(falls) / (before + after)
+    return (step, curvature * step**2) if -before < step < after else None

@@ -54,13 +54,13 @@ class MarkovChains:
         first: log density of the first reading in each state, shape (chain, state)
         after: log density of each reading after it, given the state before and its own, (chain, time, before, state)
         """
-        largest = after.max(axis=(-2, -1))
+        largest = _largest(after)
         total = largest.sum(axis=1)
         product = np.exp(np.maximum(after - largest[..., None, None], SMALLEST_LOG)) * self.transitions[:, None]
         while product.shape[1] > 1:
             even = product.shape[1] // 2 * 2
             pairs = product[:, 0:even:2] @ product[:, 1:even:2]
-            size = pairs.max(axis=(-2, -1))
+            size = _largest(pairs)
             total += np.log(size).sum(axis=1)
             product = np.concatenate((pairs / size[..., None, None], product[:, even:]), axis=1)
         top = first.max(axis=-1)
@@ -81,3 +81,9 @@ class MarkovChains:
             backward[k] = before / before.sum()
         both = forward * backward
         return np.asarray(both[:, 1] / both.sum(axis=1))
+
+
+def _largest(pairs: Array) -> Array:
+    """Return the largest of each two by two numbers, shape (…,); `max` over axes as short as these is slow."""
+    of_rows = np.maximum(pairs[..., 0], pairs[..., 1])
+    return np.asarray(np.maximum(of_rows[..., 0], of_rows[..., 1]))

@@ -63,7 +63,8 @@ def normal_score(skewness: float, readings: float) -> float:
 
 def third_cumulant(values: Array) -> float:
     """Return the mean cube of a course's deviations."""
-    return float(np.mean((values - values.mean()) ** 3))
+    deviations = values - values.mean()
+    return float(np.mean(deviations * deviations * deviations))  # `** 3` takes ten times as long
 
 
 def skewness_error(values: Array, thresholds: Thresholds = THRESHOLDS) -> float:

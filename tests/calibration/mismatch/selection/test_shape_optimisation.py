@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 from linear_machine import Drag, Power, equations_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.selection.shape_optimisation import (
-    golden_section,
     maximise,
     optimised_shape,
+    peak_within,
     shape_profile,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 
 @pytest.mark.parametrize("top", [0.0, 0.31, 1.7, 4.0])
@@ -29,19 +34,32 @@ def test_the_higher_of_two_maxima_is_found() -> None:
     assert at == pytest.approx(5.0, abs=0.01)
 
 
-def test_golden_sections_close_in_on_the_maximum() -> None:
-    """Fourteen steps narrow to less than a thousandth; each asks for one new value."""
+@pytest.mark.parametrize(
+    ("function", "most"),
+    [
+        (lambda x: -((x - 0.6) ** 2), 3),
+        (lambda x: 1 / (1 + (x - 0.6) ** 2), 6),
+        (lambda x: -abs(x - 0.6), 14),
+        (lambda x: -((x - 0.6) ** 4) if x < 0.8 else -float("inf"), 16),
+        (lambda x: x, 1),
+        (lambda _: 0.0, 14),
+    ],
+    ids=["parabola", "smooth", "kink", "flat top beside no value", "at the end", "level"],
+)
+def test_a_peak_is_narrowed_down_in_few_steps(function: Callable[[float], float], most: int) -> None:
+    """To a thousandth of the interval; golden sections alone take fourteen for each."""
     asked: list[float] = []
 
-    def function(x: float) -> float:
+    def counted(x: float) -> float:
         asked.append(x)
-        return -abs(x - 0.6)
+        return function(x)
 
-    (left, at_left), (right, at_right) = golden_section(function, 0.0, 1.0)
-    assert left < right
-    assert right - left < 1e-3
-    assert max(at_left, at_right) > -1e-3
-    assert len(asked) == 2 + 14
+    start = [(x, function(x)) for x in ((0.0, 0.5, 1.0) if function(1.0) < function(0.5) else (0.5, 1.0, 1.0))]
+    at, value = peak_within(counted, *start)
+    assert value == function(at)
+    assert value >= max(map(function, np.linspace(0, 1, 101))) - 2e-3
+    assert all(0 <= x <= 1 for x in asked)
+    assert len(asked) <= most
 
 
 def test_the_profile_is_the_gain_beside_the_other_terms() -> None:
