@@ -86,7 +86,7 @@ def _acceptable_term(equations: NormalEquations, fit: Fit, index: int) -> bool:
         return False
     if term.group.named and relative_size(equations, fit, index) < equations.thresholds.smallest_effect:
         return False
-    if not _gains_by_its_covariate(equations, fit, index):
+    if not _gains_by_its_covariate(equations, fit, index) or _is_a_parameter(equations, fit, index):
         return False
     return term.group.own_channel is None or _agrees_with_own_channel(equations, fit, index)
 
@@ -100,6 +100,26 @@ def _gains_by_its_covariate(equations: NormalEquations, fit: Fit, index: int) ->
         return True
     profile = shape_profile(equations, fit.without(index), candidate, term.wheels)
     return profile(term.group.shape) - profile(without) > term.group.selection_penalty
+
+
+def _is_a_parameter(equations: NormalEquations, fit: Fit, index: int) -> bool:
+    """Return whether a parameter of the simulation acts as a term does, and explains as much within its prior.
+
+    What the term gains is then the way that the parameter need not go, and no evidence of the readings.
+    """
+    problem, nuisance = equations.problem, equations.nuisance
+    names = problem.simulation.parameter_effects
+    places = [place for place, name in enumerate(nuisance.names) if names.get(name) == fit.terms[index].name]
+    if not places:
+        return False
+    rest = fit.without(index)
+    contradicted = set(nuisance.contradicting_their_priors(equations.fit(rest), problem).tolist())
+    for place in places:
+        freed = equations.with_nuisance(nuisance.with_precision(place, 0.0))
+        gain = freed.fit(fit.terms).delta_chi2 - freed.fit(rest).delta_chi2
+        if place not in contradicted and gain < equations.thresholds.lead_margin:
+            return True
+    return False
 
 
 def physically_plausible(equations: NormalEquations, fit: Fit, index: int) -> bool:

@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
-from linear_machine import INSTANTS, Array, Power, equations_of, group_of, problem_of, table, term_of
+from linear_machine import INSTANTS, Array, Level, Power, equations_of, group_of, problem_of, table, term_of
 
+from regolithd.calibration.mismatch import Prior
+from regolithd.calibration.mismatch.data.recording import from_columns
+from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection.best_subsets import (
@@ -22,6 +25,8 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from regolithd.calibration.mismatch import Problem, Shape
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
@@ -106,6 +111,27 @@ def test_an_effect_with_the_wrong_sign_is_not_acceptable() -> None:
     """A drag does not push."""
     equations = equations_of(problem_of(table(drag=-0.3)))
     assert not acceptable(equations, equations.fit([term_of(equations, "drag")]))
+
+
+class Rubbing(Level):
+    """A level with a drag of its own, of 0.3 V but for 0.05 V."""
+
+    parameters: Mapping[str, Prior] = {"level": Prior(2.0, 0.5, "V"), "friction_V": Prior(0.3, 0.05, "V")}
+    parameter_effects: ClassVar = {"level": "level-error", "friction_V": "drag"}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the level and the drag."""
+        return super().predict(inputs, values) + values["friction_V"] * np.sign(inputs["speed_rad_s"])
+
+
+@pytest.mark.parametrize(("stds", "named"), [(2.0, False), (2.7, False), (8.0, True)])
+def test_what_a_parameter_within_its_prior_explains_has_no_name(stds: float, *, named: bool) -> None:
+    """The drag's gain is that the parameter need not leave its mean; beyond its prior the readings say so."""
+    recorded = from_columns(table(drag=0.3 + 0.05 * stds), unit="axis")
+    equations = equations_of(build_problem(recorded, Rubbing()))
+    fit = equations.fit([term_of(equations, "drag")])
+    assert fit.delta_chi2 > (stds - 0.5) ** 2
+    assert acceptable(equations, fit) is named
 
 
 @pytest.mark.parametrize(("own", "agrees"), [(0.3, True), (0.15, True), (0.1, False), (0.6, True), (0.9, False)])
