@@ -20,7 +20,7 @@ LOWEST_IN_KELVIN = 150.0
 
 def known_temperature_degC(problem: Problem) -> NDArray[np.float64]:
     """Return the temperature [°C], 0 where it is not known, shape (time, wheel)."""
-    return problem.once("known temperature", lambda: np.nan_to_num(temperature_degC(problem)))
+    return problem.once("temperature in degrees Celsius", lambda: np.nan_to_num(temperature_degC(problem)))
 
 
 def temperature_degC(problem: Problem) -> NDArray[np.float64]:

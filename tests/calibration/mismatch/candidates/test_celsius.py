@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from linear_machine import AXES, INSTANTS, problem_of, table
 
-from regolithd.calibration.mismatch.candidates.celsius import temperature_degC
+from regolithd.calibration.mismatch.candidates.celsius import known_temperature_degC, temperature_degC
 
 CELSIUS = np.array([[20.0, 30.0], [40.0, np.nan]])
 
@@ -41,3 +43,13 @@ def test_a_hot_oven_in_degrees_celsius_stays_so() -> None:
         recording=SimpleNamespace(channels={"oven_degC": hot}),
     )
     assert temperature_degC(problem) == pytest.approx(hot, nan_ok=True)  # type: ignore[arg-type]
+
+
+def test_where_it_is_known_it_is_in_degrees_celsius_too() -> None:
+    """Whoever has asked for the covariate in its own unit before: both are computed once."""
+    columns = {**table(), "gear_temperature_K": np.linspace(260.0, 300.0, AXES * INSTANTS)}
+    problem = problem_of(columns)
+    kelvin = problem.recording.channels["gear_temperature_K"]
+    warm = replace(problem, covariates={**problem.covariates, "temperature": kelvin})
+    assert warm.known("temperature") == pytest.approx(kelvin)
+    assert known_temperature_degC(warm) == pytest.approx(kelvin - 273.15)
