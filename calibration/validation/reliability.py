@@ -19,16 +19,20 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.table import Table
+from scipy.stats import binom
 
 from regolithd.calibration.mismatch.report.axes import Panel, axes, box, line, svg, text
 
 EDGES = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0)
 STYLE = """<style>text{font:12px sans-serif;fill:#5c6570}.ground{fill:#f5f6f8}.axis{stroke:#d9dde2;fill:none}
-.after{fill:none;stroke:#23679b;stroke-width:1.6}.dot{fill:#23679b}.zero{stroke:#b5482a;stroke-dasharray:3 3;fill:none}
-.paper{fill:#fff}</style><rect class="paper" width="420" height="320"/>"""
+.after{fill:none;stroke:#23679b;stroke-width:1.6}.dot{fill:#23679b}
+.expected{stroke:#b9c1cb;stroke-width:4;fill:none}.zero{stroke:#b5482a;stroke-dasharray:3 3;fill:none}
+.paper{fill:#fff}</style><rect class="paper" width="420" height="352"/>"""
 
 Truth = dict[str, Any]
 Answer = dict[str, Any]
+
+NINETEEN_IN_TWENTY = 0.95
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,12 @@ class Bin:
     def standard_error(self) -> float:
         """Of the share, if the stated probability is true (binomial)."""
         return float(np.sqrt(self.stated * (1 - self.stated) / self.count))
+
+    @property
+    def expected(self) -> tuple[float, float]:
+        """Bounds of the share 19 times in 20, if the stated probability is true (binomial)."""
+        low, high = binom.interval(NINETEEN_IN_TWENTY, self.count, self.stated)
+        return float(low) / self.count, float(high) / self.count
 
 
 def wanted(truth: Truth) -> set[str]:
@@ -102,7 +112,10 @@ def bins(answers: list[Stated]) -> list[Bin]:
 
 
 def picture(found: list[Bin]) -> str:
-    """Return the reliability diagram as SVG: the share that is right against the stated probability."""
+    """Return the reliability diagram as SVG: the share that is right against the stated probability.
+
+    Bars show where that share lies 19 times in 20 if what is stated is true: few answers say little.
+    """
     panel = Panel(left=80, top=20, width=310, height=240, x=(0.0, 1.0), y=(0.0, 1.0))
     dots = [
         f'<circle class="dot" cx="{panel.at_x(each.stated):.1f}" cy="{panel.at_y(each.right):.1f}" '
@@ -110,11 +123,15 @@ def picture(found: list[Bin]) -> str:
         for each in found
     ]
     diagonal = [(panel.at_x(at), panel.at_y(at)) for at in (0.0, 1.0)]
-    parts = [STYLE, box(panel), axes(panel, "stated probability", "share of answers that are right"), *dots]
+    bars = [line([(panel.at_x(each.stated), panel.at_y(end)) for end in each.expected], "expected") for each in found]
+    parts = [STYLE, box(panel), axes(panel, "stated probability", "share of answers that are right"), *bars, *dots]
     parts.append(line(diagonal, "zero"))
-    parts.append(text(panel.at_x(0.4), panel.at_y(0.12), "dashed: stated = right"))
-    parts.append(text(panel.at_x(0.4), panel.at_y(0.05), "area of a dot: number of answers"))
-    return svg(420, 320, parts, "Share of right answers against the stated probability")
+    legend = (
+        "dashed: stated = right; area: number of answers",
+        "bars: 19 shares of 20, if what is stated is true",
+    )
+    parts += [text(panel.left, 322 + 16 * k, words) for k, words in enumerate(legend)]
+    return svg(420, 352, parts, "Share of right answers against the stated probability")
 
 
 def figures_of(answers: list[Stated], found: list[Bin]) -> dict[str, float]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from regolithd.calibration.validation.reliability import Stated, answers_of, bins, is_right, main
+from regolithd.calibration.validation.reliability import Bin, Stated, answers_of, bins, is_right, main
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -74,4 +74,12 @@ def test_batches_become_a_table_figures_and_a_picture(tmp_path: Path) -> None:
     assert answers_of(tmp_path) == [Stated(0.9, True), Stated(0.97, True)]
     main(str(tmp_path / "figures.json"), str(tmp_path / "picture.svg"), str(tmp_path))
     assert json.loads((tmp_path / "figures.json").read_text())["right_of_sure"] == 1.0
-    assert (tmp_path / "picture.svg").read_text().count("<circle") == 2
+    drawn = (tmp_path / "picture.svg").read_text()
+    assert drawn.count("<circle") == drawn.count('class="expected"') == 2
+
+
+@pytest.mark.parametrize(("count", "low", "high"), [(1, 0.0, 1.0), (1000, 0.88, 0.92)])
+def test_few_answers_say_little_about_a_stated_probability(count: int, low: float, high: float) -> None:
+    """Nineteen times in twenty their share is within these bounds, of a true 0.9."""
+    found = Bin(0.8, 0.95, count, 0.9, 1.0).expected
+    assert found == pytest.approx((low, high), abs=0.005)
