@@ -22,6 +22,7 @@ from regolithd.calibration.mismatch.inference.collinearity import (
 from regolithd.calibration.mismatch.inference.experiment import rounded_up, seconds_needed, with_experiment
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable, rivals, wrong_choice_rate
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities, smallest_detectable
+from regolithd.calibration.mismatch.regression.candidate_groups import with_candidate
 from regolithd.calibration.mismatch.selection.best_subsets import acceptable
 
 if TYPE_CHECKING:
@@ -306,3 +307,14 @@ def test_where_free_parameters_hide_a_member_the_load_is_taken_off(monkeypatch: 
     strict = replace(equations.problem, thresholds=replace(equations.thresholds, experiment_tolerance=1e-9))
     patient = replace(equations, design=replace(equations.design, problem=strict))
     assert "lift it" not in instruction(patient, "offset")
+
+
+def test_what_cannot_be_told_apart_does_not_depend_on_what_was_searched_for() -> None:
+    """A shape that a search came by between the points of the grid represents no candidate."""
+    equations = equations_of(problem_of(table(factor=0.3)))
+    design, _ = with_candidate(equations.design, Power(), [{"power": 1.23}], [1.0])
+    searched = equations.over(design)
+    assert len(searched.design.groups) == len(equations.design.groups) + 1
+    shapes = {name: [term.group.shape for term in terms] for name, terms in representatives(searched).items()}
+    assert shapes == {name: [term.group.shape for term in terms] for name, terms in representatives(equations).items()}
+    assert shapes["power"] == [{"power": 1.0}, {"power": 2.0}]
