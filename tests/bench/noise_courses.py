@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -59,3 +61,10 @@ def in_spells(random: Generator, rms: float) -> tuple[Array, Array]:
         drag[part], acting[part] = random.uniform(0.5, 1.5), True
         at += length + int(random.uniform(125, 450))
     return drag * rms / np.sqrt(np.mean(drag**2)), acting
+
+
+def over_its_noise(left: Array) -> tuple[Array, Array]:
+    """Return the sum of axes (time, axis), or one course (time,), over the size of the noise; nothing is explained."""
+    courses = left.reshape(len(left), -1)
+    one = np.ones(courses.shape)
+    return of_usual_noise(courses - courses.mean(axis=0), 0 * one, one > 0, one)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.inference.experiment import with_experiment
+from regolithd.calibration.mismatch.regression.candidate_groups import of_grid
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
 from regolithd.calibration.mismatch.regression.nuisance import EXACT
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Indistinguishable
     from regolithd.calibration.mismatch.experiments.choice import Experimenter
     from regolithd.calibration.mismatch.inference.alternatives import Alternative
-    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Fit, Group
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
@@ -61,23 +61,18 @@ def _mutual(name: str, like: dict[str, set[str]]) -> list[str]:
 
 
 def representatives(equations: NormalEquations) -> dict[str, list[Term]]:
-    """Return every shape of each candidate's grid that all wheels may share, if it has few columns.
-
-    Shapes between the points of a grid are left out: which there are depends on what was searched for before.
-    """
-    found: dict[str, list[Term]] = {}
+    """Return every shape of each candidate's grid that all wheels may share, if it has few columns."""
+    families: dict[tuple[str, bool], list[Group]] = {}
     most = equations.thresholds.most_imitating_columns
     for group in equations.design.groups:
         shared = "all" in group.sharing or len(equations.weights) == 1
-        if group.named and shared and len(group.columns) <= most and _is_of_grid(equations.problem, group):
-            found.setdefault(group.name, []).append(Term(group, equations.all_wheels))
+        if group.named and shared and len(group.columns) <= most:
+            families.setdefault(group.law, []).append(group)
+    found: dict[str, list[Term]] = {}
+    for groups in families.values():
+        on_grid = of_grid(equations.problem, groups)
+        found.setdefault(groups[0].name, []).extend(Term(group, equations.all_wheels) for group in on_grid)
     return found
-
-
-def _is_of_grid(problem: Problem, group: Group) -> bool:
-    """Return whether a candidate's shape is one of its grid, or was proposed where it has none."""
-    grid = group.candidate.shapes(problem) if group.candidate else ()
-    return not grid or group.shape in grid
 
 
 def energy_apart(equations: NormalEquations, given: Sequence[Term], term: Term) -> float:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import Sensitivity
+from regolithd.calibration.mismatch.regression.candidate_groups import of_grid
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.penalties import full_penalty
 from regolithd.calibration.mismatch.regression.residuals import active_rms
@@ -31,9 +32,8 @@ def sensitivities(
         if not groups:
             found.append(Sensitivity(candidate.name, channel, float("inf"), unit))
             continue
-        # A shape in the middle of the grid stands for the family, whichever others the search has tried.
-        grid = candidate.shapes(equations.problem)
-        on_grid = [group for group in groups if group.shape in grid] or groups
+        # A shape in the middle of the grid stands for the family.
+        on_grid = of_grid(equations.problem, groups)
         group = on_grid[len(on_grid) // 2]
         wheels = equations.all_wheels
         patterns = [wheels] if "all" in candidate.sharing or len(wheels) == 1 else [(w,) for w in wheels]

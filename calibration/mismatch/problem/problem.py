@@ -212,7 +212,10 @@ class Problem:
         return self.once(f"known {covariate}", lambda: np.nan_to_num(self.covariates[covariate]))
 
     def once(self, name: str, derive: Callable[[], Array]) -> Array:
-        """Return what is derived from covariates and readings, the first time that this name is asked for."""
+        """Return what is derived from covariates and readings, the first time that this name is asked for.
+
+        All callers share the names: one says which quantity it is, and in which unit where that is not the covariate's.
+        """
         if name not in self._derived:
             values = self._derived[name] = derive()
             values.setflags(write=False)  # whoever asks for it gets the same array

@@ -23,6 +23,16 @@ def coefficient_signs(candidate: Candidate, count: int) -> tuple[int, ...]:
     return declared + (0,) * (count - len(declared))
 
 
+def of_grid(problem: Problem, groups: Sequence[Group]) -> Sequence[Group]:
+    """Return those groups of one candidate whose shape is of its grid, or all where none is.
+
+    Which there are between the points of the grid depends on what was searched for before.
+    """
+    candidate = groups[0].candidate
+    grid = candidate.shapes(problem) if candidate else ()
+    return [group for group in groups if group.shape in grid] or groups
+
+
 def implausibility(problem: Problem, candidate: Candidate, shape: Shape) -> float:
     """Return the Δχ² that a candidate must gain for being hardly possible on this machine, or in this shape.
 

@@ -109,17 +109,17 @@ def _is_a_parameter(equations: NormalEquations, fit: Fit, index: int) -> bool:
     """
     problem, nuisance = equations.problem, equations.nuisance
     names = problem.simulation.parameter_effects
-    places = [place for place, name in enumerate(nuisance.names) if names.get(name) == fit.terms[index].name]
+    places = {place for place, name in enumerate(nuisance.names) if names.get(name) == fit.terms[index].name}
     if not places:
         return False
     rest = fit.without(index)
-    contradicted = set(nuisance.contradicting_their_priors(equations.fit(rest), problem).tolist())
-    for place in places:
+
+    def gain_beside_any(place: int) -> float:
         freed = equations.with_nuisance(nuisance.with_precision(place, 0.0))
-        gain = freed.fit(fit.terms).delta_chi2 - freed.fit(rest).delta_chi2
-        if place not in contradicted and gain < equations.thresholds.lead_margin:
-            return True
-    return False
+        return freed.fit(fit.terms).delta_chi2 - freed.fit(rest).delta_chi2
+
+    within = places.difference(nuisance.contradicting_their_priors(equations.fit(rest), problem).tolist())
+    return any(gain_beside_any(place) < equations.thresholds.lead_margin for place in within)
 
 
 def physically_plausible(equations: NormalEquations, fit: Fit, index: int) -> bool:

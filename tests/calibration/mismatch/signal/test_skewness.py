@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from noise_courses import NOISE, READINGS, RECORDINGS, partly
+from noise_courses import NOISE, READINGS, RECORDINGS, over_its_noise, partly
 from scipy.stats import skewtest
 
-from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
 from regolithd.calibration.mismatch.signal.skewness import (
     normal_score,
     skewed_lengths,
@@ -26,13 +25,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
-
-
-def over_its_noise(left: Array) -> tuple[Array, Array]:
-    """Return the sum of axes (time, axis), or one course (time,), over the size of the noise; nothing is explained."""
-    courses = left.reshape(len(left), -1)
-    one = np.ones(courses.shape)
-    return of_usual_noise(courses - courses.mean(axis=0), 0 * one, one > 0, one)
 
 
 def lengths_of(noise: Array) -> tuple[int, ...]:

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from noise_courses import NOISE, READINGS, RECORDINGS, in_spells, partly, with_memory
+from noise_courses import NOISE, READINGS, RECORDINGS, in_spells, over_its_noise, partly, with_memory
 
-from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
 from regolithd.calibration.mismatch.signal.spells import switching_spells
 from regolithd.calibration.mismatch.signal.switching_mean import SwitchingMean, switching_mean
 
@@ -21,15 +20,9 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-def over_its_noise(course: Array) -> Array:
-    """Return one course of readings over the size of its noise."""
-    one = np.ones((len(course), 1))
-    return of_usual_noise((course - course.mean())[:, None], 0 * one, one > 0, one)[0]
-
-
 def found_in(course: Array, peers: Sequence[Array] = ()) -> SwitchingMean | None:
     """Return the two levels of a course, if it has them."""
-    return switching_mean(over_its_noise(course), [over_its_noise(peer) for peer in peers])
+    return switching_mean(over_its_noise(course)[0], [over_its_noise(peer)[0] for peer in peers])
 
 
 @pytest.mark.parametrize("noise", NOISE.values(), ids=NOISE)
@@ -93,7 +86,7 @@ def test_spells_are_located_and_measured() -> None:
     for seed in range(RECORDINGS):
         random = np.random.default_rng(seed)
         drag, acting = in_spells(random, 0.9)
-        course = over_its_noise(drag + partly(random, 9))
+        course = over_its_noise(drag + partly(random, 9))[0]
         if switching := switching_mean(course):
             spells, at = switching_spells(course, switching), np.flatnonzero(acting)
             first.append(spells.first - at[0])
