@@ -100,7 +100,7 @@ fleet: $(DEV) ## 100 recordings of five virtual rovers on a local Dask cluster, 
 	$(BIN)/python -m regolithd.calibration.validation.fleet_study $(if $(SEED),--seed $(SEED)) $(if $(CHECK),--check $(CHECK))
 
 mutations: $(DEV) ## `regolithd mismatch` on a thousand damaged files of each kind, and in other units (half an hour)
-	MUTATIONS=1000 INVARIANCES=1000 $(BIN)/python -m pytest tests/daemon/mismatch tests/calibration/mismatch/test_invariance.py
+	MUTATIONS=1000 INVARIANCES=1000 $(BIN)/python -m pytest --timeout 3600 tests/daemon/mismatch tests/calibration/mismatch/test_invariance.py
 
 mutants: $(DEV) ## mutation testing on a random sample (SEED=… COUNT=… ONLY=drivers/can; RETRY=1 tries survivors again)
 	$(BIN)/python tests/mutation/sample.py --seed $(or $(SEED),1) --count $(or $(COUNT),200) $(if $(ONLY),--only $(ONLY)) \

@@ -1,8 +1,9 @@
-"""Calibration of a simulation that is not linear in its parameters: it is linearised anew where the fit leads.
+"""Calibration: the problem is posed anew where the fit of the parameters leads.
 
 The engine fits the parameters by the tangents of the prediction. Where those, over the distance that a parameter moves,
 differ from what the simulation itself predicts, the problem is posed again at the new values, with the priors as stated
-(Gauss and Newton's method), until the two agree: what the answer calls calibrated has been run.
+(Gauss and Newton's method), until the two agree: what the answer calls calibrated has been run. It is searched again
+where what was found makes the prediction another one, as some effects are a share of it.
 """
 
 from __future__ import annotations
@@ -19,9 +20,13 @@ from regolithd.calibration.mismatch.selection.noise_estimation import fit_of_sig
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from numpy.typing import NDArray
+
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+    Array = NDArray[np.float64]
 
 ON_TIME_WITHIN = 0.5
 """Readings by which an input that was put on time may still be late (a choice: what sampling leaves open)."""
@@ -94,7 +99,21 @@ def bent(problem: Problem, values: Mapping[str, float]) -> bool:
     residual = (problem.measured - run)[problem.mask]
     if not np.isfinite(apart).all():
         return False
-    return float(np.mean(apart**2)) > problem.thresholds.linearisation_share**2 * float(np.mean(residual**2))
+    return _power(apart) > problem.thresholds.linearisation_share**2 * _power(residual)
+
+
+def another_law(problem: Problem, values: Mapping[str, float]) -> bool:
+    """Return whether what is a share of the prediction, such as a loss, would have another law at other values.
+
+    That is where the prediction changes by more than may be missed of a law.
+    """
+    run, here = problem.changed(**values)[problem.mask], problem.filled[problem.mask]
+    return bool(np.isfinite(run).all()) and _power(run - here) > problem.thresholds.form_misfit * _power(run)
+
+
+def _power(values: Array) -> float:
+    """Return the mean square."""
+    return float(np.mean(values**2))
 
 
 def late_otherwise(problem: Problem, values: Mapping[str, float]) -> bool:

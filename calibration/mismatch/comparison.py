@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from regolithd.calibration.mismatch.calibration import (
+    another_law,
     bent,
     beyond_their_doubt,
     late_otherwise,
@@ -301,7 +302,7 @@ def _search(
     candidates = with_changes(problem, candidates, stated)
     found = _search_at(equations, candidates, progress)
     values = moved_values(found.decision.equations, found.decision.whole)
-    if not found.decision.has_delay and bent(problem, values):
+    if not found.decision.has_delay and (bent(problem, values) or another_law(problem, values)):
         noise_size = found.decision.equations.problem.noise_size
         del found, equations  # memory holds the matrix of one search at a time, and TMPDIR its columns
         found = _search_at(smooth_equations(replace(pose(values), noise_size=noise_size)), candidates, progress)

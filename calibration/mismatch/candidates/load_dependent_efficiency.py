@@ -27,6 +27,8 @@ SAME_AS_GAIN = 0.95
 the load drives the motor for a fortieth of the torque's energy at most)."""
 LARGEST_LOSS = 2 / 3
 """Largest share of the stated efficiency that may be lost at any torque (a choice: a third is left)."""
+USUAL = 0.98
+"""Quantile of the torques up to which a loss has to be possible (a choice: one reading in fifty may be disturbed)."""
 LESS_THAN_PREDICTED = "less than is predicted, by a share that depends on the transmitted torque"
 """What a loss below zero is."""
 POWERS, LIGHT_LOADS, SLOPES = (0.0, 0.5, 1.0, 2.0), (0.5, 1.0), (-0.2, 0.0, 0.3)
@@ -115,15 +117,24 @@ class LoadDependentEfficiency(Candidate):
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the loss as a multiple of the predicted size, against the motion."""
-        relative, lost = _relative(problem, shape), _against_motion(problem, shape)
-        if "bent" in shape:
-            above = relative - 1
-            # At torques beyond those of the identification, the line ends where a third of the efficiency is left.
-            left = np.maximum(1 - float(shape["bent"]) * above, 1 - LARGEST_LOSS)
-            return (lost * above / left)[None]
-        if "light" in shape:
-            return (lost * np.exp(-relative / float(shape["light"])))[None]
-        return (lost * relative ** float(shape["power"]))[None]
+        return (_against_motion(problem, shape) * _of_size(problem, shape))[None]
+
+    def plausible(self, problem: Problem, shape: Shape, values: Sequence[float]) -> bool:
+        """Return whether at the usual torques at least a third of the efficiency is left, and no more is gained."""
+        lost = values[0] * np.quantile(_of_size(problem, shape)[problem.mask], (1 - USUAL, USUAL))
+        return bool(lost.min() >= -LARGEST_LOSS and lost.max() <= LARGEST_LOSS / (1 - LARGEST_LOSS))
+
+
+def _of_size(problem: Problem, shape: Shape) -> Array:
+    """Return what is lost for a coefficient of 1 as a multiple of the predicted size, shape (time, wheel)."""
+    relative = _relative(problem, shape)
+    if "bent" in shape:
+        above = relative - 1
+        # At torques beyond those of the identification, the line ends where a third of the efficiency is left.
+        return np.asarray(above / np.maximum(1 - float(shape["bent"]) * above, 1 - LARGEST_LOSS))
+    if "light" in shape:
+        return np.exp(-relative / float(shape["light"]))
+    return np.asarray(relative ** float(shape["power"]))
 
 
 def _against_motion(problem: Problem, shape: Shape) -> Array:

@@ -174,7 +174,7 @@ def _about_reversals(problem: Problem) -> list[Array]:
 
 
 def _laws(problem: Problem, shape: Shape) -> list[Array]:
-    """Return friction that is constant, grows with the root of speed, with it, or the load, or changes slowly.
+    """Return friction that is constant on each axis, grows with the root of speed, with it, or the load.
 
     The first three change with the temperature and with time: they would seem to reverse with a long displacement. A
     late channel shows friction late: on time, it would seem to reverse with the displacement.
@@ -184,7 +184,8 @@ def _laws(problem: Problem, shape: Shape) -> list[Array]:
     if problem.has("temperature"):
         slow.append(problem.known("temperature"))
     factors = [of_speed * each for of_speed in (1.0, np.sqrt(speed), speed) for each in slow]
-    return list(as_shown(problem, [direction * factor for factor in (*factors, np.abs(problem.filled))]))
+    of_axis = np.eye(speed.shape[1])[:, None] if speed.shape[1] > 1 else ()  # one axis alone may have friction
+    return list(as_shown(problem, [direction * factor for factor in (*factors, np.abs(problem.filled), *of_axis)]))
 
 
 def _in_order(problem: Problem, columns: Sequence[Array], whitening: Whitening, deviation: Array) -> Array:

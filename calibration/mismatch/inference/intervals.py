@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+OF_SIGN = {1: (0.0, np.inf), -1: (-np.inf, 0.0)}
+"""Bounds of a coefficient that has one sign alone."""
 UNIT_OF_ENDING = {"_rad_s": ANGULAR_SPEED, "_degC": "degC", "_K": "K", "_s": "s"}
 
 
@@ -112,7 +114,8 @@ def _of_term(
     channel, labels = equations.problem.simulation.unit, equations.problem.labels
     units = {c.name: in_units(c.unit, channel, labels) for c in candidate.coefficients}
     units |= {name: unit_of(name, labels) for name in candidate.free}
-    limits = candidate.bounds(equations.problem, shape)
+    signs = zip(candidate.coefficients, term.group.signs, strict=False)  # both phases of a ripple are one amplitude
+    limits = {c.name: OF_SIGN[sign] for c, sign in signs if sign} | dict(candidate.bounds(equations.problem, shape))
     found = {
         name: interval(value, drawn[name], units.get(name, "1"), limits.get(name)) for name, value in central.items()
     }

@@ -47,7 +47,8 @@ def _with_curve(decision: Decision, other: Alternative) -> Decision:
 def _named(decision: Decision, other: Alternative) -> Decision | None:
     """Return the decision for other names, None where a curve explains them or what they leave."""
     equations, terms = optimised_shapes(decision.equations, other.terms)
-    named, unnamed = weigh_against_smooth_terms(equations, equations.fit(terms), (), decision.entry_threshold)
+    simpler, threshold = [equations.fit(decision.named.terms)], decision.entry_threshold
+    named, unnamed = weigh_against_smooth_terms(equations, equations.fit(terms), simpler, threshold)
     if len(named.terms) < len(terms) or unnamed:
         return None
     return replace(decision, equations=equations, named=named, unnamed=(), whole=named)

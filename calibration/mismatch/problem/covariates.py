@@ -71,7 +71,11 @@ def covariates_of(
         rate, angle = _derivative(speed, recording), _integral(speed, recording)
         given = found.get("wheel_acceleration", rate)
         found["wheel_acceleration"] = np.where(np.isfinite(given), given, rate)
-        found["wheel_angle"] = _measured_angle(found.get("wheel_angle", angle), angle)
+        if "wheel_angle" in found:
+            found["wheel_angle"] = _measured_angle(found["wheel_angle"], angle)
+            found.setdefault("position", found["wheel_angle"])  # of limited travel a measured angle is a position
+        else:
+            found["wheel_angle"] = angle
     measured = {name: values for name, values in found.items() if np.isfinite(values).any()}
     varying = {name: values for name, values in found.items() if name in KEPT_WHERE_CONSTANT or _varies(values)}
     return varying, {name: values for name, values in measured.items() if name not in varying}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
-RUNS_WITHIN = 0.2
+RUNS_WITHIN = 0.5
 """Share of a parameter's value within which any simulation can be run, however well the value is said to be known (a
 choice)."""
 
@@ -31,7 +31,7 @@ class Prior:
         return min(max(value, self.value - furthest, low), self.value + furthest, high)
 
     def reach(self, stds: float) -> float:
-        """Return how far the value may be off [standard deviations]: so many, or a fifth of it if that is further."""
+        """Return how far the value may be off [standard deviations]: so many, or half of it if that is further."""
         return max(stds, RUNS_WITHIN * abs(self.value) / self.std) if self.std > 0 else stds
 
     def out_of_bounds(self, value: float) -> bool:

@@ -12,6 +12,8 @@ from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.problem.prior import own_name
 
 if TYPE_CHECKING:
+    from collections.abc import Collection
+
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
     from regolithd.calibration.mismatch.regression.group import Fit
@@ -50,6 +52,18 @@ class Nuisance:
         precision[place] = value
         return replace(self, precision=precision)
 
+    def widened(self, places: Collection[int], problem: Problem) -> Nuisance:
+        """Return the same parameters, the priors of some as wide as a wrong statement goes."""
+        precision = self.precision.copy()
+        for place in places:
+            precision[place] /= self.reach(place, problem) ** 2
+        return replace(self, precision=precision)
+
+    def reach(self, place: int, problem: Problem) -> float:
+        """Return how far one of the simulation's own parameters may be off [standard deviations of its prior]."""
+        prior = problem.simulation.parameters[self.names[place]]
+        return prior.reach(problem.thresholds.furthest_linearisation_stds)
+
     def prior_stds_away(self, fit: Fit) -> Array:
         """Return how far each parameter is from its prior in a fit, in the prior's standard deviations."""
         fitted = fit.coefficients[: len(self.columns)]
@@ -64,11 +78,14 @@ class Nuisance:
         """Return the places of the simulation's own parameters that are beyond their priors in a fit."""
         return self._own(self.prior_stds_away(fit) > problem.thresholds.furthest_prior_stds, problem)
 
-    def _own(self, beyond: NDArray[np.bool_], problem: Problem) -> NDArray[np.int64]:
-        """Return the places of those that are the simulation's own parameters, and told."""
+    def told(self, problem: Problem) -> list[int]:
+        """Return the places of the simulation's own parameters that an answer tells."""
         parameters = problem.simulation.parameters
-        own = [name in parameters and parameters[name].told for name in self.names]
-        return np.flatnonzero(beyond & np.array(own, bool))
+        return [place for place, name in enumerate(self.names) if name in parameters and parameters[name].told]
+
+    def _own(self, beyond: NDArray[np.bool_], problem: Problem) -> NDArray[np.int64]:
+        """Return the places of those beyond that are the simulation's own parameters, and told."""
+        return np.array([place for place in self.told(problem) if beyond[place]], np.int64)
 
 
 def beyond_prior_predictive(away: Array, variance: Array, thresholds: Thresholds) -> NDArray[np.bool_]:

@@ -25,8 +25,12 @@ Array = NDArray[np.float64]
 
 WITHOUT_SMOOTH_TERM = frozenset({"direction", "wheel_angle", "wheel_acceleration"})
 """Covariates of two values, without bound, or with their own candidates alone."""
+OF_THE_WAY = frozenset({"place", "position"})
+"""Covariates that are another name of the time where the machine never returns."""
 LEAST_PASSES = 3.0
-"""Length of the way over the range of places, from which a place is more than another name of the time (a choice)."""
+"""Length of the way over its range, from which a place is more than another name of the time (a choice)."""
+SAME_COURSE = 0.999
+"""Correlation of two covariates above which they are one quantity (a choice: a thousandth of the power differs)."""
 PERIODIC = "drag, periodic"
 """Coupling of a sine over time."""
 
@@ -54,14 +58,33 @@ def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
 
 
 def has_smooth_term(problem: Problem, covariate: str) -> bool:
-    """Return whether a curve over a covariate may explain something; over a place, where the machine returns to it."""
-    if covariate != "place":
-        return covariate not in WITHOUT_SMOOTH_TERM | problem.fed_back
-    for column in problem.covariates[covariate].T:
-        known = column[np.isfinite(column)]
-        if known.size and float(np.sum(np.abs(np.diff(known)))) >= LEAST_PASSES * float(np.ptp(known)) > 0:
-            return True
-    return False
+    """Return whether a curve over a covariate may explain something.
+
+    Over the way only where the machine returns; over a position only where no other covariate has the same course.
+    """
+    if covariate in WITHOUT_SMOOTH_TERM | problem.fed_back:
+        return False
+    values = problem.covariates[covariate]
+    if covariate in OF_THE_WAY and not any(map(_returns, values.T)):
+        return False
+    others = problem.covariates.keys() - {"position", "wheel_angle"} if covariate == "position" else ()
+    return not any(same_course(values, problem.covariates[other], problem.mask) for other in others)
+
+
+def _returns(way: Array) -> bool:
+    """Return whether a way (time,) passes its range more than once."""
+    known = way[np.isfinite(way)]
+    return bool(known.size) and float(np.sum(np.abs(np.diff(known)))) >= LEAST_PASSES * float(np.ptp(known)) > 0
+
+
+def same_course(one: Array, other: Array, mask: NDArray[np.bool_]) -> bool:
+    """Return whether two covariates (time, wheel) differ by a factor and a constant alone, on each wheel."""
+    for first, second, rows in zip(one.T, other.T, mask.T, strict=True):
+        known = rows & np.isfinite(first) & np.isfinite(second)
+        pair = np.stack((first[known], second[known]))
+        if known.sum() < 2 or np.any(np.ptp(pair, axis=1) == 0) or abs(np.corrcoef(pair)[0, 1]) <= SAME_COURSE:
+            return False
+    return True
 
 
 def couplings_of(problem: Problem) -> dict[str, Array]:

@@ -115,7 +115,7 @@ def _is_a_parameter(equations: NormalEquations, fit: Fit, index: int) -> bool:
     rest = fit.without(index)
 
     def gain_beside_any(place: int) -> float:
-        freed = equations.with_nuisance(nuisance.with_precision(place, 0.0))
+        freed = equations.with_nuisance(nuisance.widened([place], problem))
         return freed.fit(fit.terms).delta_chi2 - freed.fit(rest).delta_chi2
 
     within = places.difference(nuisance.contradicting_their_priors(equations.fit(rest), problem).tolist())

@@ -32,9 +32,9 @@ def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold
 
     Of parameters that could stand for each other the one whose release has most evidence is released, or all together;
     in the place of a name, where it is ahead of that by more than chance (`lead_margin`).
-    None where the readings contradict none, where one would go further than a wrong statement explains
-    (`furthest_linearisation_stds`), where something stays unexplained all the same, or where the evidence of `whole`,
-    names and curves within the priors, is larger.
+    None where the readings contradict none, where the one with most evidence would go further than a wrong statement
+    explains (`Prior.reach`), where something stays unexplained all the same, or where the evidence of `whole`, names
+    and curves within the priors, is larger.
     """
     lead = equations.thresholds.lead_margin
     best, most = None, _evidence(equations, whole, (), entry_threshold)
@@ -43,39 +43,34 @@ def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold
         for freed, places in _releases(equations, kept):
             fit = freed.fit(kept)
             evidence = _evidence(equations, fit, places, entry_threshold) - least
-            if evidence >= most and _is_all_that_is_wrong(equations, freed, fit, places):
+            if evidence < most:
+                continue
+            if _goes_too_far(equations, fit, places):
+                best, most = None, evidence  # what explains less is not released in its place
+            elif unexplained_beside(freed, fit, tolerated=0.0) is None:
                 best, most = (freed, fit), evidence
     return best
 
 
 def _releases(equations: NormalEquations, kept: Sequence[Term]) -> Iterator[tuple[NormalEquations, tuple[int, ...]]]:
-    """Yield equations with each contradicted parameter's prior widened, then with all, and these parameters' places."""
-    contradicted = equations.nuisance.contradicting_their_priors(equations.fit(kept), equations.problem).tolist()
-    for places in dict.fromkeys([*((place,) for place in contradicted), tuple(contradicted)]):
-        if places:
-            yield _with_wide_priors(equations, places), places
+    """Yield equations with wider priors, and the places of these: each parameter's, then all that are contradicted.
+
+    Nothing where none is contradicted. Where one is, another may be the one that was stated wrongly: held by its own
+    prior, it has left the way to those that act alike.
+    """
+    nuisance, problem = equations.nuisance, equations.problem
+    contradicted = tuple(nuisance.contradicting_their_priors(equations.fit(kept), problem).tolist())
+    if not contradicted:
+        return
+    for places in dict.fromkeys([*((place,) for place in nuisance.told(problem)), contradicted]):
+        yield equations.with_nuisance(nuisance.widened(places, problem)), places
 
 
-def _with_wide_priors(equations: NormalEquations, places: Sequence[int]) -> NormalEquations:
-    """Return equations with these parameters' priors widened as far as a wrong statement goes."""
-    wider = equations.nuisance
-    for place in places:
-        wide = float(wider.precision[place]) / _reach(equations, place) ** 2
-        wider = wider.with_precision(place, wide)
-    return equations.with_nuisance(wider)
-
-
-def _reach(equations: NormalEquations, place: int) -> float:
-    """Return how far one of the simulation's own parameters may be off [standard deviations of its prior]."""
-    prior = equations.problem.simulation.parameters[equations.nuisance.names[place]]
-    return prior.reach(equations.thresholds.furthest_linearisation_stds)
-
-
-def _is_all_that_is_wrong(equations: NormalEquations, freed: NormalEquations, fit: Fit, places: Sequence[int]) -> bool:
-    """Return whether no released parameter goes too far, and nothing significant is left beside them."""
-    away = equations.nuisance.prior_stds_away(fit)
-    too_far = any(away[place] > _reach(equations, place) for place in places)
-    return not too_far and unexplained_beside(freed, fit, tolerated=0.0) is None
+def _goes_too_far(equations: NormalEquations, fit: Fit, places: Sequence[int]) -> bool:
+    """Return whether a released parameter goes further than a wrong statement explains."""
+    nuisance = equations.nuisance
+    away = nuisance.prior_stds_away(fit)
+    return any(away[place] > nuisance.reach(place, equations.problem) for place in places)
 
 
 def _evidence(equations: NormalEquations, fit: Fit, free: Collection[int], entry_threshold: float) -> float:

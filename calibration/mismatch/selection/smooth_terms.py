@@ -9,10 +9,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
-from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
+from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, same_course
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_smooth_term,
@@ -29,19 +28,13 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-SAME_COURSE = 0.999
-"""Correlation of two covariates above which they are one quantity (a choice: a thousandth of the power differs)."""
-
 
 def weigh_against_smooth_terms(
     equations: NormalEquations, named: Fit, simpler: Sequence[Fit], entry_threshold: float
 ) -> tuple[Fit, tuple[Term, ...]]:
     """Return the effects that keep their names, and the smooth terms that they leave.
 
-    A simpler set (`simpler`, smallest first) that leaves nothing significant is preferred to a smooth term.
+    Some of the effects alone (`simpler`, smallest first) that leave nothing significant are preferred to a smooth term.
     """
     alone = best_of_each_smooth_term(equations, ())
     if not alone:
@@ -50,10 +43,13 @@ def weigh_against_smooth_terms(
     named = drop_what_a_changed_parameter_explains(equations, drop_transients(equations, named))
     refuted = [term for term in passed.terms if term not in named.terms]
     curve = alone[0][1]
-    imitated = _imitates_a_curve(equations, named, curve)
-    for fit in simpler if imitated else ():
-        if unexplained_beside(equations, fit) is None:
+    behind = _is_behind_a_curve(equations, named, curve)
+    names = {term.name for term in named.terms}
+    for fit in simpler if behind else ():
+        if names.issuperset(term.name for term in fit.terms) and unexplained_beside(equations, fit) is None:
             return fit, ()
+    # Laws that are a little wrong are behind a curve as well, where the noise is small.
+    imitated = behind and law_misfit(equations, named, equations.fit((curve,))) > equations.thresholds.form_misfit
     left = unexplained_beside(equations, named) or _rest_of_refuted(equations, named, refuted, entry_threshold)
     beside = _effects_beside_curve(equations, named, curve, entry_threshold)
     with_rest = named if left is None else equations.fit((*named.terms, left))
@@ -76,7 +72,7 @@ def _rest_of_refuted(
     return found[0][1] if found and found[0][0] > entry_threshold else None
 
 
-def _imitates_a_curve(equations: NormalEquations, named: Fit, curve: Term) -> bool:
+def _is_behind_a_curve(equations: NormalEquations, named: Fit, curve: Term) -> bool:
     """Return whether one curve scores more than several effects, of which some have other covariates.
 
     The curve has not to be likelier by chance, as it would be by a name's entry, but significant beyond the effects.
@@ -177,16 +173,7 @@ def _same_quantity(problem: Problem, term: Term, curve: Term) -> bool:
     one, other = (problem.covariates.get(name) for name in (covariate, curve.name))
     if one is None or other is None:
         return False
-    return all(_proportional(one[:, w], other[:, w], problem.mask[:, w]) for w in wheels)
-
-
-def _proportional(one: Array, other: Array, mask: Mask) -> bool:
-    """Return whether two courses differ by a factor and a constant alone."""
-    known = mask & np.isfinite(one) & np.isfinite(other)
-    pair = np.stack((one[known], other[known]))
-    if known.sum() < 2 or np.any(np.ptp(pair, axis=1) == 0):
-        return False
-    return bool(abs(np.corrcoef(pair)[0, 1]) > SAME_COURSE)
+    return same_course(one[:, wheels], other[:, wheels], problem.mask[:, wheels])
 
 
 def drop_transients(equations: NormalEquations, named: Fit) -> Fit:

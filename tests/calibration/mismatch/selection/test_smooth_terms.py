@@ -75,7 +75,8 @@ def test_a_curve_that_effects_imitate_goes_before_what_they_leave(monkeypatch: p
     """Even where the effects score better with a further curve than the curve does with what is left of them."""
     equations = equations_with(bump, drag=0.4)
     named = equations.fit([term_of(equations, "drag")])
-    monkeypatch.setattr(smooth_terms, "_imitates_a_curve", lambda *_: True)
+    monkeypatch.setattr(smooth_terms, "_is_behind_a_curve", lambda *_: True)
+    monkeypatch.setattr(smooth_terms, "law_misfit", lambda *_: 1.0)
     monkeypatch.setattr(smooth_terms, "_effects_beside_curve", lambda equations, *_: equations.fit(()))
     kept, curves = weigh_against_smooth_terms(equations, named, (), 8.0)
     assert kept.terms == ()
