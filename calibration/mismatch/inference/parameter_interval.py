@@ -18,8 +18,8 @@ NINE_TENTHS = (0.05, 0.95)
 """Quantiles of a 90 % interval."""
 LEAST_MARGIN = 0.05
 """Share of the interval's width by which it reaches beyond its value (a choice: a value is never its own bound)."""
-ON_THE_BOUND = 0.01
-"""Distance to a declared bound, as a share of the range, within which a value stands on it (a choice)."""
+MIDDLE_HALF = (0.25, 0.75)
+"""Quantiles between which a value is told that a declared bound holds (a choice: its best value is no centre)."""
 FEWEST_DRAWS_WITHIN = 20
 """Draws within the declared bounds from which quantiles are taken (a choice: one is then below the 5 % quantile)."""
 
@@ -29,17 +29,30 @@ def interval(
 ) -> Parameter:
     """Return a value with the bounds of its draws; a value outside of them widens the interval beyond itself.
 
-    Where `bounds` are declared, draws beyond them are impossible: those within are the posterior. A best value that
-    stands on a bound is then no centre of it, and its median is returned instead.
+    Where `bounds` are declared, draws beyond them are impossible: those within are the posterior. A best value near a
+    bound is then no centre of it, and the nearest in the middle half of the posterior is returned instead.
     """
     least, most = bounds or (-np.inf, np.inf)
-    inside = np.asarray(drawn, np.float64)
-    inside = inside[(inside >= least) & (inside <= most)]
+    everywhere = np.asarray(drawn, np.float64)
+    inside = everywhere[(everywhere >= least) & (everywhere <= most)]
+    bounded = len(inside) < len(everywhere)
     if len(inside) < FEWEST_DRAWS_WITHIN:
-        inside = np.clip(drawn, least, most)
+        inside = np.clip(_tail(everywhere, least, most), least, most)
     low, high = (float(bound) for bound in np.quantile(inside, NINE_TENTHS))
-    edge = ON_THE_BOUND * (most - least) if np.isfinite(most - least) else 0.0
-    if not least + edge < value < most - edge:
-        value = float(np.median(inside))
+    if bounded or not least < value < most:
+        value = float(np.clip(value, *np.quantile(inside, MIDDLE_HALF)))
     margin = LEAST_MARGIN * (high - low)
     return Parameter(value, max(min(low, value - margin), least), min(max(high, value + margin), most), unit)
+
+
+def _tail(drawn: Array, least: float, most: float) -> Array:
+    """Return quantiles of what the density of draws nearly all beyond a bound leaves within it.
+
+    A normal density falls exponentially there, by a factor e over σ²/d at a distance d of the bound from its mean.
+    """
+    mean, variance = float(np.mean(drawn)), float(np.var(drawn))
+    bound, inwards = (least, 1.0) if mean < least else (most, -1.0)
+    if variance == 0 or least <= mean <= most:
+        return drawn
+    quantiles = (np.arange(len(drawn)) + 0.5) / len(drawn)
+    return np.asarray(bound - inwards * variance / abs(mean - bound) * np.log1p(-quantiles))

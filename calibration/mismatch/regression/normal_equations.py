@@ -130,13 +130,15 @@ class NormalEquations:
         terms = tuple(terms)
         columns = self._columns(terms)
         matrix, moment = self._normal(columns)
-        base = len(self.nuisance.columns)
         inverse = pseudo_inverse(matrix, SINGULAR)
         solved = inverse @ moment
-        delta_chi2 = float(moment @ solved)
-        if base:
-            delta_chi2 -= float(moment[:base] @ np.linalg.solve(matrix[:base, :base], moment[:base]))
-        return Fit(terms, columns, solved, inverse, delta_chi2)
+        return Fit(terms, columns, solved, inverse, float(moment @ solved) - self._explained_by_parameters)
+
+    @cached_property
+    def _explained_by_parameters(self) -> float:
+        """Return the Δχ² of the free parameters alone, of which one may act on nothing and have no prior."""
+        matrix, moment = self._normal(self._columns(()))
+        return float(moment @ pseudo_inverse(matrix, SINGULAR) @ moment)
 
     def information(self, terms: Iterable[Term], kept: Sequence[int]) -> tuple[Array, Array]:
         """Return the information matrix and vector of some free parameters beside terms and all other parameters.

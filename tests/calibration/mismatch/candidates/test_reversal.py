@@ -118,6 +118,14 @@ def test_friction_that_follows_the_displacement_is_found(presliding_rad: float) 
     assert found == {"presliding_rad": pytest.approx(presliding_rad, rel=0.2)}
 
 
+def test_the_friction_of_one_axis_alone_shows_how_it_reverses() -> None:
+    """Of both axes together it is half as large, and the other half of the readings contradicts it."""
+    still, rubbing = table(noise=0.2)["reading_V"], with_presliding(2.0, noise=0.2)
+    first = rubbing["axis"] == 1
+    found = reversal_of(problem_of({**rubbing, "reading_V": np.where(first, rubbing["reading_V"], still)}))
+    assert found == {"presliding_rad": pytest.approx(2.0, rel=0.25)}
+
+
 def test_friction_that_follows_the_displacement_has_its_state_from_before() -> None:
     """It follows the displacement, whatever the speed; a run begins with all of it."""
     problem = problem_of(with_presliding(2.0))

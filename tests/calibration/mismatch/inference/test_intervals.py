@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
-from linear_machine import NOISE, Power, equations_of, problem_of, table, term_of
+from linear_machine import CANDIDATES, NOISE, Power, equations_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch import Prior, Simulation, from_columns
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
@@ -144,6 +144,14 @@ def test_no_size_is_known_better_than_the_common_discrepancy() -> None:
     assert (size.high - size.low) / (2 * 1.645 * size.value) > 0.95 * THRESHOLDS.size_discrepancy_std
 
 
+def test_a_drag_is_no_thrust() -> None:
+    """Where hardly anything tells a factor from its power, the factor's interval still keeps its sign."""
+    equations = equations_of(problem_of(table(factor=0.02, power=1.5, noise=0.2)), CANDIDATES)
+    fit = equations.fit([term_of(equations, "power")])
+    (found,) = intervals(equations, fit, equations.problem.noise_of(equations.problem.residual))
+    assert 0 <= found["factor"].low < found["factor"].value < found["factor"].high
+
+
 def test_a_shape_parameter_has_its_interval() -> None:
     """The power of a curve of power 1.5."""
     equations = equations_of(problem_of(table(factor=0.8, power=1.5)))
@@ -247,13 +255,23 @@ def test_a_value_is_within_its_own_interval() -> None:
 
 
 def test_an_interval_stays_within_declared_bounds() -> None:
-    """Draws beyond the bounds are impossible, and a best value on a bound gives way to the median of the others."""
+    """Draws beyond the bounds are impossible, and a value on a bound gives way to the middle of the others."""
     drawn = np.linspace(-1.0, 1.0, 2001)
     found = interval(0.0, drawn, "s", (0.0, 0.5))
-    assert (found.low, found.value, found.high) == pytest.approx((0.025, 0.25, 0.475), abs=1e-3)
+    assert (found.low, found.value, found.high) == pytest.approx((0.025, 0.125, 0.475), abs=1e-3)
     kept = interval(0.3, drawn, "s", (0.0, 0.5))
     assert kept.value == 0.3
     assert interval(1.35, [1.2, 1.3, 1.5], "1", (0.7, 1.4)).high <= 1.4
+
+
+@pytest.mark.parametrize(("mean", "bounds", "sign"), [(-5.0, (0.0, 10.0), 1.0), (5.0, (-np.inf, 0.0), -1.0)])
+def test_of_draws_beyond_a_bound_the_tail_is_left(mean: float, bounds: tuple[float, float], sign: float) -> None:
+    """A normal density of standard deviation 1 falls by a factor e over a fifth, five deviations from its mean."""
+    drawn = np.random.default_rng(0).normal(mean, 1.0, 200)
+    found = interval(0.0, drawn, "s", bounds)
+    assert min(abs(found.low), abs(found.high)) < abs(found.value) < max(abs(found.low), abs(found.high))
+    assert found.value * sign == pytest.approx(0.2 * np.log(4 / 3), rel=0.2)
+    assert max(found.low * sign, found.high * sign) == pytest.approx(0.2 * np.log(20), rel=0.2)
 
 
 @pytest.mark.parametrize(

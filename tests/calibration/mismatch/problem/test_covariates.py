@@ -172,6 +172,13 @@ def test_an_angle_that_never_changes_is_integrated_from_the_speed() -> None:
         np.testing.assert_allclose(turning(wheel_angle=measured)["wheel_angle"][:, 0], 0.2 * np.arange(200))
 
 
+def test_a_measured_angle_is_a_position_too() -> None:
+    """An integrated one is none: it does not know where the machine began."""
+    measured = 0.3 * np.arange(200)
+    np.testing.assert_array_equal(turning(wheel_angle=measured)["position"][:, 0], measured)
+    assert "position" not in turning()
+
+
 def test_blanks_of_a_measured_acceleration_follow_from_the_speed() -> None:
     """A speed that is constant has none."""
     measured = np.where(np.arange(200) < 50, np.nan, 1.0)

@@ -153,3 +153,13 @@ def test_a_place_that_is_passed_again_is_more_than_another_name_of_the_time(pass
     problem = replace(PROBLEM, covariates={**PROBLEM.covariates, "place": place})
     assert has_smooth_term(problem, "place") == curve
     assert not has_smooth_term(problem, "wheel_angle")
+
+
+@pytest.mark.parametrize(("name", "curve"), [("position", True), ("angle", False)])
+def test_a_position_has_a_curve_where_no_other_covariate_is_the_same(name: str, curve: bool) -> None:
+    """Two curves over one quantity would be two answers to one question."""
+    there_and_back = np.abs((np.linspace(0, 5, INSTANTS) + 1) % 2 - 1)[:, None] * np.ones(PROBLEM.mask.shape)
+    covariates = {**PROBLEM.covariates, "position": there_and_back, name: 57.3 * there_and_back}
+    problem = replace(PROBLEM, covariates=covariates)
+    assert has_smooth_term(problem, "position") == curve
+    assert has_smooth_term(problem, name)

@@ -209,3 +209,19 @@ def test_priors_of_any_unit_leave_the_fit_as_it_is(equations: NormalEquations) -
     )
     again = equations.over(column).with_nuisance(more).fit(found.terms)
     assert again.delta_chi2 == pytest.approx(found.delta_chi2, rel=1e-9)
+
+
+def test_a_parameter_that_acts_on_nothing_and_has_no_prior_changes_no_fit(equations: NormalEquations) -> None:
+    """As one of two channels' parameters in the other channel, once its prior is lifted."""
+    design, (silent,) = equations.design.extended([np.zeros(equations.problem.mask.shape)])
+    held = equations.nuisance
+    nuisance = replace(
+        held,
+        names=(*held.names, "silent"),
+        columns=(*held.columns, silent),
+        precision=np.append(held.precision, 0.0),
+        centre=np.append(held.centre, 0.0),
+    )
+    wider = replace(equations, design=design, nuisance=nuisance)
+    term = term_of(equations, "drag")
+    assert wider.fit([term]).delta_chi2 == pytest.approx(equations.fit([term]).delta_chi2)

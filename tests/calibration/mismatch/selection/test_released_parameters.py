@@ -117,6 +117,43 @@ def test_of_parameters_that_are_like_each_other_one_is_released() -> None:
     assert not found["capacity_J_K"].beyond_prior()
 
 
+class Braked(Simulation):
+    """A wheel with a bearing and a brake, which act alike as far as the brake is pulled as the wheel turns."""
+
+    channel, unit = "motor_current_mA", "mA"
+    inputs = ("speed_rad_s", "pulled")
+    parameters: ClassVar = {"bearing_mA_s": Prior(8.0, 0.4, "mA s"), "brake_mA_s": Prior(10.0, 0.4, "mA s")}
+
+    def predict(self, inputs: Mapping[str, NDArray[np.float64]], values: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return the current [mA]."""
+        return (values["bearing_mA_s"] + values["brake_mA_s"] * inputs["pulled"]) * inputs["speed_rad_s"]
+
+
+def braked(brake_mA_s: float) -> Answer:
+    """Compare with a wheel whose brake is this strong; the noise is a tenth of the mean reading."""
+    generator, time_s = np.random.default_rng(6), np.arange(ROWS) / 10
+    speed = 3 + np.sin(time_s / 7)
+    pulled = 0.5 + 0.15 * np.sin(time_s / 11) + 0.1 * np.sin(time_s / 23)
+    reading = (8.0 + brake_mA_s * pulled) * speed + generator.normal(0, 4.0, ROWS)
+    columns = {"t_s": time_s, "speed_rad_s": speed, "pulled": pulled, "motor_current_mA": reading}
+    return compare(from_columns(columns), Braked()).answer
+
+
+def test_what_was_stated_wrongly_is_the_parameter_whose_release_explains_most() -> None:
+    """Held by its prior the brake leaves a part of the way to the bearing, which is then further from its own."""
+    found = braked(14.2)
+    bearing, brake = found.parameters
+    assert (found.verdict, found.effects, found.unexplained) == ("missing-physics", (), ())
+    assert not bearing.beyond_prior()
+    assert brake.low < 14.2 < brake.high
+
+
+def test_no_other_parameter_is_told_in_the_place_of_one_that_goes_too_far() -> None:
+    """No brake is two and a half times as strong as it was stated: what is left has no name."""
+    found = braked(25.0)
+    assert (found.verdict, found.effects) == ("unexplained", ())
+
+
 class Waving(Candidate):
     """An offset with a wave of a fifth of its size: without the wave it acts as the parameter `level` does."""
 
