@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.answer import CalibratedParameter
 from regolithd.calibration.mismatch.regression.nuisance import beyond_prior_predictive
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
-from regolithd.calibration.mismatch.selection.released_parameters import WRONG_STATEMENT_PENALTY
+from regolithd.calibration.mismatch.selection.released_parameters import price_of_wrong_statement
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -90,7 +90,9 @@ class JointPosterior:
     def too_far(self, priors: Mapping[str, Prior]) -> bool:
         """Return whether a released parameter goes further than a wrong statement explains."""
         shifts = dict(zip(self.names, np.abs(self.shifts).tolist(), strict=True))
-        return any(shifts[name] > _reach(priors[name]) for name in self.released)
+        return any(
+            shifts[name] > priors[name].furthest(THRESHOLDS.furthest_linearisation_stds) for name in self.released
+        )
 
     def restated(self, priors: Mapping[str, Prior]) -> dict[str, tuple[float, float]]:
         """Return mean and standard deviation of the released parameters, had they been stated where they are."""
@@ -170,7 +172,9 @@ class _Likelihood:
         shifts = covariance @ self.vector
         away = np.delete(shifts, list(released))
         chi2 = shifts @ self.matrix @ shifts - 2 * self.vector @ shifts + away @ away
-        evidence = -float(chi2) - WRONG_STATEMENT_PENALTY * len(released)
+        evidence = -float(chi2) - sum(
+            price_of_wrong_statement(abs(float(shifts[place])), float(self.reach[place])) for place in released
+        )
         stds, names = np.sqrt(np.maximum(np.diag(covariance), 0.0)), tuple(self.names[place] for place in released)
         return JointPosterior(self.names, shifts, stds, evidence, self.held, names)
 

@@ -8,6 +8,9 @@ from math import inf
 RUNS_WITHIN = 0.5
 """Share of a parameter's value within which any simulation can be run, however well the value is said to be known (a
 choice)."""
+OFTEN_WITHIN = 0.2
+"""Share of its value within which a parameter is wrong, where it is wrong at all: an old or rounded value, another
+batch (a choice). One that is further away has to explain more."""
 
 
 @dataclass(frozen=True)
@@ -27,12 +30,16 @@ class Prior:
     def near(self, value: float, stds: float) -> float:
         """Return a value as far as it may be from the prior: within its bounds and its reach."""
         low, high = self.bounds
-        furthest = self.reach(stds) * self.std
+        furthest = self.furthest(stds) * self.std
         return min(max(value, self.value - furthest, low), self.value + furthest, high)
 
-    def reach(self, stds: float) -> float:
-        """Return how far the value may be off [standard deviations]: so many, or half of it if that is further."""
-        return max(stds, RUNS_WITHIN * abs(self.value) / self.std) if self.std > 0 else stds
+    def reach(self, stds: float, share: float = OFTEN_WITHIN) -> float:
+        """Return how far the value is off if it is wrong [standard deviations]: so many, or this share of the value."""
+        return max(stds, share * abs(self.value) / self.std) if self.std > 0 else stds
+
+    def furthest(self, stds: float) -> float:
+        """Return how far the value may be off at most [standard deviations]: so many, or `RUNS_WITHIN` of the value."""
+        return self.reach(stds, RUNS_WITHIN)
 
     def out_of_bounds(self, value: float) -> bool:
         """Return whether a fitted value is out of the bounds by more than noise: by half of their width."""

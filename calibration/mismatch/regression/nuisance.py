@@ -60,9 +60,14 @@ class Nuisance:
         return replace(self, precision=precision)
 
     def reach(self, place: int, problem: Problem) -> float:
-        """Return how far one of the simulation's own parameters may be off [standard deviations of its prior]."""
+        """Return how far one of the simulation's own parameters is off if it is wrong [standard deviations]."""
         prior = problem.simulation.parameters[self.names[place]]
         return prior.reach(problem.thresholds.furthest_linearisation_stds)
+
+    def furthest(self, place: int, problem: Problem) -> float:
+        """Return how far it may be off at most [standard deviations]."""
+        prior = problem.simulation.parameters[self.names[place]]
+        return prior.furthest(problem.thresholds.furthest_linearisation_stds)
 
     def prior_stds_away(self, fit: Fit) -> Array:
         """Return how far each parameter is from its prior in a fit, in the prior's standard deviations."""

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     Fitted = tuple[NormalEquations, Fit]
 
 WRONG_STATEMENT_PENALTY = 9.2
-"""Δχ² charged for a parameter that was stated wrongly: odds of one in a hundred before the recording, 2 ln 100."""
+"""Δχ² charged for a parameter that was stated wrongly: odds of one in a hundred before the recording, 2 ln 100. Beyond
+`Prior.reach` it grows with the square of the distance, as with a normal density of wrong values."""
 
 
 def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold: float) -> Fitted | None:
@@ -33,7 +34,7 @@ def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold
     Of parameters that could stand for each other the one whose release has most evidence is released, or all together;
     in the place of a name, where it is ahead of that by more than chance (`lead_margin`).
     None where the readings contradict none, where the one with most evidence would go further than a wrong statement
-    explains (`Prior.reach`), where something stays unexplained all the same, or where the evidence of `whole`, names
+    explains (`Prior.furthest`), where something stays unexplained all the same, or where the evidence of `whole`, names
     and curves within the priors, is larger.
     """
     lead = equations.thresholds.lead_margin
@@ -66,16 +67,23 @@ def _releases(equations: NormalEquations, kept: Sequence[Term]) -> Iterator[tupl
         yield equations.with_nuisance(nuisance.widened(places, problem)), places
 
 
+def price_of_wrong_statement(away: float, reach: float) -> float:
+    """Return the Δχ² charged for a parameter that is so far from its stated value, with its `Prior.reach`."""
+    return WRONG_STATEMENT_PENALTY * max(1.0, (away / reach) ** 2)
+
+
 def _goes_too_far(equations: NormalEquations, fit: Fit, places: Sequence[int]) -> bool:
     """Return whether a released parameter goes further than a wrong statement explains."""
     nuisance = equations.nuisance
     away = nuisance.prior_stds_away(fit)
-    return any(away[place] > nuisance.reach(place, equations.problem) for place in places)
+    return any(away[place] > nuisance.furthest(place, equations.problem) for place in places)
 
 
 def _evidence(equations: NormalEquations, fit: Fit, free: Collection[int], entry_threshold: float) -> float:
     """Return minus the χ² of readings and priors, less what terms and parameters outside their priors are charged."""
-    away = np.delete(equations.nuisance.prior_stds_away(fit), list(free))
-    entries = entry_cost(equations, fit.terms, entry_threshold)
-    charged = entries + sum(map(equations.penalty, fit.terms)) + WRONG_STATEMENT_PENALTY * len(free)
-    return -float(chi2_of(equations, fit).sum() + away @ away + charged)
+    nuisance = equations.nuisance
+    away = nuisance.prior_stds_away(fit)
+    held = np.delete(away, list(free))
+    wrong = sum(price_of_wrong_statement(float(away[k]), nuisance.reach(k, equations.problem)) for k in free)
+    charged = entry_cost(equations, fit.terms, entry_threshold) + sum(map(equations.penalty, fit.terms)) + wrong
+    return -float(chi2_of(equations, fit).sum() + held @ held + charged)

@@ -75,9 +75,10 @@ def test_half_of_its_value_is_no_limit_however_firmly_it_was_stated() -> None:
     (loss,) = (each for each in found.parameters if each.name == "loss_W_K")
     assert (found.verdict, found.effects, found.unexplained) == ("missing-physics", (), ())
     assert loss.low < 3.4 < loss.high
-    assert Prior(4.0, 0.04).reach(8.0) == pytest.approx(50.0)
-    assert Prior(4.0, 0.4).reach(8.0) == 8.0
-    assert Prior(4.0).reach(8.0) == 8.0
+    assert Prior(4.0, 0.04).furthest(8.0) == pytest.approx(50.0)
+    assert Prior(4.0, 0.4).furthest(8.0) == 8.0
+    assert Prior(4.0).furthest(8.0) == 8.0
+    assert Prior(4.0, 0.04).reach(8.0) == pytest.approx(20.0)
 
 
 def test_what_no_parameter_explains_stays_unexplained() -> None:
