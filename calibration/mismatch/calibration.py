@@ -30,8 +30,13 @@ if TYPE_CHECKING:
 
 ON_TIME_WITHIN = 0.5
 """Readings by which an input that was put on time may still be late (a choice: what sampling leaves open)."""
-STEPS = 6
-"""Linearisations at most (a choice: a smooth simulation needs two or three)."""
+STEPS = 10
+"""Linearisations at most (a choice: a smooth simulation needs two or three, one that is stated at 0 a few more)."""
+HALVINGS = 5
+"""Halvings of a step at most (a choice: a thirtieth of the way is left)."""
+WORSE = 1.1
+"""Power of the residual, over that before a step, from which the step has gone too far (a choice: firm priors may lead
+back by a little)."""
 
 
 def linearised_where_it_fits(pose: Callable[[Mapping[str, float] | None], Problem]) -> NormalEquations:
@@ -48,10 +53,24 @@ def linearised_where_it_fits(pose: Callable[[Mapping[str, float] | None], Proble
         values = moved_values(equations, equations.fit(()))
         if not bent(problem, values):
             break
-        problem = pose(values)
+        problem = pose(damped(problem, values))
     equations = smooth_equations(problem)
     values = moved_values(equations, fit_of_significant_terms(equations))
     return smooth_equations(pose(values)) if bent(problem, values) else equations
+
+
+def damped(problem: Problem, values: Mapping[str, float]) -> Mapping[str, float]:
+    """Return the values of a step, halved until the simulation does not fit the recording worse there than before it.
+
+    Tangents at a value of 0, where a part of the simulation does nothing, may lead anywhere.
+    """
+    measured, here = problem.measured[problem.mask], problem.filled[problem.mask]
+    for _ in range(HALVINGS):
+        run = problem.changed(**values)[problem.mask]
+        if np.isfinite(run).all() and _power(measured - run) <= WORSE * _power(measured - here):
+            break
+        values = {name: (problem.values[name] + at) / 2 for name, at in values.items()}
+    return values
 
 
 def moved_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch.calibration import damped
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.problem.build import build_problem
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -56,6 +58,29 @@ def test_parameters_within_their_priors_are_no_missing_physics(off: tuple[float,
     assert answer.verdict == "consistent"
     for parameter, away in zip(answer.parameters, off, strict=True):
         assert (parameter.value - parameter.prior) / parameter.prior_std == pytest.approx(away, abs=0.5)
+
+
+class Pipe(Simulation):
+    """The flow that a pump's head drives through a pipe: none where the head is below the static one."""
+
+    channel, unit = "flow_m3_h", "m3/h"
+    inputs = ("speed_1_s",)
+    parameters: ClassVar = {"head_m": Prior(4.0, 3.0, "m")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the flow."""
+        return np.sqrt(np.maximum(values["head_m"] * inputs["speed_1_s"] ** 2 - 1.0, 0.0) / 0.006)
+
+
+def test_a_step_that_leads_too_far_is_halved() -> None:
+    """Below 0 nothing flows and every tangent is 0: from a head of 4, half of the way there fits better than it."""
+    speed = 1.5 + 0.3 * np.sin(np.arange(600.0) / 20)
+    measured = Pipe().predict({"speed_1_s": speed[:, None]}, {"head_m": 2.5})
+    problem = build_problem(
+        from_columns({"t_s": np.arange(600.0), "speed_1_s": speed, "flow_m3_h": measured[:, 0]}), Pipe()
+    )
+    assert damped(problem, {"head_m": -1.0}) == {"head_m": 1.5}
+    assert damped(problem, {"head_m": 1.5}) == {"head_m": 1.5}
 
 
 def test_what_is_called_calibrated_has_been_run() -> None:
