@@ -76,6 +76,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "Simulated",
         "Linearisation",
         "StatedShare",
+        "Step",
         "InputDoubt",
         "DesignMatrix",
         "Ranges",

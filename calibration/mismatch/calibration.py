@@ -8,6 +8,8 @@ where what was found makes the prediction another one, as some effects are a sha
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,6 +41,69 @@ WORSE = 1.1
 back by a little)."""
 
 
+@dataclass(frozen=True, eq=False)
+class Step:
+    """A step of the parameters from where a problem is linearised. The simulation runs once at its end.
+
+    Attributes
+    ----------
+    problem: where it is linearised
+    values: the parameters' at the end of the step
+    """
+
+    problem: Problem
+    values: Mapping[str, float]
+
+    @cached_property
+    def run(self) -> Array:
+        """Return the prediction at the end, shape (compared reading,)."""
+        return self.problem.changed(**self.values)[self.problem.mask]
+
+    @property
+    def begin(self) -> Array:
+        """Return the prediction at the beginning, shape (compared reading,)."""
+        return self.problem.filled[self.problem.mask]
+
+    @property
+    def measured(self) -> Array:
+        """Return the readings, shape (compared reading,)."""
+        return self.problem.measured[self.problem.mask]
+
+    def is_bent(self) -> bool:
+        """Return whether the prediction differs from its tangents by more than the noise lets pass."""
+        problem = self.problem
+        shifts = {name: at - problem.values[name] for name, at in self.values.items() if at != problem.values[name]}
+        if not shifts:
+            return False
+        along = problem.filled + sum(shift * problem.tangent(name) for name, shift in shifts.items())
+        apart = self.run - along[problem.mask]
+        if not np.isfinite(apart).all():
+            return False
+        return _power(apart) > problem.thresholds.linearisation_share**2 * _power(self.measured - self.run)
+
+    def leads_to_another_law(self) -> bool:
+        """Return whether what is a share of the prediction, such as a loss, would have another law at the end.
+
+        That is where the prediction changes by more than may be missed of a law.
+        """
+        share = self.problem.thresholds.form_misfit
+        return bool(np.isfinite(self.run).all()) and _power(self.run - self.begin) > share * _power(self.run)
+
+    def damped(self) -> Mapping[str, float]:
+        """Return the values at the end, the step halved until the simulation fits the recording no worse than before.
+
+        Tangents at a value of 0, where a part of the simulation does nothing, may lead anywhere.
+        """
+        step, most = self, WORSE * _power(self.measured - self.begin)
+        for _ in range(HALVINGS):
+            if np.isfinite(step.run).all() and _power(self.measured - step.run) <= most:
+                break
+            step = replace(
+                step, values={name: (self.problem.values[name] + at) / 2 for name, at in step.values.items()}
+            )
+        return step.values
+
+
 def linearised_where_it_fits(pose: Callable[[Mapping[str, float] | None], Problem]) -> NormalEquations:
     """Return the equations of parameters and smooth curves, linearised where they fit the recording best.
 
@@ -50,27 +115,13 @@ def linearised_where_it_fits(pose: Callable[[Mapping[str, float] | None], Proble
     problem = pose(None)
     for _ in range(STEPS):
         equations = free_parameter_equations(problem)
-        values = moved_values(equations, equations.fit(()))
-        if not bent(problem, values):
+        step = Step(problem, moved_values(equations, equations.fit(())))
+        if not step.is_bent():
             break
-        problem = pose(damped(problem, values))
+        problem = pose(step.damped())
     equations = smooth_equations(problem)
-    values = moved_values(equations, fit_of_significant_terms(equations))
-    return smooth_equations(pose(values)) if bent(problem, values) else equations
-
-
-def damped(problem: Problem, values: Mapping[str, float]) -> Mapping[str, float]:
-    """Return the values of a step, halved until the simulation does not fit the recording worse there than before it.
-
-    Tangents at a value of 0, where a part of the simulation does nothing, may lead anywhere.
-    """
-    measured, here = problem.measured[problem.mask], problem.filled[problem.mask]
-    for _ in range(HALVINGS):
-        run = problem.changed(**values)[problem.mask]
-        if np.isfinite(run).all() and _power(measured - run) <= WORSE * _power(measured - here):
-            break
-        values = {name: (problem.values[name] + at) / 2 for name, at in values.items()}
-    return values
+    step = Step(problem, moved_values(equations, fit_of_significant_terms(equations)))
+    return smooth_equations(pose(step.values)) if step.is_bent() else equations
 
 
 def moved_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:
@@ -107,29 +158,6 @@ def _fitted(equations: NormalEquations, fit: Fit) -> dict[str, float]:
     }
 
 
-def bent(problem: Problem, values: Mapping[str, float]) -> bool:
-    """Return whether the prediction at other values differs from its tangents by more than the noise lets pass."""
-    shifts = {name: values[name] - problem.values[name] for name in values if values[name] != problem.values[name]}
-    if not shifts:
-        return False
-    along = problem.filled + sum(shift * problem.tangent(name) for name, shift in shifts.items())
-    run = problem.changed(**shifts_to_values(problem, shifts))
-    apart = (run - along)[problem.mask]
-    residual = (problem.measured - run)[problem.mask]
-    if not np.isfinite(apart).all():
-        return False
-    return _power(apart) > problem.thresholds.linearisation_share**2 * _power(residual)
-
-
-def another_law(problem: Problem, values: Mapping[str, float]) -> bool:
-    """Return whether what is a share of the prediction, such as a loss, would have another law at other values.
-
-    That is where the prediction changes by more than may be missed of a law.
-    """
-    run, here = problem.changed(**values)[problem.mask], problem.filled[problem.mask]
-    return bool(np.isfinite(run).all()) and _power(run - here) > problem.thresholds.form_misfit * _power(run)
-
-
 def _power(values: Array) -> float:
     """Return the mean square."""
     return float(np.mean(values**2))
@@ -141,15 +169,10 @@ def late_otherwise(problem: Problem, values: Mapping[str, float]) -> bool:
     shown = as_shown(problem, [here, there])
     now, then = ((late - at)[problem.mask] for late, at in zip(shown, (here, there), strict=True))
     share = problem.thresholds.size_discrepancy_std
-    return float(np.mean((then - now) ** 2)) > share**2 * float(np.mean(now**2))
+    return _power(then - now) > share**2 * _power(now)
 
 
 def put_on_time_by(problem: Problem, late: Mapping[str, float]) -> bool:
     """Return whether a problem has all these inputs on time that are late by so much [s]."""
     within = ON_TIME_WITHIN * problem.recording.step_s
     return all(abs(delay - problem.on_time.get(name, 0.0)) <= within for name, delay in late.items())
-
-
-def shifts_to_values(problem: Problem, shifts: Mapping[str, float]) -> dict[str, float]:
-    """Return the values that the shifts lead to."""
-    return {name: problem.values[name] + shift for name, shift in shifts.items()}

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from regolithd.calibration.mismatch.calibration import (
-    another_law,
-    bent,
+    Step,
     beyond_their_doubt,
     late_otherwise,
     linearised_where_it_fits,
@@ -301,11 +300,11 @@ def _search(
     problem = equations.problem
     candidates = with_changes(problem, candidates, stated)
     found = _search_at(equations, candidates, progress)
-    values = moved_values(found.decision.equations, found.decision.whole)
-    if not found.decision.has_delay and (bent(problem, values) or another_law(problem, values)):
+    step = Step(problem, moved_values(found.decision.equations, found.decision.whole))
+    if not found.decision.has_delay and (step.is_bent() or step.leads_to_another_law()):
         noise_size = found.decision.equations.problem.noise_size
         del found, equations  # memory holds the matrix of one search at a time, and TMPDIR its columns
-        found = _search_at(smooth_equations(replace(pose(values), noise_size=noise_size)), candidates, progress)
+        found = _search_at(smooth_equations(replace(pose(step.values), noise_size=noise_size)), candidates, progress)
     return _searched_beside_delays(found, found.decision, pose, progress)
 
 

@@ -27,7 +27,7 @@ SAME_AS_GAIN = 0.95
 the load drives the motor for a fortieth of the torque's energy at most)."""
 LARGEST_LOSS = 2 / 3
 """Largest share of the stated efficiency that may be lost at any torque (a choice: a third is left)."""
-USUAL = 0.98
+USUAL_TORQUE_QUANTILE = 0.98
 """Quantile of the torques up to which a loss has to be possible (a choice: one reading in fifty may be disturbed)."""
 LESS_THAN_PREDICTED = "less than is predicted, by a share that depends on the transmitted torque"
 """What a loss below zero is."""
@@ -121,7 +121,8 @@ class LoadDependentEfficiency(Candidate):
 
     def plausible(self, problem: Problem, shape: Shape, values: Sequence[float]) -> bool:
         """Return whether at the usual torques at least a third of the efficiency is left, and no more is gained."""
-        lost = values[0] * np.quantile(_of_size(problem, shape)[problem.mask], (1 - USUAL, USUAL))
+        usual = (1 - USUAL_TORQUE_QUANTILE, USUAL_TORQUE_QUANTILE)
+        lost = values[0] * np.quantile(_of_size(problem, shape)[problem.mask], usual)
         return bool(lost.min() >= -LARGEST_LOSS and lost.max() <= LARGEST_LOSS / (1 - LARGEST_LOSS))
 
 

@@ -90,9 +90,8 @@ class JointPosterior:
     def too_far(self, priors: Mapping[str, Prior]) -> bool:
         """Return whether a released parameter goes further than a wrong statement explains."""
         shifts = dict(zip(self.names, np.abs(self.shifts).tolist(), strict=True))
-        return any(
-            shifts[name] > priors[name].furthest(THRESHOLDS.furthest_linearisation_stds) for name in self.released
-        )
+        stds = THRESHOLDS.furthest_linearisation_stds
+        return any(shifts[name] > priors[name].furthest(stds) for name in self.released)
 
     def restated(self, priors: Mapping[str, Prior]) -> dict[str, tuple[float, float]]:
         """Return mean and standard deviation of the released parameters, had they been stated where they are."""
@@ -162,7 +161,8 @@ class _Likelihood:
             about = np.array([held.get(name, priors[name].value) for name in each.names])
             matrix[np.ix_(at, at)] += each.matrix[np.ix_(kept, kept)] * np.outer(std, std)
             vector[at] += (each.vector - each.matrix @ about)[kept] * std
-        return cls(names, matrix, vector, held, np.array([_reach(priors[name]) for name in names]))
+        reach = np.array([priors[name].reach(THRESHOLDS.furthest_linearisation_stds) for name in names])
+        return cls(names, matrix, vector, held, reach)
 
     def posterior(self, released: Sequence[int]) -> JointPosterior:
         """Return the posterior with the priors of some parameters as wide as a wrong statement goes."""
@@ -177,8 +177,3 @@ class _Likelihood:
         )
         stds, names = np.sqrt(np.maximum(np.diag(covariance), 0.0)), tuple(self.names[place] for place in released)
         return JointPosterior(self.names, shifts, stds, evidence, self.held, names)
-
-
-def _reach(prior: Prior) -> float:
-    """Return how far a parameter may be off [standard deviations of its prior]."""
-    return prior.reach(THRESHOLDS.furthest_linearisation_stds)

@@ -72,7 +72,7 @@ def has_smooth_term(problem: Problem, covariate: str) -> bool:
 
 
 def _returns(way: Array) -> bool:
-    """Return whether a way (time,) passes its range more than once."""
+    """Return whether a way (time,) is at least `LEAST_PASSES` times as long as its range."""
     known = way[np.isfinite(way)]
     return bool(known.size) and float(np.sum(np.abs(np.diff(known)))) >= LEAST_PASSES * float(np.ptp(known)) > 0
 

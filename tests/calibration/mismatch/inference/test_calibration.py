@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
-from regolithd.calibration.mismatch.calibration import damped
+from regolithd.calibration.mismatch.calibration import Step
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
 
@@ -79,8 +79,8 @@ def test_a_step_that_leads_too_far_is_halved() -> None:
     problem = build_problem(
         from_columns({"t_s": np.arange(600.0), "speed_1_s": speed, "flow_m3_h": measured[:, 0]}), Pipe()
     )
-    assert damped(problem, {"head_m": -1.0}) == {"head_m": 1.5}
-    assert damped(problem, {"head_m": 1.5}) == {"head_m": 1.5}
+    assert Step(problem, {"head_m": -1.0}).damped() == {"head_m": 1.5}
+    assert Step(problem, {"head_m": 1.5}).damped() == {"head_m": 1.5}
 
 
 def test_what_is_called_calibrated_has_been_run() -> None:
