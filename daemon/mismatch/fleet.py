@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
@@ -196,9 +197,12 @@ def run_fleet(files: Sequence[RoverFile], simulation: Path, outputs: Outputs, op
             f"recording of more than {LONGEST_AT_ONCE} rows, has --json and --catalogue"
         )
     simulated = load_simulation(simulation, announce=partial(typer.echo, err=True))
-    workers: Workers = DaskCluster(options.scheduler) if options.scheduler else AllCores()
     store = Store(_kept_beside(options.catalogue)) if options.catalogue else None
-    with _bar() as bar:
+    with ExitStack() as opened:
+        workers: Workers = AllCores()
+        if options.scheduler:
+            workers = opened.enter_context(DaskCluster(options.scheduler))
+        bar = opened.enter_context(_bar())
         task = bar.add_task("reading", total=len(files))
         found = compare_fleet(
             members_of(files, simulated.wheel_column),

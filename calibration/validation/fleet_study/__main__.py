@@ -76,12 +76,13 @@ def members_of(paths: Sequence[Path]) -> list[Member]:
 def on_a_cluster(paths: Sequence[Path], folder: Path, workers: int) -> tuple[FleetComparison, int]:
     """Compare on a cluster of this computer, kill a worker half way, and return how many were killed."""
     load = partial(load_simulation, (folder / "SIM.toml").resolve())
-    with LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster:
+    local = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
+    with local as cluster, DaskCluster(cluster.scheduler_address) as remote:
         killer = Killer(cluster)
         found = compare_fleet(
             members_of(paths),
             load,
-            workers=DaskCluster(cluster.scheduler_address),
+            workers=remote,
             store=Store(folder / "parts"),
             progress=killer,
         )

@@ -11,7 +11,7 @@ from collections import deque
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, Self, TypeVar
 
 from regolithd.calibration.mismatch.errors import MismatchError
 
@@ -91,7 +91,10 @@ class AllCores:
 
 
 class DaskCluster:
-    """The workers of a Dask cluster; they need the same version of regolithd, and see files under the same paths."""
+    """The workers of a Dask cluster; they need the same version of regolithd, and see files under the same paths.
+
+    A context manager that closes the connection: left open, it looks for a cluster that has ended for half a minute.
+    """
 
     def __init__(self, scheduler: str) -> None:
         try:
@@ -104,6 +107,14 @@ class DaskCluster:
             self._client = Client(scheduler, timeout=CONNECT_S, set_as_default=False)
         except (OSError, ValueError) as error:
             raise MismatchError(f"no Dask scheduler answers at {scheduler}: {error}") from error
+
+    def __enter__(self) -> Self:
+        """Return the workers."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the connection."""
+        self._client.close()
 
     def results(
         self, numbers: Sequence[int], task_of: Callable[[int], Callable[[], Result]]

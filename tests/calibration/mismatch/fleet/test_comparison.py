@@ -108,9 +108,10 @@ def test_a_cluster_that_loses_a_worker_has_the_same_answer(
                 killed.append(next(iter(cluster.workers.values())).pid)
                 os.kill(killed[0], signal.SIGKILL)
 
-        workers = DaskCluster(cluster.scheduler_address)
-        again = compare_fleet(members, fleet_arm.loader(folder), workers=workers, progress=kill)
+        with DaskCluster(cluster.scheduler_address) as workers:
+            again = compare_fleet(members, fleet_arm.loader(folder), workers=workers, progress=kill)
     assert len(killed) == 1
+    assert workers._client.status == "closed"
     assert largest_difference(fleet.to_json(), again.to_json()) < 1e-9
 
 
