@@ -103,7 +103,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
             "Chooser",
             "Chosen",
         ),
-        *("Decided", "_Search"),
+        *("Decided", "_Search", "Start"),
         "AsRead",
         *("_BetweenReadings", "MarkovChains", "SwitchingMean"),
         *("Gains", "JointPosterior", "_Likelihood", "Drawn", "Information"),

@@ -8,8 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
-from regolithd.calibration.mismatch.calibration import (
-    Step,
+from regolithd.calibration.mismatch.calibration.linearised import (
     beyond_their_doubt,
     late_otherwise,
     linearised_where_it_fits,
@@ -17,6 +16,8 @@ from regolithd.calibration.mismatch.calibration import (
     out_of_bounds,
     put_on_time_by,
 )
+from regolithd.calibration.mismatch.calibration.starting_values import Start, starting_values
+from regolithd.calibration.mismatch.calibration.step import Step
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, stated_late_inputs, with_changes
 from regolithd.calibration.mismatch.corrected import write_corrected
@@ -234,15 +235,15 @@ def decided(
         problem = build_problem(recorded, simulation, values, inputs=inputs, late=late, thresholds=thresholds)
         return replace(corrected_problem(problem, stated), fed_back=fed, held=held)
 
-    found = _decided(candidates, stated, pose, progress)
     while True:
+        start = starting_values(pose(None))
+        found = _decided(candidates, stated, pose, start, progress)
         further, decision = fed_back(found.decision), found.decision
         out = out_of_bounds(decision.equations, decision.whole) | beyond_their_doubt(decision.equations, decision.named)
         if not further | out:
             break
         fed, held = fed | further, held | out
-        found = _decided(candidates, stated, pose, progress)
-    notes = notes_of_feedback(found.decision.equations.problem)
+    notes = (*start.notes(), *notes_of_feedback(found.decision.equations.problem))
     return replace(found, decision=replace(found.decision, notes=(*found.decision.notes, *notes)))
 
 
@@ -250,10 +251,11 @@ def _decided(
     candidates: Sequence[Candidate],
     stated: Sequence[Stated],
     pose: _Pose,
+    start: Start,
     progress: Callable[[str], None],
 ) -> Decided:
     """Search, and keep what held-out readings confirm and what is more probable than chance."""
-    search = _search(candidates, stated, pose, progress)
+    search = _search(candidates, stated, pose, start, progress)
     progress("measuring on held-out blocks and comparing with rivals")
     decision, held_out = earned(search.decision, search.grid)
     if decision.has_delay and not search.decision.has_delay:  # which was refused before held-out readings asked
@@ -289,6 +291,7 @@ def _search(
     candidates: Sequence[Candidate],
     stated: Sequence[Stated],
     pose: _Pose,
+    start: Start,
     progress: Callable[[str], None],
 ) -> _Search:
     """Search, and once more where what was found moves the parameters far, or where a column is late.
@@ -296,7 +299,7 @@ def _search(
     What a delay changes depends on the prediction, so that the simulation is linearised anew beside it, too: with all
     else late with the channel, and with inputs that are late on time.
     """
-    equations = linearised_where_it_fits(pose)
+    equations = linearised_where_it_fits(pose, start)
     problem = equations.problem
     candidates = with_changes(problem, candidates, stated)
     found = _search_at(equations, candidates, progress)

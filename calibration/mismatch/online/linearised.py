@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.calibration import linearised_where_it_fits
+from regolithd.calibration.mismatch.calibration.linearised import linearised_where_it_fits
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, with_changes
 from regolithd.calibration.mismatch.errors import SimulationError

@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from regolithd.calibration.mismatch.calibration import linearised_where_it_fits
+from regolithd.calibration.mismatch.calibration.linearised import linearised_where_it_fits
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.comparison import decided
 from regolithd.calibration.mismatch.data.recording import read_recording

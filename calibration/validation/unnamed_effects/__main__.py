@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.answer import Suggestion
-from regolithd.calibration.mismatch.calibration import linearised_where_it_fits
+from regolithd.calibration.mismatch.calibration.linearised import linearised_where_it_fits
 from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.empirical.found import curves_of
 from regolithd.calibration.mismatch.fleet.work.found import one_channel

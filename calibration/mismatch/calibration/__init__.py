@@ -1,0 +1,1 @@
+"""Where the parameters fit a recording best, and the problem posed there."""

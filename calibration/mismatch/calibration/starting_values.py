@@ -1,0 +1,203 @@
+"""Starting values: where the fit of the parameters begins if their priors are too wide for tangents at the stated ones.
+
+A parameter that is stated as 0 ± 2 has no value yet. There a product has no tangent, an exponential or a saturation has
+a misleading one, and the residual is nearly all misfit, so that the noise seems large. So the sum of squares of the
+simulation itself is searched from several places of the prior, with the noise that is left at each.
+
+The objective is −2 log of the posterior density with the unknown variance of each wheel's noise at its maximum
+(concentrated likelihood):
+
+    Σ over wheels  n / τ · ln(mean square of the residual)  +  Σ over parameters  ((value − stated) / std)²
+
+with n readings of the wheel, and the provisional autocorrelation time τ, as the noise is not known yet. It is minimised
+by Levenberg and Marquardt's method (Marquardt, 1963).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+from regolithd.calibration.mismatch.calibration.step import Step
+from regolithd.calibration.mismatch.inference.statements import after_number
+from regolithd.calibration.mismatch.problem.prior import OFTEN_WITHIN
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from regolithd.calibration.mismatch.problem.prior import Prior
+    from regolithd.calibration.mismatch.problem.problem import Problem
+
+Array = NDArray[np.float64]
+
+DRAWS = 32
+"""Places of the prior at which the simulation is run (a choice: five parameters, each above or below its stated value).
+"""
+ASKED = 4
+"""Of these, places at which the tangents at the stated values are compared with the simulation (a choice)."""
+SEARCHES = 4
+"""Searches from the best of those places, beside the one from the stated values (a choice of cost)."""
+ITERATIONS = 30
+"""Steps of a search at most (a choice: a search that converges needs five to fifteen)."""
+CONVERGED = 1e-3
+"""Decrease of the objective by a step, from which on a search goes on: far less than chance changes it by."""
+AS_WELL = 3.8
+"""Difference of the objective up to which two minima are told (χ² of one degree of freedom at 95 %)."""
+APART = 0.1
+"""Difference of a parameter, in its prior's standard deviations, from which two minima are two (a choice)."""
+DIFFERENCE = 1e-4
+"""Step of a difference quotient in the prior's standard deviations (a choice: a search needs no exact tangents)."""
+FIRST_DAMPING, LESS, MORE, MOST_DAMPING = 1e-2, 0.2, 5.0, 1e8
+"""Damping of a search's first step, its factors after a step that succeeds and one that fails, and the one at which no
+step is left to try (Marquardt's scheme)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where the fit begins.
+
+    Attributes
+    ----------
+    problem: at the stated values
+    values: the parameters'; None: the stated ones
+    others: further values that fit the recording as well
+    """
+
+    problem: Problem
+    values: Mapping[str, float] | None = None
+    others: tuple[Mapping[str, float], ...] = ()
+
+    def notes(self) -> tuple[str, ...]:
+        """Return what to tell of other values that fit as well."""
+        priors = self.problem.simulation.parameters
+        return tuple(
+            f"Other values of the parameters fit the recording as well: {_listed(each, priors)}. State which are meant "
+            f"by bounds, or by a prior, of one of them."
+            for each in self.others
+        )
+
+
+def starting_values(problem: Problem) -> Start:
+    """Return the parameters' values where the simulation itself fits best.
+
+    They are the stated ones where no parameter is as good as unknown, and where the tangents hold all over the prior.
+    """
+    search = _Search.of(problem)
+    if not search.is_wide:
+        return Start(problem)
+    places = search.draws()
+    steps = [Step(problem, search.values(place)) for place in places[:ASKED]]
+    if not any(step.is_bent() or not step.is_defined for step in steps):
+        return Start(problem)
+    with np.errstate(all="ignore"):  # a prediction may overflow on the way
+        ranked = sorted(places, key=lambda place: search.objective(search.left(place), place))
+        begun = (np.zeros(len(search.names)), *ranked[:SEARCHES])
+        found = sorted((search.minimum(place) for place in begun), key=lambda one: one[0])
+    least, best = found[0]
+    told: list[Array] = [best]
+    for objective, place in found[1:]:
+        if objective - least < AS_WELL and all(np.abs(place - each).max() > APART for each in told):
+            told.append(place)
+    return Start(problem, search.values(best), tuple(search.values(place) for place in told[1:]))
+
+
+def _listed(values: Mapping[str, float], priors: Mapping[str, Prior]) -> str:
+    """Return parameters with their values and units."""
+    free = {name: value for name, value in values.items() if priors[name].std > 0 and priors[name].told}
+    return ", ".join(f"{name} {value:.4g}{after_number(priors[name].unit)}" for name, value in free.items())
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """The search of a problem. A place is in the priors' standard deviations from the stated values."""
+
+    problem: Problem
+    names: tuple[str, ...]
+    wheel: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, problem: Problem) -> _Search:
+        """Return the search over the free parameters; each reading's wheel is its place among those compared."""
+        priors = problem.simulation.parameters.items()
+        names = tuple(name for name, prior in priors if prior.std > 0 and name not in problem.held)
+        _, wheel = np.unique(np.nonzero(problem.mask)[1], return_inverse=True)
+        return cls(problem, names, wheel)
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether a parameter is hardly known: where a value is wrong, it is seldom so far off."""
+        priors = (self.problem.simulation.parameters[name] for name in self.names)
+        return any(prior.std > OFTEN_WITHIN * abs(prior.value) for prior in priors)
+
+    def draws(self) -> list[Array]:
+        """Return places that fill the prior evenly (Sobol, 1967), always the same ones."""
+        uniform = qmc.Sobol(len(self.names), scramble=False).random(2 * DRAWS)[1 : DRAWS + 1]
+        return [self.within(place) for place in ndtri(uniform)]
+
+    def within(self, place: Array) -> Array:
+        """Return a place as far as the parameters may be moved."""
+        limit = self.problem.thresholds.furthest_linearisation_stds
+        priors = [self.problem.simulation.parameters[name] for name in self.names]
+        moved = [prior.near(prior.value + prior.std * at, limit) for prior, at in zip(priors, place, strict=True)]
+        return np.array([(value - prior.value) / prior.std for prior, value in zip(priors, moved, strict=True)])
+
+    def values(self, place: Array) -> dict[str, float]:
+        """Return the parameters' values at a place."""
+        priors = self.problem.simulation.parameters
+        at = zip(self.names, place.tolist(), strict=True)
+        return {**self.problem.values, **{name: priors[name].value + priors[name].std * stds for name, stds in at}}
+
+    def left(self, place: Array) -> Array:
+        """Return what the simulation leaves of the readings there, shape (reading,); NaN where it cannot be run."""
+        step = Step(self.problem, self.values(place))
+        return step.measured - step.run
+
+    def objective(self, left: Array, place: Array) -> float:
+        """Return −2 log of the posterior density of a place that leaves this; infinity where it cannot be run."""
+        if not np.isfinite(left).all():
+            return np.inf
+        counts = np.bincount(self.wheel)
+        time = self.problem.thresholds.provisional_autocorrelation_time
+        return float(counts / time @ np.log(self.power(left)) + place @ place)
+
+    def power(self, left: Array) -> Array:
+        """Return the mean square on each wheel, shape (wheel,), above what rounding leaves."""
+        counts = np.bincount(self.wheel)
+        rounding = np.finfo(np.float64).eps * float(np.mean(self.problem.measured[self.problem.mask] ** 2))
+        return np.asarray(np.bincount(self.wheel, left**2) / counts + rounding)
+
+    def minimum(self, place: Array) -> tuple[float, Array]:
+        """Return the least objective that a search from a place finds, and where."""
+        left = self.left(place)
+        best, damping = self.objective(left, place), FIRST_DAMPING
+        for _ in range(ITERATIONS if np.isfinite(best) else 0):
+            matrix, slope = self.normal(left, place)
+            before = best
+            while damping < MOST_DAMPING:
+                step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), slope)
+                tried = self.within(place + step)
+                further = self.left(tried)
+                if (now := self.objective(further, tried)) < best:
+                    place, left, best, damping = tried, further, now, damping * LESS
+                    break
+                damping *= MORE
+            if before - best < CONVERGED:
+                break
+        return best, place
+
+    def normal(self, left: Array, place: Array) -> tuple[Array, Array]:
+        """Return matrix and right side of the normal equations of a step, the prior included."""
+        weights = 1 / (self.power(left) * self.problem.thresholds.provisional_autocorrelation_time)[self.wheel]
+        rows = []
+        for parameter in range(len(place)):
+            aside = place.copy()
+            aside[parameter] += DIFFERENCE
+            change = (left - self.left(aside)) / DIFFERENCE
+            rows.append(np.where(np.isfinite(change), change, 0.0))
+        tangents = np.array(rows)
+        return tangents * weights @ tangents.T + np.eye(len(place)), tangents * weights @ left - place
