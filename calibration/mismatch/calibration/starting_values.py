@@ -47,9 +47,8 @@ ITERATIONS = 30
 CONVERGED = 1e-3
 """Decrease of the objective by a step, from which on a search goes on: far less than chance changes it by."""
 AS_WELL = 3.8
-"""Difference of the objective up to which two minima are told (χ² of one degree of freedom at 95 %)."""
-APART = 0.1
-"""Difference of a parameter, in its prior's standard deviations, from which two minima are two (a choice)."""
+"""Difference of the objective up to which two minima fit equally well, and which lies between them half way if they are
+two (χ² of one degree of freedom at 95 %)."""
 DIFFERENCE = 1e-4
 """Step of a difference quotient in the prior's standard deviations (a choice: a search needs no exact tangents)."""
 FIRST_DAMPING, LESS, MORE, MOST_DAMPING = 1e-2, 0.2, 5.0, 1e8
@@ -98,11 +97,11 @@ def starting_values(problem: Problem) -> Start:
         ranked = sorted(places, key=lambda place: search.objective(search.left(place), place))
         begun = (np.zeros(len(search.names)), *ranked[:SEARCHES])
         found = sorted((search.minimum(place) for place in begun), key=lambda one: one[0])
-    least, best = found[0]
-    told: list[Array] = [best]
-    for objective, place in found[1:]:
-        if objective - least < AS_WELL and all(np.abs(place - each).max() > APART for each in told):
-            told.append(place)
+        least, best = found[0]
+        told: list[Array] = [best]
+        for objective, place in found[1:]:
+            if objective - least < AS_WELL and all(search.are_two(place, each, objective) for each in told):
+                told.append(place)
     return Start(problem, search.values(best), tuple(search.values(place) for place in told[1:]))
 
 
@@ -189,6 +188,11 @@ class _Search:
             if before - best < CONVERGED:
                 break
         return best, place
+
+    def are_two(self, one: Array, other: Array, objective: float) -> bool:
+        """Return whether two places of about this objective are two minima: half way between them the fit is worse."""
+        middle = (one + other) / 2
+        return self.objective(self.left(middle), middle) - objective > AS_WELL
 
     def normal(self, left: Array, place: Array) -> tuple[Array, Array]:
         """Return matrix and right side of the normal equations of a step, the prior included."""
