@@ -16,12 +16,11 @@ by Levenberg and Marquardt's method (Marquardt, 1963).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
-from scipy.stats import qmc
 
 from regolithd.calibration.mismatch.calibration.step import Step
 from regolithd.calibration.mismatch.inference.statements import after_number
@@ -135,8 +134,12 @@ class _Search:
 
     def draws(self) -> list[Array]:
         """Return places that fill the prior evenly (Sobol, 1967), always the same ones."""
+        # Importing it takes half a second, which a simulation with known parameters need not wait.
+        from scipy.stats import qmc  # noqa: PLC0415
+
         uniform = qmc.Sobol(len(self.names), scramble=False).random(2 * DRAWS)[1 : DRAWS + 1]
-        return [self.within(place) for place in ndtri(uniform)]
+        normal = np.vectorize(NormalDist().inv_cdf)(uniform)
+        return [self.within(place) for place in normal]
 
     def within(self, place: Array) -> Array:
         """Return a place as far as the parameters may be moved."""
