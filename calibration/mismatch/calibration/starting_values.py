@@ -74,8 +74,8 @@ class Start:
         """Return what to tell of other values that fit as well."""
         priors = self.problem.simulation.parameters
         return tuple(
-            f"Other values of the parameters fit the recording as well: {_listed(each, priors)}. State which are meant "
-            f"by bounds, or by a prior, of one of them."
+            f"Other values of the parameters fit the recording as well: {_listed(each, priors)}. A narrower prior of "
+            f"one of them tells which are meant."
             for each in self.others
         )
 

@@ -84,7 +84,17 @@ class CheckedSimulation(Simulation):
         return {name: array_of(table[name], shape, f"{method}: {name}") for name in self.channels}  # type: ignore[return-value]
 
     def _predicted(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> object:
-        return called(self.inner, "predict", Columns(inputs), Parameters(values))
+        try:
+            return called(self.inner, "predict", Columns(inputs), Parameters(values))
+        except SimulationError as error:
+            priors = self.inner.parameters
+            moved = [f"{name} = {at:.6g}" for name, at in values.items() if name in priors and at != priors[name].value]
+            if not moved:
+                raise
+            raise SimulationError(
+                f"{error}; this was with {', '.join(moved)}, where the recording leads: return NaN where the "
+                "simulation has no value, or state a narrower prior"
+            ) from error
 
     def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
         """Return what a residual may be ordered by, each of shape (time, wheel)."""

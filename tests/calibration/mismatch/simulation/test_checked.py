@@ -223,3 +223,23 @@ def test_candidates_of_the_library_are_as_they_are() -> None:
     assert type(found) is CheckedCandidate
     assert isinstance(found, Candidate)
     assert checked_candidate(found, "here") is found
+
+
+def test_values_at_which_a_prediction_fails_are_told(tmp_path: Path) -> None:
+    """At the stated ones nothing is added: the class itself is wrong."""
+    refusing = CLASS.replace(
+        'return values["mass_kg"]', 'assert values["mass_kg"] != self.refused\n        return values["mass_kg"]'
+    )
+    (tmp_path / "axis.py").write_text(
+        refusing.replace("class Axis(Simulation):", "class Axis(Simulation):\n    refused = 95.0")
+    )
+    (tmp_path / "SIM.toml").write_text('[simulation]\nmodel = "axis:Axis"\n')
+    simulation = load_simulation(tmp_path / "SIM.toml")
+    inputs = {"acceleration_m_s2": np.ones((3, 1)), "t_s": np.arange(3.0)[:, None]}
+    with pytest.raises(MismatchError) as caught:
+        simulation.predict(inputs, {"mass_kg": 95.0})
+    assert "AssertionError" in str(caught.value)
+    assert "mass_kg" not in str(caught.value)
+    simulation.inner.refused = -1.5
+    with pytest.raises(MismatchError, match=r"AssertionError: ; this was with mass_kg = -1\.5, where the recording"):
+        simulation.predict(inputs, {"mass_kg": -1.5})
