@@ -5,8 +5,8 @@ recording, simulation ─▶ problem ─▶ equations ─▶ decision ─▶ ans
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Protocol
 
 from regolithd.calibration.mismatch.calibration.linearised import (
     beyond_their_doubt,
@@ -20,7 +20,7 @@ from regolithd.calibration.mismatch.calibration.starting_values import Start, st
 from regolithd.calibration.mismatch.calibration.step import Step
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, stated_late_inputs, with_changes
-from regolithd.calibration.mismatch.corrected import write_corrected
+from regolithd.calibration.mismatch.channels import compare_channels, labelled
 from regolithd.calibration.mismatch.data.recording import as_recording
 from regolithd.calibration.mismatch.empirical.found import curves_of
 from regolithd.calibration.mismatch.empirical.stated import beyond_the_range
@@ -29,16 +29,12 @@ from regolithd.calibration.mismatch.inference.feedback import fed_back, notes_of
 from regolithd.calibration.mismatch.inference.findings import Findings, answer_of, findings_of
 from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, earned
 from regolithd.calibration.mismatch.inference.improbable import without_improbable_curves
-from regolithd.calibration.mismatch.inference.joint_parameters import information_of, joint_posterior
-from regolithd.calibration.mismatch.inference.several_channels import (
-    merged_answers,
-    nothing_else_is_wrong,
-    priors_from_others,
-)
+from regolithd.calibration.mismatch.inference.joint_parameters import information_of
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.equations import smooth_equations, with_library
 from regolithd.calibration.mismatch.regression.reliability import noise_size_of
+from regolithd.calibration.mismatch.result import Comparison
 from regolithd.calibration.mismatch.selection.decision import decide
 from regolithd.calibration.mismatch.selection.regions import in_regions
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
@@ -46,13 +42,11 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
 
-    from regolithd.calibration.mismatch.answer import Answer, Contribution, Evidence
+    from regolithd.calibration.mismatch.answer import Contribution
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.changes import Stated
     from regolithd.calibration.mismatch.data.recording import Recording
-    from regolithd.calibration.mismatch.inference.joint_parameters import Information, JointPosterior
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Group
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
@@ -62,41 +56,6 @@ if TYPE_CHECKING:
 
 LATE_SEARCHES = 2
 """Searches beside a late column, at most (a choice: parameters that move far as the delay is found move once)."""
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """The answer, the arrays behind it, and the simulation; a notebook shows it as the report.
-
-    `information` is what the readings of the one channel know of the parameters; None: of several channels.
-    """
-
-    answer: Answer
-    evidence: Evidence
-    simulation: Simulation
-    information: Information | None = field(default=None, repr=False)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return what `regolithd mismatch --json` writes."""
-        return self.answer.to_json()
-
-    def write_corrected(self, path: Path, *, empirical: bool = False) -> None:
-        """Write the corrected SIM.toml, as `regolithd mismatch --corrected` does.
-
-        With `empirical` it has curves of what stays unexplained too, as with `--empirical`.
-
-        Raises
-        ------
-        SimulationError
-            When the simulation does not come from a SIM.toml, or a curve cannot be carried to another recording.
-        """
-        write_corrected(path, self.answer, self.evidence, self.simulation, empirical=empirical)
-
-    def _repr_html_(self) -> str:
-        # A notebook alone shows the report; the command line starts sooner without it.
-        from regolithd.calibration.mismatch.report.notebook import notebook_html  # noqa: PLC0415
-
-        return notebook_html(self.answer, self.evidence)
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,40 +120,14 @@ def compare(
         def of_channel(channel: str, known: Mapping[str, tuple[float, float]]) -> Comparison:
             own = [effect for effect in effects if effect.channel == channel]
             one = OneChannel(simulation, channel, known)
-            return _labelled(compare(recorded, one, effects=own, thresholds=thresholds, progress=progress), channel)
+            return labelled(compare(recorded, one, effects=own, thresholds=thresholds, progress=progress), channel)
 
-        return _of_channels(simulation, of_channel)
+        return compare_channels(simulation, of_channel)
     chosen = decided(recorded, simulation, effects=effects, thresholds=thresholds, progress=progress)
     comparison = chosen.told(simulation)
     if chosen.decision.unnamed:
         progress("fitting a curve to what stays unexplained")
     return with_curves(comparison, chosen.decision)
-
-
-def _of_channels(simulation: Simulation, of_channel: _OfChannel) -> Comparison:
-    """Return the comparison of all channels, each posed by itself first.
-
-    Where all channels together contradict a stated parameter, they are compared again with it as they have it. If that
-    is not all that is wrong, a channel that pulls a parameter out of its prior is told what the others know of it.
-    """
-    alone = {channel: of_channel(channel, {}) for channel in simulation.channels}
-    answers = [each.answer for each in alone.values()]
-    if restated := _joint(list(alone.values()), simulation).restated(simulation.parameters):
-        again = [of_channel(channel, restated) for channel in simulation.channels]
-        if nothing_else_is_wrong(answers, [each.answer for each in again]):
-            return merged(again, simulation)
-    found = dict(alone)
-    for channel, one in alone.items():
-        others = [other.answer for name, other in alone.items() if name != channel]
-        if known := priors_from_others(one.answer, others):
-            found[channel] = of_channel(channel, known)
-    return merged(list(found.values()), simulation, may_release=False)
-
-
-def _joint(comparisons: Sequence[Comparison], simulation: Simulation, *, may_release: bool = True) -> JointPosterior:
-    """Return the parameters' posterior from all channels."""
-    informations = [each.information for each in comparisons if each.information]
-    return joint_posterior(simulation.parameters, informations, may_release=may_release)
 
 
 def with_curves(comparison: Comparison, decision: Decision) -> Comparison:
@@ -263,12 +196,6 @@ def _decided(
         decision, held_out = earned(search.decision, search.grid)
     decision = without_improbable_curves(in_regions(decision))
     return Decided(decision, held_out, search.candidates, search.applicable)
-
-
-class _OfChannel(Protocol):
-    """The comparison of one channel, with these means and standard deviations of parameters instead of the stated."""
-
-    def __call__(self, channel: str, known: Mapping[str, tuple[float, float]], /) -> Comparison: ...
 
 
 class _Pose(Protocol):
@@ -344,30 +271,3 @@ def _searched(equations: NormalEquations, candidates: Sequence[Candidate], progr
     equations, applicable = with_library(equations, candidates)
     progress("searching")
     return _Search(decide(equations, applicable), equations.design.groups, tuple(candidates), applicable)
-
-
-def _labelled(comparison: Comparison, channel: str) -> Comparison:
-    """Return a comparison whose terms say which channel they are of."""
-    evidence = comparison.evidence
-    terms = tuple(replace(term, channel=channel) for term in evidence.contributions)
-    fits = tuple(
-        replace(fit, contributions=tuple(replace(term, channel=channel) for term in fit.contributions))
-        for fit in evidence.empirical
-    )
-    return replace(comparison, evidence=replace(evidence, contributions=terms, empirical=fits))
-
-
-def merged(comparisons: Sequence[Comparison], simulation: Simulation, *, may_release: bool = True) -> Comparison:
-    """Return one comparison of all channels of a simulation: every finding, and the evidence of each channel.
-
-    `may_release`: whether the channels' parameters may leave priors that they contradict.
-    """
-    posterior = _joint(comparisons, simulation, may_release=may_release)
-    answer = merged_answers([each.answer for each in comparisons], posterior.parameters(simulation.parameters))
-    first, *others = (each.evidence for each in comparisons)
-    # As in one channel: the terms of named effects, then those of changes.
-    named = [term for each in comparisons for term in each.evidence.contributions[: len(each.answer.effects)]]
-    changes = [term for each in comparisons for term in each.evidence.contributions[len(each.answer.effects) :]]
-    values = {parameter.name: parameter.value for parameter in answer.parameters}
-    evidence = replace(first, contributions=(*named, *changes), values=values, others=tuple(others))
-    return Comparison(answer, evidence, simulation)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from regolithd.calibration.mismatch.answer import Answer
-    from regolithd.calibration.mismatch.comparison import Comparison
+    from regolithd.calibration.mismatch.result import Comparison
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.calibration.step import Step
 from regolithd.calibration.mismatch.inference.statements import after_number
-from regolithd.calibration.mismatch.problem.prior import OFTEN_WITHIN
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -128,9 +127,8 @@ class _Search:
 
     @property
     def is_wide(self) -> bool:
-        """Whether a parameter is hardly known: where a value is wrong, it is seldom so far off."""
-        priors = (self.problem.simulation.parameters[name] for name in self.names)
-        return any(prior.std > OFTEN_WITHIN * abs(prior.value) for prior in priors)
+        """Whether a parameter is hardly known."""
+        return any(self.problem.simulation.parameters[name].is_hardly_known for name in self.names)
 
     def draws(self) -> list[Array]:
         """Return places that fill the prior evenly (Sobol, 1967), always the same ones."""

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer
     from regolithd.calibration.mismatch.fleet.work.store import Store
+    from regolithd.calibration.mismatch.result import Comparison
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Result = TypeVar("Result")
@@ -93,12 +94,12 @@ def compare(
     recording: object,
     simulation: Simulation,
     **options: Any,  # noqa: ANN401
-) -> single.Comparison: ...
+) -> Comparison: ...
 def compare(
     recording: Recording | object,
     simulation: Simulation,
     **options: Any,  # of `comparison.compare`
-) -> single.Comparison | FleetComparison:
+) -> Comparison | FleetComparison:
     """Compare a recording with a simulation, or a list of recordings together.
 
     Parameters

@@ -100,6 +100,11 @@ class JointPosterior:
             name: (priors[name].value + shifts[name] * priors[name].std, priors[name].std) for name in self.released
         }
 
+    def values(self, priors: Mapping[str, Prior]) -> dict[str, float]:
+        """Return the values of the free parameters."""
+        shifts = zip(self.names, self.shifts.tolist(), strict=True)
+        return {name: priors[name].value + shift * priors[name].std for name, shift in shifts}
+
     def parameters(self, priors: Mapping[str, Prior]) -> tuple[CalibratedParameter, ...]:
         """Return the told parameters; those that are exact or held have no width."""
         places = {name: place for place, name in enumerate(self.names)}
@@ -136,6 +141,22 @@ def joint_posterior(
     found = [likelihood.posterior(places) for places in sets if places]
     plausible = [each for each in found if not each.too_far(priors)]
     return max((within, *plausible), key=lambda each: each.evidence)
+
+
+def known_better_by_others(
+    own: JointPosterior, others: JointPosterior, priors: Mapping[str, Prior]
+) -> dict[str, tuple[float, float]]:
+    """Return mean and standard deviation of the hardly known parameters that other channels know better than one.
+
+    `own` is the posterior of that channel, `others` that of all others together.
+    """
+    stds = dict(zip(own.names, own.stds.tolist(), strict=True))
+    values = others.values(priors)
+    return {
+        name: (values[name], std * priors[name].std)
+        for name, std in zip(others.names, others.stds.tolist(), strict=True)
+        if priors[name].is_hardly_known and std < stds.get(name, 0.0)
+    }
 
 
 @dataclass(frozen=True, eq=False)

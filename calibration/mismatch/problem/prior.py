@@ -27,6 +27,11 @@ class Prior:
     told: bool = True
     bounds: tuple[float, float] = (-inf, inf)
 
+    @property
+    def is_hardly_known(self) -> bool:
+        """Return whether the value may be further off than a value that is wrong usually is."""
+        return self.std > OFTEN_WITHIN * abs(self.value)
+
     def near(self, value: float, stds: float) -> float:
         """Return a value as far as it may be from the prior: within its bounds and its reach."""
         low, high = self.bounds

@@ -134,6 +134,14 @@ class DesignMatrix:
         self._whiten_new()
         return self._sums.own_products(self._places[list(columns)], tuple(folds))
 
+    def precise_sums(self, columns: Sequence[int]) -> tuple[Array, Array]:
+        """Return sums of products of a few columns with each other and with the residual, in double precision.
+
+        Their shapes are (fold, wheel, row, column) and (fold, wheel, column).
+        """
+        self._whiten_new()
+        return self._sums.precise(self._places[np.asarray(columns, np.int64)])
+
     def energies(self, columns: Sequence[int] | Index) -> Single:
         """Return sums of squares of some columns, shape (fold, wheel, column)."""
         self._whiten_new()

@@ -259,17 +259,27 @@ class NormalEquations:
         base = [(column, self.all_wheels) for column in self.nuisance.columns]
         return tuple(base + [(column, term.wheels) for term in terms for column in term.group.columns])
 
+    @cached_property
+    def _of_parameters(self) -> tuple[Array, Array]:
+        """Return the parameters' weighted sums in double precision, shapes (wheel, row, column) and (wheel, column).
+
+        Of parameters with wide priors, combinations that hardly change the prediction are held by these alone.
+        """
+        products, moments = self.design.precise_sums(self.nuisance.columns)
+        return self._weighted(products), self._weighted(moments)
+
     def _normal(self, columns: Columns) -> tuple[Array, Array]:
         """Return matrix and moment of the normal equations of these columns, the priors included."""
         index = [column for column, _ in columns]
         share = membership(columns, len(self.weights))
-        products = self.products(index, index)
+        base = len(self.nuisance.columns)
+        products, moments = self.products(index, index), self.moment[:, index]
+        products[:, :base, :base], moments[:, :base] = self._of_parameters
         matrix = np.zeros((len(columns), len(columns)))
         for w in self.all_wheels:
             matrix += np.outer(share[:, w], share[:, w]) * products[w]
-        base = len(self.nuisance.columns)
         matrix[range(base), range(base)] += self.nuisance.precision
-        moment = np.einsum("cw,wc->c", share, self.moment[:, index])
+        moment = np.einsum("cw,wc->c", share, moments)
         moment[:base] += self.nuisance.precision * self.nuisance.centre
         return matrix, moment
 

@@ -22,12 +22,13 @@ def pseudo_inverse(matrix: Array, singular: float) -> Array:
     """Return the pseudo-inverse of normal equations: undetermined directions have no part in the solution.
 
     The matrix is scaled to a diagonal of 1 first, since precisions of priors differ by the squares of their units;
-    `singular` is the relative eigenvalue below which a direction then counts as undetermined.
+    `singular` is the relative eigenvalue below which a direction then counts as undetermined; one below 0 is rounding.
     """
     size = np.sqrt(np.diag(matrix))
     size = np.where(size > 0, size, 1.0)
-    scaled = np.linalg.pinv(matrix / np.outer(size, size), rcond=singular, hermitian=True)
-    return np.asarray(scaled / np.outer(size, size), np.float64)
+    values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
+    kept = vectors[:, values > singular * values.max(initial=0.0)] / size[:, None]
+    return np.asarray(kept / values[values > singular * values.max(initial=0.0)] @ kept.T, np.float64)
 
 
 def explained_part(cross: Array, inverse: Array) -> Array:

@@ -55,6 +55,7 @@ class Sums:
         self._later: Single = np.zeros((*leading, 0, 0), np.float32)
         self._known: NDArray[np.bool_] = np.zeros((0, 0), np.bool_)
         self._own: dict[tuple[tuple[int, ...], tuple[int, ...]], Array] = {}
+        self._precise: dict[tuple[int, ...], tuple[Array, Array]] = {}
         self._summed = 0
 
     def products(self, rows: Index, columns: Index) -> Single:
@@ -88,6 +89,22 @@ class Sums:
             of_folds = self.products(columns, columns) if together else self._of(self._columns.read(columns), columns)
             self._own[key] = sum((of_folds[fold] for fold in folds), np.zeros(of_folds.shape[1:]))
         return self._own[key]
+
+    def precise(self, columns: Index) -> tuple[Array, Array]:
+        """Return sums of products of a few columns with each other, and with the residual.
+
+        Their shapes are (fold, wheel, row, column) and (fold, wheel, column). They are summed in double precision, and
+        kept: of columns of which a combination is nearly 0, rounding of single precision would be all that is left.
+        """
+        key = tuple(columns.tolist())
+        if key not in self._precise:
+            values = self._columns.read(columns).astype(np.float64)
+            residual = self._residual.astype(np.float64)
+            parts = [(values[..., a:b], residual[..., a:b]) for a, b in self._folds]
+            products = [np.einsum("rwt,cwt->wrc", part, part, optimize=True) for part, _ in parts]
+            moments = [np.einsum("cwt,wt->wc", part, of_residual) for part, of_residual in parts]
+            self._precise[key] = np.array(products), np.array(moments)
+        return self._precise[key]
 
     def moments(self, columns: Index) -> Array:
         """Return sums of products of columns and residual, shape (fold, wheel, column)."""

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from regolithd.calibration.mismatch import Candidate
-    from regolithd.calibration.mismatch.comparison import Comparison
+    from regolithd.calibration.mismatch.result import Comparison
 
     Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from regolithd.calibration.mismatch.errors import SimulationError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from regolithd.calibration.mismatch.comparison import Comparison
+    from regolithd.calibration.mismatch.result import Comparison
 
 STEPS = [
     "simulating",

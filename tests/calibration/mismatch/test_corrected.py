@@ -11,9 +11,10 @@ from rover_drives import TABLES, columns, simulation
 from servo import ServoAxis
 
 from regolithd.calibration.mismatch.answer import CalibratedParameter, Contribution, Parameter
-from regolithd.calibration.mismatch.comparison import Comparison, compare
+from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects, write_corrected
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.result import Comparison
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.simulation.load import load_simulation
 from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel

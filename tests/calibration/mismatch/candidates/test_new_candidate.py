@@ -15,7 +15,7 @@ from rover_drives import TABLES, columns, simulation
 from regolithd.calibration.mismatch import candidates
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in
-from regolithd.calibration.mismatch.comparison import Comparison, compare
+from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.reference.effects import effect_sections
@@ -24,6 +24,8 @@ from regolithd.calibration.toml_document import to_toml
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+    from regolithd.calibration.mismatch.result import Comparison
 
 
 def example() -> str:

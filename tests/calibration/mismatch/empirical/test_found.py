@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 import winch
 from winch import Winch
 
-from regolithd.calibration.mismatch.comparison import Comparison, compare
+from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.simulation.load import load_simulation
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.result import Comparison
 
 ROWS, DRUMS, STEP_S, NOISE_A = 3000, 2, 0.5, 0.2
 TIME_S = STEP_S * np.arange(ROWS)

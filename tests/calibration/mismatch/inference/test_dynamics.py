@@ -18,7 +18,7 @@ from regolithd.calibration.mismatch.report.labels import verdict_sentence
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from regolithd.calibration.mismatch.comparison import Comparison
+    from regolithd.calibration.mismatch.result import Comparison
 
 Array = NDArray[np.float64]
 COUNT, STEP_S, FINE = 4000, 0.25, 50

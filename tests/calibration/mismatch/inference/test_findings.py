@@ -15,7 +15,7 @@ from regolithd.calibration.mismatch.inference.findings import one_way_only
 from regolithd.calibration.mismatch.problem.build import build_problem
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.comparison import Comparison
+    from regolithd.calibration.mismatch.result import Comparison
 
 
 @pytest.fixture(scope="module")

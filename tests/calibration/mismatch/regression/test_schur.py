@@ -91,3 +91,13 @@ def test_a_pseudo_inverse_does_not_depend_on_units() -> None:
     np.testing.assert_allclose(found * np.outer(units, units), np.linalg.inv(matrix), rtol=1e-9)
     undetermined = pseudo_inverse(np.ones((2, 2)), 1e-10) @ np.array([1.0, -1.0])
     np.testing.assert_allclose(undetermined, 0.0, atol=1e-12)
+
+
+def test_rounding_below_zero_is_no_direction() -> None:
+    """The energy of a combination of columns that is nearly 0 may come out below 0: it has no part in the solution."""
+    along = np.array([1.0, 1.0]) / np.sqrt(2)
+    across = np.array([1.0, -1.0]) / np.sqrt(2)
+    matrix = 1e8 * np.outer(along, along) - 3.0 * np.outer(across, across)
+    inverse = pseudo_inverse(matrix, 1e-10)
+    assert np.linalg.eigvalsh(inverse).min() > -1e-20
+    assert along @ inverse @ along == pytest.approx(1e-8)

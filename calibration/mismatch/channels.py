@@ -1,0 +1,118 @@
+"""Several predicted channels: each is compared by itself, and all together have the simulation's parameters.
+
+each channel alone ─▶ near each other ─▶ parameters from all ─▶ where these contradict a prior: again ─▶ one comparison
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Protocol
+
+from regolithd.calibration.mismatch.calibration.step import Step
+from regolithd.calibration.mismatch.inference.joint_parameters import joint_posterior, known_better_by_others
+from regolithd.calibration.mismatch.inference.several_channels import (
+    merged_answers,
+    nothing_else_is_wrong,
+    priors_from_others,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from regolithd.calibration.mismatch.inference.joint_parameters import JointPosterior
+    from regolithd.calibration.mismatch.result import Comparison
+    from regolithd.calibration.mismatch.simulation.simulation import Simulation
+
+    Known = Mapping[str, tuple[float, float]]
+
+LINEARISATIONS = 3
+"""Comparisons of a channel with what the others know of hardly known parameters, at most (a choice: one is usual)."""
+
+
+class CompareChannel(Protocol):
+    """The comparison of one channel, with these means and standard deviations of parameters instead of the stated."""
+
+    def __call__(self, channel: str, known: Known, /) -> Comparison:
+        """Return the comparison of a channel."""
+
+
+def compare_channels(simulation: Simulation, of_channel: CompareChannel) -> Comparison:
+    """Return the comparison of all channels, each posed by itself first.
+
+    Where all channels together contradict a stated parameter, they are compared again with it as they have it. If that
+    is not all that is wrong, a channel that pulls a parameter out of its prior is told what the others know of it.
+    """
+    alone, near = _near_each_other(simulation, of_channel)
+    answers = [each.answer for each in alone.values()]
+    if restated := _joint(alone.values(), simulation).restated(simulation.parameters):
+        again = [of_channel(channel, {**near[channel], **restated}) for channel in simulation.channels]
+        if nothing_else_is_wrong(answers, [each.answer for each in again]):
+            return _merged(again, simulation)
+    found = dict(alone)
+    for channel, one in alone.items():
+        others = [other.answer for name, other in alone.items() if name != channel]
+        if known := priors_from_others(one.answer, others):
+            found[channel] = of_channel(channel, {**near[channel], **known})
+    return _merged(list(found.values()), simulation, may_release=False)
+
+
+def labelled(comparison: Comparison, channel: str) -> Comparison:
+    """Return a comparison whose terms say which channel they are of."""
+    evidence = comparison.evidence
+    terms = tuple(replace(term, channel=channel) for term in evidence.contributions)
+    fits = tuple(
+        replace(fit, contributions=tuple(replace(term, channel=channel) for term in fit.contributions))
+        for fit in evidence.empirical
+    )
+    return replace(comparison, evidence=replace(evidence, contributions=terms, empirical=fits))
+
+
+def _near_each_other(
+    simulation: Simulation, of_channel: CompareChannel
+) -> tuple[dict[str, Comparison], dict[str, Known]]:
+    """Return each channel's comparison, and what the others know of the parameters that are hardly known.
+
+    Channels are linearised each by itself. Of a product of two such parameters a channel knows neither, and may have
+    both far from where another channel has one: there its tangents do not tell what all channels know together. It is
+    told what the others know, and compared again, until the tangents of all reach as far as the values of all.
+    """
+    alone = {channel: of_channel(channel, {}) for channel in simulation.channels}
+    near: dict[str, Known] = {channel: {} for channel in alone}
+    for _ in range(LINEARISATIONS):
+        together = _joint(alone.values(), simulation).values(simulation.parameters)
+        for channel in [channel for channel, one in alone.items() if _is_bent_up_to(together, one)]:
+            others = [one for name, one in alone.items() if name != channel and one.answer.verdict != "unexplained"]
+            own, rest = _joint([alone[channel]], simulation), _joint(others, simulation)
+            near[channel] = known_better_by_others(own, rest, simulation.parameters)
+        if not any(near.values()):
+            break
+        alone |= {channel: of_channel(channel, known) for channel, known in near.items() if known}
+    return alone, near
+
+
+def _is_bent_up_to(values: Mapping[str, float], one: Comparison) -> bool:
+    """Return whether the tangents of a channel's comparison do not hold up to these values."""
+    problem = one.evidence.problem
+    return problem is not None and Step(problem, {**problem.values, **values}).is_bent()
+
+
+def _joint(comparisons: Iterable[Comparison], simulation: Simulation, *, may_release: bool = True) -> JointPosterior:
+    """Return the parameters' posterior from all channels."""
+    informations = [each.information for each in comparisons if each.information]
+    return joint_posterior(simulation.parameters, informations, may_release=may_release)
+
+
+def _merged(comparisons: Sequence[Comparison], simulation: Simulation, *, may_release: bool = True) -> Comparison:
+    """Return one comparison of all channels of a simulation: every finding, and the evidence of each channel.
+
+    `may_release`: whether the channels' parameters may leave priors that they contradict.
+    """
+    posterior = _joint(comparisons, simulation, may_release=may_release)
+    answer = merged_answers([each.answer for each in comparisons], posterior.parameters(simulation.parameters))
+    first, *others = (each.evidence for each in comparisons)
+    # As in one channel: the terms of named effects, then those of changes.
+    named = [term for each in comparisons for term in each.evidence.contributions[: len(each.answer.effects)]]
+    changes = [term for each in comparisons for term in each.evidence.contributions[len(each.answer.effects) :]]
+    values = {parameter.name: parameter.value for parameter in answer.parameters}
+    evidence = replace(first, contributions=(*named, *changes), values=values, others=tuple(others))
+    return replace(comparisons[0], answer=answer, evidence=evidence, simulation=simulation, information=None)
