@@ -15,9 +15,9 @@ from regolithd.calibration.mismatch.calibration.linearised import (
     moved_values,
     out_of_bounds,
     put_on_time_by,
+    step_to,
 )
 from regolithd.calibration.mismatch.calibration.starting_values import Start, starting_values
-from regolithd.calibration.mismatch.calibration.step import Step
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, stated_late_inputs, with_changes
 from regolithd.calibration.mismatch.channels import compare_channels, labelled
@@ -54,6 +54,8 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 
+FURTHER_SEARCHES = 3
+"""Searches at most beside the first, each linearised where the one before led (a choice: one is usual, and rare)."""
 LATE_SEARCHES = 2
 """Searches beside a late column, at most (a choice: parameters that move far as the delay is found move once)."""
 
@@ -221,20 +223,22 @@ def _search(
     start: Start,
     progress: Callable[[str], None],
 ) -> _Search:
-    """Search, and once more where what was found moves the parameters far, or where a column is late.
+    """Search, and again where what was found moves the parameters far, or where a column is late.
 
     What a delay changes depends on the prediction, so that the simulation is linearised anew beside it, too: with all
     else late with the channel, and with inputs that are late on time.
     """
     equations = linearised_where_it_fits(pose, start)
-    problem = equations.problem
-    candidates = with_changes(problem, candidates, stated)
+    candidates = with_changes(equations.problem, candidates, stated)
     found = _search_at(equations, candidates, progress)
-    step = Step(problem, moved_values(found.decision.equations, found.decision.whole))
-    if not found.decision.has_delay and (step.is_bent() or step.leads_to_another_law()):
+    del equations  # memory holds the matrix of one search at a time, and TMPDIR its columns
+    for _ in range(FURTHER_SEARCHES):
+        step = step_to(found.decision.equations, found.decision.whole)
+        if found.decision.has_delay or not (step.is_bent() or step.leads_to_another_law()):
+            break
         noise_size = found.decision.equations.problem.noise_size
-        del found, equations  # memory holds the matrix of one search at a time, and TMPDIR its columns
-        found = _search_at(smooth_equations(replace(pose(step.values), noise_size=noise_size)), candidates, progress)
+        del found
+        found = _search_at(smooth_equations(replace(pose(step.damped()), noise_size=noise_size)), candidates, progress)
     return _searched_beside_delays(found, found.decision, pose, progress)
 
 

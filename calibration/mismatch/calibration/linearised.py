@@ -10,11 +10,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from regolithd.calibration.mismatch.calibration.starting_values import Start, starting_values
 from regolithd.calibration.mismatch.calibration.step import Step, power
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.regression.equations import free_parameter_equations, smooth_equations
 from regolithd.calibration.mismatch.regression.nuisance import stated_name
+from regolithd.calibration.mismatch.regression.residuals import contribution
 from regolithd.calibration.mismatch.selection.noise_estimation import fit_of_significant_terms
 
 if TYPE_CHECKING:
@@ -28,6 +31,8 @@ ON_TIME_WITHIN = 0.5
 """Readings by which an input that was put on time may still be late (a choice: what sampling leaves open)."""
 STEPS = 10
 """Linearisations at most (a choice: a smooth simulation needs two or three, one that is stated at 0 a few more)."""
+STEPS_BESIDE = 3
+"""Linearisations beside curves at most (a choice: one is usual)."""
 
 
 def linearised_where_it_fits(
@@ -49,8 +54,19 @@ def linearised_where_it_fits(
             break
         problem = pose(step.damped())
     equations = smooth_equations(problem)
-    step = Step(problem, moved_values(equations, fit_of_significant_terms(equations)))
-    return smooth_equations(pose(step.values)) if step.is_bent() else equations
+    for _ in range(STEPS_BESIDE):
+        step = step_to(equations, fit_of_significant_terms(equations))
+        if not step.is_bent():
+            break
+        equations = smooth_equations(pose(step.damped()))
+    return equations
+
+
+def step_to(equations: NormalEquations, fit: Fit) -> Step:
+    """Return the step of the parameters to a fit, beside what its terms add."""
+    problem = equations.problem
+    added = sum((contribution(equations, fit, term) for term in range(len(fit.terms))), np.zeros(problem.mask.shape))
+    return Step(problem, moved_values(equations, fit), added[problem.mask])
 
 
 def moved_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:

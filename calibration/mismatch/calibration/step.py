@@ -20,9 +20,10 @@ Array = NDArray[np.float64]
 
 HALVINGS = 5
 """Halvings of a step at most (a choice: a thirtieth of the way is left)."""
+GAINED = 0.25
+"""Share of the promised gain from which a step has not gone too far (the usual choice for trust regions)."""
 WORSE = 1.1
-"""Power of the residual, over that before a step, from which the step has gone too far (a choice: firm priors may lead
-back by a little)."""
+"""Power of the residual, over the promised one, up to which a step has not gone too far (a choice)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +34,12 @@ class Step:
     ----------
     problem: where it is linearised
     values: the parameters' at the end of the step
+    beside: what is added to the prediction at the end, shape (compared reading,), or nothing
     """
 
     problem: Problem
     values: Mapping[str, float]
+    beside: Array | float = 0.0
 
     @cached_property
     def run(self) -> Array:
@@ -61,17 +64,18 @@ class Step:
         """Return whether the simulation predicts every reading at the end."""
         return bool(np.isfinite(self.run).all())
 
-    def is_bent(self) -> bool:
-        """Return whether the prediction differs from its tangents by more than the noise lets pass."""
+    @cached_property
+    def along(self) -> Array:
+        """Return what the tangents predict at the end, shape (compared reading,)."""
         problem = self.problem
         shifts = {name: at - problem.values[name] for name, at in self.values.items() if at != problem.values[name]}
-        if not shifts:
-            return False
-        along = problem.filled + sum(shift * problem.tangent(name) for name, shift in shifts.items())
-        apart = self.run - along[problem.mask]
-        return self.is_defined and power(apart) > problem.thresholds.linearisation_share**2 * power(
-            self.measured - self.run
-        )
+        moved = sum((shift * problem.tangent(name) for name, shift in shifts.items()), problem.filled)
+        return np.asarray(moved[problem.mask])
+
+    def is_bent(self) -> bool:
+        """Return whether the prediction differs from its tangents by more than the noise lets pass."""
+        share = self.problem.thresholds.linearisation_share
+        return self.is_defined and power(self.run - self.along) > share**2 * power(self.measured - self.run)
 
     def leads_to_another_law(self) -> bool:
         """Return whether what is a share of the prediction, such as a loss, would have another law at the end.
@@ -81,18 +85,31 @@ class Step:
         share = self.problem.thresholds.form_misfit
         return self.is_defined and power(self.run - self.begin) > share * power(self.run)
 
-    def damped(self) -> Mapping[str, float]:
-        """Return the values at the end, the step halved until the simulation fits the recording no worse than before.
+    def holds(self) -> bool:
+        """Return whether the simulation, with what is added beside it, fits about as its tangents promise.
 
-        Tangents at a value of 0, where a part of the simulation does nothing, may lead anywhere.
+        It has to gain a quarter of what they promise (Moré's rule for a trust region), or to fit as well as they do:
+        firm priors may lead back by a little.
         """
-        step, most = self, WORSE * power(self.measured - self.begin)
+        if not self.is_defined:
+            return False
+        before, left, promised = (
+            power(self.measured - each) for each in (self.begin, self.run + self.beside, self.along + self.beside)
+        )
+        return left <= max(before - GAINED * (before - promised), WORSE * promised)
+
+    def damped(self) -> Mapping[str, float]:
+        """Return the values at the end, the step halved until it holds.
+
+        Tangents at a value of 0, where a part of the simulation does nothing, may lead anywhere, and so may those of
+        parameters that a curve can stand for.
+        """
+        step = self
         for _ in range(HALVINGS):
-            if step.is_defined and power(self.measured - step.run) <= most:
+            if step.holds():
                 break
-            step = replace(
-                step, values={name: (self.problem.values[name] + at) / 2 for name, at in step.values.items()}
-            )
+            halfway = {name: (self.problem.values[name] + at) / 2 for name, at in step.values.items()}
+            step = replace(step, values=halfway, beside=step.beside / 2)
         return step.values
 
 
