@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
 from regolithd.calibration.mismatch.calibration.linearised import (
+    added_by,
     beyond_their_doubt,
     late_otherwise,
     linearised_where_it_fits,
@@ -178,7 +179,9 @@ def decided(
         if not further | out:
             break
         fed, held = fed | further, held | out
-    notes = (*start.notes(), *notes_of_feedback(found.decision.equations.problem))
+    problem = found.decision.equations.problem
+    added = added_by(found.decision.equations, found.decision.whole)
+    notes = (*start.notes(problem, added), *notes_of_feedback(problem))
     return replace(found, decision=replace(found.decision, notes=(*found.decision.notes, *notes)))
 
 

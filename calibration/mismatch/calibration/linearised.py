@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.calibration.starting_values import Start, starting_values
 from regolithd.calibration.mismatch.calibration.step import Step, power
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+Array = NDArray[np.float64]
 
 ON_TIME_WITHIN = 0.5
 """Readings by which an input that was put on time may still be late (a choice: what sampling leaves open)."""
@@ -65,8 +68,13 @@ def linearised_where_it_fits(
 def step_to(equations: NormalEquations, fit: Fit) -> Step:
     """Return the step of the parameters to a fit, beside what its terms add."""
     problem = equations.problem
-    added = sum((contribution(equations, fit, term) for term in range(len(fit.terms))), np.zeros(problem.mask.shape))
-    return Step(problem, moved_values(equations, fit), added[problem.mask])
+    return Step(problem, moved_values(equations, fit), added_by(equations, fit)[problem.mask])
+
+
+def added_by(equations: NormalEquations, fit: Fit) -> Array:
+    """Return what the terms of a fit add to the prediction, shape (time, wheel)."""
+    terms = (contribution(equations, fit, term) for term in range(len(fit.terms)))
+    return sum(terms, np.zeros(equations.problem.mask.shape))
 
 
 def moved_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:

@@ -15,7 +15,7 @@ by Levenberg and Marquardt's method (Marquardt, 1963).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import TYPE_CHECKING
 
@@ -26,7 +26,7 @@ from regolithd.calibration.mismatch.calibration.step import Step
 from regolithd.calibration.mismatch.inference.statements import after_number
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.problem.prior import Prior
     from regolithd.calibration.mismatch.problem.problem import Problem
@@ -69,13 +69,23 @@ class Start:
     values: Mapping[str, float] | None = None
     others: tuple[Mapping[str, float], ...] = ()
 
-    def notes(self) -> tuple[str, ...]:
-        """Return what to tell of other values that fit as well."""
-        priors = self.problem.simulation.parameters
+    def notes(self, problem: Problem, added: Array) -> tuple[str, ...]:
+        """Return what to tell of other values that fit as well, beside what was found.
+
+        `problem` is linearised where that was, and `added` is what it adds to the prediction, shape (time, wheel).
+        """
+        if not self.others:
+            return ()
+        search = _Search.of(replace(problem, measured=problem.measured - added))
+        with np.errstate(all="ignore"):
+            found = [search.minimum(search.place(values)) for values in (problem.values, *self.others)]
+            (least, _), *_ = found
+            kept = [place for objective, place in search.apart(found)[1:] if abs(objective - least) < AS_WELL]
+        priors = problem.simulation.parameters
         return tuple(
-            f"Other values of the parameters fit the recording as well: {_listed(each, priors)}. A narrower prior of "
-            f"one of them tells which are meant."
-            for each in self.others
+            f"Other values of the parameters fit the recording as well: {_listed(search.values(place), priors)}. A "
+            f"narrower prior of one of them tells which are meant."
+            for place in kept
         )
 
 
@@ -95,12 +105,8 @@ def starting_values(problem: Problem) -> Start:
         ranked = sorted(places, key=lambda place: search.objective(search.left(place), place))
         begun = (np.zeros(len(search.names)), *ranked[:SEARCHES])
         found = sorted((search.minimum(place) for place in begun), key=lambda one: one[0])
-        least, best = found[0]
-        told: list[Array] = [best]
-        for objective, place in found[1:]:
-            if objective - least < AS_WELL and all(search.are_two(place, each, objective) for each in told):
-                told.append(place)
-    return Start(problem, search.values(best), tuple(search.values(place) for place in told[1:]))
+        best, *others = [place for objective, place in search.apart(found) if objective - found[0][0] < AS_WELL]
+    return Start(problem, search.values(best), tuple(search.values(place) for place in others))
 
 
 def _listed(values: Mapping[str, float], priors: Mapping[str, Prior]) -> str:
@@ -189,6 +195,19 @@ class _Search:
             if before - best < CONVERGED:
                 break
         return best, place
+
+    def place(self, values: Mapping[str, float]) -> Array:
+        """Return the place of the parameters' values."""
+        priors = self.problem.simulation.parameters
+        return np.array([(values[name] - priors[name].value) / priors[name].std for name in self.names])
+
+    def apart(self, found: Sequence[tuple[float, Array]]) -> list[tuple[float, Array]]:
+        """Return those of the minima, objective and place each, that are not the same as one before."""
+        kept: list[tuple[float, Array]] = []
+        for objective, place in found:
+            if all(self.are_two(place, other, max(objective, least)) for least, other in kept):
+                kept.append((objective, place))
+        return kept
 
     def are_two(self, one: Array, other: Array, objective: float) -> bool:
         """Return whether two places of about this objective are two minima: half way between them the fit is worse."""

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from regolithd.calibration.mismatch.problem.problem import Problem
+
     Array = NDArray[np.float64]
 
 
@@ -72,15 +74,29 @@ class Pipe(Simulation):
         return np.sqrt(np.maximum(values["head_m"] * inputs["speed_1_s"] ** 2 - 1.0, 0.0) / 0.006)
 
 
-def test_a_step_that_leads_too_far_is_halved() -> None:
-    """Below 0 nothing flows and every tangent is 0: from a head of 4, half of the way there fits better than it."""
+def pipe_problem() -> Problem:
+    """Return the problem of a pipe whose head is 2.5 m and stated as 4 m."""
     speed = 1.5 + 0.3 * np.sin(np.arange(600.0) / 20)
     measured = Pipe().predict({"speed_1_s": speed[:, None]}, {"head_m": 2.5})
-    problem = build_problem(
-        from_columns({"t_s": np.arange(600.0), "speed_1_s": speed, "flow_m3_h": measured[:, 0]}), Pipe()
-    )
-    assert Step(problem, {"head_m": -1.0}).damped() == {"head_m": 1.5}
-    assert Step(problem, {"head_m": 1.5}).damped() == {"head_m": 1.5}
+    columns = {"t_s": np.arange(600.0), "speed_1_s": speed, "flow_m3_h": measured[:, 0]}
+    return build_problem(from_columns(columns), Pipe())
+
+
+def test_a_step_that_leads_too_far_is_halved() -> None:
+    """Below 0 nothing flows and every tangent is 0; a quarter of the way there from 4 fits as the tangents promise."""
+    problem = pipe_problem()
+    assert not Step(problem, {"head_m": -1.0}).holds()
+    assert Step(problem, {"head_m": -1.0}).damped() == {"head_m": 2.75}
+    assert Step(problem, {"head_m": 2.5}).damped() == {"head_m": 2.5}
+
+
+def test_a_step_is_judged_with_what_is_added_beside_it() -> None:
+    """A curve that was to stand for the difference is halved with the parameter that it moved."""
+    problem = pipe_problem()
+    missing = (problem.measured - problem.changed(head_m=3.0))[problem.mask]
+    assert not Step(problem, {"head_m": 3.0}, -missing).holds()
+    assert Step(problem, {"head_m": 3.0}, missing).damped() == {"head_m": 3.0}
+    assert Step(problem, {"head_m": 3.0}, -8 * missing).damped()["head_m"] > 3.4
 
 
 def test_what_is_called_calibrated_has_been_run() -> None:
