@@ -17,6 +17,7 @@ from regolithd.calibration.mismatch.calibration.linearised import (
     out_of_bounds,
     put_on_time_by,
     step_to,
+    worse_than_stated,
 )
 from regolithd.calibration.mismatch.calibration.starting_values import Start, starting_values
 from regolithd.calibration.mismatch.candidates.library import library
@@ -179,10 +180,15 @@ def decided(
         if not further | out:
             break
         fed, held = fed | further, held | out
-    problem = found.decision.equations.problem
-    added = added_by(found.decision.equations, found.decision.whole)
-    notes = (*start.notes(problem, added), *notes_of_feedback(problem))
+    notes = (*_notes_on_values(found.decision, start), *notes_of_feedback(found.decision.equations.problem))
     return replace(found, decision=replace(found.decision, notes=(*found.decision.notes, *notes)))
+
+
+def _notes_on_values(decision: Decision, start: Start) -> tuple[str, ...]:
+    """Return notes on values of the parameters: others that fit as well, and such that fit only beside a curve."""
+    equations, whole = decision.equations, decision.whole
+    others = start.notes(equations.problem, added_by(equations, whole))
+    return (*others, *(worse_than_stated(equations, whole, start.problem) if decision.unnamed else ()))
 
 
 def _decided(

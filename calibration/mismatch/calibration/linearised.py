@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.calibration.starting_values import Start, starting_values
 from regolithd.calibration.mismatch.calibration.step import Step, power
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
+from regolithd.calibration.mismatch.inference.statements import after_number
 from regolithd.calibration.mismatch.regression.equations import free_parameter_equations, smooth_equations
 from regolithd.calibration.mismatch.regression.nuisance import stated_name
 from regolithd.calibration.mismatch.regression.residuals import contribution
@@ -69,6 +70,22 @@ def step_to(equations: NormalEquations, fit: Fit) -> Step:
     """Return the step of the parameters to a fit, beside what its terms add."""
     problem = equations.problem
     return Step(problem, moved_values(equations, fit), added_by(equations, fit)[problem.mask])
+
+
+def worse_than_stated(equations: NormalEquations, fit: Fit, stated: Problem) -> tuple[str, ...]:
+    """Return a note where the simulation alone fits worse with the parameters of a fit than with the stated ones.
+
+    Beside a curve parameters go where what the curve leaves is smallest, and nothing holds the sum of both.
+    """
+    step, as_stated = Step(equations.problem, moved_values(equations, fit)), stated.measured - stated.filled
+    now, before = power(step.measured - step.run), power(as_stated[stated.mask])
+    if not now > before:
+        return ()
+    rms = (f"{np.sqrt(each):.3g}{after_number(stated.simulation.unit)}" for each in (now, before))
+    return (
+        "Beside what stays unexplained the parameters are such that the simulation alone is further from the recording "
+        "(root mean square {} instead of {} as stated): do not use it with these values.".format(*rms),
+    )
 
 
 def added_by(equations: NormalEquations, fit: Fit) -> Array:

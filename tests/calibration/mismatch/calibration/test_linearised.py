@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
+from regolithd.calibration.mismatch.calibration.linearised import worse_than_stated
 from regolithd.calibration.mismatch.calibration.step import Step
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.regression.equations import free_parameter_equations
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -99,6 +102,17 @@ def test_a_step_is_judged_with_what_is_added_beside_it() -> None:
     curve = far.measured - far.along
     assert not Step(problem, {"head_m": -1.0}, curve).holds()
     assert 1.0 < Step(problem, {"head_m": -1.0}, curve).damped()["head_m"] < 4.0
+
+
+def test_values_that_fit_worse_than_the_stated_ones_are_told() -> None:
+    """One linearisation from 9 m goes to where the simulation is further from the recording than at 2.5 m."""
+    right = pipe_problem()
+    near = replace(right, values={"head_m": 2.5}, prediction=right.changed(head_m=2.5))
+    far = replace(right, values={"head_m": 9.0}, prediction=right.changed(head_m=9.0), made={})
+    equations = free_parameter_equations(far)
+    (note,) = worse_than_stated(equations, equations.fit(()), near)
+    assert "instead of 0 m3/h as stated): do not use it" in note
+    assert worse_than_stated(equations, equations.fit(()), far) == ()
 
 
 def test_what_is_called_calibrated_has_been_run() -> None:
