@@ -80,13 +80,15 @@ def _near_each_other(
     near: dict[str, Known] = {channel: {} for channel in alone}
     for _ in range(LINEARISATIONS):
         together = _joint(alone.values(), simulation).values(simulation.parameters)
-        for channel in [channel for channel, one in alone.items() if _is_bent_up_to(together, one)]:
+        far = [channel for channel, one in alone.items() if _is_bent_up_to(together, one)]
+        for channel in far:
             others = [one for name, one in alone.items() if name != channel and one.answer.verdict != "unexplained"]
             own, rest = _joint([alone[channel]], simulation), _joint(others, simulation)
             near[channel] = known_better_by_others(own, rest, simulation.parameters)
-        if not any(near.values()):
+        again = {channel: of_channel(channel, near[channel]) for channel in far if near[channel]}
+        if not again:
             break
-        alone |= {channel: of_channel(channel, known) for channel, known in near.items() if known}
+        alone |= again
     return alone, near
 
 

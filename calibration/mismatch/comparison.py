@@ -57,7 +57,8 @@ if TYPE_CHECKING:
 
 
 FURTHER_SEARCHES = 3
-"""Searches at most beside the first, each linearised where the one before led (a choice: one is usual, and rare)."""
+"""Searches at most beside the first, each linearised where the one before led (a choice: most comparisons need
+none)."""
 LATE_SEARCHES = 2
 """Searches beside a late column, at most (a choice: parameters that move far as the delay is found move once)."""
 
@@ -187,7 +188,7 @@ def decided(
 def _notes_on_values(decision: Decision, start: Start) -> tuple[str, ...]:
     """Return notes on values of the parameters: others that fit as well, and such that fit only beside a curve."""
     equations, whole = decision.equations, decision.whole
-    others = start.notes(equations.problem, added_by(equations, whole))
+    others = start.notes(equations.problem, added_by(equations, whole)) if start.others else ()
     return (*others, *(worse_than_stated(equations, whole, start.problem) if decision.unnamed else ()))
 
 

@@ -2,7 +2,7 @@
 
 A parameter that is stated as 0 ± 2 has no value yet. There a product has no tangent, an exponential or a saturation has
 a misleading one, and the residual is nearly all misfit, so that the noise seems large. So the sum of squares of the
-simulation itself is searched from several places of the prior, with the noise that is left at each.
+simulation itself is searched from several places of the prior (multi-start), with the noise that is left at each.
 
 The objective is −2 log of the posterior density with the unknown variance of each wheel's noise at its maximum
 (concentrated likelihood):
@@ -74,8 +74,6 @@ class Start:
 
         `problem` is linearised where that was, and `added` is what it adds to the prediction, shape (time, wheel).
         """
-        if not self.others:
-            return ()
         search = _Search.of(replace(problem, measured=problem.measured - added))
         with np.errstate(all="ignore"):
             found = [search.minimum(search.place(values)) for values in (problem.values, *self.others)]
@@ -132,9 +130,14 @@ class _Search:
         return cls(problem, names, wheel)
 
     @property
+    def priors(self) -> list[Prior]:
+        """The priors of the free parameters."""
+        return [self.problem.simulation.parameters[name] for name in self.names]
+
+    @property
     def is_wide(self) -> bool:
         """Whether a parameter is hardly known."""
-        return any(self.problem.simulation.parameters[name].is_hardly_known for name in self.names)
+        return any(prior.is_hardly_known for prior in self.priors)
 
     def draws(self) -> list[Array]:
         """Return places that fill the prior evenly (Sobol, 1967), always the same ones."""
@@ -148,15 +151,13 @@ class _Search:
     def within(self, place: Array) -> Array:
         """Return a place as far as the parameters may be moved."""
         limit = self.problem.thresholds.furthest_linearisation_stds
-        priors = [self.problem.simulation.parameters[name] for name in self.names]
-        moved = [prior.near(prior.value + prior.std * at, limit) for prior, at in zip(priors, place, strict=True)]
-        return np.array([(value - prior.value) / prior.std for prior, value in zip(priors, moved, strict=True)])
+        values, named = self.values(place), zip(self.names, self.priors, strict=True)
+        return self.place({name: prior.near(values[name], limit) for name, prior in named})
 
     def values(self, place: Array) -> dict[str, float]:
         """Return the parameters' values at a place."""
-        priors = self.problem.simulation.parameters
-        at = zip(self.names, place.tolist(), strict=True)
-        return {**self.problem.values, **{name: priors[name].value + priors[name].std * stds for name, stds in at}}
+        at = zip(self.names, self.priors, place.tolist(), strict=True)
+        return {**self.problem.values, **{name: prior.value + prior.std * stds for name, prior, stds in at}}
 
     def left(self, place: Array) -> Array:
         """Return what the simulation leaves of the readings there, shape (reading,); NaN where it cannot be run."""
@@ -198,8 +199,8 @@ class _Search:
 
     def place(self, values: Mapping[str, float]) -> Array:
         """Return the place of the parameters' values."""
-        priors = self.problem.simulation.parameters
-        return np.array([(values[name] - priors[name].value) / priors[name].std for name in self.names])
+        named = zip(self.names, self.priors, strict=True)
+        return np.array([(values[name] - prior.value) / prior.std for name, prior in named])
 
     def apart(self, found: Sequence[tuple[float, Array]]) -> list[tuple[float, Array]]:
         """Return those of the minima, objective and place each, that are not the same as one before."""

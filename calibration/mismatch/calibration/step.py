@@ -41,9 +41,17 @@ class Step:
     values: Mapping[str, float]
     beside: Array | float = 0.0
 
+    @property
+    def shifts(self) -> dict[str, float]:
+        """Return by how much each parameter that moves does."""
+        before = self.problem.values
+        return {name: at - before[name] for name, at in self.values.items() if at != before[name]}
+
     @cached_property
     def run(self) -> Array:
         """Return the prediction at the end, shape (compared reading,); NaN where the simulation refuses the values."""
+        if not self.shifts:
+            return self.begin
         try:
             return self.problem.changed(**self.values)[self.problem.mask]
         except SimulationError:
@@ -68,8 +76,7 @@ class Step:
     def along(self) -> Array:
         """Return what the tangents predict at the end, shape (compared reading,)."""
         problem = self.problem
-        shifts = {name: at - problem.values[name] for name, at in self.values.items() if at != problem.values[name]}
-        moved = sum((shift * problem.tangent(name) for name, shift in shifts.items()), problem.filled)
+        moved = sum((shift * problem.tangent(name) for name, shift in self.shifts.items()), problem.filled)
         return np.asarray(moved[problem.mask])
 
     def is_bent(self) -> bool:

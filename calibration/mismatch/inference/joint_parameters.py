@@ -95,10 +95,8 @@ class JointPosterior:
 
     def restated(self, priors: Mapping[str, Prior]) -> dict[str, tuple[float, float]]:
         """Return mean and standard deviation of the released parameters, had they been stated where they are."""
-        shifts = dict(zip(self.names, self.shifts.tolist(), strict=True))
-        return {
-            name: (priors[name].value + shifts[name] * priors[name].std, priors[name].std) for name in self.released
-        }
+        values = self.values(priors)
+        return {name: (values[name], priors[name].std) for name in self.released}
 
     def values(self, priors: Mapping[str, Prior]) -> dict[str, float]:
         """Return the values of the free parameters."""

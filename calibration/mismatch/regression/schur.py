@@ -27,8 +27,9 @@ def pseudo_inverse(matrix: Array, singular: float) -> Array:
     size = np.sqrt(np.diag(matrix))
     size = np.where(size > 0, size, 1.0)
     values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
-    kept = vectors[:, values > singular * values.max(initial=0.0)] / size[:, None]
-    return np.asarray(kept / values[values > singular * values.max(initial=0.0)] @ kept.T, np.float64)
+    determined = values > singular * values.max(initial=0.0)
+    kept = vectors[:, determined] / size[:, None]
+    return np.asarray(kept / values[determined] @ kept.T, np.float64)
 
 
 def explained_part(cross: Array, inverse: Array) -> Array:
