@@ -21,10 +21,11 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import regolithd
+from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.data.stretches import LONGEST_AT_ONCE
 from regolithd.calibration.mismatch.report.axes import Panel, axes, box, line, svg, text
 from regolithd.calibration.validation.blind_trials.errors import ProofError
-from regolithd.calibration.validation.blind_trials.figures.limited_libraries import SIMULATIONS
+from regolithd.calibration.validation.blind_trials.figures.limited_libraries import LIMITED
 from regolithd.calibration.validation.blind_trials.recordings.files import (
     COLUMNS,
     recording_columns,
@@ -34,7 +35,8 @@ from regolithd.calibration.validation.blind_trials.recordings.files import (
 from regolithd.calibration.validation.blind_trials.recordings.generator import Plan, make_trial
 
 DURATIONS_S = (300.0, 600.0, 1200.0, 1800.0, 3600.0)
-COUNTS = (2, 4, 8, 16)
+ALL = len(library())
+"""Candidates of the whole library."""
 FULL = 1800.0
 ROWS_PER_S = 30.0
 """Rows of a generated recording in a second: six wheels at 5 Hz."""
@@ -92,14 +94,16 @@ def costs(scratch: Path, most_rows: int = MOST_ROWS) -> list[Cost]:
     """Return the costs: each length with all candidates, one of them with fewer, and the longest on fewer cores."""
     durations = [duration for duration in DURATIONS_S if duration * ROWS_PER_S <= most_rows]
     found = []
-    for duration_s, counts in [(d, COUNTS if d == FULL else COUNTS[-1:]) for d in durations]:
+    for duration_s in durations:
         trial = make_trial(Plan(1, 3, "single", ("viscous-friction",)), duration_s=duration_s)
         write_trial(trial, scratch)
-        for count in counts:
-            model = f"{SIMULATIONS[count].__module__}:{SIMULATIONS[count].__name__}"
+        for count, limited in LIMITED.items() if duration_s == FULL else ():
+            model = f"{limited.__module__}:{limited.__name__}"
             tables = {**trial.tables, "simulation": {**trial.tables["simulation"], "model": model}}
             (scratch / "SIM.toml").write_text(toml_text(tables))
             found.append(measure(scratch, "recording.csv.gz", trial.load_N.size, count))
+        (scratch / "SIM.toml").write_text(toml_text(trial.tables))
+        found.append(measure(scratch, "recording.csv.gz", trial.load_N.size, ALL))
     return [*found, *_of_long_recordings(scratch, most_rows)]
 
 
@@ -110,7 +114,7 @@ def _of_long_recordings(scratch: Path, most_rows: int) -> list[Cost]:
     for rows in sorted({min(MOST_ROWS, most_rows), most_rows} if most_rows > LONGEST_AT_ONCE else ()):
         written = written_apart(rows, scratch)
         on = [most] if found else range(1, most + 1)
-        found += [measure(scratch, "recording.parquet", written, COUNTS[-1], workers) for workers in on]
+        found += [measure(scratch, "recording.parquet", written, ALL, workers) for workers in on]
     return found
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class LimitedLibrary(RoverWheel):
     """The rover's simulation with the first `count` candidates of the library."""
 
-    count: ClassVar[int] = 16
+    count: ClassVar[int]
 
     def candidates(self, library: Sequence[Candidate]) -> Sequence[Candidate]:
         """Return the first `count`."""
@@ -43,9 +43,5 @@ class EightCandidates(LimitedLibrary):
     count = 8
 
 
-class SixteenCandidates(LimitedLibrary):
-    """All sixteen."""
-
-
-SIMULATIONS = {2: TwoCandidates, 4: FourCandidates, 8: EightCandidates, 16: SixteenCandidates}
+LIMITED = {2: TwoCandidates, 4: FourCandidates, 8: EightCandidates}
 """By the number of candidates."""
