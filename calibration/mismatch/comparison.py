@@ -30,7 +30,7 @@ from regolithd.calibration.mismatch.inference.evidence import empirical_fits, ev
 from regolithd.calibration.mismatch.inference.feedback import fed_back, notes_of_feedback
 from regolithd.calibration.mismatch.inference.findings import Findings, answer_of, findings_of
 from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, earned
-from regolithd.calibration.mismatch.inference.improbable import without_improbable_curves
+from regolithd.calibration.mismatch.inference.improbable import in_probable_regions
 from regolithd.calibration.mismatch.inference.joint_parameters import information_of
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
@@ -38,7 +38,6 @@ from regolithd.calibration.mismatch.regression.equations import smooth_equations
 from regolithd.calibration.mismatch.regression.reliability import noise_size_of
 from regolithd.calibration.mismatch.result import Comparison
 from regolithd.calibration.mismatch.selection.decision import decide
-from regolithd.calibration.mismatch.selection.regions import in_regions
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
@@ -206,8 +205,7 @@ def _decided(
     if decision.has_delay and not search.decision.has_delay:  # which was refused before held-out readings asked
         search = _searched_beside_delays(search, decision, pose, progress)
         decision, held_out = earned(search.decision, search.grid)
-    decision = without_improbable_curves(in_regions(decision))
-    return Decided(decision, held_out, search.candidates, search.applicable)
+    return Decided(in_probable_regions(decision), held_out, search.candidates, search.applicable)
 
 
 class _Pose(Protocol):

@@ -1,7 +1,7 @@
 """Answers that others outweigh: a "consistent" beside much evidence for something, and a curve with little.
 
 The tests of names are conditions, and an effect may fail one of them narrowly while the evidence for it is large: what
-is more probably there than not is said to be unexplained. And regions in the place of a curve, which are chosen among
+is more probably there than not is said to be unexplained. And a curve, or regions in its place, which are chosen among
 many, may be less probable than nothing.
 """
 
@@ -15,6 +15,7 @@ from regolithd.calibration.mismatch.inference.intermittent import unexplained_if
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, probability, probability_of_others
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.decision import names_of
+from regolithd.calibration.mismatch.selection.regions import in_regions
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.inference.alternatives import Alternative
@@ -58,6 +59,16 @@ def _most_probable_with_a_curve(decision: Decision) -> Decision:
         return decision
     whole = decision.equations.fit((*names, *curves))
     return replace(decision, named=decision.equations.fit(names), unnamed=curves, whole=whole)
+
+
+def in_probable_regions(decision: Decision) -> Decision:
+    """Return the decision with regions in the place of its curve, where they describe it better and are no chance.
+
+    Regions are chosen among many more than the curve is: where nothing is more probable than they are, the curve may
+    still be more probable than nothing.
+    """
+    regional = in_regions(decision)
+    return regional if without_improbable_curves(regional) is regional else without_improbable_curves(decision)
 
 
 def without_improbable_curves(decision: Decision) -> Decision:

@@ -10,7 +10,11 @@ from linear_machine import AXES, CANDIDATES, INSTANTS, equations_of, problem_of,
 
 from regolithd.calibration.mismatch.inference import improbable
 from regolithd.calibration.mismatch.inference.alternatives import Alternative, alternatives
-from regolithd.calibration.mismatch.inference.improbable import unexplained_if_improbable, without_improbable_curves
+from regolithd.calibration.mismatch.inference.improbable import (
+    in_probable_regions,
+    unexplained_if_improbable,
+    without_improbable_curves,
+)
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.decision import Decision, decide
@@ -92,6 +96,21 @@ def test_a_curve_that_is_less_probable_than_nothing_is_none(monkeypatch: pytest.
     assert not found.unnamed
     assert not found.whole.terms
     assert all(other.effects != ("unexplained",) for other in alternatives(found))
+
+
+def test_a_curve_stays_where_regions_in_its_place_are_improbable(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is more probable than nothing is not lost with the regions that describe it better."""
+    decision, nothing = with_curve(decided(0.3)), without_names(decided(0.3))
+    regional = replace(decision)
+    monkeypatch.setattr(improbable, "in_regions", lambda _: regional)
+    assert in_probable_regions(decision) is regional
+    improbable_ones = {id(regional)}
+    monkeypatch.setattr(
+        improbable, "without_improbable_curves", lambda each: nothing if id(each) in improbable_ones else each
+    )
+    assert in_probable_regions(decision) is decision
+    improbable_ones.add(id(decision))
+    assert in_probable_regions(decision) is nothing
 
 
 def test_spells_that_an_improbable_curve_stood_for_are_unexplained(monkeypatch: pytest.MonkeyPatch) -> None:
