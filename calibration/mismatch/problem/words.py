@@ -32,6 +32,8 @@ COVARIATES = {
 SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 SPELLINGS = {"degC": "°C", "degF": "°F", "Nm": "N·m", "percent": "%"}
 """Units whose spelling in a column's name is not the usual one."""
+TEMPERATURES = frozenset({"°C", "°F", "K"})
+"""Units of a column whose name need not say what it is: `gearbox_degC` is the gearbox's temperature."""
 DIVISORS = frozenset({"s", "s2", "min", "h"})
 """Unit words that divide what stands before them: `m_s` is m/s."""
 ANGULAR_SPEED = "rad/s"
@@ -78,7 +80,7 @@ def _same(values: Array, read: Array) -> bool:
 
 
 def label_of_column(column: str) -> str:
-    """Return a column's name as people write it: `carriage_speed_m_s` is "carriage speed (m/s)"."""
+    """Return a column's name as people write it: "carriage speed (m/s)" for `carriage_speed_m_s`."""
     name = quantity(column)
     parts = column[len(name) + 1 :].split("_") if name != column else []
     unit = ""
@@ -86,7 +88,10 @@ def label_of_column(column: str) -> str:
         base, power = part.rstrip("0123456789"), part[len(part.rstrip("0123456789")) :]
         joined = "/" if part in DIVISORS else "·"
         unit += (joined if unit else "") + SPELLINGS.get(base, base) + power.translate(SUPERSCRIPTS)
-    return name.replace("_", " ") + (f" ({unit})" if unit else "")
+    words = name.replace("_", " ")
+    if unit in TEMPERATURES and "temp" not in words.lower():
+        words += " temperature"
+    return words + (f" ({unit})" if unit else "")
 
 
 def unit_in_label(covariate: str, labels: Mapping[str, str]) -> str:

@@ -21,6 +21,8 @@ from regolithd.calibration.mismatch.problem.words import (
         ("carriage_speed_m_s", "carriage speed (m/s)"),
         ("motor_acceleration_rad_s2", "motor acceleration (rad/s²)"),
         ("oil_temperature_degC", "oil temperature (°C)"),
+        ("gearbox_degC", "gearbox temperature (°C)"),
+        ("brake_temp_K", "brake temp (K)"),
         ("shaft_rpm", "shaft (rpm)"),
         ("inflow_m3_s", "inflow (m³/s)"),
         ("pull_N", "pull (N)"),
