@@ -91,7 +91,7 @@ def opened_door(rng: Generator, world: World) -> Effect:
 def hot_wire(_: Generator, world: World) -> Effect:
     """Let the heater wire's resistance grow as it glows: the current sags at high voltage."""
     volts = world.drive.columns[VOLTAGE]
-    return effects.unnamed("glowing-wire", CURRENT, "voltage", -(np.clip(volts - 60, 0, None) ** 2), world)
+    return effects.unnamed("glowing-wire", CURRENT, VOLTAGE, -(np.clip(volts - 60, 0, None) ** 2), world)
 
 
 OVEN = Machine(
