@@ -23,6 +23,7 @@ from regolithd.calibration.mismatch.inference.identifiability import indistingui
 from regolithd.calibration.mismatch.inference.intervals import drawn_from, law_stds_of, parameters_of
 from regolithd.calibration.mismatch.inference.located import share_of_residual, spell_of
 from regolithd.calibration.mismatch.inference.not_looked_for import not_looked_for
+from regolithd.calibration.mismatch.inference.other_covariates import notes_on_other_covariates
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
 from regolithd.calibration.mismatch.inference.ranges import range_of
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
@@ -77,6 +78,7 @@ def findings_of(
             *notes_on_priors(parameters, unexplained=rest, thresholds=limits),
             *problem.recording.notes,
             *decision.notes,
+            *notes_on_other_covariates(decision),
             *_about_the_mask(problem),
             *not_looked_for(problem, candidates, {candidate.name for candidate in applicable}),
         ),

@@ -1,0 +1,63 @@
+"""Other covariates that what stays unexplained follows as well: on which of them it depends the recording cannot tell.
+
+The rotor speed of a fan and its predicted torque go together, as the level of a tank goes with the voltage of its pump.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from regolithd.calibration.mismatch.problem.words import word_for
+from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
+from regolithd.calibration.mismatch.regression.smooth_groups import same_course
+from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.regression.group import Term
+    from regolithd.calibration.mismatch.selection.decision import Decision
+
+
+def notes_on_other_covariates(decision: Decision) -> tuple[str, ...]:
+    """Return a note where curves over other covariates, on the same wheels, explain nearly as much.
+
+    As much but for the share that an inexact law may leave (`form_misfit`): knots lie otherwise over another covariate.
+    A curve over time has knots enough to follow what changes seldom, and is no other cause. Where several things stay
+    unexplained, each has been told beside the others; what comes and goes has no covariate.
+    """
+    if len({term.name for term in decision.unnamed}) != 1 or decision.intermittent:
+        return ()
+    told, problem = decision.unnamed[0], decision.equations.problem
+    scores = _scores_over(decision, told)
+    least = (1 - decision.equations.thresholds.form_misfit) * scores.get(told.name, float("inf"))
+    others = [
+        name
+        for name, score in scores.items()
+        if score >= least and name != "time" and not _is_the_same(problem, name, told)
+    ]
+    if not others:
+        return ()
+    here = word_for(told.name, problem.labels)
+    there = " and the ".join(word_for(name, problem.labels) for name in others)
+    note = f"What is unexplained over the {here} follows the {there} nearly as well: they go together in this recording"
+    return (f"{note}. One has to vary without the other to tell which it depends on.",)
+
+
+def _scores_over(decision: Decision, told: Term) -> dict[str, float]:
+    """Return the best score of a curve over each covariate, on the wheels of the one that is told, best first."""
+    scores: dict[str, float] = {}
+    for score, term in best_of_each_smooth_term(decision.equations, decision.named.terms):
+        if term.wheels == told.wheels and term.group.coupling not in WITHOUT_CURVE:
+            scores.setdefault(term.name, score)
+    return scores
+
+
+def _is_the_same(problem: Problem, covariate: str, told: Term) -> bool:
+    """Return whether a covariate is that of a curve, by its name or by its course, as an angle is a position."""
+    if covariate == told.name:
+        return True
+    if covariate not in problem.covariates or told.name not in problem.covariates:
+        return False
+    wheels = list(told.wheels)
+    one, other = (problem.covariates[name][:, wheels] for name in (covariate, told.name))
+    return same_course(one, other, problem.mask[:, wheels])

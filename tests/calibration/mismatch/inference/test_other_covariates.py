@@ -1,0 +1,54 @@
+"""Which covariate something unexplained depends on, where two of them go together."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch import Prior, Simulation, compare, from_columns
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+INSTANTS = 1500
+
+
+class Pump(Simulation):
+    """A pump whose power follows its flow; the pressure behind it is recorded too."""
+
+    channel, unit = "power_W", "W"
+    inputs = ("flow_l_s", "pressure_kPa")
+    parameters: ClassVar = {"power_of_flow": Prior(20.0, 1.0, "W s/l")}
+
+    def predict(self, inputs: Mapping[str, NDArray[np.float64]], values: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return power in proportion to flow."""
+        return values["power_of_flow"] * inputs["flow_l_s"]
+
+    def covariates(self, inputs: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+        """Return flow and pressure."""
+        return {"flow": inputs["flow_l_s"], "pressure": inputs["pressure_kPa"]}
+
+
+def notes(throttled: float) -> tuple[str, ...]:
+    """Compare with a pump of which more power is taken at one flow; a valve behind it moves by so much."""
+    rng = np.random.default_rng(3)
+    t_s = np.arange(INSTANTS) * 0.5
+    flow = 3.0 + 2.0 * np.sin(t_s / 17) * np.cos(t_s / 41)
+    pressure = 4.0 * flow**2 * (1.0 + throttled * np.sin(t_s / 23)) + rng.normal(0, 0.05, INSTANTS)
+    power = 20.0 * flow + 8.0 * np.exp(-(((flow - 3.5) / 0.5) ** 2)) + rng.normal(0, 1.5, INSTANTS)
+    found = compare(from_columns({"t_s": t_s, "flow_l_s": flow, "pressure_kPa": pressure, "power_W": power}), Pump())
+    assert found.answer.verdict == "unexplained"
+    assert {each.covariate for each in found.answer.unexplained} <= {"flow", "pressure"}
+    return tuple(note for note in found.answer.notes if "go together" in note)
+
+
+@pytest.mark.parametrize(("throttled", "told"), [(0.0, 1), (0.6, 0)])
+def test_covariates_that_go_together_are_both_told(throttled: float, told: int) -> None:
+    """With the valve fixed the pressure follows the flow; with a moving one the flow alone explains the power."""
+    found = notes(throttled)
+    assert len(found) == told
+    assert all("flow" in note and "pressure" in note for note in found)
