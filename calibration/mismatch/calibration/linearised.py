@@ -38,6 +38,9 @@ STEPS = 10
 STEPS_BESIDE = 3
 """Linearisations beside curves at most (a choice: one is usual)."""
 
+WORSE_BY = 0.01
+"""Share by which the error of the simulation alone has to be larger than as stated, to be told (a choice)."""
+
 
 def linearised_where_it_fits(
     pose: Callable[[Mapping[str, float] | None], Problem], start: Start | None = None
@@ -78,10 +81,10 @@ def worse_than_stated(equations: NormalEquations, fit: Fit, stated: Problem) -> 
     Beside a curve parameters go where what the curve leaves is smallest, and nothing holds the sum of both.
     """
     step, as_stated = Step(equations.problem, moved_values(equations, fit)), stated.measured - stated.filled
-    now, before = power(step.measured - step.run), power(as_stated[stated.mask])
-    if not now > before:
+    now, before = (np.sqrt(power(left)) for left in (step.measured - step.run, as_stated[stated.mask]))
+    if not now > (1 + WORSE_BY) * before:
         return ()
-    rms = (f"{np.sqrt(each):.3g}{after_number(stated.simulation.unit)}" for each in (now, before))
+    rms = (f"{each:.3g}{after_number(stated.simulation.unit)}" for each in (now, before))
     return (
         "Beside what stays unexplained the parameters are such that the simulation alone is further from the recording "
         "(root mean square {} instead of {} as stated): do not use it with these values.".format(*rms),

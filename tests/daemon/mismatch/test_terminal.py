@@ -112,7 +112,10 @@ def test_of_several_channels_each_finding_and_each_error_names_its_own() -> None
             SimpleNamespace(name="sensor-delay", channel="current", statement="A delay of pressure.", parameters={})
         ],
         changes=[GROWN],
-        unexplained=[Unexplained("pressure", (1,), "flow", 0.0, 9.0, 0.4)],
+        unexplained=[
+            Unexplained("pressure", (1,), "flow", 0.0, 9.0, 0.4),
+            Unexplained("pressure", (1,), "speed", 0.0, 9.0, 0.0049),
+        ],
         fit=fits[1],
         fits=fits,
     )
@@ -123,6 +126,7 @@ def test_of_several_channels_each_finding_and_each_error_names_its_own() -> None
         "  sensor-delay in current: A delay of pressure.",
         "  changed in current: viscous-friction is larger than the corrected simulation has it.",
         "  unexplained in pressure: 40 % of the residual follows the flow, 0 to 9 s",
+        "  unexplained in pressure: less than 1 % of the residual follows the speed, 0 to 9 s",
         "  probability of this answer: not known: what is unexplained was not decided by the evidence of a curve",
         "  held-out error of pressure: 1.5, noise floor 1",
         "  held-out error of current: 1.5 before, 1.25 after, noise floor 1",
