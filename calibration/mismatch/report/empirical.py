@@ -12,6 +12,8 @@ from regolithd.calibration.mismatch.inference.statements import NO_HELP, capital
 from regolithd.calibration.mismatch.report.axes import Panel, axes, box, line, number, svg, text
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from regolithd.calibration.mismatch.answer import EmpiricalFit, Evidence, Suggestion, Unexplained
     from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
     from regolithd.calibration.mismatch.report.axes import Array
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT = 800.0, 270.0
 """Size of the drawing [px]."""
+LONGEST_BAR = 4.0
+"""Length of an error bar, in that of the median one, beyond which it is cut at the edge (a choice: the curve shows)."""
 ACTS = {
     "offset": "It is added to the prediction.",
     "drag": "It acts against the motion: times the sign of the speed.",
@@ -82,15 +86,18 @@ def band_figure(covariate: str, curve: EmpiricalCurve, fit: EmpiricalFit | None,
     at = np.array(curve.at) * (labels.time_factor if covariate == "time" else 1.0)
     value, low, high = (factor * np.array(row) for row in (curve.value, curve.low, curve.high))
     points = _Points.of(fit, at, factor, labels.time_factor if covariate == "time" else 1.0)
-    ends = (min(0.0, float(low.min()), *points.low), max(0.0, float(high.max()), *points.high))
+    known = points.known
+    ends = (min(0.0, float(low.min()), *points.low[known]), max(0.0, float(high.max()), *points.high[known]))
     margin = 0.08 * ((ends[1] - ends[0]) or 1.0)
     panel = Panel(84, 12, WIDTH - 96, HEIGHT - 62, (float(at[0]), float(at[-1])), (ends[0] - margin, ends[1] + margin))
     parts = [box(panel), _band(panel, at, low, high)]
     parts.append(line([(panel.left, panel.at_y(0)), (panel.left + panel.width, panel.at_y(0))], "zero"))
     for x, bottom, top in zip(points.at, points.low, points.high, strict=True):
-        across_at, middle = panel.at_x(x), panel.at_y((bottom + top) / 2)
-        parts.append(line([(across_at, panel.at_y(bottom)), (across_at, panel.at_y(top))], "before bar"))
-        parts.append(f'<circle class="before" cx="{across_at:.1f}" cy="{middle:.1f}" r="2.6"/>')
+        across_at, mean = panel.at_x(x), (bottom + top) / 2
+        bar = (panel.at_y(each) for each in np.clip((bottom, top), *panel.y))
+        parts.append(line([(across_at, each) for each in bar], "before bar"))
+        if panel.y[0] <= mean <= panel.y[1]:
+            parts.append(f'<circle class="before" cx="{across_at:.1f}" cy="{panel.at_y(mean):.1f}" r="2.6"/>')
     parts.append(line([(panel.at_x(x), panel.at_y(y)) for x, y in zip(at, value, strict=True)], "before line"))
     if fit is not None and fit.suggested.size:
         broken = zip(at, factor * fit.suggested, strict=True)
@@ -108,6 +115,12 @@ class _Points:
     at: Array
     low: Array
     high: Array
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Which are known well enough to be shown whole: no bar is much longer than that of the others."""
+        bars = self.high - self.low
+        return np.asarray(bars <= LONGEST_BAR * np.median(bars)) if bars.size else np.zeros(0, np.bool_)
 
     @classmethod
     def of(cls, fit: EmpiricalFit | None, knots: Array, factor: float, time_factor: float) -> _Points:

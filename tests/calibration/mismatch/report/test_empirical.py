@@ -39,6 +39,27 @@ def test_the_drawing_has_band_curve_points_and_the_first_suggestion() -> None:
     assert "|speed|" in told.svg
 
 
+def test_a_point_that_is_hardly_known_does_not_flatten_the_curve() -> None:
+    """Its bar is cut at the edge of the drawing, and the scale is that of the others; its mean is not shown."""
+
+    def drawing(error: float) -> str:
+        fit = replace(
+            FIT,
+            at=np.array([0.2, 0.3, 0.4, 0.6]),
+            mean=np.array([error, 0.03, 0.05, 0.12]),
+            standard_error=np.array([error, 0.01, 0.01, 0.01]),
+        )
+        evidence = SimpleNamespace(unit="A", empirical=(fit,))
+        return empirical_section(PLACE, evidence, Labels()).svg  # type: ignore[arg-type]
+
+    known, hardly = drawing(0.01), drawing(10.0)
+    assert known.count("<circle") == 4
+    assert hardly.count("<circle") == 3
+    bars = [path.split('"')[0] for path in hardly.split('class="before bar" d="')[1:]]
+    assert len(bars) == 4
+    assert all(0 <= float(height) <= 270 for bar in bars for height in re.findall(r" (\d+\.\d)", bar))
+
+
 def test_the_texts_say_how_it_acts_and_what_it_brings() -> None:
     """Errors without and with it, and each form with its interval."""
     told = empirical_section(PLACE, SimpleNamespace(unit="A", empirical=()), Labels())  # type: ignore[arg-type]
