@@ -231,15 +231,22 @@ class SequentialTest:
         return lacks_fit(float(found.statistic[at]), together, at[0], LEVEL, self._limits.inexact_share)
 
     def _take_name(self, index: int) -> None:
-        """Make a change and those that begin with it one without a name, on the wheels that show it best."""
-        each, dropped = self.reported[index], self._same_wheels_and_time(index)
-        self.reported = tuple(other for k, other in enumerate(self.reported) if k not in dropped)
-        index = self.reported.index(each)
-        search = self._linearised.search
-        sharing = np.flatnonzero(search.member @ search.member[each.place.wheels] > 0)
-        tried = [(int(wheels), self.unnamed_beside(index, int(wheels))) for wheels in sharing]
+        """Make a change and those that begin with it one without a name, on the wheels that show it best.
+
+        One of them that had no name already keeps its wheels and its onset, and gets those of the change as well: what
+        has no name only grows, so that the two cannot take turns, and `_decide` ends.
+        """
+        each, together = self.reported[index], self._same_wheels_and_time(index)
+        nameless = [self.reported[k].place for k in together if not self.reported[k].named]
+        covered = [each.place, *nameless] if nameless else []
+        self.reported = tuple(other for k, other in enumerate(self.reported) if k not in together)
+        index, member = self.reported.index(each), self._linearised.search.member
+        covers = np.all(member >= member[[place.wheels for place in covered]].max(axis=0, initial=0.0), axis=1)
+        possible = np.flatnonzero(covers & (member @ member[each.place.wheels] > 0))
+        tried = [(int(wheels), self.unnamed_beside(index, int(wheels))) for wheels in possible]
         wheels, best = max(tried, key=lambda one: float(one[1].score.max()))
-        unnamed_now = replace(each, place=Place(each.place.law, wheels, best.onset_s()), named=False)
+        onset_s = min([best.onset_s(), *(place.onset_s for place in covered)])
+        unnamed_now = replace(each, place=Place(each.place.law, wheels, onset_s), named=False)
         self.reported = (*self.reported[:index], unnamed_now, *self.reported[index + 1 :])
 
 

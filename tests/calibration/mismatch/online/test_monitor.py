@@ -12,7 +12,7 @@ from regolithd.calibration.mismatch import SimulationError
 from regolithd.calibration.mismatch.online.channels import monitors_of
 from regolithd.calibration.mismatch.online.left_out import LeftOutCount, LeftOutHere
 from regolithd.calibration.mismatch.online.linearised import learned
-from regolithd.calibration.mismatch.online.monitor import Monitor
+from regolithd.calibration.mismatch.online.monitor import Monitor, SequentialTest
 from regolithd.calibration.mismatch.online.pieces import Cutter
 from regolithd.calibration.mismatch.online.report import UNNAMED
 from regolithd.calibration.mismatch.online.thresholds import ONLINE_THRESHOLDS, OnlineThresholds
@@ -114,6 +114,31 @@ def test_a_change_beside_one_without_a_name_is_still_reported() -> None:
     columns["reading_V"] = columns["reading_V"] + 0.5 * ((columns["t_s"] >= 280.0) & (axis == 1)) * sign
     told = {change.wheels: change.name for change in followed(columns)[-1].changes}
     assert told == {(2,): UNNAMED, (1,): "drag"}
+
+
+@pytest.mark.parametrize("seed", [124, 125, 126, 127, 128, 136, 140, 141])
+def test_changes_that_no_law_explains_on_all_axes_are_told_and_end_nothing(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two changes that began together, and had no name together, took turns: the decision never ended."""
+    rng, columns = np.random.default_rng(seed), recorded(seed=seed)
+    speed, t_s = columns["speed_rad_s"], columns["t_s"]
+    for axis in (1, 2):
+        late = (columns["axis"] == axis) & (t_s >= ONSET_S + rng.choice([-20.0, 0.0, 20.0]))
+        for course in (np.ones_like(speed), np.sign(speed), np.abs(speed), speed**2, np.sin(t_s / rng.uniform(2, 30))):
+            columns["reading_V"] = columns["reading_V"] + rng.normal() * rng.choice([0.3, 1.0, 3.0]) * late * course
+    taken = []
+    take_name = SequentialTest._take_name  # counts, so that the test fails and does not hang
+
+    def counted(test: SequentialTest, index: int) -> None:
+        taken.append(index)
+        assert len(taken) < 200
+        take_name(test, index)
+
+    monkeypatch.setattr(SequentialTest, "_take_name", counted)
+    reports = followed(columns)
+    assert reports[-1].changes
+    assert all(change.onset_s <= 260.0 for change in reports[-1].changes)
 
 
 def test_a_gap_is_told_and_bridged() -> None:
