@@ -265,12 +265,14 @@ class Problem:
         """Return ∂prediction/∂parameter, shape (time, wheel).
 
         By steps to both sides: by one alone, parameters whose products or quotients act would seem to be known each.
+        Where one side has no prediction by the other alone; 0 where none has.
         """
         step = self.thresholds.tangent_step * (abs(self._all_values[name]) or 1.0)
 
         def mean_of_secants() -> Array:
-            ahead, behind = self.secant(name, step), self.secant(name, -step)
-            return np.where(np.isfinite(behind), (ahead + behind) / 2, ahead)
+            sides = np.stack((self.secant(name, step), self.secant(name, -step)))
+            known = np.isfinite(sides)
+            return np.asarray(np.where(known, sides, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
 
         return self.run_once(f"tangent {name}", step, mean_of_secants)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from linear_machine import AXES, INSTANTS, STEP_S, Level, problem_of, table
 
-from regolithd.calibration.mismatch import RecordingError, from_columns
+from regolithd.calibration.mismatch import RecordingError, compare, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.prior import SensorError, own_name
 from regolithd.calibration.mismatch.problem.problem import MOST_LATELY, StatedEffect
@@ -204,3 +204,28 @@ def test_a_predicted_column_that_is_an_input_too_is_compared_as_read() -> None:
     problem = build_problem(from_columns(columns, unit="axis"), OwnInput())
     np.testing.assert_array_equal(problem.measured.ravel(), columns["reading_V"])
     assert np.std(problem.recording.channels["reading_V"]) < 0.8 * np.std(columns["reading_V"])
+
+
+class Limited(Level):
+    """The level; in the first half there is none above the stated value, in the last ten instants none but there."""
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the level, NaN where it is at a stop."""
+        found = super().predict(inputs, values)
+        found[: INSTANTS // 2] = np.nan if values["level"] > 2.0 else values["level"]
+        found[-10:] = np.nan if values["level"] != 2.0 else values["level"]
+        return found
+
+
+def test_a_tangent_is_of_the_sides_on_which_there_is_a_prediction() -> None:
+    """By one side where the other has none, and 0 where neither has: the readings are compared all the same."""
+    columns = table()
+    problem = build_problem(from_columns(columns, unit="axis"), Limited())
+    assert problem.mask.all()
+    tangent = problem.tangent("level")
+    np.testing.assert_allclose(tangent[:-10], 1.0)
+    np.testing.assert_array_equal(tangent[-10:], 0.0)
+    answer = compare(from_columns(columns, unit="axis"), Limited()).answer
+    (level,) = answer.parameters
+    assert answer.verdict == "consistent"
+    assert level.low < 2.0 < level.high
