@@ -9,6 +9,7 @@ import numpy as np
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Array, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.candidates.lag_scan import best_lag
 from regolithd.calibration.mismatch.problem.delayed import filtered, shifted
+from regolithd.calibration.mismatch.problem.limits import at_limit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -273,8 +274,11 @@ KINDS = (*OF_CHANNEL, OF_INPUT)
 
 
 def columns_of(problem: Problem, candidate: Candidate, shape: Shape) -> Array:
-    """Return a candidate's columns as the predicted channel shows them: late where it is late."""
-    return late_with(problem, candidate, np.asarray(candidate.columns(problem, shape), np.float64))
+    """Return a candidate's columns as the predicted channel shows them: not at a limit, and late where it is late."""
+    columns = np.asarray(candidate.columns(problem, shape), np.float64)
+    if candidate.loads and (limited := at_limit(problem)).any():
+        columns = np.where(limited, 0.0, columns)
+    return late_with(problem, candidate, columns)
 
 
 def late_with(problem: Problem, candidate: Candidate, columns: Array) -> Array:
