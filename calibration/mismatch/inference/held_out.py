@@ -19,7 +19,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
 from regolithd.calibration.mismatch.selection.cross_validation import squares_left, training_equations
 from regolithd.calibration.mismatch.selection.decision import names_of, without_name
 from regolithd.calibration.mismatch.selection.law_misfit import without_term
-from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
+from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape, with_best_developments
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -106,6 +106,7 @@ def with_optimised_shapes(train: NormalEquations, chosen: tuple[Term, ...]) -> t
     terms = list(chosen)
     for index, term in enumerate(chosen):
         train, terms[index] = optimised_shape(train, terms[:index] + terms[index + 1 :], term)
+    train, terms = with_best_developments(train, terms)
     return train, tuple(terms)
 
 

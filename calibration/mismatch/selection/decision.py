@@ -23,6 +23,7 @@ from regolithd.calibration.mismatch.selection.noise_estimation import (
 )
 from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what_pulls_parameters_out
 from regolithd.calibration.mismatch.selection.released_parameters import released
+from regolithd.calibration.mismatch.selection.shape_optimisation import with_best_developments
 from regolithd.calibration.mismatch.selection.sign_flip_test import entry_threshold
 from regolithd.calibration.mismatch.selection.smooth_terms import weigh_against_smooth_terms
 
@@ -110,7 +111,8 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
     threshold = entry_threshold(equations, left, blocks_of_time(problem, noise_of_whitened(equations.design, left)))
     equations = with_proposed_shapes(equations, candidates)
     equations, subsets = best_subsets(equations)
-    named = _largest_that_passes(equations, subsets, threshold)
+    equations, terms = with_best_developments(equations, _largest_that_passes(equations, subsets, threshold).terms)
+    named = equations.fit(terms)
     named = drop_what_pulls_parameters_out(equations, named)
     named = drop_what_the_implausible_explains(equations, named, threshold)
     named = drop_what_does_not_transfer(equations, named, threshold)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.regression.candidate_groups import coefficient_signs, with_candidate
 from regolithd.calibration.mismatch.regression.group import Term
@@ -17,7 +18,7 @@ from regolithd.calibration.mismatch.regression.schur import delta_chi2_together,
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.candidates.candidate import Shape
     from regolithd.calibration.mismatch.regression.design_matrix import Course
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
@@ -162,6 +163,29 @@ def optimised_shape(equations: NormalEquations, others: Sequence[Term], term: Te
                 best, gain = {**best, name: value}, found
     equations, term = _reshaped(equations, term, best)
     return _self_consistent(equations, others, term)
+
+
+def with_best_developments(equations: NormalEquations, terms: Sequence[Term]) -> tuple[NormalEquations, list[Term]]:
+    """Return the terms, each that begins at a time with the development that explains most, at its own best onset.
+
+    At the onsets of the grid a step may be behind a rise that begins earlier, and be ahead of it at its own onset.
+    """
+    terms = list(terms)
+    for index, term in enumerate(terms):
+        candidate, shape = term.group.candidate, term.group.shape
+        if candidate is None or candidate.change_point not in shape:
+            continue
+        profile = shape_profile(equations, terms[:index] + terms[index + 1 :], candidate, term.wheels)
+        best, gain = shape, profile.less_prior(shape)
+        for development in Candidate.onset_profiles(candidate, equations.problem):
+            tried = {**development, candidate.change_point: shape[candidate.change_point]}
+            bounds = candidate.bounds(equations.problem, tried)[candidate.change_point]
+            between = candidate.search_range(equations.problem, tried, candidate.change_point, bounds)
+            value, found = maximise(profile.along(tried, candidate.change_point), *between)
+            if found > gain:
+                best, gain = {**tried, candidate.change_point: value}, found
+        equations, terms[index] = _reshaped(equations, term, best)
+    return equations, terms
 
 
 def _at_its_coefficient(
