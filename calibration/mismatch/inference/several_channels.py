@@ -57,14 +57,14 @@ def joined(answers: Sequence[AnyAnswer]) -> AnyAnswer:
 
 
 def notes_of(answers: Sequence[Answer]) -> tuple[str, ...]:
-    """Return the notes of all channels; one that is not of all of them is told with its channel."""
+    """Return the notes of all channels; one that is not of all of them begins with its channel."""
     of_all = set.intersection(*(set(answer.notes) for answer in answers))
-    notes = (
-        note if note in of_all or answer.fit.channel in note else f"{answer.fit.channel}: {note}"
-        for answer in answers
-        for note in answer.notes
-    )
-    return tuple(dict.fromkeys(notes))
+    told = []
+    for answer in answers:
+        channel = answer.fit.channel
+        begins = (channel, f"Readings of {channel} ")
+        told += [note if note in of_all or note.startswith(begins) else f"{channel}: {note}" for note in answer.notes]
+    return tuple(dict.fromkeys(told))
 
 
 def other_answers(answers: Sequence[Answer]) -> tuple[OtherAnswer, ...]:

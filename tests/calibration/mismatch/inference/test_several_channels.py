@@ -118,6 +118,8 @@ def test_a_note_of_one_channel_is_told_with_the_channel() -> None:
     heat = replace(ANSWER, notes=("a gap",), fit=replace(ANSWER.fit, channel="heat_W"))
     assert notes_of([current, heat]) == ("a gap", "current_A: no speed")
     assert notes_of([replace(current, notes=("current_A is blank",)), heat]) == ("current_A is blank", "heat_W: a gap")
+    own = "speed is the reading of current_A itself"
+    assert notes_of([replace(current, notes=(own,)), heat]) == (f"current_A: {own}", "heat_W: a gap")
 
 
 class Loaded(Simulation):

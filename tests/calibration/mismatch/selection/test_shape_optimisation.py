@@ -6,14 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from linear_machine import Drag, Power, equations_of, problem_of, table, term_of
+from linear_machine import AXES, INSTANTS, STEP_S, Drag, Power, equations_of, problem_of, table, term_of
 
+from regolithd.calibration.mismatch.candidates.bearing_drag import BearingDrag
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.selection.shape_optimisation import (
     maximise,
     optimised_shape,
     peak_within,
     shape_profile,
+    with_best_developments,
 )
 
 if TYPE_CHECKING:
@@ -122,3 +124,19 @@ def test_an_onset_is_sought_near_its_place_in_the_grid() -> None:
     _, term = optimised_shape(equations, (), term_of(equations, "step", place=nearest))
     assert float(term.group.shape["onset_s"]) == pytest.approx(231, abs=2)
     assert isinstance(term, Term)
+
+
+def test_a_step_is_found_though_a_rise_is_ahead_of_it_on_the_grid() -> None:
+    """Its onset is half way between two of the grid, where a rise that begins earlier follows it closer."""
+    onset_s = 183.0
+    late = np.broadcast_to((np.arange(INSTANTS) * STEP_S >= onset_s)[:, None] * [0.0, 1.0], (INSTANTS, AXES))
+    equations = equations_of(problem_of(table(drag=2.0 * late)), (BearingDrag(),))
+    groups = [group for group in equations.design.groups if 0 < group.shape.get("rise_s", 0.0) < 20.0]
+    gains = equations.further((), groups)
+    _, rise = max(((gain, term) for gain, term in gains if term.wheels == (1,)), key=lambda pair: pair[0])
+    equations, rise = optimised_shape(equations, (), rise)
+    before = equations.fit((rise,))
+    equations, (step,) = with_best_developments(equations, (rise,))
+    assert step.group.shape["rise_s"] == 0.0
+    assert step.group.shape["onset_s"] == pytest.approx(onset_s, abs=STEP_S)
+    assert equations.score(equations.fit((step,))) > equations.score(before) + 20
