@@ -170,20 +170,20 @@ def with_best_developments(equations: NormalEquations, terms: Sequence[Term]) ->
 
     At the onsets of the grid a step may be behind a rise that begins earlier, and be ahead of it at its own onset.
     """
-    terms = list(terms)
+    terms, problem = list(terms), equations.problem
     for index, term in enumerate(terms):
         candidate, shape = term.group.candidate, term.group.shape
-        if candidate is None or candidate.change_point not in shape:
-            continue
+        if candidate is None or not shape.keys() & candidate.bounds(problem, shape).keys() & {candidate.change_point}:
+            continue  # it begins at no time, or at one that is known
+        onset = candidate.change_point
         profile = shape_profile(equations, terms[:index] + terms[index + 1 :], candidate, term.wheels)
         best, gain = shape, profile.less_prior(shape)
-        for development in Candidate.onset_profiles(candidate, equations.problem):
-            tried = {**development, candidate.change_point: shape[candidate.change_point]}
-            bounds = candidate.bounds(equations.problem, tried)[candidate.change_point]
-            between = candidate.search_range(equations.problem, tried, candidate.change_point, bounds)
-            value, found = maximise(profile.along(tried, candidate.change_point), *between)
+        for development in Candidate.onset_profiles(candidate, problem):
+            tried = {**development, onset: shape[onset]}
+            between = candidate.search_range(problem, tried, onset, candidate.bounds(problem, tried)[onset])
+            value, found = maximise(profile.along(tried, onset), *between)
             if found > gain:
-                best, gain = {**tried, candidate.change_point: value}, found
+                best, gain = {**tried, onset: value}, found
         equations, terms[index] = _reshaped(equations, term, best)
     return equations, terms
 
