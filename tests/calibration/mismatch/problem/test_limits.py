@@ -91,10 +91,8 @@ def test_the_smallest_current_of_an_unloaded_machine_is_no_limit(offset_A: float
 
 
 def test_a_drag_is_named_alone_beside_a_limited_current() -> None:
-    """While it brakes at the limit, the simulation without the drag would take more than there is.
-
-    Added to the limited current the drag would be taken from a reading that is right, and an inertia explain that.
-    """
+    """Added to the limited current, it would be taken from readings that are right, and an inertia explain that."""
+    # While it brakes at the limit, the simulation without the drag would take more current than there is.
     answer = compare(from_columns(recorded(0.0005)), Drive()).answer
     assert [effect.name for effect in answer.effects] == ["quadratic-drag"]
     assert answer.verdict == "missing-physics"
