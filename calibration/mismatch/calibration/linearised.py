@@ -37,7 +37,6 @@ STEPS = 10
 """Linearisations at most (a choice: a smooth simulation needs two or three, one that is stated at 0 a few more)."""
 STEPS_BESIDE = 3
 """Linearisations beside curves at most (a choice: one is usual)."""
-
 WORSE_BY = 0.01
 """Share by which the error of the simulation alone has to be larger than as stated, to be told (a choice)."""
 

@@ -311,7 +311,11 @@ class Candidate:
         return shape
 
     def onset_profiles(self, problem: Problem) -> Sequence[Shape]:
-        """Return how the effect may develop after its onset: every distinct shape without its `onset_s`."""
+        """Return how the effect may develop after its onset, for the onset's interval: by default as in the search."""
+        return self.developments(problem)
+
+    def developments(self, problem: Problem) -> Sequence[Shape]:
+        """Return how the search lets the effect develop: every distinct shape of the grid without its `onset_s`."""
         found = {tuple(sorted((k, v) for k, v in s.items() if k != "onset_s")) for s in self.shapes(problem)}
         return [dict(profile) for profile in sorted(found, key=str)]
 

@@ -106,8 +106,7 @@ def with_optimised_shapes(train: NormalEquations, chosen: tuple[Term, ...]) -> t
     terms = list(chosen)
     for index, term in enumerate(chosen):
         train, terms[index] = optimised_shape(train, terms[:index] + terms[index + 1 :], term)
-    train, terms = with_best_developments(train, terms)
-    return train, tuple(terms)
+    return with_best_developments(train, terms)
 
 
 def _or_as_named(

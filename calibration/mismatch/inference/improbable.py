@@ -68,7 +68,8 @@ def in_probable_regions(decision: Decision) -> Decision:
     still be more probable than nothing.
     """
     regional = in_regions(decision)
-    return regional if without_improbable_curves(regional) is regional else without_improbable_curves(decision)
+    kept = without_improbable_curves(regional)
+    return kept if kept is regional or regional is decision else without_improbable_curves(decision)
 
 
 def without_improbable_curves(decision: Decision) -> Decision:

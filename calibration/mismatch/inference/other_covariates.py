@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.problem.words import word_for
 from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
-from regolithd.calibration.mismatch.regression.smooth_groups import same_course
+from regolithd.calibration.mismatch.regression.smooth_groups import same_covariate
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
 
@@ -33,7 +32,7 @@ def notes_on_other_covariates(decision: Decision) -> tuple[str, ...]:
     others = [
         name
         for name, score in scores.items()
-        if score >= least and name != "time" and not _is_the_same(problem, name, told)
+        if score >= least and name != "time" and not same_covariate(problem, name, told.name, told.wheels)
     ]
     if not others:
         return ()
@@ -50,14 +49,3 @@ def _scores_over(decision: Decision, told: Term) -> dict[str, float]:
         if term.wheels == told.wheels and term.group.coupling not in WITHOUT_CURVE:
             scores.setdefault(term.name, score)
     return scores
-
-
-def _is_the_same(problem: Problem, covariate: str, told: Term) -> bool:
-    """Return whether a covariate is that of a curve, by its name or by its course, as an angle is a position."""
-    if covariate == told.name:
-        return True
-    if covariate not in problem.covariates or told.name not in problem.covariates:
-        return False
-    wheels = list(told.wheels)
-    one, other = (problem.covariates[name][:, wheels] for name in (covariate, told.name))
-    return same_course(one, other, problem.mask[:, wheels])

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.zero import zero_is_arbitrary
 from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
@@ -270,9 +271,7 @@ class Problem:
         step = self.thresholds.tangent_step * (abs(self._all_values[name]) or 1.0)
 
         def mean_of_secants() -> Array:
-            sides = np.stack((self.secant(name, step), self.secant(name, -step)))
-            known = np.isfinite(sides)
-            return np.asarray(np.where(known, sides, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
+            return known_mean(np.stack((self.secant(name, step), self.secant(name, -step))))
 
         return self.run_once(f"tangent {name}", step, mean_of_secants)
 

@@ -87,6 +87,16 @@ def same_course(one: Array, other: Array, mask: NDArray[np.bool_]) -> bool:
     return True
 
 
+def same_covariate(problem: Problem, one: str, other: str, wheels: Sequence[int]) -> bool:
+    """Return whether two covariates are the same on these wheels: by name, or by course, as an angle is a position."""
+    if one == other:
+        return True
+    if one not in problem.covariates or other not in problem.covariates:
+        return False
+    on = list(wheels)
+    return same_course(problem.covariates[one][:, on], problem.covariates[other][:, on], problem.mask[:, on])
+
+
 def couplings_of(problem: Problem) -> dict[str, Array]:
     """Return the factors, shape (time, wheel), by which a smooth function may act on the prediction."""
     found = {

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.regression.candidate_groups import coefficient_signs, with_candidate
 from regolithd.calibration.mismatch.regression.group import Term
@@ -18,7 +17,7 @@ from regolithd.calibration.mismatch.regression.schur import delta_chi2_together,
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from regolithd.calibration.mismatch.candidates.candidate import Shape
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
     from regolithd.calibration.mismatch.regression.design_matrix import Course
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
@@ -165,27 +164,35 @@ def optimised_shape(equations: NormalEquations, others: Sequence[Term], term: Te
     return _self_consistent(equations, others, term)
 
 
-def with_best_developments(equations: NormalEquations, terms: Sequence[Term]) -> tuple[NormalEquations, list[Term]]:
+def with_best_developments(
+    equations: NormalEquations, terms: Sequence[Term]
+) -> tuple[NormalEquations, tuple[Term, ...]]:
     """Return the terms, each that begins at a time with the development that explains most, at its own best onset.
 
     At the onsets of the grid a step may be behind a rise that begins earlier, and be ahead of it at its own onset.
     """
-    terms, problem = list(terms), equations.problem
+    found = list(terms)
     for index, term in enumerate(terms):
-        candidate, shape = term.group.candidate, term.group.shape
-        if candidate is None or not shape.keys() & candidate.bounds(problem, shape).keys() & {candidate.change_point}:
-            continue  # it begins at no time, or at one that is known
-        onset = candidate.change_point
-        profile = shape_profile(equations, terms[:index] + terms[index + 1 :], candidate, term.wheels)
-        best, gain = shape, profile.less_prior(shape)
-        for development in Candidate.onset_profiles(candidate, problem):
-            tried = {**development, onset: shape[onset]}
-            between = candidate.search_range(problem, tried, onset, candidate.bounds(problem, tried)[onset])
-            value, found = maximise(profile.along(tried, onset), *between)
-            if found > gain:
-                best, gain = {**tried, onset: value}, found
-        equations, terms[index] = _reshaped(equations, term, best)
-    return equations, terms
+        equations, found[index] = _best_developed(equations, found[:index] + found[index + 1 :], term)
+    return equations, tuple(found)
+
+
+def _best_developed(equations: NormalEquations, others: Sequence[Term], term: Term) -> tuple[NormalEquations, Term]:
+    """Return a term in its best development beside others; as it is where it begins at no time, or at a known one."""
+    candidate, shape, problem = term.group.candidate, term.group.shape, equations.problem
+    if candidate is None or (onset := candidate.change_point) not in shape:
+        return equations, term
+    if onset not in candidate.bounds(problem, shape):
+        return equations, term
+    profile = shape_profile(equations, others, candidate, term.wheels)
+    best, gain = shape, profile.less_prior(shape)
+    for development in candidate.developments(problem):
+        tried = {**development, onset: shape[onset]}
+        between = candidate.search_range(problem, tried, onset, candidate.bounds(problem, tried)[onset])
+        value, reached = maximise(profile.along(tried, onset), *between)
+        if reached > gain:
+            best, gain = {**tried, onset: value}, reached
+    return _reshaped(equations, term, best)
 
 
 def _at_its_coefficient(

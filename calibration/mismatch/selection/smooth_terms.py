@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
-from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, same_course
+from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, same_covariate
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_smooth_term,
@@ -163,17 +163,12 @@ def drop_what_gains_little(equations: NormalEquations, named: Fit, curve: Term) 
 
 
 def _same_quantity(problem: Problem, term: Term, curve: Term) -> bool:
-    """Return whether a term's covariate is a curve's on the same wheels: by name, or as an angle is a position."""
+    """Return whether a term's covariate is a curve's on the same wheels."""
     wheels = sorted(set(term.wheels) & set(curve.wheels))
     if not wheels or covariate_of(term) == "none":
         return False
     covariate = term.group.candidate.covariate if term.group.candidate else term.name
-    if covariate == curve.name:
-        return True
-    one, other = (problem.covariates.get(name) for name in (covariate, curve.name))
-    if one is None or other is None:
-        return False
-    return same_course(one[:, wheels], other[:, wheels], problem.mask[:, wheels])
+    return same_covariate(problem, covariate, curve.name, wheels)
 
 
 def drop_transients(equations: NormalEquations, named: Fit) -> Fit:
