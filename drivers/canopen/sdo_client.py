@@ -19,7 +19,13 @@ from regolithd.drivers.errors import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import AsyncIterator
+
     from regolithd.drivers.can.bus import Bus
+
+# When the time for an answer is over, it may still wait in the socket because this program itself was late: a transfer
+# times out only if no answer comes during this further time, in which the socket is read.
+_GRACE_S = 0.05
 
 
 class SdoClient:
@@ -101,7 +107,7 @@ class SdoClient:
         try:
             while True:
                 await self._send(request or b"")
-                async with asyncio.timeout(self._timeout_s):
+                async with _answered_within(self._timeout_s):
                     request = transfer.send(await self._answer())
                     while request is None:
                         request = transfer.send(await self._answer())
@@ -116,3 +122,15 @@ class SdoClient:
 
     async def _send(self, request: bytes) -> None:
         await self._bus.send(Frame(0, cob_id.SDO_REQUEST + self.node_id, request))
+
+
+@contextlib.asynccontextmanager
+async def _answered_within(time_s: float) -> AsyncIterator[None]:
+    """Raise TimeoutError `_GRACE_S` after `time_s`, counted from when the event loop comes to it."""
+    loop = asyncio.get_running_loop()
+    async with asyncio.timeout(None) as limit:
+        due = loop.call_later(time_s, lambda: limit.reschedule(loop.time() + _GRACE_S))
+        try:
+            yield
+        finally:
+            due.cancel()

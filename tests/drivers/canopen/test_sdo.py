@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import socket
+import time
 
 import pytest
 from hypothesis import given
@@ -130,6 +132,27 @@ async def test_a_timeout_aborts_the_transfer() -> None:
         await client.read(0x6041)
     assert [frame.data.hex() for frame in wire.sent] == ["4041600000000000", "8041600000000405"]
     assert (client.transfers, client.failures) == (1, 1)
+
+
+async def test_an_answer_that_waits_while_this_program_is_late_is_taken() -> None:
+    """A program that stands still for longer than the timeout reads the answer afterwards."""
+    client = SdoClient(Wire(), 5, timeout_s=0.05)
+    node, socket_of_bus = socket.socketpair()
+    loop = asyncio.get_running_loop()
+    loop.add_reader(
+        socket_of_bus, lambda: loop.call_soon(client.handle, Frame(0, 0x585, socket_of_bus.recv(8)))
+    )  # as a bus does: one task reads, another is woken
+    try:
+        reading = asyncio.ensure_future(client.read_number(0x6041))
+        await asyncio.sleep(0)
+        node.send(bytes.fromhex("4b41600037060000"))
+        time.sleep(0.2)  # noqa: ASYNC251  # the program stands still
+        assert await reading == 0x0637
+        assert client.failures == 0
+    finally:
+        loop.remove_reader(socket_of_bus)
+        node.close()
+        socket_of_bus.close()
 
 
 async def test_transfers_are_sequential() -> None:

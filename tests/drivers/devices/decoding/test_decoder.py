@@ -30,7 +30,8 @@ from regolithd.drivers.virtual.rover import KAPVIK
 
 NODES = (*KAPVIK[1:], NodeDescription(1, MOTOR_CONTROLLER, 0, diagnostics=True))
 BUSY_IDS = st.sampled_from(
-    [base + node.node_id for base in (0x80, 0x180, 0x280, 0x580, 0x600, 0x700) for node in NODES] + [0, 0x80, 0x77F]
+    [base + node.node_id for base in (0x80, 0x180, 0x200, 0x280, 0x580, 0x600, 0x700) for node in NODES]
+    + [0, 0x80, 0x77F]
 )
 FRAMES = st.builds(
     Frame,
@@ -152,5 +153,6 @@ def test_every_frame_is_decoded_ignored_or_counted(frames: list[Frame]) -> None:
         assert counted in (0, 1)
         assert not (counted and signal)
         silent += signal is None and not counted
-    useless = {0, 0x77F} | {base + node.node_id for base in (0x200, 0x580, 0x600) for node in NODES}
+    useless = {0, 0x77F} | {base + node.node_id for base in (0x580, 0x600) for node in NODES}
+    useless |= {0x200 + node.node_id for node in NODES if node.device.rpdos}
     assert silent == sum(frame.error or (frame.ordinary and frame.can_id in useless) for frame in frames)
