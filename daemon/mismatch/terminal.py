@@ -15,6 +15,7 @@ from regolithd.calibration.mismatch.inference.statements import (
     notes_beside_priors,
     on_wheels,
     parameters_found,
+    percent,
 )
 
 if TYPE_CHECKING:
@@ -36,8 +37,6 @@ NO_BREAK = "\u00a0"
 """A space at which a line is not broken."""
 TOLD_IN_THE_STATEMENT = ("relative_size", "onset_s")
 """Parameters of an effect that its statement has in words."""
-LEAST_SHARE = 0.005
-"""Share of the residual below which 0 % would be told."""
 
 
 def print_answer(console: Console, answer: Answer, labels: Labels, wheels: Sequence[int | str] = ()) -> None:
@@ -127,16 +126,11 @@ def _unexplained(rest: Unexplained, labels: Labels, of: int, *, several: bool) -
     periodic = of > 0 and rest.covariate == "time" and rest.curve is None
     follows = f"{labels.the(rest.covariate)}{' periodically' if periodic else ''}"
     line = (
-        f"unexplained{f' in {rest.channel}' if several else ''}: {_share(rest)} of the residual "
+        f"unexplained{f' in {rest.channel}' if several else ''}: {percent(rest.share_of_residual)} of the residual "
         f"follows {follows}{on_wheels(rest.wheels, of, labels.wheel)}, {rest.from_s:.0f} to {rest.to_s:.0f} s"
         f"{f'; only {rest.range.statement}' if rest.range else ''}"
     )
     return [line, *(f"  {each}" for each in _curve_lines(rest, labels))]
-
-
-def _share(rest: Unexplained) -> str:
-    """Return the share of the residual that is unexplained, in percent."""
-    return f"{100 * rest.share_of_residual:.0f} %" if rest.share_of_residual >= LEAST_SHARE else "less than 1 %"
 
 
 def _curve_lines(rest: Unexplained, labels: Labels) -> list[str]:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.experiments.settings import NOT_SET
 from regolithd.calibration.mismatch.regression.normal_equations import SINGULAR
 from regolithd.calibration.mismatch.regression.residuals import relative_size
@@ -216,7 +217,7 @@ def _columns(drive: Drive, term: Term, shape: Shape) -> Array:
     """Return a law's columns on a drive, 0 on other wheels and where the law has no part without load."""
     candidate = _candidate(term)
     with np.errstate(all="ignore"):  # a law may be undefined where there is no load
-        found = np.asarray(candidate.columns(drive.problem, shape), np.float64)
+        found = columns_of(drive.problem, candidate, shape)
     found = np.where(np.isfinite(found), found, 0.0)
     on = np.zeros(drive.problem.mask.shape[1])
     on[list(term.wheels)] = 1.0

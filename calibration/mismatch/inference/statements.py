@@ -34,6 +34,15 @@ NO_HELP = (
 """What is said of an empirical curve that does not help on held-out readings."""
 
 
+LEAST_SHARE = 0.005
+"""Share of the residual below which 0 % would be told."""
+
+
+def percent(share: float) -> str:
+    """Return a share of the residual in whole percent."""
+    return f"{100 * share:.0f} %" if share >= LEAST_SHARE else "less than 1 %"
+
+
 def listed(items: Sequence[str]) -> str:
     """Return 'a', 'a and b', or 'a, b and c'."""
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.problem.words import in_units
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def laws_of(problem: Problem, candidates: Sequence[Candidate]) -> tuple[Law, ...
     for candidate in candidates:
         shape = _one_shape(problem, candidate)
         if shape is not None:
-            parts = range(len(candidate.columns(problem, shape)))
+            parts = range(len(columns_of(problem, candidate, shape)))
             found += [_law(problem, candidate, shape, part) for part in parts]
     return tuple(found)
 
@@ -103,7 +104,7 @@ def law_columns(problem: Problem, laws: Sequence[Law]) -> Array:
     made: dict[str, Array] = {}
     for law in laws:
         if law.name not in made:
-            made[law.name] = np.asarray(law.candidate.columns(problem, law.shape), np.float64)
+            made[law.name] = columns_of(problem, law.candidate, law.shape)
     return np.stack([np.where(problem.mask, np.nan_to_num(made[law.name][law.part]), 0.0) for law in laws])
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from regolithd.calibration.mismatch.inference.statements import capital, listed, plural
+from regolithd.calibration.mismatch.inference.statements import capital, listed, percent, plural
 from regolithd.calibration.mismatch.report.axes import number
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.empirical import EmpiricalSection, empirical_section
@@ -218,7 +218,7 @@ def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> Unexp
         f"only {place.range.statement}".replace(" %", NO_BREAK + "%") if place.range else "",
         labels.wheels(place.wheels, evidence.wheels),
         f"{first} to {last} {labels.time_unit}",
-        f"{100 * place.share_of_residual:.1f} % of the residual’s power",
+        f"{percent(place.share_of_residual)} of the residual’s power".replace(" %", NO_BREAK + "%"),
     )
     curve = empirical_section(place, evidence, labels) if place.curve else None
     name = labels.the(place.covariate)

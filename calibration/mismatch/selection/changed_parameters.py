@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, growth
+from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.selection.shape_optimisation import shape_profile
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def _is_the_effect(problem: Problem, change: _ChangedParameter, term: Term) -> b
     assert term.group.candidate is not None  # noqa: S101  # only named terms come here
     shape, elsewhere = term.group.shape, [k for k in range(problem.mask.shape[1]) if k not in term.wheels]
     changed = np.where(problem.mask, change.columns(problem, shape)[0], 0.0)
-    effect = np.where(problem.mask, term.group.candidate.columns(problem, shape)[0], 0.0)
+    effect = np.where(problem.mask, columns_of(problem, term.group.candidate, shape)[0], 0.0)
     effect[:, elsewhere] = 0.0
     along = float(np.sum(changed * effect))
     return abs(along) > SAME_ACTION * float(np.linalg.norm(changed) * np.linalg.norm(effect))

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare, direction_of, from_columns
+from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.online.laws import law_columns, laws_of
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.limits import FEWEST_AT_LIMIT, at_limit
 
@@ -100,3 +102,16 @@ def test_a_drag_is_named_alone_beside_a_limited_current() -> None:
     assert coefficient.low < 0.001 < coefficient.high
     inertia = {each.name: each for each in answer.parameters}["inertia_kg_m2"]
     assert inertia.low < 0.2 < inertia.high
+
+
+def test_what_is_monitored_does_not_show_at_a_limit() -> None:
+    """The columns of `regolithd monitor` are those of the whole comparison there: 0."""
+    problem = build_problem(from_columns(recorded(0.0003)), Drive())
+    laws = laws_of(problem, library())
+    columns = law_columns(problem, laws)
+    loads = [law.candidate.loads for law in laws]
+    limited = at_limit(problem)
+    assert limited.any()
+    assert any(loads)
+    assert not columns[loads][:, limited].any()
+    assert columns[~np.array(loads)][:, limited].any()
