@@ -16,6 +16,7 @@ by Levenberg and Marquardt's method (Marquardt, 1963).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from statistics import NormalDist
 from typing import TYPE_CHECKING
 
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.calibration.step import Step
 from regolithd.calibration.mismatch.inference.statements import after_number
+from regolithd.calibration.mismatch.problem.principal_axes import switches
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -49,6 +51,8 @@ AS_WELL = 3.8
 two (χ² of one degree of freedom at 95 %)."""
 DIFFERENCE = 1e-4
 """Step of a difference quotient in the prior's standard deviations (a choice: a search needs no exact tangents)."""
+DIFFERENCE_WHERE_IT_SWITCHES = 0.1
+"""The same where the simulation switches (a choice: over several change-overs, that come at whole readings)."""
 FIRST_DAMPING, LESS, MORE, MOST_DAMPING = 1e-2, 0.2, 5.0, 1e8
 """Damping of a search's first step, its factors after a step that succeeds and one that fails, and the one at which no
 step is left to try (Marquardt's scheme)."""
@@ -93,7 +97,7 @@ def starting_values(problem: Problem) -> Start:
     They are the stated ones where no parameter is as good as unknown, and where the tangents hold all over the prior.
     """
     search = _Search.of(problem)
-    if not search.is_wide:
+    if not (search.is_wide or search.switches):
         return Start(problem)
     places = search.draws()
     steps = [Step(problem, search.values(place)) for place in places[:ASKED]]
@@ -124,10 +128,8 @@ class _Search:
     @classmethod
     def of(cls, problem: Problem) -> _Search:
         """Return the search over the free parameters; each reading's wheel is its place among those compared."""
-        priors = problem.simulation.parameters.items()
-        names = tuple(name for name, prior in priors if prior.std > 0 and name not in problem.held)
         _, wheel = np.unique(np.nonzero(problem.mask)[1], return_inverse=True)
-        return cls(problem, names, wheel)
+        return cls(problem, problem.free, wheel)
 
     @property
     def priors(self) -> list[Prior]:
@@ -138,6 +140,11 @@ class _Search:
     def is_wide(self) -> bool:
         """Whether a parameter is hardly known."""
         return any(prior.is_hardly_known for prior in self.priors)
+
+    @cached_property
+    def switches(self) -> bool:
+        """Whether the simulation switches, so that a fit may end where it does so at the wrong readings."""
+        return any(switches(self.problem, name) for name in self.names)
 
     def draws(self) -> list[Array]:
         """Return places that fill the prior evenly (Sobol, 1967), always the same ones."""
@@ -217,12 +224,13 @@ class _Search:
 
     def normal(self, left: Array, place: Array) -> tuple[Array, Array]:
         """Return matrix and right side of the normal equations of a step, the prior included."""
+        difference = DIFFERENCE_WHERE_IT_SWITCHES if self.switches else DIFFERENCE
         weights = 1 / (self.power(left) * self.problem.thresholds.provisional_autocorrelation_time)[self.wheel]
         rows = []
         for parameter in range(len(place)):
             aside = place.copy()
-            aside[parameter] += DIFFERENCE
-            change = (left - self.left(aside)) / DIFFERENCE
+            aside[parameter] += difference
+            change = (left - self.left(aside)) / difference
             rows.append(np.where(np.isfinite(change), change, 0.0))
         tangents = np.array(rows)
         return tangents * weights @ tangents.T + np.eye(len(place)), tangents * weights @ left - place

@@ -133,7 +133,7 @@ class _Beside:
 
 
 def _beside_a_step(problem: Problem) -> _Beside:
-    parameters = [problem.tangent(name) for name, prior in problem.simulation.parameters.items() if prior.std > 0]
+    parameters = [problem.tangent(name) for name in problem.free]
     free = list(as_shown(problem, [*parameters, *_about_reversals(problem)]))
     residual = problem.residual
     ones = np.ones(residual.shape[1])

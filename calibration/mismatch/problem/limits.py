@@ -31,7 +31,6 @@ def at_limit(problem: Problem) -> Mask:
 
 def _at_limit(problem: Problem) -> NDArray[np.float64]:
     found = np.zeros(problem.mask.shape)
-    free = [name for name, prior in problem.simulation.parameters.items() if prior.std > 0]
     for wheel, on in enumerate(problem.mask.T):
         predicted = problem.prediction[:, wheel]
         largest = predicted[on].max(initial=0.0)
@@ -40,8 +39,8 @@ def _at_limit(problem: Problem) -> NDArray[np.float64]:
         if extreme.sum() < FEWEST_AT_LIMIT:
             continue
         moved = np.zeros(len(on), np.bool_)
-        for name in free:
-            moved |= problem.tangent(name)[:, wheel] != 0
+        for name in problem.free:
+            moved |= problem.difference_quotient(name)[:, wheel] != 0
         if moved[on].any():
             found[extreme & ~moved, wheel] = 1.0
     return found

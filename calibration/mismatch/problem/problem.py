@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
+from regolithd.calibration.mismatch.problem.principal_axes import tangents_where_it_switches
 from regolithd.calibration.mismatch.problem.zero import zero_is_arbitrary
 from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
@@ -204,6 +205,12 @@ class Problem:
         """Return factors (wheel,) by which a covariate acts oppositely on two parts of the machine, by name."""
         return self.simulation.contrasts(covariate, self.recording.wheels)
 
+    @cached_property
+    def free(self) -> tuple[str, ...]:
+        """The parameters that are not exact, and not held at their values."""
+        priors = self.simulation.parameters.items()
+        return tuple(name for name, prior in priors if prior.std > 0 and name not in self.held)
+
     def has(self, *names: str) -> bool:
         """Return whether all these covariates were measured and vary."""
         return all(name in self.covariates for name in names)
@@ -262,13 +269,22 @@ class Problem:
         value = self._all_values[name]
         return self.run_once(name, step, lambda: (self.changed(**{name: value + step}) - self.filled) / step)
 
-    def tangent(self, name: str) -> Array:
-        """Return ∂prediction/∂parameter, shape (time, wheel).
+    def tangent_step(self, name: str) -> float:
+        """Return the step of a parameter for a difference quotient."""
+        return self.thresholds.tangent_step * (abs(self._all_values[name]) or 1.0)
 
-        By steps to both sides: by one alone, parameters whose products or quotients act would seem to be known each.
-        Where one side has no prediction by the other alone; 0 where none has.
+    def tangent(self, name: str) -> Array:
+        """Return ∂prediction/∂parameter, shape (time, wheel); of a simulation that switches see `principal_axes`."""
+        along = self.run_once("tangents where it switches", 0.0, lambda: tangents_where_it_switches(self))
+        return along[self.free.index(name)] if len(along) and name in self.free else self.difference_quotient(name)
+
+    def difference_quotient(self, name: str) -> Array:
+        """Return the prediction's change per unit of a parameter, over small steps to both sides of its value.
+
+        By one alone, parameters whose products or quotients act would seem to be known each. Where one side has no
+        prediction by the other alone; 0 where none has.
         """
-        step = self.thresholds.tangent_step * (abs(self._all_values[name]) or 1.0)
+        step = self.tangent_step(name)
 
         def mean_of_secants() -> Array:
             return known_mean(np.stack((self.secant(name, step), self.secant(name, -step))))

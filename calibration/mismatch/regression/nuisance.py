@@ -131,8 +131,7 @@ def _from_prior(problem: Problem, name: str) -> float:
 def tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
     """Return names, prior standard deviations and tangents, shape (time, wheel) each."""
     simulation, wheels = problem.simulation, problem.recording.wheels
-    priors = simulation.parameters.items()
-    free = {name: prior.std for name, prior in priors if prior.std > 0 and name not in problem.held}
+    free = {name: simulation.parameters[name].std for name in problem.free}
     names, stds = list(free), list(free.values())
     found = list(as_shown(problem, [problem.tangent(name) for name in free]))
     of_parameter = dict(zip(names, found, strict=True))

@@ -71,6 +71,13 @@ class ProblemThresholds:
         "Share of its root mean square by which a factor must vary on a wheel, to be told from a constant factor.",
         f"{CHOICE}: no friction or soil law is known to a few percent",
     )
+    switching_share: float = threshold(
+        0.05,
+        "Root mean square by which the difference quotients to both sides of a parameter's value differ, as a share of "
+        "their sum's, from which the simulation switches.",
+        f"{CHOICE}: the seven predicted channels of five machines without a switch have 0.015 at most, a thermostat "
+        "0.1 to 0.5; a law of power n has n − 1 of a half of `tangent_step`",
+    )
     tangent_step: float = threshold(
         0.01,
         "Relative step of a parameter or an input for a difference quotient.",
