@@ -19,7 +19,7 @@ from regolithd.calibration.mismatch.calibration.linearised import (
     step_to,
     worse_than_stated,
 )
-from regolithd.calibration.mismatch.calibration.starting_values import Start, starting_values
+from regolithd.calibration.mismatch.calibration.starting_values import Start, fitted_where_late, starting_values
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, stated_late_inputs, with_changes
 from regolithd.calibration.mismatch.channels import compare_channels, labelled
@@ -37,7 +37,7 @@ from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.equations import smooth_equations, with_library
 from regolithd.calibration.mismatch.regression.reliability import noise_size_of
 from regolithd.calibration.mismatch.result import Comparison
-from regolithd.calibration.mismatch.selection.decision import decide
+from regolithd.calibration.mismatch.selection.decision import as_if_late, decide
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
@@ -200,6 +200,9 @@ def _decided(
 ) -> Decided:
     """Search, and keep what held-out readings confirm and what is more probable than chance."""
     search = _search(candidates, stated, pose, start, progress)
+    if (late := as_if_late(search.decision)) is not None:
+        beside = _searched_beside_delays(search, late, pose, progress)
+        search = search if beside.decision.unnamed else beside
     progress("measuring on held-out blocks and comparing with rivals")
     decision, held_out = earned(search.decision, search.grid)
     if decision.has_delay and not search.decision.has_delay:  # which was refused before held-out readings asked
@@ -258,6 +261,9 @@ def _searched_beside_delays(
     for _ in range(LATE_SEARCHES if decision.has_delay else 0):
         noise_size = decision.equations.problem.noise_size
         problem = replace(pose(values, decision.late_inputs), late=decision.late, noise_size=noise_size)
+        if decision.is_late_alone:
+            values, late = fitted_where_late(problem)
+            problem = replace(pose(values, decision.late_inputs), late=late, noise_size=noise_size)
         again = _search_at(smooth_equations(problem), found.candidates, progress)
         if not again.decision.has_delay:
             break

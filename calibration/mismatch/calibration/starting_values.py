@@ -24,6 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.calibration.step import Step
+from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
+from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.inference.statements import after_number
 from regolithd.calibration.mismatch.problem.principal_axes import switches
 
@@ -109,6 +111,18 @@ def starting_values(problem: Problem) -> Start:
         found = sorted((search.minimum(place) for place in begun), key=lambda one: one[0])
         best, *others = [place for objective, place in search.apart(found) if objective - found[0][0] < AS_WELL]
     return Start(problem, search.values(best), tuple(search.values(place) for place in others))
+
+
+def fitted_where_late(problem: Problem) -> tuple[dict[str, float], tuple[str, float]]:
+    """Return the parameters' values and the delay with which the simulation fits best, the predicted channel late.
+
+    The search begins at the problem's values and delay: those that were fitted without it stand for a part of it.
+    """
+    found = _Search.of(problem)
+    search = _LateSearch(problem, found.names, found.wheel)
+    with np.errstate(all="ignore"):  # a prediction may overflow on the way
+        _, place = search.minimum(search.place(problem.values))
+    return search.values(place), search.late(place)
 
 
 def _listed(values: Mapping[str, float], priors: Mapping[str, Prior]) -> str:
@@ -234,3 +248,36 @@ class _Search:
             rows.append(np.where(np.isfinite(change), change, 0.0))
         tangents = np.array(rows)
         return tangents * weights @ tangents.T + np.eye(len(place)), tangents * weights @ left - place
+
+
+class _LateSearch(_Search):
+    """The same of a problem whose predicted channel is late. The delay's share of change is the last coordinate."""
+
+    def late(self, place: Array) -> tuple[str, float]:
+        """Return how, and by how much, the channel is late at a place."""
+        assert self.problem.late is not None  # noqa: S101  # a search of late problems alone
+        kind, delay = self.problem.late
+        return kind, delay * (1 + float(place[-1]))
+
+    def values(self, place: Array) -> dict[str, float]:
+        """Return the parameters' values at a place."""
+        return super().values(place[:-1])
+
+    def place(self, values: Mapping[str, float]) -> Array:
+        """Return the place of the parameters' values with the delay of the problem."""
+        return np.append(super().place(values), 0.0)
+
+    def within(self, place: Array) -> Array:
+        """Return a place as far as the parameters may be moved, and the delay to its half or its double."""
+        found = super().within(place)
+        found[-1] = np.clip(place[-1], -0.5, 1.0)
+        return found
+
+    def left(self, place: Array) -> Array:
+        """Return what the simulation leaves of the readings there, shown as late as they are, shape (reading,)."""
+        problem = replace(self.problem, late=self.late(place))
+        try:
+            (shown,) = as_shown(problem, [problem.changed(**self.values(place))])
+        except SimulationError:
+            return np.full(len(self.wheel), np.nan)
+        return np.asarray((problem.measured - shown)[problem.mask])

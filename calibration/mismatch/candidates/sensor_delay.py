@@ -94,12 +94,15 @@ class SensorDelay(Candidate):
         return of_first_order if "filter_s" in shape else dead_time
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
-        """Return the predicted channel and each input, late by two readings up to a tenth of the recording."""
-        simulation = problem.simulation
+        """Return the predicted channel and each input, late by two readings up to a tenth of the recording.
+
+        A delay by which the problem has the channel, or an input, late already is among them.
+        """
+        simulation, (of_kind, known) = problem.simulation, problem.late or ("", 0.0)
         of_channel: list[Shape] = [
             {"late": simulation.channel, kind: delay}
             for kind in OF_CHANNEL
-            for delay in _delays(problem, RATIO_OF_CHANNEL)
+            for delay in sorted({*_delays(problem, RATIO_OF_CHANNEL), *([known] if of_kind == kind else [])})
         ]
         of_inputs: list[Shape] = [
             {"late": name, OF_INPUT: delay}

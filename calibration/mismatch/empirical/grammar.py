@@ -26,22 +26,38 @@ NARROWEST, WIDEST = 0.03, 3.0
 to what is all but a straight line)."""
 FEWEST_CYCLES, MOST_CYCLES = 0.5, 8.0
 """Cycles of a sine within the range (a choice: fewer are a parabola, more are noise to eight knots)."""
+VALUES_A_CYCLE = 3
+"""Values of a covariate that has few, in each cycle of a sine (a choice: one more than Nyquist's two)."""
 WIDTHS, PLACES = 12, 21
 """Points of the grids, refined afterwards (a choice)."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """The ends of the covariate in a recording, and the least magnitude that it has."""
+    """The ends of the covariate in a recording, the least magnitude that it has, and its largest gap.
+
+    The gap is the largest step from one of its values to the next: of gears it is 1.
+    """
 
     low: float
     high: float
     least: float
+    gap: float = 0.0
 
     @property
     def width(self) -> float:
         """The range."""
         return self.high - self.low
+
+    @property
+    def narrowest(self) -> float:
+        """The least width or length: what is narrower could lie between two values, and have any size there."""
+        return max(NARROWEST * self.width, self.gap / 4)
+
+    @property
+    def most_cycles(self) -> float:
+        """The most cycles that show: at two values a cycle, a sine and its phase are one number."""
+        return min(MOST_CYCLES, self.width / (VALUES_A_CYCLE * self.gap) if self.gap > 0 else MOST_CYCLES)
 
     @property
     def both_signs(self) -> bool:
@@ -185,8 +201,9 @@ def _sine() -> ClosedForm:
         "sine",
         "c cos(2π x/k) + d sin(2π x/k)",
         lambda x, s: np.stack((np.cos(2 * np.pi * x / s[0]), np.sin(2 * np.pi * x / s[0]))),
-        lambda span: (span.width / np.linspace(FEWEST_CYCLES, MOST_CYCLES, 46))[:, None],
+        lambda span: (span.width / np.linspace(FEWEST_CYCLES, span.most_cycles, 46))[:, None],
         ("k",),
+        suits=lambda span: span.most_cycles > FEWEST_CYCLES,
         coefficients=("c", "d"),
     )
 
@@ -204,11 +221,11 @@ def _away_from_zero(span: Span) -> bool:
 
 
 def _widths(span: Span) -> Array:
-    return span.width * np.geomspace(NARROWEST, WIDEST, 2 * WIDTHS)[:, None]
+    return np.geomspace(span.narrowest, WIDEST * span.width, 2 * WIDTHS)[:, None]
 
 
 def _places(span: Span) -> Array:
-    at, wide = np.linspace(span.low, span.high, PLACES), span.width * np.geomspace(NARROWEST, WIDEST, WIDTHS)
+    at, wide = np.linspace(span.low, span.high, PLACES), np.geomspace(span.narrowest, WIDEST * span.width, WIDTHS)
     return np.stack([each.ravel() for each in np.meshgrid(at, wide)], axis=1)
 
 

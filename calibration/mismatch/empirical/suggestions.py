@@ -63,8 +63,8 @@ class FittedForm:
 
 
 def span_of(x: Array) -> Span:
-    """Return the ends of a covariate (ascending), and its least magnitude."""
-    return Span(float(x[0]), float(x[-1]), float(np.min(np.abs(x))))
+    """Return the ends of a covariate (ascending), its least magnitude, and its largest gap."""
+    return Span(float(x[0]), float(x[-1]), float(np.min(np.abs(x))), float(np.max(np.diff(x), initial=0.0)))
 
 
 def best_forms(sums: CovariateSums, autocorrelation_time: float) -> list[tuple[float, FittedForm]]:

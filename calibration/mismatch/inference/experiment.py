@@ -167,7 +167,7 @@ def _own_experiments(
     lift = bool(unloaded) and (hidden or any(candidate.run_unloaded for candidate in candidates))
     sentence = "; then ".join(dict.fromkeys([*drives, unloaded] if lift else drives))
     duration_s, in_all = rounded_up(seconds_needed(equations, experimenter.entry_threshold))
-    why = experimenter.unpredictable or "no experiment that can be predicted does it"
+    why = experimenter.unpredictable or "none of the experiments that can be simulated here does"
     return Indistinguishable(
         effects=names,
         experiment=f"{capital(sentence)}; {in_all} in all. How well that tells them apart is not predicted: {why}.",

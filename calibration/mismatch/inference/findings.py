@@ -18,6 +18,7 @@ from regolithd.calibration.mismatch.answer import (
 from regolithd.calibration.mismatch.changes import ChangedSize, changes_of
 from regolithd.calibration.mismatch.experiments.drives import DIRECTION
 from regolithd.calibration.mismatch.inference.alternatives import alternatives
+from regolithd.calibration.mismatch.inference.dynamics import notes_on_dynamics
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values, wheel_names
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
 from regolithd.calibration.mismatch.inference.intervals import drawn_from, law_stds_of, parameters_of
@@ -79,6 +80,7 @@ def findings_of(
             *problem.recording.notes,
             *decision.notes,
             *notes_on_other_covariates(decision),
+            *notes_on_dynamics(decision),
             *_about_the_mask(problem),
             *not_looked_for(problem, candidates, {candidate.name for candidate in applicable}),
         ),

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import late_inputs, lateness
+from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay, late_inputs, lateness
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.candidate_groups import with_candidate
+from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import with_periodic_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_subsets, passes_entry_test
@@ -92,6 +93,11 @@ class Decision:
         return lateness(named, self.equations.problem.simulation.channel)
 
     @property
+    def is_late_alone(self) -> bool:
+        """Whether the predicted channel is late, and nothing else was found."""
+        return self.late is not None and len(self.whole.terms) == 1
+
+    @property
     def has_delay(self) -> bool:
         """Whether a named effect makes a column late."""
         return self.late is not None or bool(self.late_inputs)
@@ -135,6 +141,23 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
         unnamed=unnamed,
         whole=equations.fit((*named.terms, *unnamed)),
     )
+
+
+def as_if_late(decision: Decision) -> Decision | None:
+    """Return a decision with the best delay in the place of an unexplained past of the prediction; None: there is none.
+
+    Parameters that were fitted without a delay may stand for a part of it; the rest has not the form of a delay there.
+    Where the simulation is linearised beside the delay, it has.
+    """
+    equations = decision.equations
+    delays = [group for group in equations.design.groups if group.named and group.name == SensorDelay.name]
+    if decision.has_delay or not delays or not any(term.name in LAGGED for term in decision.unnamed):
+        return None
+    best = equations.largest_score(equations.gains(decision.named.terms, delays))
+    if best is None:
+        return None
+    fit = equations.fit((*decision.named.terms, best[1]))
+    return replace(decision, named=fit, unnamed=(), whole=fit)
 
 
 def names_of(decision: Decision) -> frozenset[str]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch.empirical.grammar import Span, grammar
+from regolithd.calibration.mismatch.empirical.suggestions import span_of
 
 RANGES = [Span(0.2, 3.0, 0.2), Span(-3.0, -0.2, 0.2), Span(-1.0, 2.0, 0.0)]
 
@@ -29,3 +30,23 @@ def test_a_sine_has_half_a_cycle_or_more_within_the_range() -> None:
     periods = sine.shapes(Span(-1.0, 2.0, 0.0))[:, 0]
     assert np.all(periods > 0)
     assert periods.max() == pytest.approx(2 * 3.0)
+
+
+def test_nothing_is_fitted_between_the_values_of_a_gear() -> None:
+    """A sine of less than three gears a cycle, or a bump between two gears, could have any size there."""
+    gears = span_of(np.array([1.0, 2.0, 3.0, 4.0, 5.0]))
+    assert gears.gap == 1.0
+    forms = {form.text: form for form in grammar() if form.suits(gears)}
+    assert forms["c cos(2π x/k) + d sin(2π x/k)"].shapes(gears).min() == pytest.approx(3.0)
+    for form in forms.values():
+        if "k" in form.names and form.family != "sine":
+            assert form.shapes(gears)[:, form.names.index("k")].min() == pytest.approx(0.25)
+    assert not any(form.family == "sine" and form.suits(span_of(np.array([0.0, 1.0]))) for form in grammar())
+
+
+def test_the_gaps_of_a_continuous_covariate_limit_nothing() -> None:
+    """A sine has eight cycles at most, and widths begin at three hundredths of the range."""
+    (sine,) = (form for form in grammar() if form.family == "sine")
+    span = span_of(np.linspace(0.0, 1.0, 240))
+    assert sine.shapes(span).min() == pytest.approx(1 / 8)
+    assert span.narrowest == pytest.approx(0.03)

@@ -96,6 +96,7 @@ def test_a_reading_that_rings_is_unexplained(frequency_Hz: float, damping: float
     assert place.curve is None
     assert place.to_s - place.from_s > 0.8 * TIME_S[-1]
     assert "depends on the past of the" in verdict_sentence(found.answer)
+    assert any("how thrust_N follows in time: a late reading, a filter" in note for note in found.answer.notes)
     with pytest.raises(SimulationError, match="follows what was before"):
         with_curves(found.answer, found.evidence)
 
@@ -105,7 +106,9 @@ def test_noise_with_a_memory_is_no_dynamics(memory: float) -> None:
     """Whatever its memory."""
     random = np.random.default_rng(3)
     speed = driven(random)
-    assert compared(thrust(speed) + noise(random, memory), speed).answer.verdict == "consistent"
+    answer = compared(thrust(speed) + noise(random, memory), speed).answer
+    assert answer.verdict == "consistent"
+    assert not any("follows in time" in note for note in answer.notes)
 
 
 @pytest.mark.parametrize("late", ["filter", "dead time"])
