@@ -202,7 +202,9 @@ def _decided(
     search = _search(candidates, stated, pose, start, progress)
     if (late := as_if_late(search.decision)) is not None:
         beside = _searched_beside_delays(search, late, pose, progress)
-        search = search if beside.decision.unnamed else beside
+        # A delay that is there explains as much as a free response to the past does; a part of an oscillation less.
+        if not beside.decision.unnamed and beside.decision.power_left <= search.decision.power_left:
+            search = beside
     progress("measuring on held-out blocks and comparing with rivals")
     decision, held_out = earned(search.decision, search.grid)
     if decision.has_delay and not search.decision.has_delay:  # which was refused before held-out readings asked

@@ -93,6 +93,11 @@ class Decision:
         return lateness(named, self.equations.problem.simulation.channel)
 
     @property
+    def power_left(self) -> float:
+        """Mean square of what is left of the compared readings beside all that was found."""
+        return float(np.mean(residual_of(self.equations, self.whole)[self.equations.problem.mask] ** 2))
+
+    @property
     def is_late_alone(self) -> bool:
         """Whether the predicted channel is late, and nothing else was found."""
         return self.late is not None and len(self.whole.terms) == 1

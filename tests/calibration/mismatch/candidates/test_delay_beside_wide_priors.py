@@ -77,3 +77,20 @@ def test_a_delay_has_its_name_and_the_parameters_their_values(seed: int, late: i
     # Twice the half-width of the 90 % interval holds the truth 999 times in 1000.
     for each in answer.parameters:
         assert abs(truth[each.name] - each.value) < each.high - each.low, each.name
+
+
+def test_an_oscillation_is_no_hidden_delay() -> None:
+    """A free response to the past explains it better than a delay with other parameters does."""
+    columns, truth = recorded(13, 0)
+    true = Cell().predict({"current_A": columns["current_A"][:, None]}, truth)[:, 0]
+    rate, steps, at, speed, shown = 2 * np.pi * 0.008, 40, float(true[0]), 0.0, []
+    for value in true.tolist():
+        shown.append(at)
+        for _ in range(steps):
+            speed += STEP_s / steps * (rate**2 * (value - at) - 2 * 0.26 * rate * speed)
+            at += STEP_s / steps * speed
+    columns["cell_V"] = columns["cell_V"] + 0.6 * (np.array(shown) - true)
+    answer = compare(from_columns(columns), Cell()).answer
+    assert answer.verdict == "unexplained"
+    assert [place.covariate for place in answer.unexplained] == ["lagged_prediction"]
+    assert answer.effects == ()
