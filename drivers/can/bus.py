@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from regolithd.drivers.can.frame import Frame
 
 
+READ_WITHIN_S = 0.05
+"""Time in which frames that wait in the socket are read, once this program runs. Until then it was late itself, and no
+node can be told to be silent: a time that waits for a node's frame is over only when this time is over as well."""
 _MOST_PENDING = 20_000  # frames: two seconds of a full bus
 
 

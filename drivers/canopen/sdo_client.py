@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 from typing import TYPE_CHECKING
 
+from regolithd.drivers.can.bus import READ_WITHIN_S
 from regolithd.drivers.can.frame import Frame
 from regolithd.drivers.canopen import cob_id
 from regolithd.drivers.canopen.sdo import ABORT_COMMAND, ABORT_TIMEOUT, Transfer, abort_request, download, upload
@@ -22,10 +23,6 @@ if TYPE_CHECKING:
     from collections.abc import AsyncIterator
 
     from regolithd.drivers.can.bus import Bus
-
-# When the time for an answer is over, it may still wait in the socket because this program itself was late: a transfer
-# times out only if no answer comes during this further time, in which the socket is read.
-_GRACE_S = 0.05
 
 
 class SdoClient:
@@ -126,10 +123,10 @@ class SdoClient:
 
 @contextlib.asynccontextmanager
 async def _answered_within(time_s: float) -> AsyncIterator[None]:
-    """Raise TimeoutError `_GRACE_S` after `time_s`, counted from when the event loop comes to it."""
+    """Raise TimeoutError `READ_WITHIN_S` after `time_s`, counted from when the event loop comes to it."""
     loop = asyncio.get_running_loop()
     async with asyncio.timeout(None) as limit:
-        due = loop.call_later(time_s, lambda: limit.reschedule(loop.time() + _GRACE_S))
+        due = loop.call_later(time_s, lambda: limit.reschedule(loop.time() + READ_WITHIN_S))
         try:
             yield
         finally:

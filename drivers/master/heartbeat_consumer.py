@@ -7,14 +7,11 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from regolithd.drivers.can.bus import READ_WITHIN_S
 from regolithd.drivers.canopen.nmt import NmtState
 
 if TYPE_CHECKING:
     from regolithd.drivers.master.remote_node import RemoteNode
-
-# After the heartbeat time has passed, frames may still wait in the socket because this program itself was late: a node
-# is lost only when nothing arrives from it during this further time, in which the socket is read.
-_GRACE_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +67,7 @@ class HeartbeatConsumer:
             if left():
                 what = remote.state.text if remote.state else "nothing"
                 return Loss(f"it left operational and reports {what}", silent=False)
-            if not await _heard_within(remote, _GRACE_S):
+            if not await _heard_within(remote, READ_WITHIN_S):
                 return Loss(f"no heartbeat for {self._lost_after_s:g} s", silent=True)
 
     def _left_s(self, remote: RemoteNode) -> float:

@@ -77,7 +77,7 @@ async def test_a_heartbeat_wakes_nothing(monkeypatch: pytest.MonkeyPatch) -> Non
 
 async def test_a_node_that_is_heard_in_the_grace_time_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     """The program was late, not the node; its next heartbeat time is monitored as the first was."""
-    monkeypatch.setattr(heartbeat_consumer, "_GRACE_S", 10.0)
+    monkeypatch.setattr(heartbeat_consumer, "READ_WITHIN_S", 10.0)
     consumer, node = HeartbeatConsumer(0.05), operational(1)
     running = asyncio.ensure_future(consumer.run())
     waiting = asyncio.ensure_future(consumer.until_lost(node))
@@ -85,7 +85,7 @@ async def test_a_node_that_is_heard_in_the_grace_time_is_not_lost(monkeypatch: p
         await asyncio.sleep(0.12)
         assert not waiting.done()
         node.take_state(NodeState(2, 1, NmtState.OPERATIONAL))
-    monkeypatch.setattr(heartbeat_consumer, "_GRACE_S", 0.01)
+    monkeypatch.setattr(heartbeat_consumer, "READ_WITHIN_S", 0.01)
     async with asyncio.timeout(10):
         assert await waiting == Loss("no heartbeat for 0.05 s", silent=True)
     running.cancel()
