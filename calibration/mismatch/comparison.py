@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
+from regolithd.calibration.mismatch.calibration.beside_delay import fitted_where_late
 from regolithd.calibration.mismatch.calibration.linearised import (
     added_by,
     beyond_their_doubt,
@@ -19,7 +20,7 @@ from regolithd.calibration.mismatch.calibration.linearised import (
     step_to,
     worse_than_stated,
 )
-from regolithd.calibration.mismatch.calibration.starting_values import Start, fitted_where_late, starting_values
+from regolithd.calibration.mismatch.calibration.starting_values import Start, starting_values
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, stated_late_inputs, with_changes
 from regolithd.calibration.mismatch.channels import compare_channels, labelled

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
+from mass_on_spring import behind
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare, from_columns
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-ROWS, STEP_s = 3000, 10.0
+ROWS, STEP_s, FINE = 3000, 10.0, 40
 
 
 class Cell(Simulation):
@@ -83,13 +84,8 @@ def test_an_oscillation_is_no_hidden_delay() -> None:
     """A free response to the past explains it better than a delay with other parameters does."""
     columns, truth = recorded(13, 0)
     true = Cell().predict({"current_A": columns["current_A"][:, None]}, truth)[:, 0]
-    rate, steps, at, speed, shown = 2 * np.pi * 0.008, 40, float(true[0]), 0.0, []
-    for value in true.tolist():
-        shown.append(at)
-        for _ in range(steps):
-            speed += STEP_s / steps * (rate**2 * (value - at) - 2 * 0.26 * rate * speed)
-            at += STEP_s / steps * speed
-    columns["cell_V"] = columns["cell_V"] + 0.6 * (np.array(shown) - true)
+    shown = behind(np.repeat(true, FINE), FINE, STEP_s / FINE, 0.008, 0.26)
+    columns["cell_V"] = columns["cell_V"] + 0.6 * (shown - true)
     answer = compare(from_columns(columns), Cell()).answer
     assert answer.verdict == "unexplained"
     assert [place.covariate for place in answer.unexplained] == ["lagged_prediction"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
+import mass_on_spring
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -59,15 +60,8 @@ def driven(random: np.random.Generator) -> Array:
 
 def behind(values: Array, frequency_Hz: float, damping: float) -> Array:
     """Return values behind a mass on a spring, integrated in small steps."""
-    rate, step = 2 * np.pi * frequency_Hz, STEP_S / FINE
-    fine = np.interp(np.arange(COUNT * FINE) * step, TIME_S, values)
-    at, speed, course = values[0], 0.0, []
-    for k, value in enumerate(fine.tolist()):
-        if k % FINE == 0:
-            course.append(at)
-        speed += step * (rate**2 * (value - at) - 2 * damping * rate * speed)
-        at += step * speed
-    return np.array(course)
+    fine = np.interp(np.arange(COUNT * FINE) * STEP_S / FINE, TIME_S, values)
+    return mass_on_spring.behind(fine, FINE, STEP_S / FINE, frequency_Hz, damping)
 
 
 def noise(random: np.random.Generator, memory: float = 0.8) -> Array:

@@ -1,0 +1,70 @@
+"""The parameters and the delay of the predicted channel, fitted together by the simulation itself.
+
+Parameters that are fitted without a delay stand for a part of it: a longer time constant is late as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.calibration.search import Search
+from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
+from regolithd.calibration.mismatch.errors import SimulationError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from regolithd.calibration.mismatch.problem.problem import Problem
+
+Array = NDArray[np.float64]
+
+
+def fitted_where_late(problem: Problem) -> tuple[dict[str, float], tuple[str, float]]:
+    """Return the parameters' values and the delay with which the simulation fits best, the predicted channel late.
+
+    The search begins at the problem's values and delay: those that were fitted without it stand for a part of it.
+    """
+    search = _LateSearch.of(problem)
+    with np.errstate(all="ignore"):  # a prediction may overflow on the way
+        _, place = search.minimum(search.place(problem.values))
+    return search.values(place), search.late(place)
+
+
+class _LateSearch(Search):
+    """The search of a problem whose predicted channel is late: the last coordinate is the change of the delay, over it.
+
+    The delay has no prior: what the prior of a coordinate adds to the objective is 1 at most, at its double.
+    """
+
+    def late(self, place: Array) -> tuple[str, float]:
+        """Return how, and by how much, the channel is late at a place."""
+        assert self.problem.late is not None  # noqa: S101  # a search of late problems alone
+        kind, delay = self.problem.late
+        return kind, delay * (1 + float(place[-1]))
+
+    def values(self, place: Array) -> dict[str, float]:
+        """Return the parameters' values at a place."""
+        return super().values(place[:-1])
+
+    def place(self, values: Mapping[str, float]) -> Array:
+        """Return the place of the parameters' values with the delay of the problem."""
+        return np.append(super().place(values), 0.0)
+
+    def within(self, place: Array) -> Array:
+        """Return a place as far as the parameters may be moved, and the delay to its half or its double."""
+        found = super().within(place)
+        found[-1] = np.clip(place[-1], -0.5, 1.0)
+        return found
+
+    def left(self, place: Array) -> Array:
+        """Return what the simulation leaves of the readings there, shown as late as they are, shape (reading,)."""
+        problem = replace(self.problem, late=self.late(place))
+        try:
+            (shown,) = as_shown(problem, [problem.changed(**self.values(place))])
+        except SimulationError:
+            return np.full(len(self.wheel), np.nan)
+        return np.asarray((problem.measured - shown)[problem.mask])
