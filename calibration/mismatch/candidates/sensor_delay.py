@@ -98,16 +98,16 @@ class SensorDelay(Candidate):
 
         A delay by which the problem has the channel, or an input, late already is among them.
         """
-        simulation, (of_kind, known) = problem.simulation, problem.late or ("", 0.0)
+        simulation, late = problem.simulation, dict([problem.late] if problem.late else [])
         of_channel: list[Shape] = [
             {"late": simulation.channel, kind: delay}
             for kind in OF_CHANNEL
-            for delay in sorted({*_delays(problem, RATIO_OF_CHANNEL), *([known] if of_kind == kind else [])})
+            for delay in _delays(problem, RATIO_OF_CHANNEL, late.get(kind))
         ]
         of_inputs: list[Shape] = [
             {"late": name, OF_INPUT: delay}
             for name in simulation.inputs
-            for delay in sorted({*_delays(problem, RATIO_OF_INPUT), *filter(None, [problem.on_time.get(name)])})
+            for delay in _delays(problem, RATIO_OF_INPUT, problem.on_time.get(name))
         ]
         return [*of_channel, *of_inputs]
 
@@ -221,11 +221,11 @@ def _slope(problem: Problem, name: str) -> Array:
     )
 
 
-def _delays(problem: Problem, ratio: float) -> list[float]:
-    """Return the delays of the grid [s]: a geometric series."""
+def _delays(problem: Problem, ratio: float, known: float | None) -> list[float]:
+    """Return the delays of the grid [s]: a geometric series, and the one that the problem has already."""
     shortest, longest = FINEST_READINGS * problem.recording.step_s, LONGEST_SHARE * problem.length_s
     count = int(np.log(max(longest / shortest, 1.0)) / np.log(ratio) + 1e-9) + 1
-    return [float(delay) for delay in shortest * ratio ** np.arange(count)]
+    return sorted({*(shortest * ratio ** np.arange(count)).tolist(), *filter(None, [known])})
 
 
 def _without_blanks(problem: Problem, delay_s: float) -> Array:

@@ -184,7 +184,7 @@ def effect(found: Effect, evidence: Evidence, labels: Labels, *, several: bool =
     )
     return EffectSection(
         capital(labels.effect(found.name)),
-        capital(found.statement).replace(" %", NO_BREAK + "%"),
+        _unbroken(capital(found.statement)),
         found.equation,
         tuple(fact for fact in facts if fact),
         _parameter_rows(found, labels),
@@ -215,17 +215,17 @@ def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> Unexp
     """Return one structure that no candidate explains: range, wheels, time, and share of the residual's power."""
     first, last = (number(each * labels.time_factor) for each in (place.from_s, place.to_s))
     facts = (
-        f"only {place.range.statement}".replace(" %", NO_BREAK + "%") if place.range else "",
+        f"only {place.range.statement}" if place.range else "",
         labels.wheels(place.wheels, evidence.wheels),
         f"{first} to {last} {labels.time_unit}",
-        f"{percent(place.share_of_residual)} of the residual’s power".replace(" %", NO_BREAK + "%"),
+        f"{percent(place.share_of_residual)} of the residual’s power",
     )
     curve = empirical_section(place, evidence, labels) if place.curve else None
     name = labels.the(place.covariate)
     # Of one recording, what has no curve is periodic in time.
     periodic = place.covariate == "time" and curve is None
     return UnexplainedSection(
-        f"{name}, periodically" if periodic else name, tuple(fact for fact in facts if fact), curve
+        f"{name}, periodically" if periodic else name, tuple(_unbroken(fact) for fact in facts if fact), curve
     )
 
 
@@ -295,6 +295,11 @@ def other_curves(answer: Answer, evidence: Evidence, labels: Labels) -> tuple[Fi
         for curve in others[:MOST_OTHER_CURVES]
     ]
     return tuple(Figure(_safe(drawing)) for drawing in drawings)
+
+
+def _unbroken(text: str) -> str:
+    """Return a text whose numbers and percent signs stay on one line."""
+    return text.replace(" %", NO_BREAK + "%")
 
 
 def _safe(svg: str) -> Markup:
