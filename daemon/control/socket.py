@@ -1,9 +1,10 @@
-"""Creates the control socket's file with permissions for its group only, without a moment of wider permissions."""
+"""Creates the control socket's file: it appears once it listens, with its permissions, never with wider ones."""
 
 from __future__ import annotations
 
 import grp
 import os
+import secrets
 import socket
 import stat
 from typing import TYPE_CHECKING
@@ -36,6 +37,8 @@ def open_control_socket(path: Path, group: str) -> socket.socket:
 def open_socket(path: Path, mode: int, group: int | None = None, remedy: str = "") -> socket.socket:
     """Return a listening socket at `path` with these permissions, and this group's number.
 
+    It is bound beside `path` and linked to it when it listens: a client that finds the file gets an answer.
+
     Raises
     ------
     ControlSocketError
@@ -43,20 +46,24 @@ def open_socket(path: Path, mode: int, group: int | None = None, remedy: str = "
     """
     _remove_stale(path)
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM | socket.SOCK_NONBLOCK | socket.SOCK_CLOEXEC)
+    bound = path.with_name(f".{secrets.token_hex(4)}")  # short: a socket's path has at most 107 bytes, unix(7)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         mask = os.umask(0o177)  # only the daemon's user, until the group is set
         try:
-            listener.bind(str(path))
+            listener.bind(str(bound))
         finally:
             os.umask(mask)
-        if group is not None and path.stat().st_gid != group:
-            os.chown(path, -1, group)
-        path.chmod(mode)
+        if group is not None and bound.stat().st_gid != group:
+            os.chown(bound, -1, group)
+        bound.chmod(mode)
         listener.listen(8)
+        os.link(bound, path)  # unlike a rename, it does not replace the socket of a daemon that starts meanwhile
     except OSError as error:
         listener.close()
         raise ControlSocketError(f"{path}: {error.strerror or error}. {remedy}".rstrip()) from error
+    finally:
+        bound.unlink(missing_ok=True)
     return listener
 
 

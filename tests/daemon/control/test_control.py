@@ -7,6 +7,7 @@ import stat
 import subprocess
 import tempfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
@@ -214,6 +215,25 @@ async def test_the_socket_of_a_killed_daemon_is_taken_over(tmp_path: Path) -> No
         open_control_socket(path, GROUP)
     with pytest.raises(ControlSocketError, match=r"groupadd --system rovers"):
         open_control_socket(tmp_path / "other.sock", "rovers")
+
+
+def test_whoever_finds_the_socket_s_file_is_answered(tmp_path: Path) -> None:
+    """A client that waits for the file and connects at once is never refused, and no other file is left."""
+    path = tmp_path / "control.sock"
+
+    def connect() -> None:
+        while not path.exists():
+            pass
+        with socket.socket(socket.AF_UNIX) as client:
+            client.connect(str(path))
+
+    with ThreadPoolExecutor(1) as pool:
+        for _ in range(200):
+            connected = pool.submit(connect)
+            with open_control_socket(path, GROUP):
+                connected.result()
+                assert [file.name for file in tmp_path.iterdir()] == ["control.sock"]
+            path.unlink()
 
 
 async def test_a_socket_that_cannot_be_made_is_reported_and_the_rest_goes_on(tmp_path: Path) -> None:
