@@ -4,7 +4,8 @@ The error of an input biases the prediction and every candidate that is computed
 way: the residual correlates with candidates though no physics is missing. Replacing a reading by E[truth | recording]
 removes this; the error that remains is of Berkson's kind, uncorrelated with what is computed from it (Carroll et al.,
 2006, chapter 4). The truth is modelled as first-order autoregressive about its mean, with the correlation of the
-recording, so that a signal that jumps is hardly smoothed. With a stated error of 0 nothing changes.
+recording, so that a signal that jumps is hardly smoothed. With a stated error of 0 nothing changes. Where the error is
+relative to the reading, all this is on a scale on which it is not (`reading_scale.py`).
 
 A normal density is wrong for a truth that is 0 for half of the time, or has few levels, and shrinks it wrongly. So the
 density of the truth's values is estimated too, and used in two more models: in the place of the autoregression's normal
@@ -25,6 +26,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
 from regolithd.calibration.mismatch.problem.true_values import NormalTruth, refined_by_density
 from regolithd.calibration.mismatch.signal.recursion import recursion
 
@@ -76,9 +78,11 @@ def expected_inputs(
         return recording
     values = np.concatenate([recording.channels[name] for name in names], axis=1)
     owners = [name for name in names for _ in recording.wheels]
-    scale = [_error_of(column, sensors[name]) for name, column in zip(owners, values.T, strict=True)]
+    scales = [ReadingScale.of(column, sensors[name]) for name, column in zip(owners, values.T, strict=True)]
     starts = np.flatnonzero(np.diff(recording.run, prepend=recording.run[0] - 1))
-    rest, truths = _at_rest(values), normal_truths(values, np.array(scale) ** 2, starts)
+    even = np.stack([scale.even(column) for scale, column in zip(scales, values.T, strict=True)], axis=1)
+    rest = _at_rest(values)
+    truths = normal_truths(even, np.array([scale.deviation for scale in scales]) ** 2, starts)
     smooth = truths.mean.copy()
     for k, name in enumerate(owners):
         if name in normal:
@@ -86,19 +90,11 @@ def expected_inputs(
         if k and owners[k - 1] == name and np.array_equal(values[:, k - 1], values[:, k], equal_nan=True):
             smooth[:, k] = smooth[:, k - 1]  # a sensor of the whole machine
             continue
-        moving = np.where(rest[:, k], np.nan, values[:, k])
-        smooth[:, k] = refined_by_density(moving, scale[k], starts, truths.column(k))
-    parts = np.split(np.where(rest, 0.0, smooth), len(names), axis=1)
+        moving = np.where(rest[:, k], np.nan, even[:, k])
+        smooth[:, k] = refined_by_density(moving, scales[k].deviation, starts, truths.column(k))
+    expected = np.stack([scale.readings(column) for scale, column in zip(scales, smooth.T, strict=True)], axis=1)
+    parts = np.split(np.where(rest, 0.0, expected), len(names), axis=1)
     return recording.with_channels(**dict(zip(names, parts, strict=True)))
-
-
-def error_of(recording: Recording, name: str, error: SensorError) -> float:
-    """Return the standard deviation of an input's error, in its unit."""
-    return _error_of(recording.channels[name].ravel(), error) if name in recording.channels else 0.0
-
-
-def _error_of(readings: Array, error: SensorError) -> float:
-    return error.absolute + error.relative * float(known_mean(np.abs(readings)))
 
 
 def _at_rest(values: Array) -> NDArray[np.bool_]:

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.problem.errors_in_variables import error_of, known_mean
+from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
+from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -51,17 +52,21 @@ def input_doubt(
     since a simulation that integrates would add up an error that stays. None where no input has an error.
     """
     inputs = complete_inputs(expected)
-    stated = {name: error_of(as_read, name, error) for name, error in simulation.sensors.items() if name in inputs}
-    if not any(stated.values()):
+    scales = {
+        name: ReadingScale.of(as_read.channels[name], error)
+        for name, error in simulation.sensors.items()
+        if name in as_read.channels and name in inputs
+    }
+    stated = {name: scale.error(inputs[name]) for name, scale in scales.items() if scale.deviation > 0}
+    if not stated:
         return None
     before = simulation.predict(inputs, values)
     alone, together, random = np.zeros(before.shape), np.zeros(before.shape), np.random.default_rng(0)
     for name, error in stated.items():
-        if error:
-            lot = random.choice([-error, error], size=(len(before), 1))
-            variance = np.nan_to_num(simulation.predict({**inputs, name: inputs[name] + lot}, values) - before) ** 2
-            alone += variance * _left_by_smoothing(as_read.channels[name] - inputs[name], error)
-            together += variance * wheels_in_common(inputs[name])
+        lot = error * random.choice([-1.0, 1.0], size=(len(before), 1))
+        variance = np.nan_to_num(simulation.predict({**inputs, name: inputs[name] + lot}, values) - before) ** 2
+        alone += variance * _left_by_smoothing(as_read.channels[name] - inputs[name], error)
+        together += variance * wheels_in_common(inputs[name])
     return InputDoubt(alone, together)
 
 
@@ -74,12 +79,12 @@ def total_doubt(doubts: Iterable[InputDoubt | None]) -> InputDoubt | None:
     return InputDoubt(alone, together)
 
 
-def _left_by_smoothing(taken_out: Array, error: float) -> float:
+def _left_by_smoothing(taken_out: Array, error: Array) -> float:
     """Return the share of an error's variance that is left in its conditional expectation.
 
     What smoothing takes out is a function of the readings, and what is left of the error is orthogonal to these.
     """
-    return float(np.clip(1 - known_mean(taken_out.ravel() ** 2) / error**2, LEAST_LEFT, 1.0))
+    return float(np.clip(1 - known_mean((taken_out / error).ravel() ** 2), LEAST_LEFT, 1.0))
 
 
 def wheels_in_common(values: Array) -> int:

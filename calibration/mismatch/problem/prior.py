@@ -54,7 +54,10 @@ class Prior:
 
 @dataclass(frozen=True)
 class SensorError:
-    """A recorded input's standard error: a fraction of the reading plus a constant, independent for each reading."""
+    """A recorded input's standard error: a fraction of the reading, and a constant.
+
+    Both are independent of each other and from reading to reading.
+    """
 
     relative: float = 0.0
     absolute: float = 0.0

@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.problem.errors_in_variables import (
     known_mean,
 )
 from regolithd.calibration.mismatch.problem.prior import SensorError
+from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
 
 Array = NDArray[np.float64]
 RANDOM = np.random.default_rng(7)
@@ -90,15 +91,18 @@ def recording(**channels: Array) -> Recording:
 
 
 def test_an_input_is_replaced_where_it_has_an_error() -> None:
-    """The error is the absolute one plus the relative one times the channel's mean magnitude, wheel by wheel."""
+    """Wheel by wheel, and where the error is relative, on the scale on which it is not."""
     load, slip = RANDOM.normal(50, 5, (40, 2)), RANDOM.normal(0.1, 0.02, (40, 2))
     found = expected_inputs(
         recording(load=load, slip=slip, other=load),
         {"load": SensorError(relative=0.05), "slip": SensorError(absolute=0.01), "other": SensorError()},
     )
-    scale = np.r_[0.05 * np.abs(load).mean(axis=0), 0.01, 0.01] ** 2
-    expected = conditional_expectation(np.hstack((load, slip)), scale, np.array([0, 20]))
-    np.testing.assert_allclose(found.channels["load"], expected[:, :2])
+    scales = [ReadingScale.of(column, SensorError(relative=0.05)) for column in load.T]
+    even = np.stack([scale.even(column) for scale, column in zip(scales, load.T, strict=True)], axis=1)
+    variances = np.array([*(scale.deviation for scale in scales), 0.01, 0.01]) ** 2
+    expected = conditional_expectation(np.hstack((even, slip)), variances, np.array([0, 20]))
+    for column, scale in enumerate(scales):
+        np.testing.assert_allclose(found.channels["load"][:, column], scale.readings(expected[:, column]))
     np.testing.assert_allclose(found.channels["slip"], expected[:, 2:])
     assert found.channels["other"] is load
     assert np.std(found.channels["load"]) < 0.95 * np.std(load)
