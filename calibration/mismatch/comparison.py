@@ -163,7 +163,7 @@ def decided(
     candidates: Sequence[Candidate] = [each.form_for(simulation) for each in simulation.candidates(library())]
     stated = stated_in(candidates, effects, simulation.stated_effects(), simulation.empirical_curves)
 
-    inputs, on_time = inputs_of(recorded, simulation), stated_late_inputs(stated, simulation.inputs)
+    inputs, on_time = inputs_of(recorded, simulation, thresholds), stated_late_inputs(stated, simulation.inputs)
 
     fed: frozenset[str] = frozenset()
     held: frozenset[str] = frozenset()

@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import RecordingError
-from regolithd.calibration.mismatch.problem.compared import blanks_of, isolated_outliers, left_out
+from regolithd.calibration.mismatch.problem.compared import (
+    blanks_of,
+    bursts_out_of_range,
+    isolated_outliers,
+    left_out,
+    note_on_far_readings,
+)
 from regolithd.calibration.mismatch.problem.covariates import covariates_of
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.problem import Problem
@@ -49,7 +55,7 @@ def build_problem(
         When the predicted channel or an input is missing, or too little can be compared.
     """
     chosen = dict(values or {name: prior.value for name, prior in simulation.parameters.items()})
-    inputs = inputs or inputs_of(recording, simulation)
+    inputs = inputs or inputs_of(recording, simulation, thresholds)
     all_values = {**simulation.variants(), **chosen}
     run = simulated(put_on_time(inputs, late) if late else inputs, simulation, all_values, thresholds)
     as_recorded = None
@@ -61,6 +67,7 @@ def build_problem(
     compared = run.known & np.isfinite(measured)
     residual = np.where(compared, measured - prediction, np.nan)
     outliers = isolated_outliers(residual, recording.run, thresholds)
+    bursts = bursts_out_of_range(measured, residual, recording.run, thresholds)
     as_read = None if run.as_read is prepared else complete_inputs(run.as_read)
     found, constants = covariates_of(
         prepared,
@@ -71,9 +78,10 @@ def build_problem(
         arbitrary_zero=zero_is_arbitrary(simulation, measured),
     )
     found, notes = without_the_reading_itself(found, measured, simulation.channel)
-    prepared = prepared.with_notes(*notes, *note_on_zero(simulation, measured))
+    far = note_on_far_readings(simulation.channel, residual, outliers | bursts, thresholds)
+    prepared = prepared.with_notes(*notes, *note_on_zero(simulation, measured), *far)
     covariates, blanks = blanks_of(found, simulation.undefined_at_times, compared, thresholds)
-    mask = compared & ~outliers
+    mask = compared & ~outliers & ~bursts
     for blank in blanks.values():
         mask &= ~blank
     if mask.sum() < thresholds.fewest_readings:
@@ -95,7 +103,7 @@ def build_problem(
         labels=labels,
         side=simulation.side(recording.wheels),
         row=simulation.row(recording.wheels),
-        left_out=left_out(simulation.channel, measured, run, outliers, blanks, labels),
+        left_out=left_out(simulation.channel, measured, run, outliers, bursts, blanks, labels),
         thresholds=thresholds,
         doubt=inputs.doubt,
         on_time=dict(late or {}),

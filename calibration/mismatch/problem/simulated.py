@@ -19,8 +19,10 @@ from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.problem.delayed import beyond_the_end, shifted
 from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
 from regolithd.calibration.mismatch.problem.input_doubt import InputDoubt, input_doubt, total_doubt, wheels_in_common
+from regolithd.calibration.mismatch.problem.input_faults import without_input_faults
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.signal.robust import robust_std
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -86,22 +88,27 @@ class Simulated:
         return np.asarray(np.isfinite(self.prediction) & ~unknown)
 
 
-def inputs_of(recording: Recording, simulation: Predictor) -> Inputs:
-    """Return what the simulation is run on.
+def inputs_of(recording: Recording, simulation: Predictor, thresholds: Thresholds = THRESHOLDS) -> Inputs:
+    """Return what the simulation is run on, without single, isolated faults.
 
     Raises
     ------
     RecordingError
         When the predicted channel or an input is missing.
     """
+    stated = {name: prior.value for name, prior in simulation.parameters.items()}
+    values = {**simulation.variants(), **stated}
+
+    def predict(faulty: Recording) -> Array:
+        return simulation.predict(complete_inputs(_prepared(faulty, simulation)[0]), values)
+
+    recording = without_input_faults(recording, simulation.channel, predict, thresholds)
     as_read, blanks = _prepared(recording, simulation)
     normal = _inputs_of_speed(as_read, simulation)
     expected, otherwise = expected_inputs(as_read, simulation.sensors, normal), None
     if blanks:
         otherwise, _ = _prepared(recording, simulation, other_way=True)
         otherwise = expected_inputs(otherwise, simulation.sensors, normal)
-    stated = {name: prior.value for name, prior in simulation.parameters.items()}
-    values = {**simulation.variants(), **stated}
     between = _between_readings(recording, as_read, simulation, values)
     doubts = (input_doubt(as_read, expected, simulation, values), *(each.doubt for each in between.values()))
     within = {name: each.within for name, each in between.items()}

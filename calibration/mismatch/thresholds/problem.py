@@ -23,6 +23,12 @@ class ProblemThresholds:
         "Share of a wheel's readings of which more outliers are no faults of the recording but physics.",
         f"{CHOICE}: a bus or a sensor that drops one reading in 200 is repaired, not compared",
     )
+    isolated_excursion: float = threshold(
+        4.0,
+        "A reading of an input or covariate is far from both of its neighbours where it lies beyond them by so many "
+        "times what all but `most_outliers_share` of the readings do.",
+        f"{CHOICE}: of 100 000 readings of white noise the furthest lies beyond by twice what all but 1 in 200 do",
+    )
     least_known_share: float = threshold(
         0.5,
         "Share of the compared readings at which a covariate must be known; else it is left out, not the readings.",

@@ -1,0 +1,157 @@
+"""Faults of single readings, or of a few in a row, in what is not predicted: inputs and covariates.
+
+A logger writes 0, 9999 or 65535 where a reading was lost. In the predicted column the residual shows it
+(`compared.py`). In an input it would be simulated, and what it does to the prediction would be told as physics; in a
+state it lasts. A fault of one reading lies far beyond the readings before and after it, one of a few in a row out of
+the range of all others, and so does a pulse that was really there: the valve that opened once. Where the prediction
+depends on it, the simulation decides: with a true pulse it clearly follows the measured column better. Elsewhere it is
+a fault if it is out of the range of all others.
+
+What is found becomes a blank, and a note says so.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.errors import counted
+from regolithd.calibration.mismatch.problem.compared import isolated_outliers, out_of_range, short
+from regolithd.calibration.mismatch.signal.robust import robust_std
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.thresholds import Thresholds
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+REACH = 2
+"""Readings before a fault that it may change: a difference over three readings, and one more (a choice)."""
+CLEARLY = 5.0
+"""Log likelihood ratio from which a pulse was there (a choice: noise that is not white makes it seem larger)."""
+LEAST_CHANGE = 1.0
+"""Sum of squares by which a reading has to change the prediction, in variances of what is left, to be judged by it."""
+MOST_TOLD = 3
+"""Faults of a column of which a note tells time and value."""
+
+
+def without_input_faults(
+    recording: Recording, predicted: str, predict: Callable[[Recording], Array], thresholds: Thresholds
+) -> Recording:
+    """Return the recording with single, isolated faults of all columns but the predicted one as blanks, and notes.
+
+    `predict` runs the simulation on a recording; it is called twice, and only where a reading lies far from both of its
+    neighbours.
+    """
+    far = {
+        name: mask
+        for name, values in recording.channels.items()
+        if name != predicted and (mask := far_from_all_others(values, recording.run, thresholds)).any()
+    }
+    if not far:
+        return recording
+    blanked = {name: np.where(mask, np.nan, recording.channels[name]) for name, mask in far.items()}
+    with_them, without = predict(recording), predict(recording.with_channels(**blanked))
+    left = recording.channel(predicted) - without
+    left[isolated_outliers(left, recording.run, thresholds)] = np.nan  # of the predicted column's own faults
+    faulty = _faulty(recording, left, with_them - without, far)
+    faults = {
+        name: mask & np.where(np.isnan(faulty), out_of_range(recording.channels[name], mask), faulty == 1)
+        for name, mask in far.items()
+    }
+    faults = {name: mask for name, mask in faults.items() if mask.any()}
+    if not faults:
+        return recording
+    cleaned = {name: np.where(mask, np.nan, recording.channels[name]) for name, mask in faults.items()}
+    return recording.with_channels(**cleaned).with_notes(*(_note(recording, *fault) for fault in faults.items()))
+
+
+def excursions(values: Array, run: NDArray[np.int64]) -> Array:
+    """Return by how much readings, shape (time,), lie above or below both of their neighbours within a run.
+
+    Neighbours are the readings before and after, however many blanks are between; 0 for those between their neighbours,
+    for blanks, and for a run's first and last reading.
+    """
+    found = np.zeros(len(values))
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size < 3:
+        return found
+    steps = np.diff(values[known])
+    away, back = steps[:-1], -steps[1:]
+    turned = (away * back > 0) & (run[known[:-2]] == run[known[2:]])
+    found[known[1:-1]] = np.where(turned, np.minimum(np.abs(away), np.abs(back)), 0.0)
+    return found
+
+
+def far_from_all_others(values: Array, run: NDArray[np.int64], thresholds: Thresholds) -> Mask:
+    """Return the few readings (time, wheel) that may be faults: single ones, and a few in a row."""
+    single = far_from_both_neighbours(values, run, thresholds)
+    rest = np.where(single, np.nan, values)
+    known = rest[np.isfinite(rest)]
+    share = thresholds.most_outliers_share
+    low, high = np.quantile(known, (share, 1 - share)) if known.size else (0.0, 0.0)
+    margin = thresholds.isolated_excursion * (high - low)
+    beyond = short((rest < low - margin) | (rest > high + margin), run)
+    return single | beyond if beyond.sum() <= share * known.size else single
+
+
+def far_from_both_neighbours(values: Array, run: NDArray[np.int64], thresholds: Thresholds) -> Mask:
+    """Return the few readings (time, wheel) that lie beyond their neighbours by far more than all others do.
+
+    Next to a fault, a good reading lies far from one neighbour, and by chance from the other: of two next to each other
+    the one that is further is looked at first, and the other without it.
+    """
+    found = np.zeros(values.shape, np.bool_)
+    for wheel, column in enumerate(values.T):
+        left, beyond = column.copy(), excursions(column, run)
+        most = int(thresholds.most_outliers_share * np.isfinite(column).sum())
+        least = thresholds.isolated_excursion * float(np.partition(beyond, -most - 1)[-most - 1])
+        while most and np.any(far := beyond > least):
+            beside = np.maximum(np.append(beyond[1:], 0.0), np.insert(beyond[:-1], 0, 0.0))
+            far &= beyond >= beside
+            found[far, wheel], left[far] = True, np.nan
+            beyond = excursions(left, run)
+        if found[:, wheel].sum() > most:
+            found[:, wheel] = False
+    return found
+
+
+def _faulty(recording: Recording, left: Array, changed: Array, far: dict[str, Mask]) -> Array:
+    """Return whether what is far at an instant is a fault by the prediction: 1 or 0, shape (time, 1).
+
+    NaN where the prediction does not depend on it. `left` (time, wheel) is what the prediction without them leaves,
+    `changed` is what they change of it. From one such instant to the next, in the same run, `left` = b · `changed` +
+    constant + noise, where b = 0 if nothing was there, and b = 1 if it was. A prediction that is none with them is
+    better without.
+    """
+    faulty, variance = np.full((len(left), 1), np.nan), robust_std(left[np.isfinite(left)]) ** 2
+    places = np.flatnonzero(np.any([mask.any(axis=1) for mask in far.values()], axis=0))
+    for place, following in zip(places, np.append(places[1:], len(left) + REACH), strict=True):
+        rows = np.arange(max(place - REACH, 0), max(following - REACH, place + 1))
+        rows = rows[recording.run[rows] == recording.run[place]]
+        if np.any(np.isfinite(left[rows]) & ~np.isfinite(changed[rows])):
+            faulty[place] = 1
+            continue
+        both = np.isfinite(left[rows] * changed[rows])
+        change, rest = (each[rows] - np.mean(each[rows], axis=0, where=both) for each in (changed, left))
+        size = float(np.sum(change**2, where=both))
+        if size > LEAST_CHANGE * variance:
+            faulty[place] = float(np.sum(change * rest, where=both)) - size / 2 < CLEARLY * variance
+    return faulty
+
+
+def _note(recording: Recording, name: str, faults: Mask) -> str:
+    """Return what is told of a column's faults; a sensor that the wheels share is told once."""
+    values = recording.channels[name]
+    instants = np.flatnonzero(faults.any(axis=1))
+    first = [f"{values[t][faults[t]][0]:.6g} at {recording.time_s[t]:.6g} s" for t in instants[:MOST_TOLD]]
+    more = "" if len(instants) <= MOST_TOLD else ", …"
+    return (
+        f"{counted(len(instants), 'reading')} of {name}, far from those before and after, "
+        f"{'is' if len(instants) == 1 else 'are'} taken as blank: {', '.join(first)}{more}."
+    )
