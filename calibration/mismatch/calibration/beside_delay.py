@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+ITERATIONS = 8
+"""Steps of a search at most (a choice: it begins near, and each costs a run of the simulation for each parameter)."""
+
 
 def fitted_where_late(problem: Problem) -> tuple[dict[str, float], tuple[str, float]]:
     """Return the parameters' values and the delay with which the simulation fits best, the predicted channel late.
@@ -30,7 +33,7 @@ def fitted_where_late(problem: Problem) -> tuple[dict[str, float], tuple[str, fl
     """
     search = _LateSearch.of(problem)
     with np.errstate(all="ignore"):  # a prediction may overflow on the way
-        _, place = search.minimum(search.place(problem.values))
+        _, place = search.minimum(search.place(problem.values), ITERATIONS)
     return search.values(place), search.late(place)
 
 
@@ -62,9 +65,10 @@ class _LateSearch(Search):
 
     def left(self, place: Array) -> Array:
         """Return what the simulation leaves of the readings there, shown as late as they are, shape (reading,)."""
-        problem = replace(self.problem, late=self.late(place))
+        problem, values = replace(self.problem, late=self.late(place)), self.values(place)
         try:
-            (shown,) = as_shown(problem, [problem.changed(**self.values(place))])
+            on_time = problem.run_once(f"{sorted(values.items())}", 0.0, lambda: problem.changed(**values))
+            (shown,) = as_shown(problem, [on_time])
         except SimulationError:
             return np.full(len(self.wheel), np.nan)
         return np.asarray((problem.measured - shown)[problem.mask])

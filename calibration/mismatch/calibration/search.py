@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 ITERATIONS = 30
 """Steps of a search at most (a choice: a search that converges needs five to fifteen)."""
@@ -104,16 +105,19 @@ class Search:
         rounding = np.finfo(np.float64).eps * float(np.mean(self.problem.measured[self.problem.mask] ** 2))
         return np.asarray(np.bincount(self.wheel, left**2) / counts + rounding)
 
-    def minimum(self, place: Array) -> tuple[float, Array]:
+    def minimum(self, place: Array, iterations: int = ITERATIONS) -> tuple[float, Array]:
         """Return the least objective that a search from a place finds, and where."""
         left = self.left(place)
         best, damping = self.objective(left, place), FIRST_DAMPING
-        for _ in range(ITERATIONS if np.isfinite(best) else 0):
+        for _ in range(iterations if np.isfinite(best) else 0):
             matrix, slope = self.normal(left, place)
-            before = best
+            before, moved = best, np.ones(len(place), np.bool_)
             while damping < MOST_DAMPING:
-                step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), slope)
+                step = _step(matrix + damping * np.diag(np.diag(matrix)), slope, moved)
                 tried = self.within(place + step)
+                if np.any(held := moved & (step != 0) & (tried == place)):
+                    moved &= ~held  # at its limit, and would go beyond: the others' best step is another one
+                    continue
                 further = self.left(tried)
                 if (now := self.objective(further, tried)) < best:
                     place, left, best, damping = tried, further, now, damping * LESS
@@ -153,3 +157,10 @@ class Search:
             rows.append(np.where(np.isfinite(change), change, 0.0))
         tangents = np.array(rows)
         return tangents * weights @ tangents.T + np.eye(len(place)), tangents * weights @ left - place
+
+
+def _step(matrix: Array, slope: Array, moved: Mask) -> Array:
+    """Return the step of the coordinates that are moved; 0 of the others."""
+    step = np.zeros(len(slope))
+    step[moved] = np.linalg.solve(matrix[np.ix_(moved, moved)], slope[moved])
+    return step

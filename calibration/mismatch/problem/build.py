@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import RecordingError
-from regolithd.calibration.mismatch.problem.compared import (
-    blanks_of,
+from regolithd.calibration.mismatch.problem.compared import blanks_of, left_out
+from regolithd.calibration.mismatch.problem.covariates import covariates_of
+from regolithd.calibration.mismatch.problem.outliers import (
+    at_common_limit,
     bursts_out_of_range,
     isolated_outliers,
-    left_out,
     note_on_far_readings,
 )
-from regolithd.calibration.mismatch.problem.covariates import covariates_of
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.problem import Problem
 from regolithd.calibration.mismatch.problem.simulated import Inputs, inputs_of, put_on_time, simulated
@@ -68,6 +68,7 @@ def build_problem(
     residual = np.where(compared, measured - prediction, np.nan)
     outliers = isolated_outliers(residual, recording.run, thresholds)
     bursts = bursts_out_of_range(measured, residual, recording.run, thresholds)
+    limited = at_common_limit(measured, np.where(compared, prediction, np.nan), residual)
     as_read = None if run.as_read is prepared else complete_inputs(run.as_read)
     found, constants = covariates_of(
         prepared,
@@ -81,7 +82,7 @@ def build_problem(
     far = note_on_far_readings(simulation.channel, residual, outliers | bursts, thresholds)
     prepared = prepared.with_notes(*notes, *note_on_zero(simulation, measured), *far)
     covariates, blanks = blanks_of(found, simulation.undefined_at_times, compared, thresholds)
-    mask = compared & ~outliers & ~bursts
+    mask = compared & ~outliers & ~bursts & ~limited
     for blank in blanks.values():
         mask &= ~blank
     if mask.sum() < thresholds.fewest_readings:
@@ -103,7 +104,7 @@ def build_problem(
         labels=labels,
         side=simulation.side(recording.wheels),
         row=simulation.row(recording.wheels),
-        left_out=left_out(simulation.channel, measured, run, outliers, bursts, blanks, labels),
+        left_out=left_out(simulation.channel, measured, run, outliers, bursts, limited, blanks, labels),
         thresholds=thresholds,
         doubt=inputs.doubt,
         on_time=dict(late or {}),

@@ -1,4 +1,4 @@
-"""Which readings are compared: blanks and faults of a few readings are left out, counted and told with a reason."""
+"""What is not compared: blanks and faults of a few readings are left out, counted and told with a reason."""
 
 from __future__ import annotations
 
@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.errors import counted
 from regolithd.calibration.mismatch.problem.covariates import FOLLOW_SPEED
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 from regolithd.calibration.mismatch.problem.words import word_for
-from regolithd.calibration.mismatch.signal.robust import robust_std
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,97 +19,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-MOST_IN_A_ROW = 5
-"""Readings one after the other that are a fault, at most, and not an event (a choice: a few telegrams were lost)."""
-OUT_OF_RANGE = 1.0
-"""Ranges of all other readings beyond which a reading is out of range (a choice)."""
-
-
-def isolated_outliers(residual: Array, run: NDArray[np.int64], thresholds: Thresholds) -> Mask:
-    """Return where single readings lie far outside of what the others of their wheel do, shape (time, wheel).
-
-    Only a reading whose neighbours are not outliers is a fault of the recording, and only where such are few. What
-    lasts longer, or comes often, is physics that the simulation leaves out.
-    """
-    same_run = np.concatenate(([False], np.diff(run) == 0, [False]))
-    far = _far(residual, thresholds)
-    before = np.vstack((far[:1] & False, far[:-1])) & same_run[:-1, None]
-    after = np.vstack((far[1:], far[:1] & False)) & same_run[1:, None]
-    alone = far & ~before & ~after
-    return alone & (alone.sum(axis=0) <= thresholds.most_outliers_share * np.isfinite(residual).sum(axis=0))
-
-
-def out_of_range(values: Array, some: Mask) -> Mask:
-    """Return which of some readings (time, wheel) are out of the range of all others.
-
-    The furthest is looked at first, and those within are looked at without it. Readings that are equal are one code. Of
-    pulses that were there, the largest is within reach of the next.
-    """
-    found, known = np.zeros(values.shape, np.bool_), np.isfinite(values)
-    middle = float(np.median(values[known])) if known.any() else 0.0
-    for value in sorted(set(values[some & known].tolist()), key=lambda each: -abs(each - middle)):
-        others = values[known & ~found & (values != value)]
-        equal = some & (values == value)
-        if not others.size or equal.sum() > MOST_IN_A_ROW:
-            break
-        low, high = float(others.min()), float(others.max())
-        margin = OUT_OF_RANGE * (high - low)
-        if low - margin <= value <= high + margin:
-            break
-        found |= equal
-    return found
-
-
-def short(some: Mask, run: NDArray[np.int64]) -> Mask:
-    """Return which of some readings (time, wheel) are at most `MOST_IN_A_ROW` one after the other in a run."""
-    found = np.zeros(some.shape, np.bool_)
-    for wheel, column in enumerate(some.T):
-        at = np.flatnonzero(column)
-        parts = np.split(at, np.flatnonzero((np.diff(at) > 1) | (np.diff(run[at]) != 0)) + 1) if at.size else []
-        for part in parts:
-            found[part, wheel] = len(part) <= MOST_IN_A_ROW
-    return found
-
-
-def bursts_out_of_range(measured: Array, residual: Array, run: NDArray[np.int64], thresholds: Thresholds) -> Mask:
-    """Return where a few readings in a row are codes rather than readings, shape (time, wheel).
-
-    Their residuals are outliers, and they themselves are out of the range of all others: 9999, 65535. That such are
-    few is asked for all together, since an event of the machine that lasts is physics.
-    """
-    found = short(out_of_range(measured, _far(residual, thresholds)), run)
-    return found if _are_few(found, residual, thresholds) else found & False
-
-
-def note_on_far_readings(channel: str, residual: Array, left: Mask, thresholds: Thresholds) -> tuple[str, ...]:
-    """Return a note on a few readings far from the prediction that are compared: faults in a row, or an event."""
-    far = _far(residual, thresholds) & ~left
-    if not far.any() or not _are_few(far, residual, thresholds):
-        return ()
-    told = (
-        f"{counted(int(far.sum()), 'reading')} of {channel} further than {thresholds.outlier_deviations:g} standard "
-        f"deviations from the prediction {'is' if far.sum() == 1 else 'are'} compared, since neither single nor out of "
-        f"the range of all others: leave the cells empty if they are faults of the recording."
-    )
-    return (told,)
-
-
-def _far(residual: Array, thresholds: Thresholds) -> Mask:
-    """Return which residuals (time, wheel) are further from the median of their wheel than an outlier is."""
-    found = np.zeros(residual.shape, np.bool_)
-    for wheel, column in enumerate(residual.T):
-        known = np.isfinite(column)
-        if known.any():
-            middle, deviation = float(np.median(column[known])), robust_std(column[known])
-            away = np.abs(column[known] - middle)
-            found[known, wheel] = (away > thresholds.outlier_deviations * deviation) & (deviation > 0)
-    return found
-
-
-def _are_few(some: Mask, residual: Array, thresholds: Thresholds) -> bool:
-    """Return whether readings are a share of those compared that may be faults."""
-    return bool(some.sum() <= thresholds.most_outliers_share * np.isfinite(residual).sum())
 
 
 def blanks_of(
@@ -145,6 +52,7 @@ def left_out(
     run: Simulated,
     outliers: Mask,
     bursts: Mask,
+    limited: Mask,
     blanks: Mapping[str, Mask],
     labels: Mapping[str, str],
 ) -> tuple[LeftOut, ...]:
@@ -160,6 +68,7 @@ def left_out(
         ),
         (outliers, "single, isolated readings far outside all others"),
         (bursts & ~outliers, "a few in a row that are far out of the range of all others, as codes for faults are"),
+        (limited & ~outliers & ~bursts, "reading and prediction are at a limit that both have, or near to it"),
         *((blank, f"{word_for(name, labels)} was not measured there") for name, blank in blanks.items()),
     ]
     return tuple(LeftOut(channel, int(where.sum()), reason) for where, reason in reasons if where.any())

@@ -1,7 +1,7 @@
 """Faults of single readings, or of a few in a row, in what is not predicted: inputs and covariates.
 
 A logger writes 0, 9999 or 65535 where a reading was lost. In the predicted column the residual shows it
-(`compared.py`). In an input it would be simulated, and what it does to the prediction would be told as physics; in a
+(`outliers.py`). In an input it would be simulated, and what it does to the prediction would be told as physics; in a
 state it lasts. A fault of one reading lies far beyond the readings before and after it, one of a few in a row out of
 the range of all others, and so does a pulse that was really there: the valve that opened once. Where the prediction
 depends on it, the simulation decides: with a true pulse it clearly follows the measured column better. Elsewhere it is
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import counted
-from regolithd.calibration.mismatch.problem.compared import isolated_outliers, out_of_range, short
+from regolithd.calibration.mismatch.problem.outliers import isolated_outliers, out_of_range, short
 from regolithd.calibration.mismatch.signal.robust import robust_std
 
 if TYPE_CHECKING:

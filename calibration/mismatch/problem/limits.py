@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.problem.outliers import FEWEST_AT_LIMIT
+
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 Mask = NDArray[np.bool_]
-
-FEWEST_AT_LIMIT = 3
-"""Readings of one wheel at exactly the same extreme value, from which on it is a limit (a choice)."""
 
 
 def at_limit(problem: Problem) -> Mask:

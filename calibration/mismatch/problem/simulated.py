@@ -48,6 +48,7 @@ class Inputs:
     expected: the same with inputs replaced by their conditional expectation
     bridged_otherwise: the same with blanks bridged in another way; None where there are none
     blanks: where each input was not measured
+    undefined: where the simulation predicts nothing from the readings as they are, shape (time, wheel); None: nowhere
     doubt: of the prediction by the inputs' stated errors, and between the readings of slower ones; None: there is none
     between: by how much the prediction is uncertain since a slower column was read, by column, shape (time, wheel)
     """
@@ -56,6 +57,7 @@ class Inputs:
     expected: Recording
     bridged_otherwise: Recording | None
     blanks: Mapping[str, Mask]
+    undefined: Mask | None = None
     doubt: InputDoubt | None = None
     between: Mapping[str, Array] = field(default_factory=dict)
 
@@ -112,7 +114,8 @@ def inputs_of(recording: Recording, simulation: Predictor, thresholds: Threshold
     between = _between_readings(recording, as_read, simulation, values)
     doubts = (input_doubt(as_read, expected, simulation, values), *(each.doubt for each in between.values()))
     within = {name: each.within for name, each in between.items()}
-    return Inputs(as_read, expected, otherwise, blanks, total_doubt(doubts), within)
+    undefined = _undefined(as_read, simulation, values) if expected is not as_read else None
+    return Inputs(as_read, expected, otherwise, blanks, undefined, total_doubt(doubts), within)
 
 
 def put_on_time(inputs: Inputs, late: Mapping[str, float]) -> Inputs:
@@ -145,6 +148,8 @@ def simulated(inputs: Inputs, simulation: Predictor, values: Mapping[str, float]
     """Run the simulation with these parameters; twice where an input has blanks."""
     prepared, other, blanks = inputs.expected, inputs.bridged_otherwise, inputs.blanks
     prediction = simulation.predict(complete_inputs(prepared), values)
+    if inputs.undefined is not None:
+        prediction = np.where(inputs.undefined, np.nan, prediction)
     carried, blank = np.zeros(prediction.shape, np.bool_), np.zeros(prediction.shape, np.bool_)
     for each in blanks.values():
         blank |= each
@@ -158,6 +163,16 @@ def simulated(inputs: Inputs, simulation: Predictor, values: Mapping[str, float]
     most = max(thresholds.between_share * deviation, rounding)
     changed = {name: ~blank & ~carried & (within > most) for name, within in inputs.between.items()}
     return Simulated(prepared, inputs.as_read, prediction, blanks, carried, changed)
+
+
+def _undefined(as_read: Recording, simulation: Predictor, values: Mapping[str, float]) -> Mask | None:
+    """Return where the simulation predicts nothing from the readings as they are, as at standstill; None: nowhere.
+
+    A speed that is smoothed passes through zero more slowly and with less noise than the one that was read, and would
+    be a motion, of either direction, where the simulation sees none.
+    """
+    undefined = ~np.isfinite(simulation.predict(complete_inputs(as_read), values))
+    return undefined if undefined.any() else None
 
 
 def _prepared(

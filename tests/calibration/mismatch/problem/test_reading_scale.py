@@ -31,10 +31,8 @@ def test_the_error_of_a_reading_has_both_parts() -> None:
 
 
 def test_levels_are_found_though_their_errors_differ() -> None:
-    """Loads from 220 to 900 kg that stay for a while, read to 1 %: a tenth of the error is left.
-
-    With one error for all, neither level fits what is stated, and nothing is smoothed: all of the error is left.
-    """
+    """Of loads from 220 to 900 kg that stay for a while, read to 1 %, a tenth of the error is left."""
+    # With one error for all levels none fits what is stated: nothing was smoothed, and all of the error was left.
     random = np.random.default_rng(3)
     load_kg = np.repeat(random.choice([220.0, 400.0, 650.0, 900.0], 40), 50)
     read = load_kg * (1 + 0.01 * random.standard_normal(len(load_kg)))

@@ -141,3 +141,28 @@ def test_what_the_speed_is_computed_from_is_smoothed_as_a_normal_signal() -> Non
     normal = conditional_expectation(np.column_stack((power, rpm)), np.full(2, 4.0), np.array([0]))
     np.testing.assert_allclose(found.channels["motor_rpm"][:, 0], normal[:, 1])
     assert np.std(found.channels["power_W"][:, 0] - normal[:, 0]) > 1.0
+
+
+def test_what_is_undefined_of_the_readings_is_not_compared() -> None:
+    """At standstill, as the speed was read, though the smoothed speed still moves."""
+
+    class Friction(Simulation):
+        """A drive of which nothing is known at standstill."""
+
+        channel, unit, inputs = "current_A", "A", ("speed_rad_s",)
+        parameters: ClassVar = {"coulomb_A": Prior(1.0, 0.1, "A")}
+        sensors: ClassVar = {"speed_rad_s": SensorError(absolute=0.2)}
+
+        def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+            """Return a current that has the sign of the speed."""
+            sign = np.where(np.abs(inputs["speed_rad_s"]) < 0.1, np.nan, np.sign(inputs["speed_rad_s"]))
+            return values["coulomb_A"] * sign
+
+    random, count = np.random.default_rng(1), 600
+    speed = np.sin(np.arange(count) / 15) + random.normal(0, 0.2, count)
+    recording = from_columns({"t_s": np.arange(count) * 0.1, "speed_rad_s": speed, "current_A": np.sign(speed)})
+    simulation = Friction()
+    inputs = inputs_of(recording, simulation)
+    assert np.any((np.abs(inputs.expected.channels["speed_rad_s"]) > 0.1) & (np.abs(speed) < 0.1)[:, None])
+    run = simulated(inputs, simulation, {"coulomb_A": 1.0}, THRESHOLDS)
+    assert np.isnan(run.prediction[np.abs(speed) < 0.1]).all()

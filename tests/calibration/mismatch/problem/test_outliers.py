@@ -1,0 +1,103 @@
+"""Only single, isolated readings, codes, and readings at a common limit are left out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch.problem.outliers import (
+    at_common_limit,
+    bursts_out_of_range,
+    isolated_outliers,
+    note_on_far_readings,
+)
+from regolithd.calibration.mismatch.thresholds import Thresholds
+
+LIMITS = Thresholds()
+COUNT = 1000
+
+
+def residual(*far: int, size: float = 60.0) -> np.ndarray:
+    """Return normal noise on one wheel with readings far away at these places."""
+    values = np.random.default_rng(3).normal(0, 1, (COUNT, 1))
+    values[list(far)] = size
+    return values
+
+
+def outliers(values: np.ndarray, run: np.ndarray | None = None) -> list[int]:
+    """Return the places that are left out."""
+    found = isolated_outliers(values, np.zeros(len(values), np.int64) if run is None else run, LIMITS)
+    return np.flatnonzero(found).tolist()
+
+
+def test_a_single_reading_far_away_is_left_out() -> None:
+    """On either side of the median, at the ends too."""
+    assert outliers(residual(0, 500, 999)) == [0, 500, 999]
+    assert outliers(residual(500, size=-60.0)) == [500]
+
+
+def test_two_neighbours_are_physics() -> None:
+    """A hard stop that is met for two readings is compared."""
+    assert outliers(residual(500, 501)) == []
+
+
+def test_neighbours_in_different_runs_are_both_single() -> None:
+    """The last reading of a run and the first of the next are not beside each other."""
+    assert outliers(residual(499, 500), np.repeat([0, 1], 500)) == [499, 500]
+
+
+def test_many_single_readings_are_physics() -> None:
+    """More than half a percent of a wheel's readings are no faults of the recording."""
+    assert len(outliers(residual(*range(0, 100, 20)))) == 5
+    assert outliers(residual(*range(0, 120, 20))) == []
+
+
+@pytest.mark.parametrize("values", [np.full((COUNT, 1), 3.0), np.full((COUNT, 1), np.nan)])
+def test_a_constant_residual_has_no_outliers(values: np.ndarray) -> None:
+    """Nor has one that was never measured."""
+    assert outliers(values) == []
+
+
+def test_each_wheel_has_its_own_scale() -> None:
+    """Newtons beside newton metres: the larger is not an outlier of the smaller."""
+    both = np.concatenate((residual(), 1000 * residual()), axis=1)
+    assert not isolated_outliers(both, np.zeros(COUNT, np.int64), LIMITS).any()
+
+
+def test_codes_of_faults_in_a_row_are_left_out() -> None:
+    """Up to five readings far from the prediction and out of the range of all others; six are an event."""
+    run, away = np.zeros(COUNT, np.int64), residual(500, 501, 502)
+    measured = np.linspace(0.0, 30.0, COUNT)[:, None]
+    measured[500:503] = 9999.0
+    assert np.flatnonzero(bursts_out_of_range(measured, away, run, LIMITS)).tolist() == [500, 501, 502]
+    measured[500:503] = 50.0  # within once more the range, 0 to 60: a high load
+    assert not bursts_out_of_range(measured, away, run, LIMITS).any()
+    measured[500:506] = 9999.0
+    assert not bursts_out_of_range(measured, residual(*range(500, 506)), run, LIMITS).any()
+
+
+def test_readings_at_a_limit_that_both_have_are_left_out() -> None:
+    """And those whose prediction is within the reach of noise; none where noise is added after the limit."""
+    random = np.random.default_rng(4)
+    current = 4 + np.sin(np.arange(COUNT) / 20)[:, None]
+    prediction, noise = np.minimum(current, 4.5), random.normal(0, 0.05, (COUNT, 1))
+    measured = np.minimum(current + 0.1 + noise, 4.5)
+    left = at_common_limit(measured, prediction, measured - prediction)
+    assert left[measured == 4.5].all()
+    assert left[prediction == 4.5].all()
+    assert not left[prediction < 4.2].any()
+    noisy = prediction + noise
+    assert not at_common_limit(noisy, prediction, noise).any()
+    assert not at_common_limit(measured, current, measured - current).any()  # a limit that is not simulated is physics
+
+
+def test_a_few_far_readings_that_are_compared_are_told() -> None:
+    """With the cure; not those that are left out, nor where they are so many that they are physics."""
+    nothing_left = np.zeros((COUNT, 1), np.bool_)
+    (told,) = note_on_far_readings("current_A", residual(500, 501), nothing_left, LIMITS)
+    assert told.startswith(
+        "2 readings of current_A further than 15 standard deviations from the prediction are compared"
+    )
+    assert "leave the cells empty" in told
+    assert not note_on_far_readings("current_A", residual(500), residual(500) > 50, LIMITS)
+    assert not note_on_far_readings("current_A", residual(*range(500, 506)), nothing_left, LIMITS)
