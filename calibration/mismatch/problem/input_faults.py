@@ -4,8 +4,8 @@ A logger writes 0, 9999 or 65535 where a reading was lost. In the predicted colu
 (`outliers.py`). In an input it would be simulated, and what it does to the prediction would be told as physics; in a
 state it lasts. A fault of one reading lies far beyond the readings before and after it, one of a few in a row out of
 the range of all others, and so does a pulse that was really there: the valve that opened once. Where the prediction
-depends on it, the simulation decides: with a true pulse it clearly follows the measured column better. Elsewhere it is
-a fault if it is out of the range of all others.
+depends on it, the simulation decides, which follows the measured column clearly better with a true pulse, and clearly
+worse with a fault. Else it is a fault if it is out of the range of all others.
 
 What is found becomes a blank, and a note says so.
 """
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import counted
+from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.problem.outliers import isolated_outliers, out_of_range, short
 from regolithd.calibration.mismatch.signal.robust import robust_std
 
@@ -33,7 +34,8 @@ Mask = NDArray[np.bool_]
 REACH = 2
 """Readings before a fault that it may change: a difference over three readings, and one more (a choice)."""
 CLEARLY = 5.0
-"""Log likelihood ratio from which a pulse was there (a choice: noise that is not white makes it seem larger)."""
+"""Log likelihood ratio from which a pulse was there, or was not (a choice: noise that is not white makes it seem
+larger). Between the two a reading out of the range of all others is a fault, and any other is none."""
 LEAST_CHANGE = 1.0
 """Sum of squares by which a reading has to change the prediction, in variances of what is left, to be judged by it."""
 MOST_TOLD = 3
@@ -59,11 +61,11 @@ def without_input_faults(
     with_them, without = predict(recording), predict(recording.with_channels(**blanked))
     left = recording.channel(predicted) - without
     left[isolated_outliers(left, recording.run, thresholds)] = np.nan  # of the predicted column's own faults
-    faulty = _faulty(recording, left, with_them - without, far)
-    faults = {
-        name: mask & np.where(np.isnan(faulty), out_of_range(recording.channels[name], mask), faulty == 1)
-        for name, mask in far.items()
-    }
+    evidence = _evidence(recording, left, with_them - without, far)
+    faults = {}
+    for name, mask in far.items():
+        beyond = out_of_range(recording.channels[name], mask)
+        faults[name] = (mask & (evidence < -CLEARLY)) | (beyond & ~(evidence > CLEARLY))
     faults = {name: mask for name, mask in faults.items() if mask.any()}
     if not faults:
         return recording
@@ -121,28 +123,28 @@ def far_from_both_neighbours(values: Array, run: NDArray[np.int64], thresholds: 
     return found
 
 
-def _faulty(recording: Recording, left: Array, changed: Array, far: dict[str, Mask]) -> Array:
-    """Return whether what is far at an instant is a fault by the prediction: 1 or 0, shape (time, 1).
+def _evidence(recording: Recording, left: Array, changed: Array, far: dict[str, Mask]) -> Array:
+    """Return the log likelihood ratio of a pulse that was there to a fault, at each instant with a far one: (time, 1).
 
     NaN where the prediction does not depend on it. `left` (time, wheel) is what the prediction without them leaves,
     `changed` is what they change of it. From one such instant to the next, in the same run, `left` = b · `changed` +
-    constant + noise, where b = 0 if nothing was there, and b = 1 if it was. A prediction that is none with them is
-    better without.
+    constant + noise, where b = 0 if nothing was there, and b = 1 if it was. A prediction that is none with them speaks
+    for a fault.
     """
-    faulty, variance = np.full((len(left), 1), np.nan), robust_std(left[np.isfinite(left)]) ** 2
+    evidence, variance = np.full((len(left), 1), np.nan), robust_std(left[np.isfinite(left)]) ** 2
     places = np.flatnonzero(np.any([mask.any(axis=1) for mask in far.values()], axis=0))
     for place, following in zip(places, np.append(places[1:], len(left) + REACH), strict=True):
         rows = np.arange(max(place - REACH, 0), max(following - REACH, place + 1))
         rows = rows[recording.run[rows] == recording.run[place]]
         if np.any(np.isfinite(left[rows]) & ~np.isfinite(changed[rows])):
-            faulty[place] = 1
+            evidence[place] = -np.inf
             continue
         both = np.isfinite(left[rows] * changed[rows])
-        change, rest = (each[rows] - np.mean(each[rows], axis=0, where=both) for each in (changed, left))
+        change, rest = (each[rows] - known_mean(np.where(both, each[rows], np.nan)) for each in (changed, left))
         size = float(np.sum(change**2, where=both))
         if size > LEAST_CHANGE * variance:
-            faulty[place] = float(np.sum(change * rest, where=both)) - size / 2 < CLEARLY * variance
-    return faulty
+            evidence[place] = (float(np.sum(change * rest, where=both)) - size / 2) / variance
+    return evidence
 
 
 def _note(recording: Recording, name: str, faults: Mask) -> str:
