@@ -262,6 +262,8 @@ def _what_is_wrong(text: bytes, told: str) -> str:
     """Return the line and the cure for what the CSV reader complains about."""
     if found := re.search(r"Row #(\d+): Expected (\d+) columns, got (\d+)", told):
         row, expected, got = found.groups()
+        if expected == "1" and (separated := _separated_otherwise(text.split(b"\n", 1)[0].decode(errors="replace"))):
+            return f": {separated}"
         return (
             f", line {row}: {got} cells, but {expected} columns in the first line. Complete the line or remove it; "
             "a decimal comma has to be a point."
@@ -298,14 +300,20 @@ def _columns(table: Any, unit: str, source: _Source) -> Columns:  # noqa: ANN401
     return found
 
 
+def _separated_otherwise(first_line: str) -> str:
+    """Return what is told of a first line without commas whose columns are separated by something else."""
+    mark = next((mark for mark in ";\t|" if mark in first_line), "")
+    return f"columns are separated by {mark!r}; write commas, and points in numbers." if mark else ""
+
+
 def _names(table: Any, place: str) -> list[str]:  # noqa: ANN401
     """Return the columns' names without spaces around them."""
     try:
         names = [name.strip() for name in table.column_names]
     except UnicodeDecodeError as error:
         raise RecordingError(f"{place}the columns' names are not UTF-8. Save the file as UTF-8.") from error
-    if len(names) == 1 and (mark := next((mark for mark in ";\t|" if mark in names[0]), "")):
-        raise RecordingError(f"{place}columns are separated by {mark!r}; write commas, and points in numbers.")
+    if len(names) == 1 and (separated := _separated_otherwise(names[0])):
+        raise RecordingError(f"{place}{separated}")
     if twice := [name for name, count in Counter(names).items() if count > 1]:
         raise RecordingError(f"{place}more than one column is called {listed(twice)}. Rename or remove all but one.")
     return names

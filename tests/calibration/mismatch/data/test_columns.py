@@ -37,6 +37,7 @@ def read(folder: Path, content: str | bytes, name: str = "drive.csv") -> Recordi
         (GOOD.replace("force_N", "t_s"), "drive.csv: more than one column is called t_s"),
         (GOOD.replace("t_s", "time"), "there is no column of time (t_s, t_ms"),
         (GOOD.replace(",", ";"), "drive.csv: columns are separated by ';'; write commas"),
+        ("t_s;force_N\n0,0;1,5\n0,1;1,7\n", "drive.csv: columns are separated by ';'; write commas"),
         (GOOD.replace("t_s,axis", "t_s,joint"), "10 rows at 5 instants and no column axis"),
         (GOOD.encode("utf-16"), "drive.csv is UTF-16: save it as UTF-8"),
         (GOOD.replace("wrist", "Geländer", 1).encode("latin-1"), "line 3, character 8: this is not UTF-8"),
