@@ -231,8 +231,8 @@ def _check_shape(shape: tuple[int, int], rows: int, unit: str, *, named: bool) -
     if not named and rows > MOST_ROWS_PER_INSTANT * shape[0]:
         raise RecordingError(
             f"there are {rows} rows at {shape[0]} instants and no column {unit} that tells them apart; name the column "
-            "that does, as `wheel_column` of the simulation. Of one machine with a coarse clock, write times that differ "
-            "from row to row"
+            "that does, as `wheel_column` of the simulation. Of one machine with a coarse clock, write times that "
+            "differ from row to row"
         )
     if shape[0] * shape[1] > MOST_PLACES_PER_ROW * rows:
         raise RecordingError(
