@@ -126,19 +126,16 @@ def far_from_both_neighbours(values: Array, run: NDArray[np.int64], thresholds: 
 def _evidence(recording: Recording, left: Array, changed: Array, far: dict[str, Mask]) -> Array:
     """Return the log likelihood ratio of a pulse that was there to a fault, at each instant with a far one: (time, 1).
 
-    NaN where the prediction does not depend on it. `left` (time, wheel) is what the prediction without them leaves,
+    NaN where it cannot be judged. `left` (time, wheel) is what the prediction without them leaves,
     `changed` is what they change of it. From one such instant to the next, in the same run, `left` = b · `changed` +
-    constant + noise, where b = 0 if nothing was there, and b = 1 if it was. A prediction that is none with them speaks
-    for a fault.
+    constant + noise, where b = 0 if nothing was there, and b = 1 if it was. Where there is no prediction with them
+    nothing is judged: it may be a standstill.
     """
     evidence, variance = np.full((len(left), 1), np.nan), robust_std(left[np.isfinite(left)]) ** 2
     places = np.flatnonzero(np.any([mask.any(axis=1) for mask in far.values()], axis=0))
     for place, following in zip(places, np.append(places[1:], len(left) + REACH), strict=True):
         rows = np.arange(max(place - REACH, 0), max(following - REACH, place + 1))
         rows = rows[recording.run[rows] == recording.run[place]]
-        if np.any(np.isfinite(left[rows]) & ~np.isfinite(changed[rows])):
-            evidence[place] = -np.inf
-            continue
         both = np.isfinite(left[rows] * changed[rows])
         change, rest = (each[rows] - known_mean(np.where(both, each[rows], np.nan)) for each in (changed, left))
         size = float(np.sum(change**2, where=both))

@@ -132,8 +132,8 @@ def test_a_pulse_that_changes_nothing_stays_within_the_range_of_others() -> None
     assert np.flatnonzero(np.isnan(found.channels["room_degC"])).tolist() == [1234]
 
 
-def test_a_prediction_that_fails_at_a_fault_is_better_without() -> None:
-    """The root of a negative flow is no number, and what follows from it is none."""
+def test_a_fault_with_which_there_is_no_prediction_is_one_out_of_range() -> None:
+    """The root of a negative flow is no number."""
 
     def root(recording: Recording) -> Array:
         return np.sqrt(recording.channels["flow"])
