@@ -38,36 +38,37 @@ def fitted_where_late(problem: Problem) -> tuple[dict[str, float], tuple[str, fl
 
 
 class _LateSearch(Search):
-    """The search of a problem whose predicted channel is late: the last coordinate is the change of the delay, over it.
+    """The search of a problem whose predicted channel is late; the first coordinate is the delay's change over it.
 
-    The delay has no prior: what the prior of a coordinate adds to the objective is 1 at most, at its double.
+    The delay has no prior: what the prior of a coordinate adds to the objective is 1 at most, at its double. It is the
+    first to be changed for a difference quotient, for which the prediction that was made last is shown later.
     """
 
     def late(self, place: Array) -> tuple[str, float]:
         """Return how, and by how much, the channel is late at a place."""
         assert self.problem.late is not None  # noqa: S101  # a search of late problems alone
         kind, delay = self.problem.late
-        return kind, delay * (1 + float(place[-1]))
+        return kind, delay * (1 + float(place[0]))
 
     def values(self, place: Array) -> dict[str, float]:
         """Return the parameters' values at a place."""
-        return super().values(place[:-1])
+        return super().values(place[1:])
 
     def place(self, values: Mapping[str, float]) -> Array:
         """Return the place of the parameters' values with the delay of the problem."""
-        return np.append(super().place(values), 0.0)
+        return np.concatenate(([0.0], super().place(values)))
 
     def within(self, place: Array) -> Array:
         """Return a place as far as the parameters may be moved, and the delay to its half or its double."""
         found = super().within(place)
-        found[-1] = np.clip(place[-1], -0.5, 1.0)
+        found[0] = np.clip(place[0], -0.5, 1.0)
         return found
 
     def left(self, place: Array) -> Array:
         """Return what the simulation leaves of the readings there, shown as late as they are, shape (reading,)."""
         problem, values = replace(self.problem, late=self.late(place)), self.values(place)
         try:
-            on_time = problem.run_once(f"{sorted(values.items())}", 0.0, lambda: problem.changed(**values))
+            on_time = self.problem.lately(f"on time {values}", lambda: problem.changed(**values))
             (shown,) = as_shown(problem, [on_time])
         except SimulationError:
             return np.full(len(self.wheel), np.nan)

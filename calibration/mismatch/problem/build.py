@@ -10,12 +10,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.problem.compared import blanks_of, left_out
 from regolithd.calibration.mismatch.problem.covariates import covariates_of
-from regolithd.calibration.mismatch.problem.outliers import (
-    at_common_limit,
-    bursts_out_of_range,
-    isolated_outliers,
-    note_on_far_readings,
-)
+from regolithd.calibration.mismatch.problem.outliers import Faults, note_on_far_readings
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.problem import Problem
 from regolithd.calibration.mismatch.problem.simulated import Inputs, inputs_of, put_on_time, simulated
@@ -65,10 +60,7 @@ def build_problem(
     prepared, prediction = run.recording, run.prediction
     measured = run.as_read.channel(simulation.channel)  # as read, also where it is an input that is smoothed
     compared = run.known & np.isfinite(measured)
-    residual = np.where(compared, measured - prediction, np.nan)
-    outliers = isolated_outliers(residual, recording.run, thresholds)
-    bursts = bursts_out_of_range(measured, residual, recording.run, thresholds)
-    limited = at_common_limit(measured, np.where(compared, prediction, np.nan), residual)
+    faults = Faults.of(measured, prediction, compared, recording.run, thresholds)
     as_read = None if run.as_read is prepared else complete_inputs(run.as_read)
     found, constants = covariates_of(
         prepared,
@@ -79,10 +71,10 @@ def build_problem(
         arbitrary_zero=zero_is_arbitrary(simulation, measured),
     )
     found, notes = without_the_reading_itself(found, measured, simulation.channel)
-    far = note_on_far_readings(simulation.channel, residual, outliers | bursts, thresholds)
+    far = note_on_far_readings(simulation.channel, faults.compared, compared, thresholds)
     prepared = prepared.with_notes(*notes, *note_on_zero(simulation, measured), *far)
     covariates, blanks = blanks_of(found, simulation.undefined_at_times, compared, thresholds)
-    mask = compared & ~outliers & ~bursts & ~limited
+    mask = compared & ~faults.all
     for blank in blanks.values():
         mask &= ~blank
     if mask.sum() < thresholds.fewest_readings:
@@ -104,7 +96,7 @@ def build_problem(
         labels=labels,
         side=simulation.side(recording.wheels),
         row=simulation.row(recording.wheels),
-        left_out=left_out(simulation.channel, measured, run, outliers, bursts, limited, blanks, labels),
+        left_out=left_out(simulation.channel, measured, run, faults, blanks, labels),
         thresholds=thresholds,
         doubt=inputs.doubt,
         on_time=dict(late or {}),

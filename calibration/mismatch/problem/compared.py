@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.problem.words import word_for
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from regolithd.calibration.mismatch.problem.outliers import Faults
     from regolithd.calibration.mismatch.problem.simulated import Simulated
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
@@ -50,9 +51,7 @@ def left_out(
     channel: str,
     measured: Array,
     run: Simulated,
-    outliers: Mask,
-    bursts: Mask,
-    limited: Mask,
+    faults: Faults,
     blanks: Mapping[str, Mask],
     labels: Mapping[str, str],
 ) -> tuple[LeftOut, ...]:
@@ -66,9 +65,9 @@ def left_out(
             (known & changed, f"{name}, which is measured less often, changed between its readings")
             for name, changed in run.changed.items()
         ),
-        (outliers, "single, isolated readings far outside all others"),
-        (bursts & ~outliers, "a few in a row that are far out of the range of all others, as codes for faults are"),
-        (limited & ~outliers & ~bursts, "reading and prediction are at a limit that both have, or near to it"),
+        (faults.isolated, "single, isolated readings far outside all others"),
+        (faults.codes, "a few in a row that are far out of the range of all others, as codes for faults are"),
+        (faults.limited, "reading and prediction are at a limit that both have, or near to it"),
         *((blank, f"{word_for(name, labels)} was not measured there") for name, blank in blanks.items()),
     ]
     return tuple(LeftOut(channel, int(where.sum()), reason) for where, reason in reasons if where.any())

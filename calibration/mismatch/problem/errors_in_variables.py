@@ -80,9 +80,9 @@ def expected_inputs(
     owners = [name for name in names for _ in recording.wheels]
     scales = [ReadingScale.of(column, sensors[name]) for name, column in zip(owners, values.T, strict=True)]
     starts = np.flatnonzero(np.diff(recording.run, prepend=recording.run[0] - 1))
-    even = np.stack([scale.even(column) for scale, column in zip(scales, values.T, strict=True)], axis=1)
+    stabilised = np.stack([scale.stabilised(column) for scale, column in zip(scales, values.T, strict=True)], axis=1)
     rest = _at_rest(values)
-    truths = normal_truths(even, np.array([scale.deviation for scale in scales]) ** 2, starts)
+    truths = normal_truths(stabilised, np.array([scale.deviation for scale in scales]) ** 2, starts)
     smooth = truths.mean.copy()
     for k, name in enumerate(owners):
         if name in normal:
@@ -90,7 +90,7 @@ def expected_inputs(
         if k and owners[k - 1] == name and np.array_equal(values[:, k - 1], values[:, k], equal_nan=True):
             smooth[:, k] = smooth[:, k - 1]  # a sensor of the whole machine
             continue
-        moving = np.where(rest[:, k], np.nan, even[:, k])
+        moving = np.where(rest[:, k], np.nan, stabilised[:, k])
         smooth[:, k] = refined_by_density(moving, scales[k].deviation, starts, truths.column(k))
     expected = np.stack([scale.readings(column) for scale, column in zip(scales, smooth.T, strict=True)], axis=1)
     parts = np.split(np.where(rest, 0.0, expected), len(names), axis=1)

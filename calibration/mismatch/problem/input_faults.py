@@ -19,7 +19,12 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import counted
 from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
-from regolithd.calibration.mismatch.problem.outliers import isolated_outliers, out_of_range, short
+from regolithd.calibration.mismatch.problem.outliers import (
+    far_from_prediction,
+    few_in_a_row,
+    isolated_outliers,
+    out_of_range,
+)
 from regolithd.calibration.mismatch.signal.robust import robust_std
 
 if TYPE_CHECKING:
@@ -45,10 +50,9 @@ MOST_TOLD = 3
 def without_input_faults(
     recording: Recording, predicted: str, predict: Callable[[Recording], Array], thresholds: Thresholds
 ) -> Recording:
-    """Return the recording with single, isolated faults of all columns but the predicted one as blanks, and notes.
+    """Return the recording with faults of a few readings of all columns but the predicted one as blanks, and notes.
 
-    `predict` runs the simulation on a recording; it is called twice, and only where a reading lies far from both of its
-    neighbours.
+    `predict` runs the simulation on a recording; it is called twice, and only where a reading may be a fault.
     """
     far = {
         name: mask
@@ -60,7 +64,8 @@ def without_input_faults(
     blanked = {name: np.where(mask, np.nan, recording.channels[name]) for name, mask in far.items()}
     with_them, without = predict(recording), predict(recording.with_channels(**blanked))
     left = recording.channel(predicted) - without
-    left[isolated_outliers(left, recording.run, thresholds)] = np.nan  # of the predicted column's own faults
+    far_left = far_from_prediction(left, thresholds)
+    left[isolated_outliers(far_left, np.isfinite(left), recording.run, thresholds)] = np.nan  # its own faults
     evidence = _evidence(recording, left, with_them - without, far)
     faults = {}
     for name, mask in far.items():
@@ -98,7 +103,7 @@ def far_from_all_others(values: Array, run: NDArray[np.int64], thresholds: Thres
     share = thresholds.most_outliers_share
     low, high = np.quantile(known, (share, 1 - share)) if known.size else (0.0, 0.0)
     margin = thresholds.isolated_excursion * (high - low)
-    beyond = short((rest < low - margin) | (rest > high + margin), run)
+    beyond = few_in_a_row((rest < low - margin) | (rest > high + margin), run)
     return single | beyond if beyond.sum() <= share * known.size else single
 
 
@@ -126,10 +131,10 @@ def far_from_both_neighbours(values: Array, run: NDArray[np.int64], thresholds: 
 def _evidence(recording: Recording, left: Array, changed: Array, far: dict[str, Mask]) -> Array:
     """Return the log likelihood ratio of a pulse that was there to a fault, at each instant with a far one: (time, 1).
 
-    NaN where it cannot be judged. `left` (time, wheel) is what the prediction without them leaves,
-    `changed` is what they change of it. From one such instant to the next, in the same run, `left` = b · `changed` +
-    constant + noise, where b = 0 if nothing was there, and b = 1 if it was. Where there is no prediction with them
-    nothing is judged: it may be a standstill.
+    `left` (time, wheel) is what the prediction without them leaves, `changed` is what they change of it. From one such
+    instant to the next, in the same run, `left` = b · `changed` + constant + noise, where b = 0 if nothing was there,
+    and b = 1 if it was. NaN where it cannot be judged: the prediction hardly depends on it, or there is none with it,
+    as at standstill.
     """
     evidence, variance = np.full((len(left), 1), np.nan), robust_std(left[np.isfinite(left)]) ** 2
     places = np.flatnonzero(np.any([mask.any(axis=1) for mask in far.values()], axis=0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,18 +29,65 @@ OUT_OF_RANGE = 1.0
 """Ranges of all other readings beyond which a reading is out of range (a choice)."""
 
 
-def isolated_outliers(residual: Array, run: NDArray[np.int64], thresholds: Thresholds) -> Mask:
-    """Return where single readings lie far outside of what the others of their wheel do, shape (time, wheel).
+@dataclass(frozen=True, eq=False)
+class Faults:
+    """Readings of the predicted column that are not compared, and why, each for one reason, shape (time, wheel).
 
-    Only a reading whose neighbours are not outliers is a fault of the recording, and only where such are few. What
-    lasts longer, or comes often, is physics that the simulation leaves out.
+    Attributes
+    ----------
+    isolated: single readings far from the prediction
+    codes: a few in a row that are out of the range of all others
+    limited: at a limit that the prediction has too
+    compared: far readings that are compared all the same
     """
-    same_run = np.concatenate(([False], np.diff(run) == 0, [False]))
-    far = _far(residual, thresholds)
-    before = np.vstack((far[:1] & False, far[:-1])) & same_run[:-1, None]
-    after = np.vstack((far[1:], far[:1] & False)) & same_run[1:, None]
-    alone = far & ~before & ~after
-    return alone & (alone.sum(axis=0) <= thresholds.most_outliers_share * np.isfinite(residual).sum(axis=0))
+
+    isolated: Mask
+    codes: Mask
+    limited: Mask
+    compared: Mask
+
+    @classmethod
+    def of(
+        cls, measured: Array, prediction: Array, compared: Mask, run: NDArray[np.int64], thresholds: Thresholds
+    ) -> Faults:
+        """Return the faults among the readings that are `compared`."""
+        residual = np.where(compared, measured - prediction, np.nan)
+        far = far_from_prediction(residual, thresholds)
+        isolated = isolated_outliers(far, compared, run, thresholds)
+        codes = codes_in_a_row(measured, far, compared, run, thresholds) & ~isolated
+        limited = at_common_limit(measured, np.where(compared, prediction, np.nan), residual) & ~isolated & ~codes
+        return cls(isolated, codes, limited, far & ~isolated & ~codes & ~limited)
+
+    @property
+    def all(self) -> Mask:
+        """Where a reading is not compared, for any of the reasons."""
+        return self.isolated | self.codes | self.limited
+
+
+def far_from_prediction(residual: Array, thresholds: Thresholds) -> Mask:
+    """Return which residuals (time, wheel) are further from the median of their wheel than an outlier is."""
+    found = np.zeros(residual.shape, np.bool_)
+    for wheel, column in enumerate(residual.T):
+        known = np.isfinite(column)
+        if known.any():
+            middle, deviation = float(np.median(column[known])), robust_std(column[known])
+            away = np.abs(column[known] - middle)
+            found[known, wheel] = (away > thresholds.outlier_deviations * deviation) & (deviation > 0)
+    return found
+
+
+def isolated_outliers(far: Mask, compared: Mask, run: NDArray[np.int64], thresholds: Thresholds) -> Mask:
+    """Return which of the readings far from the prediction are single ones, shape (time, wheel).
+
+    Only a reading whose neighbours are not far is a fault of the recording, and only where such are few of a wheel's
+    `compared`. What lasts longer, or comes often, is physics that the simulation leaves out.
+    """
+    same_run = np.diff(run)[:, None] == 0
+    beside = np.zeros(far.shape, np.bool_)
+    beside[1:] |= far[:-1] & same_run
+    beside[:-1] |= far[1:] & same_run
+    alone = far & ~beside
+    return alone & (alone.sum(axis=0) <= thresholds.most_outliers_share * compared.sum(axis=0))
 
 
 def out_of_range(values: Array, some: Mask) -> Mask:
@@ -63,7 +111,7 @@ def out_of_range(values: Array, some: Mask) -> Mask:
     return found
 
 
-def short(some: Mask, run: NDArray[np.int64]) -> Mask:
+def few_in_a_row(some: Mask, run: NDArray[np.int64]) -> Mask:
     """Return which of some readings (time, wheel) are at most `MOST_IN_A_ROW` one after the other in a run."""
     found = np.zeros(some.shape, np.bool_)
     for wheel, column in enumerate(some.T):
@@ -74,14 +122,14 @@ def short(some: Mask, run: NDArray[np.int64]) -> Mask:
     return found
 
 
-def bursts_out_of_range(measured: Array, residual: Array, run: NDArray[np.int64], thresholds: Thresholds) -> Mask:
+def codes_in_a_row(measured: Array, far: Mask, compared: Mask, run: NDArray[np.int64], thresholds: Thresholds) -> Mask:
     """Return where a few readings in a row are codes rather than readings, shape (time, wheel).
 
-    Their residuals are outliers, and they themselves are out of the range of all others: 9999, 65535. That such are
-    few is asked for all together, since an event of the machine that lasts is physics.
+    They are far from the prediction, and out of the range of all others: 9999, 65535. That such are few is asked for
+    all together, since an event of the machine that lasts is physics.
     """
-    found = short(out_of_range(measured, _far(residual, thresholds)), run)
-    return found if _are_few(found, residual, thresholds) else found & False
+    found = few_in_a_row(out_of_range(measured, far), run)
+    return found if _are_few(found, compared, thresholds) else np.zeros(found.shape, np.bool_)
 
 
 def at_common_limit(measured: Array, prediction: Array, residual: Array) -> Mask:
@@ -111,31 +159,19 @@ def at_common_limit(measured: Array, prediction: Array, residual: Array) -> Mask
     return found
 
 
-def note_on_far_readings(channel: str, residual: Array, left: Mask, thresholds: Thresholds) -> tuple[str, ...]:
+def note_on_far_readings(channel: str, far: Mask, compared: Mask, thresholds: Thresholds) -> tuple[str, ...]:
     """Return a note on a few readings far from the prediction that are compared: faults in a row, or an event."""
-    far = _far(residual, thresholds) & ~left
-    if not far.any() or not _are_few(far, residual, thresholds):
+    count = int(far.sum())
+    if not count or not _are_few(far, compared, thresholds):
         return ()
     told = (
-        f"{counted(int(far.sum()), 'reading')} of {channel} further than {thresholds.outlier_deviations:g} standard "
-        f"deviations from the prediction {'is' if far.sum() == 1 else 'are'} compared, since neither single nor out of "
-        f"the range of all others: leave the cells empty if they are faults of the recording."
+        f"{counted(count, 'reading')} of {channel} further than {thresholds.outlier_deviations:g} standard deviations "
+        f"from the prediction {'is' if count == 1 else 'are'} compared, since neither single nor out of the range of "
+        f"all others: leave the cells empty if they are faults of the recording."
     )
     return (told,)
 
 
-def _far(residual: Array, thresholds: Thresholds) -> Mask:
-    """Return which residuals (time, wheel) are further from the median of their wheel than an outlier is."""
-    found = np.zeros(residual.shape, np.bool_)
-    for wheel, column in enumerate(residual.T):
-        known = np.isfinite(column)
-        if known.any():
-            middle, deviation = float(np.median(column[known])), robust_std(column[known])
-            away = np.abs(column[known] - middle)
-            found[known, wheel] = (away > thresholds.outlier_deviations * deviation) & (deviation > 0)
-    return found
-
-
-def _are_few(some: Mask, residual: Array, thresholds: Thresholds) -> bool:
+def _are_few(some: Mask, compared: Mask, thresholds: Thresholds) -> bool:
     """Return whether readings are a share of those compared that may be faults."""
-    return bool(some.sum() <= thresholds.most_outliers_share * np.isfinite(residual).sum())
+    return bool(some.sum() <= thresholds.most_outliers_share * compared.sum())

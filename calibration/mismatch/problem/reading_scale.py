@@ -49,14 +49,14 @@ class ReadingScale:
         """Return the standard deviation of each reading's error."""
         return np.hypot(self.absolute, self.relative * readings)
 
-    def even(self, readings: Array) -> Array:
+    def stabilised(self, readings: Array) -> Array:
         """Return readings on the scale on which the error is `deviation` everywhere."""
         if not self.relative:
             return readings
         return self.deviation / self.relative * np.arcsinh(self.relative / self.absolute * readings)
 
-    def readings(self, even: Array) -> Array:
+    def readings(self, stabilised: Array) -> Array:
         """Return values of that scale in the unit of the readings."""
         if not self.relative:
-            return even
-        return self.absolute / self.relative * np.sinh(self.relative / self.deviation * even)
+            return stabilised
+        return self.absolute / self.relative * np.sinh(self.relative / self.deviation * stabilised)

@@ -9,6 +9,7 @@ compared either. A simulation without a state depends on nothing but its instant
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,7 +26,7 @@ from regolithd.calibration.mismatch.signal.robust import robust_std
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.predictor import Predictor
@@ -91,7 +92,7 @@ class Simulated:
 
 
 def inputs_of(recording: Recording, simulation: Predictor, thresholds: Thresholds = THRESHOLDS) -> Inputs:
-    """Return what the simulation is run on, without single, isolated faults.
+    """Return what the simulation is run on, without faults of a few readings.
 
     Raises
     ------
@@ -101,20 +102,23 @@ def inputs_of(recording: Recording, simulation: Predictor, thresholds: Threshold
     stated = {name: prior.value for name, prior in simulation.parameters.items()}
     values = {**simulation.variants(), **stated}
 
-    def predict(faulty: Recording) -> Array:
-        return simulation.predict(complete_inputs(_prepared(faulty, simulation)[0]), values)
+    def predict(prepared: Recording) -> Array:
+        return simulation.predict(complete_inputs(prepared), values)
 
-    recording = without_input_faults(recording, simulation.channel, predict, thresholds)
+    recording = without_input_faults(
+        recording, simulation.channel, lambda faulty: predict(_prepared(faulty, simulation)[0]), thresholds
+    )
     as_read, blanks = _prepared(recording, simulation)
     normal = _inputs_of_speed(as_read, simulation)
     expected, otherwise = expected_inputs(as_read, simulation.sensors, normal), None
     if blanks:
         otherwise, _ = _prepared(recording, simulation, other_way=True)
         otherwise = expected_inputs(otherwise, simulation.sensors, normal)
-    between = _between_readings(recording, as_read, simulation, values)
+    predicted = cache(lambda: predict(as_read))
+    between = _between_readings(recording, simulation, values, predicted)
     doubts = (input_doubt(as_read, expected, simulation, values), *(each.doubt for each in between.values()))
     within = {name: each.within for name, each in between.items()}
-    undefined = _undefined(as_read, simulation, values) if expected is not as_read else None
+    undefined = _undefined(predicted()) if expected is not as_read else None
     return Inputs(as_read, expected, otherwise, blanks, undefined, total_doubt(doubts), within)
 
 
@@ -165,13 +169,13 @@ def simulated(inputs: Inputs, simulation: Predictor, values: Mapping[str, float]
     return Simulated(prepared, inputs.as_read, prediction, blanks, carried, changed)
 
 
-def _undefined(as_read: Recording, simulation: Predictor, values: Mapping[str, float]) -> Mask | None:
+def _undefined(predicted: Array) -> Mask | None:
     """Return where the simulation predicts nothing from the readings as they are, as at standstill; None: nowhere.
 
     A speed that is smoothed passes through zero more slowly and with less noise than the one that was read, and would
     be a motion, of either direction, where the simulation sees none.
     """
-    undefined = ~np.isfinite(simulation.predict(complete_inputs(as_read), values))
+    undefined = ~np.isfinite(predicted)
     return undefined if undefined.any() else None
 
 
@@ -207,12 +211,15 @@ class _BetweenReadings:
 
 
 def _between_readings(
-    recording: Recording, as_read: Recording, simulation: Predictor, values: Mapping[str, float]
+    recording: Recording, simulation: Predictor, values: Mapping[str, float], predicted: Callable[[], Array]
 ) -> dict[str, _BetweenReadings]:
-    """Return how uncertain the prediction is by each slower column that it depends on, between its readings."""
+    """Return how uncertain the prediction is by each slower column that it depends on, between its readings.
+
+    `predicted` returns the prediction from the readings as they are.
+    """
     filled = filled_between(recording, simulation.channel, simulation.between_readings)
     slower = [name for name, column in filled.channels.items() if column is not recording.channels[name]]
-    before = simulation.predict(complete_inputs(as_read), values) if slower else np.zeros(0)
+    before = predicted() if slower else np.zeros(0)
     found = {}
     for name in slower:
         drawn, last = drawn_between(recording, filled, name, simulation.between_readings.get(name, "linear"))

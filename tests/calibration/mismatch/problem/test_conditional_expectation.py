@@ -98,9 +98,9 @@ def test_an_input_is_replaced_where_it_has_an_error() -> None:
         {"load": SensorError(relative=0.05), "slip": SensorError(absolute=0.01), "other": SensorError()},
     )
     scales = [ReadingScale.of(column, SensorError(relative=0.05)) for column in load.T]
-    even = np.stack([scale.even(column) for scale, column in zip(scales, load.T, strict=True)], axis=1)
+    stabilised = np.stack([scale.stabilised(column) for scale, column in zip(scales, load.T, strict=True)], axis=1)
     variances = np.array([*(scale.deviation for scale in scales), 0.01, 0.01]) ** 2
-    expected = conditional_expectation(np.hstack((even, slip)), variances, np.array([0, 20]))
+    expected = conditional_expectation(np.hstack((stabilised, slip)), variances, np.array([0, 20]))
     for column, scale in enumerate(scales):
         np.testing.assert_allclose(found.channels["load"][:, column], scale.readings(expected[:, column]))
     np.testing.assert_allclose(found.channels["slip"], expected[:, 2:])

@@ -7,7 +7,8 @@ import pytest
 
 from regolithd.calibration.mismatch.problem.outliers import (
     at_common_limit,
-    bursts_out_of_range,
+    codes_in_a_row,
+    far_from_prediction,
     isolated_outliers,
     note_on_far_readings,
 )
@@ -24,10 +25,27 @@ def residual(*far: int, size: float = 60.0) -> np.ndarray:
     return values
 
 
+def isolated(values: np.ndarray, run: np.ndarray | None = None) -> np.ndarray:
+    """Return which residuals are single outliers."""
+    far, runs = far_from_prediction(values, LIMITS), np.zeros(len(values), np.int64) if run is None else run
+    return isolated_outliers(far, np.isfinite(values), runs, LIMITS)
+
+
+def codes(measured: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return which readings with these residuals are codes in a row."""
+    far = far_from_prediction(values, LIMITS)
+    return codes_in_a_row(measured, far, np.isfinite(values), np.zeros(COUNT, np.int64), LIMITS)
+
+
+def notes(values: np.ndarray, left: np.ndarray) -> tuple[str, ...]:
+    """Return what is told of far residuals that are not left out."""
+    far = far_from_prediction(values, LIMITS) & ~left
+    return note_on_far_readings("current_A", far, np.isfinite(values), LIMITS)
+
+
 def outliers(values: np.ndarray, run: np.ndarray | None = None) -> list[int]:
     """Return the places that are left out."""
-    found = isolated_outliers(values, np.zeros(len(values), np.int64) if run is None else run, LIMITS)
-    return np.flatnonzero(found).tolist()
+    return np.flatnonzero(isolated(values, run)).tolist()
 
 
 def test_a_single_reading_far_away_is_left_out() -> None:
@@ -61,19 +79,19 @@ def test_a_constant_residual_has_no_outliers(values: np.ndarray) -> None:
 def test_each_wheel_has_its_own_scale() -> None:
     """Newtons beside newton metres: the larger is not an outlier of the smaller."""
     both = np.concatenate((residual(), 1000 * residual()), axis=1)
-    assert not isolated_outliers(both, np.zeros(COUNT, np.int64), LIMITS).any()
+    assert not isolated(both).any()
 
 
 def test_codes_of_faults_in_a_row_are_left_out() -> None:
     """Up to five readings far from the prediction and out of the range of all others; six are an event."""
-    run, away = np.zeros(COUNT, np.int64), residual(500, 501, 502)
+    away = residual(500, 501, 502)
     measured = np.linspace(0.0, 30.0, COUNT)[:, None]
     measured[500:503] = 9999.0
-    assert np.flatnonzero(bursts_out_of_range(measured, away, run, LIMITS)).tolist() == [500, 501, 502]
+    assert np.flatnonzero(codes(measured, away)).tolist() == [500, 501, 502]
     measured[500:503] = 50.0  # within once more the range, 0 to 60: a high load
-    assert not bursts_out_of_range(measured, away, run, LIMITS).any()
+    assert not codes(measured, away).any()
     measured[500:506] = 9999.0
-    assert not bursts_out_of_range(measured, residual(*range(500, 506)), run, LIMITS).any()
+    assert not codes(measured, residual(*range(500, 506))).any()
 
 
 def test_readings_at_a_limit_that_both_have_are_left_out() -> None:
@@ -94,10 +112,10 @@ def test_readings_at_a_limit_that_both_have_are_left_out() -> None:
 def test_a_few_far_readings_that_are_compared_are_told() -> None:
     """With the cure; not those that are left out, nor where they are so many that they are physics."""
     nothing_left = np.zeros((COUNT, 1), np.bool_)
-    (told,) = note_on_far_readings("current_A", residual(500, 501), nothing_left, LIMITS)
+    (told,) = notes(residual(500, 501), nothing_left)
     assert told.startswith(
         "2 readings of current_A further than 15 standard deviations from the prediction are compared"
     )
     assert "leave the cells empty" in told
-    assert not note_on_far_readings("current_A", residual(500), residual(500) > 50, LIMITS)
-    assert not note_on_far_readings("current_A", residual(*range(500, 506)), nothing_left, LIMITS)
+    assert not notes(residual(500), residual(500) > 50)
+    assert not notes(residual(*range(500, 506)), nothing_left)

@@ -18,9 +18,9 @@ def test_the_error_is_the_same_everywhere(error: SensorError) -> None:
     """A reading that is one of its errors further is one deviation further on the scale, and the way back is exact."""
     scale = ReadingScale.of(READINGS, error)
     step = 1e-3
-    further = scale.even(READINGS + step * scale.error(READINGS)) - scale.even(READINGS)
+    further = scale.stabilised(READINGS + step * scale.error(READINGS)) - scale.stabilised(READINGS)
     np.testing.assert_allclose(further[:-1], step * scale.deviation, rtol=1e-4)
-    np.testing.assert_allclose(scale.readings(scale.even(READINGS)), READINGS, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(scale.readings(scale.stabilised(READINGS)), READINGS, rtol=1e-9, atol=1e-9)
 
 
 def test_the_error_of_a_reading_has_both_parts() -> None:
