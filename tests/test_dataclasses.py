@@ -77,6 +77,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "Linearisation",
         "StatedShare",
         "Step",
+        "FaultyReadings",
         "InputDoubt",
         "DesignMatrix",
         "Ranges",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.problem.compared import blanks_of, left_out
 from regolithd.calibration.mismatch.problem.covariates import covariates_of
-from regolithd.calibration.mismatch.problem.outliers import Faults, note_on_far_readings
+from regolithd.calibration.mismatch.problem.outliers import FaultyReadings, note_on_far_readings
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.problem import Problem
 from regolithd.calibration.mismatch.problem.simulated import Inputs, inputs_of, put_on_time, simulated
@@ -60,7 +60,7 @@ def build_problem(
     prepared, prediction = run.recording, run.prediction
     measured = run.as_read.channel(simulation.channel)  # as read, also where it is an input that is smoothed
     compared = run.known & np.isfinite(measured)
-    faults = Faults.of(measured, prediction, compared, recording.run, thresholds)
+    faults = FaultyReadings.of(measured, prediction, compared, recording.run, thresholds)
     as_read = None if run.as_read is prepared else complete_inputs(run.as_read)
     found, constants = covariates_of(
         prepared,

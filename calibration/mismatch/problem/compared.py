@@ -14,7 +14,7 @@ from regolithd.calibration.mismatch.problem.words import word_for
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from regolithd.calibration.mismatch.problem.outliers import Faults
+    from regolithd.calibration.mismatch.problem.outliers import FaultyReadings
     from regolithd.calibration.mismatch.problem.simulated import Simulated
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
@@ -51,7 +51,7 @@ def left_out(
     channel: str,
     measured: Array,
     run: Simulated,
-    faults: Faults,
+    faults: FaultyReadings,
     blanks: Mapping[str, Mask],
     labels: Mapping[str, str],
 ) -> tuple[LeftOut, ...]:

@@ -30,7 +30,7 @@ OUT_OF_RANGE = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Faults:
+class FaultyReadings:
     """Readings of the predicted column that are not compared, and why, each for one reason, shape (time, wheel).
 
     Attributes
@@ -49,7 +49,7 @@ class Faults:
     @classmethod
     def of(
         cls, measured: Array, prediction: Array, compared: Mask, run: NDArray[np.int64], thresholds: Thresholds
-    ) -> Faults:
+    ) -> FaultyReadings:
         """Return the faults among the readings that are `compared`."""
         residual = np.where(compared, measured - prediction, np.nan)
         far = far_from_prediction(residual, thresholds)

@@ -6,7 +6,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.compared import blanks_of, left_out
-from regolithd.calibration.mismatch.problem.outliers import Faults
+from regolithd.calibration.mismatch.problem.outliers import FaultyReadings
 from regolithd.calibration.mismatch.problem.simulated import Simulated
 from regolithd.calibration.mismatch.thresholds import Thresholds
 
@@ -75,7 +75,12 @@ def test_what_is_left_out_is_counted_with_its_reason() -> None:
     changed = np.arange(10)[:, None] == 9
     run = Simulated(recording, recording, prediction, {}, none, {"load_N": changed, "slip": none})
     told = left_out(
-        "current_A", measured, run, Faults(none, none, none, none), {"yaw_rate": blank}, {"yaw_rate": "turning (rad/s)"}
+        "current_A",
+        measured,
+        run,
+        FaultyReadings(none, none, none, none),
+        {"yaw_rate": blank},
+        {"yaw_rate": "turning (rad/s)"},
     )
     assert [(each.channel, each.readings) for each in told] == [("current_A", 2), ("current_A", 1), ("current_A", 3)]
     assert "predicts nothing" in told[0].reason
