@@ -118,7 +118,7 @@ def far_from_both_neighbours(values: Array, run: NDArray[np.int64], thresholds: 
         left, beyond = column.copy(), excursions(column, run)
         most = int(thresholds.most_outliers_share * np.isfinite(column).sum())
         least = thresholds.isolated_excursion * float(np.partition(beyond, -most - 1)[-most - 1])
-        while most and np.any(far := beyond > least):
+        while found[:, wheel].sum() <= most and np.any(far := beyond > least):
             beside = np.maximum(np.append(beyond[1:], 0.0), np.insert(beyond[:-1], 0, 0.0))
             far &= beyond >= beside
             found[far, wheel], left[far] = True, np.nan

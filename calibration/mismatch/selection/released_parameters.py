@@ -35,10 +35,13 @@ def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold
     in the place of a name, where it is ahead of that by more than chance (`lead_margin`).
     None where the readings contradict none, where the one with most evidence would go further than a wrong statement
     explains (`Prior.furthest`), where something stays unexplained all the same, or where the evidence of `whole`, names
-    and curves within the priors, is larger.
+    and curves within the priors, is larger. Beside names alone, a wrong value has to be ahead by more than chance: an
+    effect that is just too small to be named bends a parameter as well.
     """
     lead = equations.thresholds.lead_margin
     best, most = None, _evidence(equations, whole, (), entry_threshold)
+    if all(term.group.named for term in whole.terms):
+        most += lead
     for kept in (named.terms, *(named.without(index) for index in range(len(named.terms)))):
         least = lead * (len(named.terms) - len(kept))
         for freed, places in _releases(equations, kept):
