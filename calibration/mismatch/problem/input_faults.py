@@ -2,10 +2,10 @@
 
 A logger writes 0, 9999 or 65535 where a reading was lost. In the predicted column the residual shows it
 (`outliers.py`). In an input it would be simulated, and what it does to the prediction would be told as physics; in a
-state it lasts. A fault of one reading lies far beyond the readings before and after it, one of a few in a row out of
-the range of all others, and so does a pulse that was really there: the valve that opened once. Where the prediction
-depends on it, the simulation decides, which follows the measured column clearly better with a true pulse, and clearly
-worse with a fault. Else it is a fault if it is out of the range of all others.
+state it lasts. A fault of one reading, or of a few that are equal, lies far beyond the readings before and after it,
+any other of a few in a row out of the range of all others. So does a pulse that was really there: the valve that opened
+once. Where the prediction depends on it, the simulation decides, which follows the measured column clearly better with
+a true pulse, and clearly worse with a fault. Else it is a fault if it is out of the range of all others.
 
 What is found becomes a blank, and a note says so.
 """
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.errors import counted
 from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.problem.outliers import (
+    MOST_IN_A_ROW,
     far_from_prediction,
     few_in_a_row,
     isolated_outliers,
@@ -81,17 +82,22 @@ def without_input_faults(
 def excursions(values: Array, run: NDArray[np.int64]) -> Array:
     """Return by how much readings, shape (time,), lie above or below both of their neighbours within a run.
 
-    Neighbours are the readings before and after, however many blanks are between; 0 for those between their neighbours,
-    for blanks, and for a run's first and last reading.
+    Neighbours are the readings before and after, however many blanks are between. Equal ones in a row count as one: a
+    logger repeats what it writes for a lost reading. 0 for those between their neighbours, for blanks, for a run's
+    first and last, and for more than `MOST_IN_A_ROW`.
     """
     found = np.zeros(len(values))
     known = np.flatnonzero(np.isfinite(values))
     if known.size < 3:
         return found
-    steps = np.diff(values[known])
+    starts = np.flatnonzero(np.append(True, (np.diff(values[known]) != 0) | (np.diff(run[known]) != 0)))
+    many, first = np.diff(np.append(starts, known.size)), known[starts]
+    steps = np.diff(values[first])
     away, back = steps[:-1], -steps[1:]
-    turned = (away * back > 0) & (run[known[:-2]] == run[known[2:]])
-    found[known[1:-1]] = np.where(turned, np.minimum(np.abs(away), np.abs(back)), 0.0)
+    turned = (away * back > 0) & (run[first[:-2]] == run[first[2:]]) & (many[1:-1] <= MOST_IN_A_ROW)
+    beyond = np.zeros(len(first))
+    beyond[1:-1] = np.where(turned, np.minimum(np.abs(away), np.abs(back)), 0.0)
+    found[known] = np.repeat(beyond, many)
     return found
 
 
@@ -131,21 +137,23 @@ def far_from_both_neighbours(values: Array, run: NDArray[np.int64], thresholds: 
 def _evidence(recording: Recording, left: Array, changed: Array, far: dict[str, Mask]) -> Array:
     """Return the log likelihood ratio of a pulse that was there to a fault, at each instant with a far one: (time, 1).
 
-    `left` (time, wheel) is what the prediction without them leaves, `changed` is what they change of it. From one such
-    instant to the next, in the same run, `left` = b · `changed` + constant + noise, where b = 0 if nothing was there,
-    and b = 1 if it was. NaN where it cannot be judged: the prediction hardly depends on it, or there is none with it,
+    `left` (time, wheel) is what the prediction without them leaves, `changed` is what they change of it. From one pulse
+    to the next, in the same run, `left` = b · `changed` + constant + noise, where b = 0 if nothing was there, and b = 1
+    if it was. NaN where it cannot be judged: the prediction hardly depends on it, or there is none with it,
     as at standstill.
     """
     evidence, variance = np.full((len(left), 1), np.nan), robust_std(left[np.isfinite(left)]) ** 2
     places = np.flatnonzero(np.any([mask.any(axis=1) for mask in far.values()], axis=0))
-    for place, following in zip(places, np.append(places[1:], len(left) + REACH), strict=True):
-        rows = np.arange(max(place - REACH, 0), max(following - REACH, place + 1))
-        rows = rows[recording.run[rows] == recording.run[place]]
+    pulses = np.split(places, np.flatnonzero((np.diff(places) > 1) | (np.diff(recording.run[places]) != 0)) + 1)
+    following = [*(int(pulse[0]) for pulse in pulses[1:]), len(left) + REACH]
+    for pulse, then in zip(pulses, following, strict=True):
+        rows = np.arange(max(pulse[0] - REACH, 0), max(then - REACH, pulse[-1] + 1))
+        rows = rows[recording.run[rows] == recording.run[pulse[0]]]
         both = np.isfinite(left[rows] * changed[rows])
         change, rest = (each[rows] - known_mean(np.where(both, each[rows], np.nan)) for each in (changed, left))
         size = float(np.sum(change**2, where=both))
         if size > LEAST_CHANGE * variance:
-            evidence[place] = (float(np.sum(change * rest, where=both)) - size / 2) / variance
+            evidence[pulse] = (float(np.sum(change * rest, where=both)) - size / 2) / variance
     return evidence
 
 

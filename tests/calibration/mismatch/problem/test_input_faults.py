@@ -53,10 +53,12 @@ def tank(recording: Recording) -> Array:
 
 
 def test_how_far_a_reading_lies_beyond_both_neighbours() -> None:
-    """By the smaller of both; over blanks; 0 on a ramp, at a step, and at the ends of a run."""
+    """By the smaller of both; over blanks; of equal ones together; 0 on a ramp, at a step, and at a run's ends."""
     values = np.array([0.0, 5.0, 1.0, np.nan, -3.0, 2.0, 3.0, 4.0, 4.0, 9.0, 9.0])
     run = np.zeros(len(values), np.int64)
     np.testing.assert_array_equal(excursions(values, run), [0, 4, 0, 0, 4, 0, 0, 0, 0, 0, 0])
+    lost = np.array([5.0, 0.0, 0.0, np.nan, 0.0, 6.0, *[0.0] * 6, 5.0])
+    np.testing.assert_array_equal(excursions(lost, np.zeros(13, np.int64)), [0, 5, 5, 0, 5, 6, *[0] * 7])
     np.testing.assert_array_equal(excursions(values, (np.arange(11) > 1).astype(np.int64))[:3], [0, 0, 0])
 
 
@@ -93,6 +95,20 @@ def test_a_code_in_a_row_is_found() -> None:
     assert np.flatnonzero(far_from_all_others(values, np.zeros(COUNT, np.int64), LIMITS)).tolist() == [500, 501, 502]
     values[500:506] = 850.0
     assert not far_from_all_others(values, np.zeros(COUNT, np.int64), LIMITS).any()
+
+
+def test_equal_readings_in_a_row_are_a_fault_within_the_range_of_others() -> None:
+    """Three zeros of a flow that is zero elsewhere, too, and did not stop there; a stop that the level shows stays."""
+    flow = recorded({}).channels["flow"].copy()
+    flow[:100, 0] = np.linspace(0, 20, 100)
+    stopping = flow.copy()
+    stopping[300:303] = 0.0
+    noise = np.random.default_rng(4).normal(0, 0.3, (COUNT, 1))
+    ran, stopped = (tank(recorded({}).with_channels(flow=each)) + noise for each in (flow, stopping))
+    found = without_input_faults(recorded({}).with_channels(flow=stopping, level_cm=ran), "level_cm", tank, LIMITS)
+    assert np.flatnonzero(np.isnan(found.channels["flow"])).tolist() == [300, 301, 302]
+    given = recorded({}).with_channels(flow=stopping, level_cm=stopped)
+    assert without_input_faults(given, "level_cm", tank, LIMITS) is given
 
 
 def test_faults_of_an_input_become_blanks_and_are_told() -> None:
