@@ -152,7 +152,9 @@ def from_columns(columns: Mapping[str, Column], *, unit: str = UNIT) -> Recordin
         When there is no time or fewer than two instants, or a column is no row of numbers.
     """
     notes: list[str] = []
-    clock = next((name for name in TIME_UNITS_S if name in columns), TIME)
+    clock, *others = [name for name in TIME_UNITS_S if name in columns] or [TIME]
+    if others:
+        notes.append(f"The time is {clock}. Also named as a time, and read as a channel: {listed(others)}.")
     names, table = _table(columns, clock, unit, notes)
     keys, row, column = _places(table, unit)
     wheels = tuple(names[int(k)] for k in np.unique(table[unit]))

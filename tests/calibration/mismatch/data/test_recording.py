@@ -42,6 +42,13 @@ def test_repeated_rows_are_averaged_and_said() -> None:
     assert any("6 rows with the same t_s and wheel" in note for note in found.notes)
 
 
+def test_a_second_column_of_time_is_said() -> None:
+    """Seconds are the time; minutes beside them are a channel, whatever they say."""
+    found = from_columns({**TABLE, "t_min": TABLE["t_s"]})
+    np.testing.assert_array_equal(found.time_s, from_columns(TABLE).time_s)
+    assert "The time is t_s. Also named as a time, and read as a channel: t_min." in found.notes
+
+
 def test_a_clock_that_jumps_back_begins_another_run() -> None:
     """Nothing is mixed: both halves keep all their instants."""
     jumped = {name: values.copy() for name, values in TABLE.items()}
