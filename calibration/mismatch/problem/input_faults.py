@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import counted
-from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.problem.outliers import (
     MOST_IN_A_ROW,
     far_from_prediction,
@@ -39,11 +38,15 @@ Mask = NDArray[np.bool_]
 
 REACH = 2
 """Readings before a fault that it may change: a difference over three readings, and one more (a choice)."""
+AROUND = 50
+"""Readings before and after a pulse that are asked whether it was there (a choice: a straight line holds so long)."""
 CLEARLY = 5.0
 """Log likelihood ratio from which a pulse was there, or was not (a choice: noise that is not white makes it seem
 larger). Between the two a reading out of the range of all others is a fault, and any other is none."""
 LEAST_CHANGE = 1.0
 """Sum of squares by which a reading has to change the prediction, in variances of what is left, to be judged by it."""
+LEAST_VARIANCE = 1e-300
+"""Variance of a recording without noise: any change is clear."""
 MOST_TOLD = 3
 """Faults of a column of which a note tells time and value."""
 
@@ -137,24 +140,55 @@ def far_from_both_neighbours(values: Array, run: NDArray[np.int64], thresholds: 
 def _evidence(recording: Recording, left: Array, changed: Array, far: dict[str, Mask]) -> Array:
     """Return the log likelihood ratio of a pulse that was there to a fault, at each instant with a far one: (time, 1).
 
-    `left` (time, wheel) is what the prediction without them leaves, `changed` is what they change of it. From one pulse
-    to the next, in the same run, `left` = b · `changed` + constant + noise, where b = 0 if nothing was there, and b = 1
-    if it was. NaN where it cannot be judged: the prediction hardly depends on it, or there is none with it,
-    as at standstill.
+    `left` (time, wheel) is what the prediction without them leaves, `changed` is what they change of it. Around each
+    pulse, up to the ones before and after, `left` = b · `changed` + a straight line + noise, where b = 0 if nothing was
+    there, and b = 1 if it was. The line stands for parameters that are not fitted yet, and the noise is taken as an
+    autoregression of first order. NaN where it cannot be judged: the prediction hardly depends on it, or there is none
+    with it, as at standstill.
     """
-    evidence, variance = np.full((len(left), 1), np.nan), robust_std(left[np.isfinite(left)]) ** 2
+    evidence = np.full((len(left), 1), np.nan)
     places = np.flatnonzero(np.any([mask.any(axis=1) for mask in far.values()], axis=0))
     pulses = np.split(places, np.flatnonzero((np.diff(places) > 1) | (np.diff(recording.run[places]) != 0)) + 1)
-    following = [*(int(pulse[0]) for pulse in pulses[1:]), len(left) + REACH]
-    for pulse, then in zip(pulses, following, strict=True):
-        rows = np.arange(max(pulse[0] - REACH, 0), max(then - REACH, pulse[-1] + 1))
-        rows = rows[recording.run[rows] == recording.run[pulse[0]]]
-        both = np.isfinite(left[rows] * changed[rows])
-        change, rest = (each[rows] - known_mean(np.where(both, each[rows], np.nan)) for each in (changed, left))
-        size = float(np.sum(change**2, where=both))
+    ends = [-1, *(int(pulse[-1]) for pulse in pulses[:-1])]
+    starts = [*(int(pulse[0]) for pulse in pulses[1:]), len(left) + REACH]
+    around = []
+    for pulse, end, start in zip(pulses, ends, starts, strict=True):
+        first, last = int(pulse[0]), int(pulse[-1])
+        until = max(min(start - REACH, last + 1 + AROUND, len(left)), last + 1)
+        rows = np.arange(max(end + 1, first - AROUND, 0), until)
+        around.append(rows[recording.run[rows] == recording.run[first]])
+    both = np.where(np.isfinite(left) & np.isfinite(changed), 1.0, np.nan)
+    lines = [tuple(_without_line(each[rows] * both[rows]) for each in (changed, left)) for rows in around]
+    persistence, variance = _autoregression([rest for _, rest in lines])
+    for pulse, (change, rest) in zip(pulses, lines, strict=True):
+        new, other = (each[1:] - persistence * each[:-1] for each in (change, rest))
+        size = float(np.nansum(new**2))
         if size > LEAST_CHANGE * variance:
-            evidence[pulse] = (float(np.sum(change * rest, where=both)) - size / 2) / variance
+            evidence[pulse] = (float(np.nansum(new * other)) - size / 2) / variance
     return evidence
+
+
+def _without_line(values: Array) -> Array:
+    """Return values (time, wheel) less a straight line over time on each wheel; NaN where they are."""
+    found = np.full(values.shape, np.nan)
+    for wheel, column in enumerate(values.T):
+        at = np.flatnonzero(np.isfinite(column))
+        if at.size > 2:
+            basis = np.stack((np.ones(at.size), at - at.mean()), axis=1)
+            found[at, wheel] = column[at] - basis @ np.linalg.lstsq(basis, column[at], rcond=None)[0]
+    return found
+
+
+def _autoregression(series: list[Array]) -> tuple[float, float]:
+    """Return the correlation of one reading with the next, and the variance of what is new in each."""
+    before = np.concatenate([each[:-1].ravel() for each in series])
+    after = np.concatenate([each[1:].ravel() for each in series])
+    known = np.isfinite(before) & np.isfinite(after)
+    if not known.any():
+        return 0.0, LEAST_VARIANCE
+    power = float(np.sum(before[known] ** 2))
+    persistence = float(np.clip(before[known] @ after[known] / power, 0.0, 1.0)) if power > 0 else 0.0
+    return persistence, max(robust_std(after[known] - persistence * before[known]) ** 2, LEAST_VARIANCE)
 
 
 def _note(recording: Recording, name: str, faults: Mask) -> str:
