@@ -114,7 +114,7 @@ def predicts_row_by_row(problem: Problem) -> bool:
     with np.errstate(all="ignore"):
         alone = problem.simulation.predict(inputs, values)[::-1]
     known = problem.mask[rows]
-    apart = np.abs(alone - (problem.prediction - problem.added)[rows])[known]
+    apart = np.abs(alone - (problem.prediction - problem.added - problem.error_bias)[rows])[known]
     return bool(np.mean(apart <= ROUNDING * max(problem.mean_size, 1e-300)) >= SAME_SHARE)
 
 

@@ -56,6 +56,7 @@ def build_problem(
     as_recorded = None
     if late:
         as_recorded = simulation.predict(complete_inputs(inputs.expected), all_values)
+        as_recorded = as_recorded + (0.0 if inputs.doubt is None else inputs.doubt.bias)
         as_recorded = np.where(np.isfinite(as_recorded), as_recorded, run.prediction)
     prepared, prediction = run.recording, run.prediction
     measured = run.as_read.channel(simulation.channel)  # as read, also where it is an input that is smoothed

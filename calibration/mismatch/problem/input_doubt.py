@@ -1,7 +1,9 @@
 """How much the stated errors of its inputs change a prediction, reading by reading.
 
 Where a prediction is steep in an input, near standstill in a slip that is a quotient of two speeds, a small error of
-that input is a large one of the prediction. Such a reading says less than another.
+that input is a large one of the prediction. Such a reading says less than another. Where a prediction is curved in an
+input, the prediction from the expected input is not the expected prediction: the mean of a squared current is more than
+the square of its mean, by the variance that is left (Jensen's inequality).
 """
 
 from __future__ import annotations
@@ -24,23 +26,36 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+DRAWS = 8
+"""Draws of errors that last (a choice: of a variance from so many the standard deviation is known to a quarter)."""
+LASTING = 0.5
+"""Correlation of the prediction's error with that of the next reading, from which it lasts (a choice: errors of
+readings are independent, and what a prediction makes of each alone has none)."""
 LEAST_LEFT = 0.02
 """Share of an error's variance that smoothing leaves at least (a choice: a mean of fifty readings)."""
 
 
+SUMMED = ("alone", "together", "bias")
+"""What independent causes add up to."""
+
+
 @dataclass(frozen=True, eq=False)
 class InputDoubt:
-    """The variance of a prediction by what is uncertain of its inputs, shape (time, wheel) each.
+    """What the inputs' errors do to a prediction, shape (time, wheel) each.
 
     Attributes
     ----------
-    alone: of each reading
+    bias: the expected prediction less that from the expected inputs
+    draws: of its error, where that lasts from one reading to the next, shape (draw, time, wheel); else there are none
+    alone: the variance of each reading's
     together: by which a mean over wheels and time is as uncertain as if each reading had this for itself: an error that
         wheels have in common does not average out, and smoothing an input leaves the slow part of its error as it was
     """
 
     alone: Array
     together: Array
+    bias: Array
+    draws: Array
 
 
 def input_doubt(
@@ -48,8 +63,10 @@ def input_doubt(
 ) -> InputDoubt | None:
     """Return how uncertain the prediction from expected inputs is by the stated errors of their readings.
 
-    One run of the simulation for each input with an error: at each instant one standard deviation up or down, by lot,
-    since a simulation that integrates would add up an error that stays. None where no input has an error.
+    Two runs of the simulation for each input with an error: at each instant one standard deviation up or down, by lot,
+    since a simulation that integrates would add up an error that stays, and the other way round. Of one that
+    integrates the error lasts: it is drawn `DRAWS` times more, with all inputs at once. None where no input has an
+    error.
     """
     inputs = complete_inputs(expected)
     scales = {
@@ -61,13 +78,29 @@ def input_doubt(
     if not stated:
         return None
     before = simulation.predict(inputs, values)
-    alone, together, random = np.zeros(before.shape), np.zeros(before.shape), np.random.default_rng(0)
+    alone, together, bias = (np.zeros(before.shape) for _ in range(3))
+    random, lasting = np.random.default_rng(0), False
     for name, error in stated.items():
         lot = error * random.choice([-1.0, 1.0], size=(len(before), 1))
-        variance = np.nan_to_num(simulation.predict({**inputs, name: inputs[name] + lot}, values) - before) ** 2
-        alone += variance * _left_by_smoothing(as_read.channels[name] - inputs[name], error)
-        together += variance * wheels_in_common(inputs[name])
-    return InputDoubt(alone, together)
+        moved = (simulation.predict({**inputs, name: inputs[name] + sign * lot}, values) for sign in (1.0, -1.0))
+        one, other = (np.nan_to_num(each - before) for each in moved)
+        left = _left_by_smoothing(as_read.channels[name] - inputs[name], error)
+        alone += left * (one**2 + other**2) / 2
+        together += wheels_in_common(inputs[name]) * (one**2 + other**2) / 2
+        bias += left * (one + other) / 2
+        lasting |= _lasts(one - other)
+    draws = np.zeros((DRAWS if lasting else 0, *before.shape))
+    for place in range(len(draws)):
+        lots = {name: error * random.choice([-1.0, 1.0], size=(len(before), 1)) for name, error in stated.items()}
+        drawn = {**inputs, **{name: inputs[name] + lot for name, lot in lots.items()}}
+        draws[place] = np.nan_to_num(simulation.predict(drawn, values) - before)
+    return InputDoubt(alone, together, bias, draws)
+
+
+def _lasts(error: Array) -> bool:
+    """Return whether a prediction's error (time, wheel) goes on from one reading to the next."""
+    power = float(np.sum(error[:-1] ** 2))
+    return float(np.sum(error[1:] * error[:-1])) > LASTING * power > 0
 
 
 def total_doubt(doubts: Iterable[InputDoubt | None]) -> InputDoubt | None:
@@ -75,8 +108,8 @@ def total_doubt(doubts: Iterable[InputDoubt | None]) -> InputDoubt | None:
     known = [doubt for doubt in doubts if doubt is not None]
     if not known:
         return None
-    alone, together = (np.sum([getattr(doubt, name) for doubt in known], axis=0) for name in ("alone", "together"))
-    return InputDoubt(alone, together)
+    alone, together, bias = (np.sum([getattr(each, name) for each in known], axis=0) for name in SUMMED)
+    return InputDoubt(alone, together, bias, np.concatenate([each.draws for each in known]))
 
 
 def _left_by_smoothing(taken_out: Array, error: Array) -> float:

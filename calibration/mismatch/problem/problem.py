@@ -177,6 +177,11 @@ class Problem:
         columns = [effect.column for effect in self.stated if not (effect.in_simulation or effect.on_time)]
         return sum(columns, np.zeros(self.mask.shape))
 
+    @property
+    def error_bias(self) -> Array | float:
+        """What the inputs' errors add to the mean of the prediction, where that is curved in them."""
+        return 0.0 if self.doubt is None else self.doubt.bias
+
     @cached_property
     def courses(self) -> tuple[Readings, ...]:
         """Each wheel's compared readings, runs and gaps apart."""
@@ -261,7 +266,7 @@ class Problem:
     def changed(self, **changes: float) -> Array:
         """Return the prediction with parameters (or variants) set otherwise, 0 where `filled` has no prediction."""
         values = {**self._all_values, **changes}
-        predicted = self.simulation.predict(complete_inputs(self.recording), values) + self.added
+        predicted = self.simulation.predict(complete_inputs(self.recording), values) + self.added + self.error_bias
         return self._where_predicted(predicted)
 
     def secant(self, name: str, step: float) -> Array:
@@ -304,7 +309,7 @@ class Problem:
     def with_input(self, column: str, values: Array) -> Array:
         """Return the prediction for another reading of one input, 0 where there is none."""
         inputs = {**complete_inputs(self.recording), column: values}
-        moved = self.simulation.predict(inputs, self._all_values) + self.added
+        moved = self.simulation.predict(inputs, self._all_values) + self.added + self.error_bias
         return np.where(np.isfinite(moved), self._where_predicted(moved), 0.0)
 
     def _where_predicted(self, values: Array) -> Array:

@@ -152,6 +152,8 @@ def simulated(inputs: Inputs, simulation: Predictor, values: Mapping[str, float]
     """Run the simulation with these parameters; twice where an input has blanks."""
     prepared, other, blanks = inputs.expected, inputs.bridged_otherwise, inputs.blanks
     prediction = simulation.predict(complete_inputs(prepared), values)
+    if inputs.doubt is not None:
+        prediction = prediction + inputs.doubt.bias
     if inputs.undefined is not None:
         prediction = np.where(inputs.undefined, np.nan, prediction)
     carried, blank = np.zeros(prediction.shape, np.bool_), np.zeros(prediction.shape, np.bool_)
@@ -227,7 +229,9 @@ def _between_readings(
         off = np.nan_to_num(simulation.predict(complete_inputs(other), values) - before)
         if off.any():
             rows = np.stack([np.bincount(of_wheel)[of_wheel] for of_wheel in last.T], axis=1)
-            doubt = InputDoubt(off**2, off**2 * rows * wheels_in_common(drawn))
+            doubt = InputDoubt(
+                off**2, off**2 * rows * wheels_in_common(drawn), np.zeros(off.shape), np.zeros((0, *off.shape))
+            )
             found[name] = _BetweenReadings(doubt, np.abs(off - np.take_along_axis(off, last, axis=0)))
     return found
 
