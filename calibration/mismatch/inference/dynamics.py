@@ -1,18 +1,25 @@
-"""What to look at where the residual follows what was predicted, or how the machine was accelerated, before."""
+"""What to look at where the residual follows what was before: of the prediction, of the acceleration, or by a state."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from regolithd.calibration.mismatch.problem.state_memory import memory_s
 from regolithd.calibration.mismatch.problem.words import word_for
 from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
+from regolithd.calibration.mismatch.regression.state_groups import ON_STATE
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 
 def notes_on_dynamics(decision: Decision) -> tuple[str, ...]:
-    """Return a note where something is unexplained over the past: what it may be, and what would tell.
+    """Return a note where something is unexplained over the past: what it may be, and what would tell."""
+    return (*_note_on_lags(decision), *_notes_on_states(decision))
+
+
+def _note_on_lags(decision: Decision) -> tuple[str, ...]:
+    """Return a note on what follows the past of the prediction, or of the acceleration.
 
     Parameters with wide priors can stand for a part of a delay, which then has not the form of a delay any more.
     """
@@ -27,3 +34,15 @@ def notes_on_dynamics(decision: Decision) -> tuple[str, ...]:
         f"delay: state those better that change how fast the prediction follows."
     )
     return (note,)
+
+
+def _notes_on_states(decision: Decision) -> tuple[str, ...]:
+    """Return a note on each covariate over which something acts on a state of the simulation."""
+    problem = decision.equations.problem
+    names = [term.name for term in decision.unnamed if term.group.coupling == ON_STATE]
+    return tuple(
+        f"What is unexplained over the {word_for(name, problem.labels)} acts on a state of the simulation, which shows "
+        f"it for about {float(f"{memory_s(problem):.2g}"):g} s: it is left out of a balance, as of heat, of volume or of forces. No "
+        f"curve over it is fitted."
+        for name in dict.fromkeys(names)
+    )

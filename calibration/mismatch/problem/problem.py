@@ -307,8 +307,12 @@ class Problem:
         return self.run_once("input " + column, step, change)
 
     def with_input(self, column: str, values: Array) -> Array:
-        """Return the prediction for another reading of one input, 0 where there is none."""
-        inputs = {**complete_inputs(self.recording), column: values}
+        """Return the prediction for other readings of one input, 0 where there is none."""
+        return self.with_inputs({column: values})
+
+    def with_inputs(self, readings: Mapping[str, Array]) -> Array:
+        """Return the prediction for other readings of some inputs, 0 where there is none."""
+        inputs = {**complete_inputs(self.recording), **readings}
         moved = self.simulation.predict(inputs, self._all_values) + self.added + self.error_bias
         return np.where(np.isfinite(moved), self._where_predicted(moved), 0.0)
 

@@ -16,6 +16,7 @@ from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
 from regolithd.calibration.mismatch.regression.reliability import reliability_of
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
+from regolithd.calibration.mismatch.regression.state_groups import with_state_terms
 from regolithd.calibration.mismatch.signal.noise import NoiseModel
 from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED
 
@@ -35,7 +36,8 @@ def smooth_equations(problem: Problem) -> NormalEquations:
     The weights are those of the whole residual; the decision estimates better ones.
     """
     design, nuisance, noise = _free_parameters(problem)
-    return normal_equations(with_lagged_terms(with_smooth_terms(design)), nuisance, noise.weights)
+    design = with_lagged_terms(with_state_terms(with_smooth_terms(design)))
+    return normal_equations(design, nuisance, noise.weights)
 
 
 def with_library(

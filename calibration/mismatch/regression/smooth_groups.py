@@ -40,7 +40,7 @@ def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
     problem = design.problem
     couplings = couplings_of(problem)
     for name, values in problem.covariates.items():
-        if has_smooth_term(problem, name) and not _differs_between_wheels_only(problem, values):
+        if has_smooth_term(problem, name) and varies_with_time(problem, values):
             curve = np.abs(values) if name == "wheel_speed" else values
             hats = hat_functions(curve, problem.mask, problem.thresholds.curve_knots)
             for coupling, factor, sharing in (
@@ -163,10 +163,10 @@ def _with_group(
     return design.with_groups((*design.groups, group))
 
 
-def _differs_between_wheels_only(problem: Problem, values: Array) -> bool:
-    """Return whether a covariate hardly varies but from wheel to wheel: a curve over it would be a list of wheels."""
+def varies_with_time(problem: Problem, values: Array) -> bool:
+    """Return whether a covariate varies on each wheel: a curve over what hardly does would be a list of wheels."""
     known = values[problem.mask & np.isfinite(values)]
-    return problem.variance_within(values) < problem.thresholds.least_variance_within * float(np.var(known))
+    return problem.variance_within(values) >= problem.thresholds.least_variance_within * float(np.var(known))
 
 
 def with_periodic_terms(design: DesignMatrix, residual: Array) -> DesignMatrix:

@@ -1,0 +1,52 @@
+"""Smooth terms that act on a state of the simulation: a heat flow, a leak or a force over a covariate.
+
+They show in the readings for as long as the state remembers (`problem/state_memory.py`). Beside curves that act on the
+reading itself, they tell of which covariate that is which was left out of a balance.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown, bridged
+from regolithd.calibration.mismatch.problem.state_memory import memory_s, through_state
+from regolithd.calibration.mismatch.regression.group import Group
+from regolithd.calibration.mismatch.regression.smooth_groups import (
+    couplings_of,
+    has_smooth_term,
+    varies_with_time,
+)
+from regolithd.calibration.mismatch.signal.hat_basis import hat_functions
+
+if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
+
+ON_STATE = "on a state"
+"""Coupling of these terms."""
+
+
+def with_state_terms(design: DesignMatrix) -> DesignMatrix:
+    """Add, for each covariate, a smooth term that acts on a state; nothing where the simulation has none.
+
+    It acts as drag where the machine has a direction, and else as it is.
+    """
+    problem = design.problem
+    memory = memory_s(problem)
+    if memory == 0:
+        return design
+    couplings = couplings_of(problem)
+    factor = couplings["drag" if "drag" in couplings else "offset"]
+    for name, values in problem.covariates.items():
+        if name == "time" or not has_smooth_term(problem, name) or not varies_with_time(problem, values):
+            continue
+        known = bridged(np.abs(values) if name == "wheel_speed" else values)
+        hats = hat_functions(known, np.isfinite(known), problem.thresholds.curve_knots)
+        columns = [through_state(problem, hat * np.nan_to_num(bridged(factor)), memory) for hat in hats]
+        design, places = design.extended(as_shown(problem, columns))
+        if places:
+            signs = (0,) * len(places)
+            group = Group(name=name, columns=places, signs=signs, sharing=("all", "one"), coupling=ON_STATE)
+            design = design.with_groups((*design.groups, group))
+    return design
