@@ -44,6 +44,8 @@ SLOW_READINGS = 9
 """Readings whose mean is slow, and no part of a ripple that turns on between readings (a choice)."""
 ROUNDING = 1e-9
 """Share of the largest residual below which a difference is rounding."""
+NONE = 1e-4
+"""Share of the largest amplitude below which a wheel has none: what draws add to a coefficient of 0."""
 ALIAS_SHARE = 0.7
 """Share of a line's power from which another line may be the true one of which it is an alias (a choice: at one speed
 both are equal, and of noise the largest of thousands are nearly so)."""
@@ -144,7 +146,8 @@ class WheelAngleRipple(Candidate):
         """Return the fundamental's amplitude (root mean square over the wheels that have it) and the order."""
         fundamental = np.asarray(values[: len(values) // int(float(shape["sines"]))])
         amplitudes = np.hypot(fundamental[0::2], fundamental[1::2])
-        amplitude = float(np.sqrt(np.mean(amplitudes**2)))
+        has = amplitudes > NONE * np.max(amplitudes)  # a wheel that is not of the effect has coefficients of 0
+        amplitude = float(np.sqrt(np.mean(amplitudes[has] ** 2))) if has.any() else 0.0
         return {"amplitude": amplitude, "order": float(shape["order"])}
 
     def _base(self, problem: Problem, shape: Shape) -> Array:

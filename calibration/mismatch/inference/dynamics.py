@@ -40,9 +40,10 @@ def _notes_on_states(decision: Decision) -> tuple[str, ...]:
     """Return a note on each covariate over which something acts on a state of the simulation."""
     problem = decision.equations.problem
     names = [term.name for term in decision.unnamed if term.group.coupling == ON_STATE]
+    memory = float(f"{memory_s(problem):.2g}") if names else 0.0
     return tuple(
         f"What is unexplained over the {word_for(name, problem.labels)} acts on a state of the simulation, which shows "
-        f"it for about {float(f"{memory_s(problem):.2g}"):g} s: it is left out of a balance, as of heat, of volume or of forces. No "
-        f"curve over it is fitted."
+        f"it for about {memory:g} s: it is left out of a balance, as of heat, of volume or of forces. No curve over it "
+        f"is fitted."
         for name in dict.fromkeys(names)
     )
