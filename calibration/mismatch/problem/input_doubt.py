@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.predictor import Predictor
+    from regolithd.calibration.mismatch.problem.prior import SensorError
 
 Array = NDArray[np.float64]
 
@@ -59,9 +60,13 @@ class InputDoubt:
 
 
 def input_doubt(
-    as_read: Recording, expected: Recording, simulation: Predictor, values: Mapping[str, float]
+    as_read: Recording,
+    expected: Recording,
+    simulation: Predictor,
+    values: Mapping[str, float],
+    errors: Mapping[str, SensorError],
 ) -> InputDoubt | None:
-    """Return how uncertain the prediction from expected inputs is by the stated errors of their readings.
+    """Return how uncertain the prediction from expected inputs is by the errors of their readings.
 
     Two runs of the simulation for each input with an error: at each instant one standard deviation up or down, by lot,
     since a simulation that integrates would add up an error that stays, and the other way round. Of one that
@@ -71,7 +76,7 @@ def input_doubt(
     inputs = complete_inputs(expected)
     scales = {
         name: ReadingScale.of(as_read.channels[name], error)
-        for name, error in simulation.sensors.items()
+        for name, error in errors.items()
         if name in as_read.channels and name in inputs
     }
     stated = {name: scale.error(inputs[name]) for name, scale in scales.items() if scale.deviation > 0}

@@ -25,7 +25,7 @@ from regolithd.calibration.mismatch.problem.outliers import (
     isolated_outliers,
     out_of_range,
 )
-from regolithd.calibration.mismatch.signal.robust import robust_std
+from regolithd.calibration.mismatch.signal.first_order import FirstOrder
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -45,8 +45,6 @@ CLEARLY = 5.0
 larger). Between the two a reading out of the range of all others is a fault, and any other is none."""
 LEAST_CHANGE = 1.0
 """Sum of squares by which a reading has to change the prediction, in variances of what is left, to be judged by it."""
-LEAST_VARIANCE = 1e-300
-"""Variance of a recording without noise: any change is clear."""
 MOST_TOLD = 3
 """Faults of a column of which a note tells time and value."""
 
@@ -159,12 +157,10 @@ def _evidence(recording: Recording, left: Array, changed: Array, far: dict[str, 
         around.append(rows[recording.run[rows] == recording.run[first]])
     both = np.where(np.isfinite(left) & np.isfinite(changed), 1.0, np.nan)
     lines = [tuple(_without_line(each[rows] * both[rows]) for each in (changed, left)) for rows in around]
-    persistence, variance = _autoregression([rest for _, rest in lines])
+    noise = FirstOrder.of([rest for _, rest in lines])
     for pulse, (change, rest) in zip(pulses, lines, strict=True):
-        new, other = (each[1:] - persistence * each[:-1] for each in (change, rest))
-        size = float(np.nansum(new**2))
-        if size > LEAST_CHANGE * variance:
-            evidence[pulse] = (float(np.nansum(new * other)) - size / 2) / variance
+        if noise.size(change) > LEAST_CHANGE:
+            evidence[pulse] = noise.log_likelihood_ratio(change, rest)
     return evidence
 
 
@@ -177,18 +173,6 @@ def _without_line(values: Array) -> Array:
             basis = np.stack((np.ones(at.size), at - at.mean()), axis=1)
             found[at, wheel] = column[at] - basis @ np.linalg.lstsq(basis, column[at], rcond=None)[0]
     return found
-
-
-def _autoregression(series: list[Array]) -> tuple[float, float]:
-    """Return the correlation of one reading with the next, and the variance of what is new in each."""
-    before = np.concatenate([each[:-1].ravel() for each in series])
-    after = np.concatenate([each[1:].ravel() for each in series])
-    known = np.isfinite(before) & np.isfinite(after)
-    if not known.any():
-        return 0.0, LEAST_VARIANCE
-    power = float(np.sum(before[known] ** 2))
-    persistence = float(np.clip(before[known] @ after[known] / power, 0.0, 1.0)) if power > 0 else 0.0
-    return persistence, max(robust_std(after[known] - persistence * before[known]) ** 2, LEAST_VARIANCE)
 
 
 def _note(recording: Recording, name: str, faults: Mask) -> str:

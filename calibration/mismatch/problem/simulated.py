@@ -22,6 +22,7 @@ from regolithd.calibration.mismatch.problem.errors_in_variables import expected_
 from regolithd.calibration.mismatch.problem.input_doubt import InputDoubt, input_doubt, total_doubt, wheels_in_common
 from regolithd.calibration.mismatch.problem.input_faults import without_input_faults
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
+from regolithd.calibration.mismatch.problem.unstated_errors import notes_on_unstated, unstated_errors
 from regolithd.calibration.mismatch.signal.robust import robust_std
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -110,15 +111,18 @@ def inputs_of(recording: Recording, simulation: Predictor, thresholds: Threshold
     )
     as_read, blanks = _prepared(recording, simulation)
     normal = _inputs_of_speed(as_read, simulation)
-    expected, otherwise = expected_inputs(as_read, simulation.sensors, normal), None
+    unstated = unstated_errors(as_read, simulation, predict, normal)
+    errors = {**simulation.sensors, **unstated}
+    expected, otherwise = expected_inputs(as_read, errors, normal), None
     if blanks:
         otherwise, _ = _prepared(recording, simulation, other_way=True)
-        otherwise = expected_inputs(otherwise, simulation.sensors, normal)
+        otherwise = expected_inputs(otherwise, errors, normal)
     predicted = cache(lambda: predict(as_read))
     between = _between_readings(recording, simulation, values, predicted)
-    doubts = (input_doubt(as_read, expected, simulation, values), *(each.doubt for each in between.values()))
+    doubts = (input_doubt(as_read, expected, simulation, values, errors), *(each.doubt for each in between.values()))
     within = {name: each.within for name, each in between.items()}
     undefined = _undefined(predicted()) if expected is not as_read else None
+    expected = expected.with_notes(*notes_on_unstated(unstated, simulation.channel))
     return Inputs(as_read, expected, otherwise, blanks, undefined, total_doubt(doubts), within)
 
 
@@ -237,9 +241,9 @@ def _between_readings(
 
 
 def _inputs_of_speed(recording: Recording, simulation: Predictor) -> frozenset[str]:
-    """Return the inputs with an error that `wheel_speed` changes with."""
+    """Return the inputs that `wheel_speed` changes with."""
     inputs = complete_inputs(recording)
-    noisy = [name for name in simulation.sensors if name in inputs]
+    noisy = [name for name in {**simulation.sensors, **dict.fromkeys(simulation.inputs)} if name in inputs]
     speed = simulation.covariates(inputs).get("wheel_speed") if noisy else None
     if speed is None:
         return frozenset()

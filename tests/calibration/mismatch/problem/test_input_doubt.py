@@ -65,7 +65,7 @@ def driven(seed: int, noise: float = 0.8) -> Recording:
 def test_the_doubt_is_what_the_error_changes() -> None:
     """By the slope of the prediction, to first order; wheels with one sensor are as uncertain together as alone."""
     recording = driven(1)
-    found = input_doubt(recording, recording, Slipping(), STATED)
+    found = input_doubt(recording, recording, Slipping(), STATED, Slipping.sensors)
     assert found is not None
     wheel, ground = recording.channels["wheel_m_s"], recording.channels["ground_m_s"]
     slope = 12 * 8 * (1 - np.tanh(8 * (1 - ground / wheel)) ** 2) / wheel
@@ -83,7 +83,7 @@ def test_smoothing_takes_a_part_of_the_error_out_of_each_reading_and_not_out_of_
     slow = slow.with_channels(ground_m_s=ground + error, wheel_m_s=np.full(slow.shape, 0.11))
     inputs = inputs_of(slow, Slipping())
     assert inputs.doubt is not None
-    as_read = input_doubt(slow, slow, Slipping(), STATED)
+    as_read = input_doubt(slow, slow, Slipping(), STATED, Slipping.sensors)
     assert as_read is not None
     left = np.mean(inputs.doubt.alone) / np.mean(as_read.alone)
     assert 0.9 * LEAST_LEFT < left < 0.2
@@ -99,7 +99,7 @@ def test_without_an_error_there_is_no_doubt() -> None:
         sensors: ClassVar = {}
 
     recording = driven(3)
-    assert input_doubt(recording, recording, Exact(), STATED) is None
+    assert input_doubt(recording, recording, Exact(), STATED, {}) is None
     equations = smooth_equations(build_problem(recording, Exact()))
     left = residual_of(equations, fit_of_significant_terms(equations))
     assert whitened(equations, left).design.reliability is None
