@@ -26,6 +26,7 @@ from regolithd.calibration.mismatch.changes import corrected_problem, stated_in,
 from regolithd.calibration.mismatch.channels import compare_channels, labelled
 from regolithd.calibration.mismatch.data.recording import as_recording
 from regolithd.calibration.mismatch.empirical.found import curves_of
+from regolithd.calibration.mismatch.empirical.refuted import without_refuted_curves
 from regolithd.calibration.mismatch.empirical.stated import beyond_the_range
 from regolithd.calibration.mismatch.inference.evidence import empirical_fits, evidence_of
 from regolithd.calibration.mismatch.inference.feedback import fed_back, notes_of_feedback
@@ -211,7 +212,8 @@ def _decided(
     if decision.has_delay and not search.decision.has_delay:  # which was refused before held-out readings asked
         search = _searched_beside_delays(search, decision, pose, progress)
         decision, held_out = earned(search.decision, search.grid)
-    return Decided(in_probable_regions(decision), held_out, search.candidates, search.applicable)
+    decision = without_refuted_curves(in_probable_regions(decision))
+    return Decided(decision, held_out, search.candidates, search.applicable)
 
 
 class _Pose(Protocol):
