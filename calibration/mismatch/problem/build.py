@@ -84,7 +84,7 @@ def build_problem(
             f"at least {thresholds.fewest_readings} are needed"
         )
     predicted = {simulation.channel: np.abs(prediction)}
-    labels = labels_of(simulation.covariate_labels, {**constants, **covariates}, recording.channels, predicted)
+    labels = labels_of(simulation.covariate_labels, {**constants, **covariates}, prepared.channels, predicted)
     return Problem(
         recording=prepared,
         simulation=simulation,

@@ -22,7 +22,7 @@ from regolithd.calibration.mismatch.problem.errors_in_variables import expected_
 from regolithd.calibration.mismatch.problem.input_doubt import InputDoubt, input_doubt, total_doubt, wheels_in_common
 from regolithd.calibration.mismatch.problem.input_faults import without_input_faults
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
-from regolithd.calibration.mismatch.problem.unstated_errors import notes_on_unstated, unstated_errors
+from regolithd.calibration.mismatch.problem.shown_errors import notes_on_errors, shown_errors
 from regolithd.calibration.mismatch.signal.robust import robust_std
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -111,8 +111,8 @@ def inputs_of(recording: Recording, simulation: Predictor, thresholds: Threshold
     )
     as_read, blanks = _prepared(recording, simulation)
     normal = _inputs_of_speed(as_read, simulation)
-    unstated = unstated_errors(as_read, simulation, predict, normal)
-    errors = {**simulation.sensors, **unstated}
+    shown = shown_errors(as_read, simulation, predict, normal)
+    errors = {**simulation.sensors, **shown}
     expected, otherwise = expected_inputs(as_read, errors, normal), None
     if blanks:
         otherwise, _ = _prepared(recording, simulation, other_way=True)
@@ -122,7 +122,7 @@ def inputs_of(recording: Recording, simulation: Predictor, thresholds: Threshold
     doubts = (input_doubt(as_read, expected, simulation, values, errors), *(each.doubt for each in between.values()))
     within = {name: each.within for name, each in between.items()}
     undefined = _undefined(predicted()) if expected is not as_read else None
-    expected = expected.with_notes(*notes_on_unstated(unstated, simulation.channel))
+    expected = expected.with_notes(*notes_on_errors(shown, simulation.sensors, as_read, simulation.channel))
     return Inputs(as_read, expected, otherwise, blanks, undefined, total_doubt(doubts), within)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
+from regolithd.calibration.mismatch.problem.principal_axes import switches
 from regolithd.calibration.mismatch.signal.recursion import recursion
 
 if TYPE_CHECKING:
@@ -37,8 +38,11 @@ def _memory(problem: Problem) -> float:
     """Return the same.
 
     One run, in which all inputs change a little at each instant by lot. The correlations of the response one and two
-    readings apart have the factor of the state as their quotient, whatever the readings respond beside it.
+    readings apart have the factor of the state as their quotient, whatever the readings respond beside it. What
+    switches has no such factor.
     """
+    if any(switches(problem, name) for name in problem.free):
+        return 0.0
     inputs, random = complete_inputs(problem.recording), np.random.default_rng(0)
     moved = {}
     for name in problem.simulation.inputs:

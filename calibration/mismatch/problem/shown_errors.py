@@ -1,0 +1,103 @@
+"""Errors of inputs that nobody stated, or stated wrongly, where the recording shows them.
+
+An input with an error that is taken as exact makes a prediction noisy, biases the parameters towards a weaker response,
+and lets a delay of half a reading, which is a mean of two, or any law of the same input seem to be there. How far the
+readings scatter about what the readings beside them say is an error, or it is what the input did. The simulation
+decides: the measured column follows its prediction clearly better with inputs smoothed for that error than for the
+stated one, or clearly worse. Else what is stated holds.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
+from regolithd.calibration.mismatch.problem.prior import SensorError
+from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
+from regolithd.calibration.mismatch.signal.first_order import FirstOrder
+from regolithd.calibration.mismatch.signal.robust import robust_std
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Mapping
+
+    from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.problem.predictor import Predictor
+
+Array = NDArray[np.float64]
+
+CLEARLY = 5.0
+"""Log likelihood ratio from which the scatter of an input is its error (a choice: e⁵ to one)."""
+LEAST_SCATTER = 1e-3
+"""Scatter in standard deviations of the input below which it does not matter (a choice)."""
+NEAR = 1.4
+"""Factor between scatter and stated error up to which the statement is asked no further (a choice: the variance is
+twice as large)."""
+OF_SECOND_DIFFERENCE = 6.0**-0.5
+"""Standard deviation of white noise over that of its second differences."""
+
+
+def shown_errors(
+    as_read: Recording, simulation: Predictor, predict: Callable[[Recording], Array], normal: Collection[str] = ()
+) -> dict[str, SensorError]:
+    """Return the errors of inputs whose readings scatter otherwise than stated, where they predict better with these.
+
+    `predict` runs the simulation at the stated values; `normal` as in `expected_inputs`. One run for each input that
+    scatters otherwise, and one more.
+    """
+    otherwise = {}
+    for name in simulation.inputs:
+        if name in as_read.channels and name != simulation.channel:
+            error = _by_scatter(as_read.channels[name], as_read.run, simulation.sensors.get(name, SensorError()))
+            if error is not None:
+                otherwise[name] = error
+    if not otherwise:
+        return {}
+    found, stated = {}, predict(expected_inputs(as_read, simulation.sensors, normal))
+    for name, error in otherwise.items():
+        prediction = predict(expected_inputs(as_read, {**simulation.sensors, name: error}, normal))
+        left = as_read.channel(simulation.channel) - prediction
+        if FirstOrder.of([left]).log_likelihood_ratio(stated - prediction, left) < -CLEARLY:
+            found[name] = error
+    return found
+
+
+def _by_scatter(readings: Array, run: NDArray[np.int64], stated: SensorError) -> SensorError | None:
+    """Return the error that readings (time, wheel) scatter by; None where that is near the stated one, or nothing."""
+    scale = ReadingScale.of(readings, stated)
+    deviation = scatter(scale.stabilised(readings), run)
+    if deviation <= LEAST_SCATTER * float(np.nanstd(readings)) or deviation / NEAR < scale.deviation < deviation * NEAR:
+        return None
+    if not scale.deviation:
+        return SensorError(absolute=deviation)
+    factor = deviation / scale.deviation
+    return SensorError(relative=factor * stated.relative, absolute=factor * stated.absolute)
+
+
+def scatter(values: Array, run: NDArray[np.int64]) -> float:
+    """Return the standard deviation of white noise in readings (time, wheel), by second differences within a run.
+
+    Their median does not see steps. 0 where more than half of them are 0: a column that is set, or rounded.
+    """
+    same = (run[2:] == run[:-2])[:, None]
+    second = np.where(same, values[2:] - 2 * values[1:-1] + values[:-2], np.nan)
+    return OF_SECOND_DIFFERENCE * robust_std(second[np.isfinite(second)])
+
+
+def notes_on_errors(
+    errors: Mapping[str, SensorError], stated: Mapping[str, SensorError], as_read: Recording, channel: str
+) -> tuple[str, ...]:
+    """Return what is told of each error that was taken from the readings' scatter."""
+    notes = []
+    for name, error in errors.items():
+        deviation, said = (
+            ReadingScale.of(as_read.channels[name], each).deviation for each in (error, stated.get(name, SensorError()))
+        )
+        of_statement = f"a stated error of {said:.2g}" if said else "no stated error"
+        notes.append(
+            f"{name} has {of_statement}. Its readings scatter by {deviation:.2g} (one standard deviation) about those "
+            f"beside them, and predict {channel} better with that as their error: it is taken. State it in [sensors]."
+        )
+    return tuple(notes)
