@@ -31,22 +31,16 @@ WRONG_STATEMENT_PENALTY = 9.2
 def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold: float) -> Fitted | None:
     """Return equations with the priors of those parameters widened that the readings contradict, and the names' fit.
 
-    Of parameters that could stand for each other the one whose release has most evidence is released, or all together;
-    in the place of a name, where it is ahead of that by more than chance (`lead_margin`).
+    Of parameters that could stand for each other the one whose release has most evidence is released, or all together.
     None where the readings contradict none, where the one with most evidence would go further than a wrong statement
     explains (`Prior.furthest`), where something stays unexplained all the same, or where the evidence of `whole`, names
-    and curves within the priors, is larger. Beside names alone, a wrong value has to be ahead by more than chance: an
-    effect that is just too small to be named bends a parameter as well.
+    and curves within the priors, is larger.
     """
-    lead = equations.thresholds.lead_margin
     best, most = None, _evidence(equations, whole, (), entry_threshold)
-    if all(term.group.named for term in whole.terms):
-        most += lead
     for kept in (named.terms, *(named.without(index) for index in range(len(named.terms)))):
-        least = lead * (len(named.terms) - len(kept))
         for freed, places in _releases(equations, kept):
             fit = freed.fit(kept)
-            evidence = _evidence(equations, fit, places, entry_threshold) - least
+            evidence = _evidence(equations, fit, places, entry_threshold) - _least_lead(equations, fit, named, whole)
             if evidence < most:
                 continue
             if _goes_too_far(equations, fit, places):
@@ -54,6 +48,20 @@ def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold
             elif unexplained_beside(freed, fit, tolerated=0.0) is None:
                 best, most = (freed, fit), evidence
     return best
+
+
+def _least_lead(equations: NormalEquations, released_fit: Fit, named: Fit, whole: Fit) -> float:
+    """Return by how much the evidence for a wrong value has to be ahead of that for the answer within the priors.
+
+    In the place of a name, and beside names alone, by more than chance (`lead_margin`): an effect that is just too
+    small to be named bends a parameter as well. Where the parameter explains as much as the name does, its law is the
+    name's. It is in the simulation, and nothing is left out of that: there the name has to be ahead by as much.
+    """
+    lead = equations.thresholds.lead_margin
+    if len(released_fit.terms) == len(named.terms):
+        return lead if len(whole.terms) == len(named.terms) else 0.0
+    lags = float(chi2_of(equations, released_fit).sum() - chi2_of(equations, named).sum())
+    return -lead if lags <= equations.thresholds.equal_gain else lead
 
 
 def _releases(equations: NormalEquations, kept: Sequence[Term]) -> Iterator[tuple[NormalEquations, tuple[int, ...]]]:
