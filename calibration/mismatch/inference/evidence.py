@@ -14,7 +14,6 @@ from regolithd.calibration.mismatch.changes import ChangedSize, contribution_of_
 from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
 from regolithd.calibration.mismatch.problem.onset_clock import found_here
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
-from regolithd.calibration.mismatch.regression.nuisance import ERROR
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import has_smooth_term
 from regolithd.calibration.mismatch.signal.binning import binned_means, even_edges
@@ -92,8 +91,7 @@ def calibrated_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:
     problem, nuisance = equations.problem, equations.nuisance
     shift = fit.coefficients[: len(nuisance.names)] / equations.design.scale[list(nuisance.columns)]
     moved = dict(zip(nuisance.names, shift.tolist(), strict=True))
-    other = {name for name in moved if name in nuisance.stated or name.startswith(ERROR)}
-    known = {name: shift for name, shift in moved.items() if name not in other}
+    known = {name: shift for name, shift in moved.items() if name not in nuisance.stated}
     return {name: problem.values.get(name, 0.0) + known.get(name, 0.0) for name in {**problem.values, **known}}
 
 

@@ -150,6 +150,8 @@ def calibrated_parameters(decision: Decision) -> tuple[CalibratedParameter, ...]
     equations, fit = decision.equations, decision.whole
     problem, nuisance = equations.problem, equations.nuisance
     values = calibrated_values(equations, fit)
+    moved = equations.moments_of_errors(fit.columns) @ fit.covariance
+    by_errors = np.mean(moved**2, axis=0) if len(moved) else np.zeros(len(fit.columns))
     places = {name: place for place, name in enumerate(nuisance.names)}
     found = []
     for name, prior in problem.simulation.parameters.items():
@@ -158,7 +160,7 @@ def calibrated_parameters(decision: Decision) -> tuple[CalibratedParameter, ...]
         std = 0.0
         if name in places:
             place = places[name]
-            variance = fit.covariance[place, place]
+            variance = fit.covariance[place, place] + by_errors[place]
             std = float(np.sqrt(max(variance, 0.0)) / equations.design.scale[nuisance.columns[place]])
         value = float(values[name])
         low, high = value - NINETY_PERCENT_STDS * std, value + NINETY_PERCENT_STDS * std

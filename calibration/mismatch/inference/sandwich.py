@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.regression.as_read import columns_on_wheels
 from regolithd.calibration.mismatch.regression.discrepancy_basis import discrepancy_basis
+from regolithd.calibration.mismatch.regression.lasting_errors import covariance_of_scores, moments_of_errors
 from regolithd.calibration.mismatch.regression.residuals import whitened_residual_of
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
 
@@ -206,6 +207,7 @@ def sandwich(
     sums = block_sums(scores, blocks)
     count = int(blocks.max()) + 1
     middle = sums.T @ sums * count / max(count - 1, 1) + precision
+    middle += covariance_of_scores(moments_of_errors(design, weights, columns))
     fitted = np.arange(len(information)) < len(fit.columns)
     pull = np.where(fitted, 0.0, sums.sum(axis=0)) + linearisation.pull
     return inverse @ pull, inverse @ middle @ inverse, inverse

@@ -22,9 +22,9 @@ Array = NDArray[np.float64]
 
 SHARE = 0.1
 """Size of the changes, in standard deviations of the input (a choice: small beside it, and far above rounding)."""
-LASTING = 0.2
-"""Correlation of the response from one reading to the next, from which there is a state (a choice: what each reading
-responds by itself has none, and may be added to what a state responds)."""
+NOW, BEFORE = slice(1, None), slice(None, -1)
+RANK = 1e-6
+"""Relative singular value below which columns are dependent: without a state, the response is the change."""
 SHORTEST, LONGEST = 2.0, 0.2
 """Readings, and share of the recording, between which a memory is told from none and from a drift (a choice)."""
 
@@ -37,26 +37,37 @@ def memory_s(problem: Problem) -> float:
 def _memory(problem: Problem) -> float:
     """Return the same.
 
-    One run, in which all inputs change a little at each instant by lot. The correlations of the response one and two
-    readings apart have the factor of the state as their quotient, whatever the readings respond beside it. What
-    switches has no such factor.
+    One run, in which all inputs change a little at each instant by lot. The response is regressed on the changes at its
+    instant and at the one before, and on itself there: a state keeps that share of what it was. What switches keeps no
+    such share.
     """
     if any(switches(problem, name) for name in problem.free):
         return 0.0
     inputs, random = complete_inputs(problem.recording), np.random.default_rng(0)
-    moved = {}
+    changes = {}
     for name in problem.simulation.inputs:
         if name in inputs and (spread := float(np.nanstd(inputs[name]))) > 0:
-            moved[name] = inputs[name] + SHARE * spread * random.choice([-1.0, 1.0], size=(len(inputs[name]), 1))
-    if not moved:
+            changes[name] = SHARE * spread * random.choice([-1.0, 1.0], size=(len(inputs[name]), 1))
+    if not changes:
         return 0.0
-    response = np.nan_to_num(problem.with_inputs(moved) - problem.filled)
-    one, two = (_correlation(response, lag) for lag in (1, 2))
-    factor = two / one if one > LASTING else 0.0
-    if not np.exp(-1 / SHORTEST) < factor < 1:
+    moved = problem.with_inputs({name: inputs[name] + change for name, change in changes.items()})
+    response = np.nan_to_num(moved - problem.filled)
+    kept = _share_kept(response, list(changes.values()), np.diff(problem.recording.run) == 0)
+    if not np.exp(-1 / SHORTEST) < kept < 1:
         return 0.0
-    memory = -problem.recording.step_s / float(np.log(factor))
+    memory = -problem.recording.step_s / float(np.log(kept))
     return memory if memory < LONGEST * problem.length_s else 0.0
+
+
+def _share_kept(response: Array, changes: list[Array], same_run: NDArray[np.bool_]) -> float:
+    """Return the coefficient of a response (time, wheel) at the instant before, beside the changes of the inputs."""
+    wheels, power = response.shape[1], float(np.mean(response**2))
+    if power == 0:
+        return 0.0
+    columns = [response[:-1], *(np.repeat(each[rows], wheels, axis=1) for each in changes for rows in (NOW, BEFORE))]
+    scaled = np.stack([column[same_run].ravel() / np.sqrt(np.mean(column**2) + 1e-300) for column in columns], axis=1)
+    target = response[1:][same_run].ravel() / np.sqrt(power)
+    return float(np.linalg.lstsq(scaled, target, rcond=RANK)[0][0])
 
 
 def through_state(problem: Problem, column: Array, memory: float) -> Array:
@@ -66,9 +77,3 @@ def through_state(problem: Problem, column: Array, memory: float) -> Array:
     same_run = np.diff(recording.run, prepend=recording.run[0])[:, None] == 0
     keeps = np.where(same_run, np.exp(-np.maximum(steps, 0.0) / memory), 0.0)
     return recursion(keeps, (1 - keeps) * column)
-
-
-def _correlation(response: Array, lag: int) -> float:
-    """Return the correlation of a response (time, wheel) with itself so many readings later."""
-    power = float(np.sum(response**2))
-    return float(np.sum(response[lag:] * response[:-lag])) / power if power > 0 else 0.0

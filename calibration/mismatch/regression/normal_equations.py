@@ -17,6 +17,11 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.regression.batch import Batch, Left
 from regolithd.calibration.mismatch.regression.gains import Gains
 from regolithd.calibration.mismatch.regression.group import Fit, Term
+from regolithd.calibration.mismatch.regression.lasting_errors import (
+    covariance_of_scores,
+    has_lasting_errors,
+    moments_of_errors,
+)
 from regolithd.calibration.mismatch.regression.penalties import least_penalty, penalty, visible_in_own_channel
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
 
@@ -143,9 +148,11 @@ class NormalEquations:
     def information(self, terms: Iterable[Term], kept: Sequence[int]) -> tuple[Array, Array]:
         """Return the information matrix and vector of some free parameters beside terms and all other parameters.
 
-        They are of the readings alone, without these parameters' own priors; `kept` are their places.
+        They are of the readings alone, without these parameters' own priors; `kept` are their places. The vector has
+        the covariance M + V, where errors of the inputs that last add V: what it knows is M (M + V)⁻¹ M.
         """
-        matrix, moment = self._normal(self._columns(tuple(terms)))
+        columns = self._columns(tuple(terms))
+        matrix, moment = self._normal(columns)
         own, rest = np.array(kept, np.int64), np.setdiff1d(np.arange(len(matrix)), kept)
         precision = self.nuisance.precision[own]
         matrix[own, own] -= precision
@@ -153,7 +160,19 @@ class NormalEquations:
         cross = matrix[np.ix_(rest, own)]
         inverse = pseudo_inverse(matrix[np.ix_(rest, rest)], SINGULAR)
         left = schur_complement(matrix[np.ix_(own, own)], cross, inverse)
-        return left, moment[own] - cross.T @ inverse @ moment[rest]
+        vector = moment[own] - cross.T @ inverse @ moment[rest]
+        if not has_lasting_errors(self.problem):
+            return left, vector
+        errors = self.moments_of_errors(columns)
+        added = covariance_of_scores(errors[:, own] - errors[:, rest] @ inverse @ cross)
+        share = left @ pseudo_inverse(left + added, SINGULAR)
+        return share @ left, share @ vector
+
+    def moments_of_errors(self, columns: Columns) -> Array:
+        """Return the moments of a fit's columns with draws of errors that last, shape (draw, column)."""
+        on = membership(columns, len(self.weights))[:, :, None]
+        read = self.design.in_time(self.design.columns_as_read([column for column, _ in columns]) * on)
+        return moments_of_errors(self.design, self.weights, self.design.whitened_in_time(read))
 
     def penalty(self, term: Term) -> float:
         """Return what a term has to gain beyond chance, in Δχ²."""

@@ -1,8 +1,4 @@
-"""Nuisance parameters: the simulation's free parameters, fitted with every set of terms and held by their priors.
-
-So are the errors of the inputs, where they last in the prediction: a level that a noisy flow fills wanders, and neither
-a parameter nor a curve may be sure of what that wandering can be.
-"""
+"""Nuisance parameters: the simulation's free parameters, fitted with every set of terms and held by their priors."""
 
 from __future__ import annotations
 
@@ -27,8 +23,6 @@ Array = NDArray[np.float64]
 
 EXACT = 1e12
 """Prior precision of a scaled coefficient that counts as known exactly."""
-ERROR = "error of the inputs,"
-"""What the name of one draw of the inputs' errors begins with."""
 LEAST_KNOWN = 0.5
 """Posterior variance of a parameter over its prior's, up to which the readings know it as well as its prior does."""
 
@@ -39,7 +33,7 @@ class Nuisance:
 
     Attributes
     ----------
-    names: of the parameters; a wheel's own deviation is named by `own_name`, a draw of the inputs' errors by `ERROR`
+    names: of the parameters; a wheel's own deviation is named by `own_name`
     columns: indices in the design matrix
     precision: one over the prior variance of each scaled coefficient, shape (parameter,)
     centre: the prior's mean of each scaled coefficient: 0 at the stated values, shape (parameter,)
@@ -116,15 +110,8 @@ def beyond_prior_predictive(away: Array, variance: Array, thresholds: Thresholds
 
 
 def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:
-    """Add ∂prediction/∂parameter of every parameter whose prior has a spread, and of each wheel's own deviation.
-
-    Errors of the inputs that last have the covariance of their draws: as many columns, each with an equal share.
-    """
+    """Add ∂prediction/∂parameter of every parameter whose prior has a spread, and of each wheel's own deviation."""
     names, stds, columns = tangents(design.problem)
-    errors = [] if design.problem.doubt is None else list(design.problem.doubt.draws)
-    names += [f"{ERROR} {number}" for number in range(1, len(errors) + 1)]
-    stds += [len(errors) ** -0.5 for _ in errors]
-    columns += as_shown(design.problem, errors)
     away = np.array([_from_prior(design.problem, name) for name in names])
     design, places = design.extended(columns)
     # The coefficient of a column that was divided by its scale is the parameter's shift times that scale.

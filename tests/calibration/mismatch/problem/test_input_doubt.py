@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
+import heated_room
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch import Prior, SensorError, Simulation, compare
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
-from regolithd.calibration.mismatch.problem.input_doubt import LEAST_LEFT, input_doubt
+from regolithd.calibration.mismatch.problem.input_doubt import DRAWS, LEAST_LEFT, input_doubt
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.equations import smooth_equations
 from regolithd.calibration.mismatch.regression.residuals import residual_of
@@ -175,3 +176,34 @@ def test_a_straight_line_across_a_start_is_no_physics(seed: int) -> None:
     assert problem.mask[known].all()  # where it was read
     found = compare(recording, Ramping()).answer
     assert found.verdict == "consistent", [effect.name for effect in found.effects]
+
+
+def test_errors_that_a_state_adds_up_last_and_others_do_not() -> None:
+    """The room's temperature wanders by the error of its heater's current; a current of its own does not."""
+    inputs = inputs_of(heated_room.recorded(1), heated_room.ReadRoom())
+    assert inputs.doubt is not None
+    draws = inputs.doubt.draws
+    assert draws.shape == (DRAWS, heated_room.ROWS, 1)
+    assert np.corrcoef(draws[0, 1:, 0], draws[0, :-1, 0])[0, 1] > 0.9
+    static = inputs_of(driven(1), Slipping())
+    assert static.doubt is not None
+    assert len(static.doubt.draws) == 0
+
+
+def test_the_mean_of_a_square_is_more_than_the_square_of_the_mean() -> None:
+    """By the variance that smoothing leaves of the current, times the warmth of one square ampere."""
+    recording = heated_room.recorded(1)
+    inputs = inputs_of(recording, heated_room.ReadRoom())
+    assert inputs.doubt is not None
+    taken_out = recording.channels["heater_A"] - inputs.expected.channels["heater_A"]
+    left = heated_room.ERROR_A**2 - float(np.mean(taken_out**2))
+    bias = inputs.doubt.bias[heated_room.ROWS // 2 :]
+    assert float(np.mean(bias)) == pytest.approx(heated_room.TRUE["warmth_K_A2"] * left, rel=0.1)
+
+
+def test_intervals_have_the_errors_that_a_state_adds_up() -> None:
+    """Of ten rooms with nothing left out, nine in ten intervals hold the truth, and nothing is unexplained."""
+    answers = [compare(heated_room.recorded(seed), heated_room.ReadRoom()).answer for seed in range(10)]
+    assert [answer.verdict for answer in answers] == ["consistent"] * 10
+    held = [each.low < heated_room.TRUE[each.name] < each.high for answer in answers for each in answer.parameters]
+    assert 16 <= sum(held) <= 20

@@ -1,0 +1,92 @@
+"""Errors of inputs that the readings show are taken; what the input did is not."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+import pytest
+
+from regolithd.calibration.mismatch import Prior, SensorError, Simulation, compare
+from regolithd.calibration.mismatch.data.recording import Recording, from_columns
+from regolithd.calibration.mismatch.problem.shown_errors import scatter
+from regolithd.calibration.mismatch.problem.simulated import inputs_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+COUNT, ERROR_N = 3000, 3.0
+
+
+class Slide(Simulation):
+    """The current of a drive in proportion to its load."""
+
+    channel, unit = "current_A", "A"
+    inputs = ("load_N",)
+    parameters: ClassVar = {"gain_A_N": Prior(0.05, 0.002, "A/N")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the current."""
+        return values["gain_A_N"] * inputs["load_N"]
+
+
+def stated(error_N: float) -> Slide:
+    """Return the simulation with this error of the load."""
+    found = Slide()
+    found.sensors = {"load_N": SensorError(absolute=error_N)}
+    return found
+
+
+def recorded(seed: int, *, felt: bool) -> Recording:
+    """Return a slow load with scatter that is either the sensor's or felt by the drive."""
+    random = np.random.default_rng(seed)
+    slow = 100 + 40 * np.sin(np.arange(COUNT) / 30) * np.sin(np.arange(COUNT) / 111)
+    scattered = slow + ERROR_N * random.normal(size=COUNT)
+    current = 0.051 * (scattered if felt else slow) + 0.1 * random.normal(size=COUNT)
+    return from_columns({"t_s": np.arange(COUNT) * 0.1, "load_N": scattered, "current_A": current})
+
+
+def test_scatter_is_white_noise_and_neither_steps_nor_slow_courses() -> None:
+    """Of a column that is set, or rounded, it is 0."""
+    random, run = np.random.default_rng(3), np.zeros(COUNT, np.int64)
+    noise = random.normal(size=(COUNT, 2))
+    steps = np.repeat(random.uniform(0, 100, COUNT // 20), 20)[:, None]
+    assert scatter(noise + steps + np.linspace(0, 50, COUNT)[:, None], run) == pytest.approx(1.0, rel=0.15)
+    assert scatter(steps, run) == 0
+
+
+@pytest.mark.parametrize("said", [0.0, 1.5])
+def test_the_error_that_the_readings_show_is_taken_and_told(said: float) -> None:
+    """Where none is stated, and where half of it is."""
+    inputs = inputs_of(recorded(1, felt=False), stated(said))
+    of_statement = f"a stated error of {said:.2g}" if said else "no stated error"
+    (note,) = inputs.expected.notes
+    assert re.match(
+        rf"load_N has {of_statement}\. Its readings scatter by (2\.[89]|3) \(one standard deviation\)", note
+    )
+    assert inputs.doubt is not None
+    left = inputs.expected.channels["load_N"] - inputs.as_read.channels["load_N"]
+    assert float(np.std(left)) > 0.7 * ERROR_N
+
+
+def test_what_the_drive_feels_is_no_error() -> None:
+    """The current follows the scatter of the load; and a right statement is asked no further."""
+    recording = recorded(1, felt=True)
+    inputs = inputs_of(recording, Slide())
+    np.testing.assert_array_equal(inputs.expected.channels["load_N"], recording.channels["load_N"])
+    assert inputs.expected.notes == ()
+    assert inputs_of(recorded(1, felt=False), stated(ERROR_N)).expected.notes == ()
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_noise_that_nobody_stated_is_no_physics(seed: int) -> None:
+    """The gain is right, too: an error that is taken as exact makes it seem 2 % smaller."""
+    found = compare(recorded(seed, felt=False), Slide()).answer
+    assert found.verdict == "consistent"
+    (gain,) = found.parameters
+    assert gain.value == pytest.approx(0.051, rel=0.005)
