@@ -212,7 +212,7 @@ def _decided(
     if decision.has_delay and not search.decision.has_delay:  # which was refused before held-out readings asked
         search = _searched_beside_delays(search, decision, pose, progress)
         decision, held_out = earned(search.decision, search.grid)
-    decision = without_refuted_curves(in_probable_regions(decision))
+    decision = without_refuted_curves(in_probable_regions(decision), start.problem)
     return Decided(decision, held_out, search.candidates, search.applicable)
 
 

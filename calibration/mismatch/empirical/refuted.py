@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.calibration.linearised import worse_than_stated
 from regolithd.calibration.mismatch.empirical.found import curves_of
 from regolithd.calibration.mismatch.inference.intermittent import unexplained_if_intermittent
 from regolithd.calibration.mismatch.regression.lasting_errors import has_lasting_errors
@@ -20,6 +21,7 @@ from regolithd.calibration.mismatch.selection.decision import names_of
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.empirical.found import FoundCurve
+    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
 
@@ -37,15 +39,16 @@ SINGULAR = 1e-9
 """Relative eigenvalue below which a direction counts as undetermined."""
 
 
-def without_refuted_curves(decision: Decision) -> Decision:
+def without_refuted_curves(decision: Decision, stated: Problem) -> Decision:
     """Return the decision without curves that do not lower the error of held-out readings, or that errors explain.
 
-    A curve over time needs to lower none: of what happened once no other time tells. Nor do sines over time, and what
-    was before.
+    A curve over time needs to lower none: of what happened once no other time tells. But where the simulation alone is
+    then further from the recording than with its `stated` values, curve and parameters cancel each other. Sines over
+    time, and what was before, need to lower none either.
     """
     if not decision.unnamed or decision.intermittent:
         return decision
-    refuted = [term for curve in curves_of(decision) if _is_refuted(curve) for term in curve.terms]
+    refuted = [term for curve in curves_of(decision) if _is_refuted(decision, curve, stated) for term in curve.terms]
     refuted += [term for term in decision.unnamed if _is_explained_by_errors(decision, term)]
     if not refuted:
         return decision
@@ -55,10 +58,12 @@ def without_refuted_curves(decision: Decision) -> Decision:
     return kept if unnamed else unexplained_if_intermittent(kept)
 
 
-def _is_refuted(found: FoundCurve) -> bool:
+def _is_refuted(decision: Decision, found: FoundCurve, stated: Problem) -> bool:
     curve = found.curve
+    if curve.held_out_rmse_after <= (1 - LEAST_GAIN) * curve.held_out_rmse_before:
+        return False
     over_time = any(term.name == "time" for term in found.terms)
-    return not over_time and curve.held_out_rmse_after > (1 - LEAST_GAIN) * curve.held_out_rmse_before
+    return not over_time or bool(worse_than_stated(decision.equations, decision.whole, stated))
 
 
 def _is_explained_by_errors(decision: Decision, term: Term) -> bool:
