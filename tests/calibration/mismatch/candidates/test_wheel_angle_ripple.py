@@ -143,3 +143,12 @@ def test_white_noise_has_an_autocorrelation_time_of_one(wheels: int, monkeypatch
     speed = np.ones((10, wheels))
     problem = SimpleNamespace(mask=speed > 0, known=lambda _: speed, recording=SimpleNamespace(step_s=0.01))
     assert candidate._autocorrelation_time(problem, power, 10.0) == pytest.approx(1.0, rel=0.02)
+
+
+def test_the_amplitude_is_that_of_the_wheels_that_have_it() -> None:
+    """One of three wheels has it: the others have coefficients of 0, or what draws add to these."""
+    shape = {"order": 3.0, "sines": 1.0}
+    found = WheelAngleRipple().parameters(shape, [3.0, 4.0, 0.0, 0.0, 1e-9, -1e-9])
+    assert found["amplitude"] == pytest.approx(5.0)
+    assert WheelAngleRipple().parameters(shape, [3.0, 4.0, 0.0, 5.0])["amplitude"] == pytest.approx(5.0)
+    assert WheelAngleRipple().parameters(shape, [0.0, 0.0])["amplitude"] == 0.0

@@ -181,3 +181,40 @@ def test_a_name_that_a_wrong_statement_explains_as_well_is_given_up(wave: float,
         freed, fit = found
         assert fit.terms == ()
         assert fit.coefficients[0] / freed.design.scale[0] == pytest.approx(3.0, abs=0.3)
+
+
+class RubbingDrive(Simulation):
+    """A drive whose friction is a parameter: the law of Coulomb friction is in the simulation."""
+
+    channel, unit = "motor_current_A", "A"
+    inputs = ("speed_rad_s", "load_Nm")
+    parameters: ClassVar = {"friction_A": Prior(1.0, 0.05, "A"), "gain_A_Nm": Prior(0.5, 0.02, "A/Nm")}
+
+    def predict(self, inputs: Mapping[str, NDArray[np.float64]], values: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return the current."""
+        return values["friction_A"] * np.sign(inputs["speed_rad_s"]) + values["gain_A_Nm"] * inputs["load_Nm"]
+
+    def covariates(self, inputs: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
+        """Return the speed."""
+        return {"wheel_speed": inputs["speed_rad_s"]}
+
+
+def rubbing(friction_A: float, seed: int) -> Answer:
+    """Compare with a drive that has this friction."""
+    generator = np.random.default_rng(seed)
+    speed = np.repeat(generator.uniform(1, 9, 60) * generator.choice([-1.0, 1.0], 60), 50)
+    load = np.repeat(generator.uniform(0, 8, 100), 30)
+    current = friction_A * np.sign(speed) + 0.5 * load + generator.normal(0, 0.8, ROWS)
+    columns = {"t_s": 0.1 * np.arange(ROWS), "speed_rad_s": speed, "load_Nm": load, "motor_current_A": current}
+    return compare(from_columns(columns), RubbingDrive()).answer
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_wrong_parameter_has_no_effects_name_whose_law_it_has(seed: int) -> None:
+    """Five standard deviations are a wrong statement; twelve are more than one explains, and the effect is named."""
+    found = rubbing(1.25, seed)
+    (friction,) = (each for each in found.parameters if each.name == "friction_A")
+    assert (found.verdict, found.effects, found.unexplained) == ("missing-physics", (), ())
+    assert friction.beyond_prior()
+    assert friction.low < 1.25 < friction.high
+    assert [effect.name for effect in rubbing(2.5, seed).effects] == ["coulomb-friction"]
