@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.regression.residuals import chi2_of
+from regolithd.calibration.mismatch.regression.residuals import chi2_of, contribution
 from regolithd.calibration.mismatch.selection.best_subsets import entry_cost
+from regolithd.calibration.mismatch.selection.changed_parameters import SAME_ACTION
 from regolithd.calibration.mismatch.selection.smooth_terms import unexplained_beside
 
 if TYPE_CHECKING:
@@ -37,10 +38,12 @@ def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold
     and curves within the priors, is larger.
     """
     best, most = None, _evidence(equations, whole, (), entry_threshold)
-    for kept in (named.terms, *(named.without(index) for index in range(len(named.terms)))):
+    for removed in (None, *range(len(named.terms))):
+        kept = named.terms if removed is None else named.without(removed)
         for freed, places in _releases(equations, kept):
             fit = freed.fit(kept)
-            evidence = _evidence(equations, fit, places, entry_threshold) - _least_lead(equations, fit, named, whole)
+            least = _least_lead(equations, named, removed, places, beside_names=len(whole.terms) == len(named.terms))
+            evidence = _evidence(equations, fit, places, entry_threshold) - least
             if evidence < most:
                 continue
             if _goes_too_far(equations, fit, places):
@@ -50,18 +53,33 @@ def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold
     return best
 
 
-def _least_lead(equations: NormalEquations, released_fit: Fit, named: Fit, whole: Fit) -> float:
+def _least_lead(
+    equations: NormalEquations, named: Fit, removed: int | None, places: Sequence[int], *, beside_names: bool
+) -> float:
     """Return by how much the evidence for a wrong value has to be ahead of that for the answer within the priors.
 
     In the place of a name, and beside names alone, by more than chance (`lead_margin`): an effect that is just too
-    small to be named bends a parameter as well. Where the parameter explains as much as the name does, its law is the
-    name's. It is in the simulation, and nothing is left out of that: there the name has to be ahead by as much.
+    small to be named bends a parameter as well. Where the parameter acts as the name does, its law is in the
+    simulation, and nothing is left out of that: there the name has to be ahead by as much.
     """
     lead = equations.thresholds.lead_margin
-    if len(released_fit.terms) == len(named.terms):
-        return lead if len(whole.terms) == len(named.terms) else 0.0
-    lags = float(chi2_of(equations, released_fit).sum() - chi2_of(equations, named).sum())
-    return -lead if lags <= equations.thresholds.equal_gain else lead
+    if removed is None:
+        return lead if beside_names else 0.0
+    return -lead if any(_acts_as(equations, named, removed, place) for place in places) else lead
+
+
+def _acts_as(equations: NormalEquations, named: Fit, index: int, place: int) -> bool:
+    """Return whether a parameter changes the prediction as a name does.
+
+    Not one of which the simulation says that it is something else (`parameter_effects`): soil, not friction.
+    """
+    problem, parameter = equations.problem, equations.nuisance.names[place]
+    if problem.simulation.parameter_effects.get(parameter, named.terms[index].name) != named.terms[index].name:
+        return False
+    change = np.where(problem.mask, problem.tangent(parameter), 0.0)
+    effect = np.where(problem.mask, contribution(equations, named, index), 0.0)
+    size = float(np.linalg.norm(change) * np.linalg.norm(effect))
+    return abs(float(np.sum(change * effect))) > SAME_ACTION * size
 
 
 def _releases(equations: NormalEquations, kept: Sequence[Term]) -> Iterator[tuple[NormalEquations, tuple[int, ...]]]:
