@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
 from regolithd.calibration.mismatch.problem.prior import SensorError
 from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
@@ -57,7 +58,10 @@ def shown_errors(
         return {}
     found, stated = {}, predict(expected_inputs(as_read, simulation.sensors, normal))
     for name, error in otherwise.items():
-        prediction = predict(expected_inputs(as_read, {**simulation.sensors, name: error}, normal))
+        try:
+            prediction = predict(expected_inputs(as_read, {**simulation.sensors, name: error}, normal))
+        except SimulationError:  # it accepts no other inputs than those recorded
+            continue
         left = as_read.channel(simulation.channel) - prediction
         if FirstOrder.of([left]).log_likelihood_ratio(stated - prediction, left) < -CLEARLY:
             found[name] = error

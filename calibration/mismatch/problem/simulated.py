@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.data.slow_channels import bridged, drawn_between, filled_between
-from regolithd.calibration.mismatch.errors import RecordingError
+from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
 from regolithd.calibration.mismatch.problem.delayed import beyond_the_end, shifted
 from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
 from regolithd.calibration.mismatch.problem.input_doubt import InputDoubt, input_doubt, total_doubt, wheels_in_common
@@ -241,11 +241,14 @@ def _between_readings(
 
 
 def _inputs_of_speed(recording: Recording, simulation: Predictor) -> frozenset[str]:
-    """Return the inputs that `wheel_speed` changes with."""
+    """Return the inputs that `wheel_speed` changes with; none of a simulation that accepts no other inputs."""
     inputs = complete_inputs(recording)
     noisy = [name for name in {**simulation.sensors, **dict.fromkeys(simulation.inputs)} if name in inputs]
     speed = simulation.covariates(inputs).get("wheel_speed") if noisy else None
     if speed is None:
         return frozenset()
-    changed = {name: simulation.covariates({**inputs, name: NUDGE * inputs[name]})["wheel_speed"] for name in noisy}
+    try:
+        changed = {name: simulation.covariates({**inputs, name: NUDGE * inputs[name]})["wheel_speed"] for name in noisy}
+    except SimulationError:
+        return frozenset()
     return frozenset(name for name in noisy if not np.array_equal(changed[name], speed, equal_nan=True))

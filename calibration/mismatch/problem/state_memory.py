@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.principal_axes import switches
 from regolithd.calibration.mismatch.signal.recursion import recursion
@@ -50,7 +51,10 @@ def _memory(problem: Problem) -> float:
             changes[name] = SHARE * spread * random.choice([-1.0, 1.0], size=(len(inputs[name]), 1))
     if not changes:
         return 0.0
-    moved = problem.with_inputs({name: inputs[name] + change for name, change in changes.items()})
+    try:
+        moved = problem.with_inputs({name: inputs[name] + change for name, change in changes.items()})
+    except SimulationError:  # it accepts no other inputs than those recorded
+        return 0.0
     response = np.nan_to_num(moved - problem.filled)
     kept = _share_kept(response, list(changes.values()), np.diff(problem.recording.run) == 0)
     if not np.exp(-1 / SHORTEST) < kept < 1:

@@ -42,7 +42,8 @@ def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold
         kept = named.terms if removed is None else named.without(removed)
         for freed, places in _releases(equations, kept):
             fit = freed.fit(kept)
-            least = _least_lead(equations, named, removed, places, beside_names=len(whole.terms) == len(named.terms))
+            beside_names = len(whole.terms) == len(named.terms)
+            least = _least_lead(equations, named, removed, fit, places, beside_names=beside_names)
             evidence = _evidence(equations, fit, places, entry_threshold) - least
             if evidence < most:
                 continue
@@ -54,18 +55,22 @@ def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold
 
 
 def _least_lead(
-    equations: NormalEquations, named: Fit, removed: int | None, places: Sequence[int], *, beside_names: bool
+    equations: NormalEquations, named: Fit, removed: int | None, fit: Fit, places: Sequence[int], *, beside_names: bool
 ) -> float:
     """Return by how much the evidence for a wrong value has to be ahead of that for the answer within the priors.
 
     In the place of a name, and beside names alone, by more than chance (`lead_margin`): an effect that is just too
     small to be named bends a parameter as well. Where the parameter acts as the name does, its law is in the
-    simulation, and nothing is left out of that: there the name has to be ahead by as much.
+    simulation, and nothing is left out of that: there the name has to be ahead by as much, unless the parameter would
+    be further off than it may be at its linearisation, as where another channel knows it well.
     """
-    lead = equations.thresholds.lead_margin
+    limits = equations.thresholds
     if removed is None:
-        return lead if beside_names else 0.0
-    return -lead if any(_acts_as(equations, named, removed, place) for place in places) else lead
+        return limits.lead_margin if beside_names else 0.0
+    away = equations.nuisance.prior_stds_away(fit)
+    near = [place for place in places if away[place] <= limits.furthest_linearisation_stds]
+    preferred = any(_acts_as(equations, named, removed, place) for place in near)
+    return -limits.lead_margin if preferred else limits.lead_margin
 
 
 def _acts_as(equations: NormalEquations, named: Fit, index: int, place: int) -> bool:
