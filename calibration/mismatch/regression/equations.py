@@ -36,15 +36,17 @@ def smooth_equations(problem: Problem) -> NormalEquations:
     The weights are those of the whole residual; the decision estimates better ones.
     """
     design, nuisance, noise = _free_parameters(problem)
-    design = with_lagged_terms(with_state_terms(with_smooth_terms(design)))
-    return normal_equations(design, nuisance, noise.weights)
+    return normal_equations(with_lagged_terms(with_smooth_terms(design)), nuisance, noise.weights)
 
 
 def with_library(
     equations: NormalEquations, candidates: Sequence[Candidate]
 ) -> tuple[NormalEquations, tuple[Candidate, ...]]:
-    """Return the equations with every candidate that this recording allows, and those candidates."""
-    design, applicable = with_candidates(equations.design, candidates)
+    """Return the equations with every candidate that this recording allows, and those candidates.
+
+    And with smooth terms that act on a state: they are searched for, and do not decide where it is linearised.
+    """
+    design, applicable = with_candidates(with_state_terms(equations.design), candidates)
     return equations.over(design), applicable
 
 
