@@ -105,7 +105,8 @@ class Unexplained:
     """A structure in the residual that no candidate explains: its covariate, wheels, time and share of the power.
 
     `range` is where it is confined to a range of the covariate; None: it varies over the whole of it.
-    `curve` is what it looks like over its covariate; None where it is periodic in time, or follows what was before.
+    `curve` is what it looks like over its covariate; None where it is periodic in time, follows what was before, or
+    acts on a state.
     `suggestions` are closed forms that may describe the curve, best first.
     """
 

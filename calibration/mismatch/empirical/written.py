@@ -27,7 +27,7 @@ def with_curves(
     ------
     SimulationError
         When what is unexplained follows time, or is in proportion to a channel whose zero means nothing: on another
-        recording that curve means nothing. When it follows what was before: that is no curve.
+        recording that curve means nothing. When it follows what was before, or acts on a state: that is no curve.
     """
     shown = (evidence, *evidence.others)
     found = [fit for each in shown for fit in each.empirical]
@@ -39,6 +39,11 @@ def with_curves(
     if any(place.covariate in LAGGED for place in answer.unexplained):
         raise SimulationError(
             "--empirical: what is unexplained follows what was before, and that is no curve; leave --empirical out"
+        )
+    if any(place.curve is None for place in answer.unexplained):
+        raise SimulationError(
+            "--empirical: what is unexplained acts on a state of the simulation, and no curve over it is fitted; leave "
+            "--empirical out"
         )
     for each in shown:
         arbitrary = each.problem is not None and each.problem.arbitrary_zero

@@ -10,6 +10,8 @@ import pytest
 from heated_room import MEMORY_s, Room, STEP_s, recorded
 
 from regolithd.calibration.mismatch import Prior, compare
+from regolithd.calibration.mismatch.empirical.written import with_curves
+from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.state_memory import memory_s, through_state
 
@@ -61,9 +63,12 @@ def test_what_acts_on_a_state_shows_as_a_filter_of_gain_one() -> None:
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_draught_is_located_over_the_wind(seed: int) -> None:
     """It acts on the room's heat balance, and a curve that acts on the reading itself would not be found."""
-    found = compare(recorded(seed, draught_K=1.5, error_A=0.0), Room()).answer
+    comparison = compare(recorded(seed, draught_K=1.5, error_A=0.0), Room())
+    found = comparison.answer
     assert found.verdict == "unexplained"
     assert [place.covariate for place in found.unexplained] == ["wind"]
     (note,) = found.notes
     assert re.search(r"acts on a state of the simulation, which shows it for about 3[5-9]00 s", note)
+    with pytest.raises(SimulationError, match="acts on a state of the simulation, and no curve over it is fitted"):
+        with_curves(found, comparison.evidence)
     assert compare(recorded(seed, error_A=0.0), Room()).answer.verdict == "consistent"
