@@ -56,10 +56,12 @@ def shown_errors(
                 otherwise[name] = error
     if not otherwise:
         return {}
-    found, stated = {}, predict(expected_inputs(as_read, simulation.sensors, normal))
+    found, as_stated = {}, expected_inputs(as_read, simulation.sensors, normal)
+    stated = predict(as_stated)
     for name, error in otherwise.items():
+        smooth = expected_inputs(as_read, {name: error}, normal).channels[name]
         try:
-            prediction = predict(expected_inputs(as_read, {**simulation.sensors, name: error}, normal))
+            prediction = predict(as_stated.with_channels(**{name: smooth}))
         except SimulationError:  # it accepts no other inputs than those recorded
             continue
         left = as_read.channel(simulation.channel) - prediction
