@@ -31,6 +31,7 @@ from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
 from regolithd.calibration.mismatch.inference.statements import notes_on_priors, parameters_found, statement, words_of
 from regolithd.calibration.mismatch.regression.as_read import as_read
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
+from regolithd.calibration.mismatch.regression.lasting_errors import covariance_of_scores
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
@@ -151,7 +152,7 @@ def calibrated_parameters(decision: Decision) -> tuple[CalibratedParameter, ...]
     problem, nuisance = equations.problem, equations.nuisance
     values = calibrated_values(equations, fit)
     moved = equations.moments_of_errors(fit.columns) @ fit.covariance
-    by_errors = np.mean(moved**2, axis=0) if len(moved) else np.zeros(len(fit.columns))
+    by_errors = np.diag(covariance_of_scores(moved))
     places = {name: place for place, name in enumerate(nuisance.names)}
     found = []
     for name, prior in problem.simulation.parameters.items():

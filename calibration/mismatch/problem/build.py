@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.errors import RecordingError
 from regolithd.calibration.mismatch.problem.compared import blanks_of, left_out
 from regolithd.calibration.mismatch.problem.covariates import covariates_of
+from regolithd.calibration.mismatch.problem.input_doubt import bias_of
 from regolithd.calibration.mismatch.problem.outliers import FaultyReadings, note_on_far_readings
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.problem import Problem
@@ -55,8 +56,7 @@ def build_problem(
     run = simulated(put_on_time(inputs, late) if late else inputs, simulation, all_values, thresholds)
     as_recorded = None
     if late:
-        as_recorded = simulation.predict(complete_inputs(inputs.expected), all_values)
-        as_recorded = as_recorded + (0.0 if inputs.doubt is None else inputs.doubt.bias)
+        as_recorded = simulation.predict(complete_inputs(inputs.expected), all_values) + bias_of(inputs.doubt)
         as_recorded = np.where(np.isfinite(as_recorded), as_recorded, run.prediction)
     prepared, prediction = run.recording, run.prediction
     measured = run.as_read.channel(simulation.channel)  # as read, also where it is an input that is smoothed

@@ -46,11 +46,11 @@ class InputDoubt:
 
     Attributes
     ----------
-    bias: the expected prediction less that from the expected inputs
-    draws: of its error, where that lasts from one reading to the next, shape (draw, time, wheel); else there are none
     alone: the variance of each reading's
     together: by which a mean over wheels and time is as uncertain as if each reading had this for itself: an error that
         wheels have in common does not average out, and smoothing an input leaves the slow part of its error as it was
+    bias: the expected prediction less that from the expected inputs
+    draws: of its error, where that lasts from one reading to the next, shape (draw, time, wheel); else there are none
     """
 
     alone: Array
@@ -106,6 +106,11 @@ def _lasts(error: Array) -> bool:
     """Return whether a prediction's error (time, wheel) goes on from one reading to the next."""
     power = float(np.sum(error[:-1] ** 2))
     return float(np.sum(error[1:] * error[:-1])) > LASTING * power > 0
+
+
+def bias_of(doubt: InputDoubt | None) -> Array | float:
+    """Return what the inputs' errors add to the mean of a prediction; nothing where none is known."""
+    return 0.0 if doubt is None else doubt.bias
 
 
 def total_doubt(doubts: Iterable[InputDoubt | None]) -> InputDoubt | None:

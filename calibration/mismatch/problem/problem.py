@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
+from regolithd.calibration.mismatch.problem.input_doubt import bias_of
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.principal_axes import tangents_where_it_switches
 from regolithd.calibration.mismatch.problem.zero import zero_is_arbitrary
@@ -180,7 +181,7 @@ class Problem:
     @property
     def error_bias(self) -> Array | float:
         """What the inputs' errors add to the mean of the prediction, where that is curved in them."""
-        return 0.0 if self.doubt is None else self.doubt.bias
+        return bias_of(self.doubt)
 
     @cached_property
     def courses(self) -> tuple[Readings, ...]:

@@ -19,7 +19,13 @@ from regolithd.calibration.mismatch.data.slow_channels import bridged, drawn_bet
 from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
 from regolithd.calibration.mismatch.problem.delayed import beyond_the_end, shifted
 from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
-from regolithd.calibration.mismatch.problem.input_doubt import InputDoubt, input_doubt, total_doubt, wheels_in_common
+from regolithd.calibration.mismatch.problem.input_doubt import (
+    InputDoubt,
+    bias_of,
+    input_doubt,
+    total_doubt,
+    wheels_in_common,
+)
 from regolithd.calibration.mismatch.problem.input_faults import without_input_faults
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.shown_errors import notes_on_errors, shown_errors
@@ -155,9 +161,7 @@ def put_on_time(inputs: Inputs, late: Mapping[str, float]) -> Inputs:
 def simulated(inputs: Inputs, simulation: Predictor, values: Mapping[str, float], thresholds: Thresholds) -> Simulated:
     """Run the simulation with these parameters; twice where an input has blanks."""
     prepared, other, blanks = inputs.expected, inputs.bridged_otherwise, inputs.blanks
-    prediction = simulation.predict(complete_inputs(prepared), values)
-    if inputs.doubt is not None:
-        prediction = prediction + inputs.doubt.bias
+    prediction = simulation.predict(complete_inputs(prepared), values) + bias_of(inputs.doubt)
     if inputs.undefined is not None:
         prediction = np.where(inputs.undefined, np.nan, prediction)
     carried, blank = np.zeros(prediction.shape, np.bool_), np.zeros(prediction.shape, np.bool_)

@@ -170,6 +170,8 @@ class NormalEquations:
 
     def moments_of_errors(self, columns: Columns) -> Array:
         """Return the moments of a fit's columns with draws of errors that last, shape (draw, column)."""
+        if not has_lasting_errors(self.problem):
+            return np.zeros((0, len(columns)))
         on = membership(columns, len(self.weights))[:, :, None]
         read = self.design.in_time(self.design.columns_as_read([column for column, _ in columns]) * on)
         return moments_of_errors(self.design, self.weights, self.design.whitened_in_time(read))

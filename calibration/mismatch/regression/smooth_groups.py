@@ -46,15 +46,15 @@ def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
             for coupling, factor, sharing in (
                 _ways_to_act(problem, name, couplings) if len(hats) >= FEWEST_KNOTS else ()
             ):
-                design = _with_group(design, name, [hat * factor for hat in hats], coupling, sharing)
+                design = with_group(design, name, [hat * factor for hat in hats], coupling, sharing)
     speed = problem.covariates.get("wheel_speed")
     if speed is not None and np.nanmin(speed) < 0:
         # What acts one way only is neither a drag nor an offset.
         hats = hat_functions(speed, problem.mask, problem.thresholds.curve_knots)
-        design = _with_group(design, "wheel_speed", hats, "each way")
+        design = with_group(design, "wheel_speed", hats, "each way")
     coupling = "drag" if "drag" in couplings else "offset"
     hats = hat_functions(problem.covariates["time"], problem.mask, problem.thresholds.time_knots)
-    return _with_group(design, "time", [hat * couplings[coupling] for hat in hats], coupling)
+    return with_group(design, "time", [hat * couplings[coupling] for hat in hats], coupling)
 
 
 def has_smooth_term(problem: Problem, covariate: str) -> bool:
@@ -140,7 +140,7 @@ def _ways_to_act(
         yield f"drag, {name}", motion_of(problem) * contrast, ("all",)
 
 
-def _with_group(
+def with_group(
     design: DesignMatrix,
     covariate: str,
     columns: Sequence[Array],
@@ -187,5 +187,5 @@ def with_periodic_terms(design: DesignMatrix, residual: Array) -> DesignMatrix:
     for of_wheels in (power.sum(axis=0), *power):
         phase = 2 * np.pi * frequency_Hz[np.argmax(np.where(searched, of_wheels, 0.0))] * problem.time_s
         sines = [along * np.cos(phase), along * np.sin(phase)]
-        design = _with_group(design, "time", sines, PERIODIC, selection_penalty=selection_penalty)
+        design = with_group(design, "time", sines, PERIODIC, selection_penalty=selection_penalty)
     return design

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown, bridged
+from regolithd.calibration.mismatch.candidates.sensor_delay import bridged
 from regolithd.calibration.mismatch.problem.state_memory import memory_s, through_state
-from regolithd.calibration.mismatch.regression.group import Group
 from regolithd.calibration.mismatch.regression.smooth_groups import (
     couplings_of,
     has_smooth_term,
     varies_with_time,
+    with_group,
 )
 from regolithd.calibration.mismatch.signal.hat_basis import hat_functions
 
@@ -44,9 +44,5 @@ def with_state_terms(design: DesignMatrix) -> DesignMatrix:
         known = bridged(np.abs(values) if name == "wheel_speed" else values)
         hats = hat_functions(known, np.isfinite(known), problem.thresholds.curve_knots)
         columns = [through_state(problem, hat * np.nan_to_num(bridged(factor)), memory) for hat in hats]
-        design, places = design.extended(as_shown(problem, columns))
-        if places:
-            signs = (0,) * len(places)
-            group = Group(name=name, columns=places, signs=signs, sharing=("all", "one"), coupling=ON_STATE)
-            design = design.with_groups((*design.groups, group))
+        design = with_group(design, name, columns, ON_STATE)
     return design

@@ -74,5 +74,10 @@ def _is_the_effect(problem: Problem, change: _ChangedParameter, term: Term) -> b
     changed = np.where(problem.mask, change.columns(problem, shape)[0], 0.0)
     effect = np.where(problem.mask, columns_of(problem, term.group.candidate, shape)[0], 0.0)
     effect[:, elsewhere] = 0.0
-    along = float(np.sum(changed * effect))
-    return abs(along) > SAME_ACTION * float(np.linalg.norm(changed) * np.linalg.norm(effect))
+    return same_action(changed, effect)
+
+
+def same_action(one: Array, other: Array) -> bool:
+    """Return whether two courses (time, wheel) are one action, of either sign."""
+    along = float(np.sum(one * other))
+    return abs(along) > SAME_ACTION * float(np.linalg.norm(one) * np.linalg.norm(other))

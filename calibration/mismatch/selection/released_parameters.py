@@ -13,7 +13,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, contribution
 from regolithd.calibration.mismatch.selection.best_subsets import entry_cost
-from regolithd.calibration.mismatch.selection.changed_parameters import SAME_ACTION
+from regolithd.calibration.mismatch.selection.changed_parameters import same_action
 from regolithd.calibration.mismatch.selection.smooth_terms import unexplained_beside
 
 if TYPE_CHECKING:
@@ -83,8 +83,7 @@ def _acts_as(equations: NormalEquations, named: Fit, index: int, place: int) -> 
         return False
     change = np.where(problem.mask, problem.tangent(parameter), 0.0)
     effect = np.where(problem.mask, contribution(equations, named, index), 0.0)
-    size = float(np.linalg.norm(change) * np.linalg.norm(effect))
-    return abs(float(np.sum(change * effect))) > SAME_ACTION * size
+    return same_action(change, effect)
 
 
 def _releases(equations: NormalEquations, kept: Sequence[Term]) -> Iterator[tuple[NormalEquations, tuple[int, ...]]]:
