@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve, StatedCurve
     from regolithd.calibration.mismatch.problem.onset_clock import FoundIn
     from regolithd.calibration.mismatch.problem.problem import LeftOut, Problem
+    from regolithd.calibration.mismatch.problem.size_posterior import SizePosterior
 
 Array = NDArray[np.float64]
 Verdict = Literal["consistent", "missing-physics", "unexplained"]
@@ -48,6 +49,7 @@ class Effect:
     shape: the law's shape parameters, as `[[effects]]` of a corrected simulation has them
     law_std: relative standard deviation of what the law says of another recording, for a corrected simulation; not in
         the JSON object
+    posterior: of its size together with the simulation's parameters, for the same; neither
     """
 
     name: str
@@ -63,6 +65,7 @@ class Effect:
     form: str = ""
     shape: Mapping[str, float | str] = field(default_factory=dict)
     law_std: float = field(default=0.0, metadata={"told": False})
+    posterior: SizePosterior | None = field(default=None, metadata={"told": False})
 
 
 @dataclass(frozen=True)
@@ -297,6 +300,7 @@ class Contribution:
     shape_std: standard deviations of shape parameters, by name
     channel: the predicted channel that it acts on; empty where there is one alone
     found_in: the recording whose clock its onset is on; None: each recording's own
+    posterior: of its size together with the simulation's parameters, from the recording in which it was found
     """
 
     name: str
@@ -307,6 +311,7 @@ class Contribution:
     channel: str = ""
     shape_std: Mapping[str, float] = field(default_factory=dict)
     found_in: FoundIn | None = None
+    posterior: SizePosterior | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -138,7 +138,7 @@ class ChangedSize(Candidate):
     def __init__(self, stated: Stated, place: int, acts_as: Candidate | None) -> None:
         """Make a change of the effect in this place of `problem.stated`; `acts_as` None: it depends on nothing here."""
         of, like = stated.candidate, acts_as or stated.candidate
-        self.stated, self._place = stated, place
+        self.stated, self.place = stated, place
         for name in ("name", "equation", "source", "label", "along_motion"):
             setattr(self, name, getattr(of, name))
         self.covariate, self.imitated_over = (like.covariate, like.imitated_over) if acts_as else ("none", "none")  # type: ignore[misc]
@@ -152,7 +152,7 @@ class ChangedSize(Candidate):
 
     def applies(self, problem: Problem) -> bool:
         """Return whether the effect can act in this recording at all."""
-        return bool(np.any(problem.stated[self._place].column))
+        return bool(np.any(problem.stated[self.place].column))
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return the shape that was corrected; of a law that is not linear in its size, over several changes of it."""
@@ -167,7 +167,7 @@ class ChangedSize(Candidate):
 
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return the effect's change per relative change of its size, from the prediction without stated effects."""
-        column = problem.stated[self._place].column
+        column = problem.stated[self.place].column
         change = float(shape.get(SECANT_CHANGE, -1.0))
         if change == -1.0:
             return column[None]
@@ -225,7 +225,7 @@ def _merged(effects: Sequence[Contribution]) -> list[Contribution]:
         sizes = [float(np.linalg.norm(each.coefficients)) for each in (before, effect)]
         spread = float(np.hypot(before.relative_std * sizes[0], effect.relative_std * sizes[1]))
         relative = spread / max(float(np.linalg.norm(total)), 1e-300)
-        found[key] = replace(before, coefficients=tuple(total.tolist()), relative_std=relative)
+        found[key] = replace(before, coefficients=tuple(total.tolist()), relative_std=relative, posterior=None)
     return list(found.values())
 
 
@@ -242,6 +242,7 @@ def corrected_problem(problem: Problem, stated: Sequence[Stated]) -> Problem:
             in_simulation=each.in_simulation,
             on_time=not each.in_simulation and each.contribution.shape.get("late") in problem.on_time,
             deviations=each.deviations(problem),
+            posterior=each.contribution.posterior,
         )
         for each in stated
     )
@@ -278,7 +279,7 @@ def contribution_of_change(change: ChangedSize, relative_change: float) -> Contr
     """Return what a corrected simulation has to add for the change."""
     of = change.stated.contribution
     coefficients = tuple(relative_change * value for value in of.coefficients)
-    return replace(of, coefficients=coefficients, relative_std=0.0)
+    return replace(of, coefficients=coefficients, relative_std=0.0, posterior=None)
 
 
 def changes_of(change: ChangedSize, parameters: Mapping[str, Parameter], problem: Problem) -> tuple[Change, ...]:

@@ -34,6 +34,8 @@ from regolithd.calibration.mismatch.inference.findings import Findings, answer_o
 from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, earned
 from regolithd.calibration.mismatch.inference.improbable import in_probable_regions
 from regolithd.calibration.mismatch.inference.joint_parameters import information_of
+from regolithd.calibration.mismatch.inference.parameter_information import drawn_for
+from regolithd.calibration.mismatch.inference.same_parameters import with_changes_beside_same_parameters
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.equations import smooth_equations, with_library
@@ -82,19 +84,20 @@ class Decided:
 
     def findings(self) -> Findings:
         """Return what was found by itself, without what else could be true."""
-        return findings_of(self.decision, self.held_out, self.candidates, self.applicable)
+        return findings_of(self.decision, self.held_out, self.candidates, self.applicable, drawn_for(self.decision))
 
     def told(self, simulation: Simulation) -> Comparison:
         """Return the answer and its evidence."""
         problem = self.decision.equations.problem
-        answer = answer_of(self.decision, self.held_out, self.candidates, self.applicable)
+        drawn = drawn_for(self.decision)
+        answer = answer_of(self.decision, self.held_out, self.candidates, self.applicable, drawn)
         evidence = replace(
             evidence_of(self.decision),
             candidates=self.candidates,
             covariate_labels=problem.labels,
             wheel_column=simulation.wheel_column,
         )
-        return Comparison(answer, evidence, simulation, information_of(self.decision))
+        return Comparison(answer, evidence, simulation, information_of(self.decision, drawn))
 
 
 def compare(
@@ -213,6 +216,7 @@ def _decided(
         search = _searched_beside_delays(search, decision, pose, progress)
         decision, held_out = earned(search.decision, search.grid)
     decision = without_refuted_curves(in_probable_regions(decision), start.problem)
+    decision = with_changes_beside_same_parameters(decision)
     return Decided(decision, held_out, search.candidates, search.applicable)
 
 

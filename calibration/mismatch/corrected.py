@@ -111,7 +111,7 @@ def corrected_tables(
 def _entry(effect: Contribution) -> dict[str, Any]:
     """Return an entry of `[[effects]]`; it names its channel where the simulation predicts several."""
     entry: dict[str, Any] = _plain(asdict(effect))
-    for name in ("channel", "shape_std", "found_in"):
+    for name in ("channel", "shape_std", "found_in", "posterior"):
         if not entry[name]:
             del entry[name]
     return entry
@@ -150,7 +150,7 @@ def _with_stds(term: Contribution, effect: Effect) -> Contribution:
         name: each for name, each in effect.parameters.items() if name in term.shape and name != Candidate.change_point
     }
     shape_std = {name: std_of_interval(each.low, each.high) for name, each in told.items()}
-    return replace(term, relative_std=relative_std, shape_std=shape_std)
+    return replace(term, relative_std=relative_std, shape_std=shape_std, posterior=effect.posterior)
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401  # what TOML can hold

@@ -21,17 +21,21 @@ from regolithd.calibration.mismatch.inference.alternatives import alternatives
 from regolithd.calibration.mismatch.inference.dynamics import notes_on_dynamics
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values, wheel_names
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
-from regolithd.calibration.mismatch.inference.intervals import drawn_from, law_stds_of, parameters_of
+from regolithd.calibration.mismatch.inference.intervals import (
+    law_stds_of,
+    parameters_of,
+    size_posteriors_of,
+)
 from regolithd.calibration.mismatch.inference.located import share_of_residual, spell_of
 from regolithd.calibration.mismatch.inference.not_looked_for import not_looked_for
 from regolithd.calibration.mismatch.inference.other_covariates import notes_on_other_covariates
+from regolithd.calibration.mismatch.inference.parameter_information import parameter_covariance
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
 from regolithd.calibration.mismatch.inference.ranges import range_of
+from regolithd.calibration.mismatch.inference.same_parameters import with_changed_or_moved
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
 from regolithd.calibration.mismatch.inference.statements import notes_on_priors, parameters_found, statement, words_of
 from regolithd.calibration.mismatch.regression.as_read import as_read
-from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
-from regolithd.calibration.mismatch.regression.lasting_errors import covariance_of_scores
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
@@ -41,6 +45,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Change, Indistinguishable, Verdict
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors
+    from regolithd.calibration.mismatch.inference.intervals import Drawn
     from regolithd.calibration.mismatch.problem.problem import LeftOut, Problem
     from regolithd.calibration.mismatch.regression.as_read import AsRead
     from regolithd.calibration.mismatch.regression.group import Term
@@ -61,12 +66,16 @@ class Findings:
 
 
 def findings_of(
-    decision: Decision, held_out: HeldOutErrors, candidates: Sequence[Candidate], applicable: Sequence[Candidate]
+    decision: Decision,
+    held_out: HeldOutErrors,
+    candidates: Sequence[Candidate],
+    applicable: Sequence[Candidate],
+    drawn: Drawn | None,
 ) -> Findings:
-    """Return what was found; `applicable` are those candidates that this recording allows."""
+    """Return what was found; `applicable` are those candidates that this recording allows, `drawn` is `drawn_for`."""
     problem = decision.equations.problem
-    effects, changes = named_effects(decision, held_out)
-    parameters = calibrated_parameters(decision)
+    effects, changes = named_effects(decision, held_out, drawn)
+    parameters = calibrated_parameters(decision, drawn)
     limits, rest = decision.equations.thresholds, bool(decision.unnamed)
     moved = parameters_found(parameters, unexplained=rest, thresholds=limits)
     return Findings(
@@ -89,14 +98,18 @@ def findings_of(
 
 
 def answer_of(
-    decision: Decision, held_out: HeldOutErrors, candidates: Sequence[Candidate], applicable: Sequence[Candidate]
+    decision: Decision,
+    held_out: HeldOutErrors,
+    candidates: Sequence[Candidate],
+    applicable: Sequence[Candidate],
+    drawn: Drawn | None,
 ) -> Answer:
     """Return what was found, and what else could be true."""
     equations, threshold = decision.equations, decision.entry_threshold
     problem, thresholds = equations.problem, equations.thresholds
-    found = findings_of(decision, held_out, candidates, applicable)
+    found = findings_of(decision, held_out, candidates, applicable, drawn)
     known = decided_by_evidence(decision)
-    rest = alternatives(decision) if known else ()
+    rest = with_changed_or_moved(decision, alternatives(decision)) if known else ()
     extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold, rest)
     after = held_out.after if decision.named.terms else held_out.before
     return Answer(
@@ -128,13 +141,16 @@ def noise_floor(decision: Decision) -> float:
     return float(np.sqrt(np.mean(left[decision.equations.problem.mask] ** 2)))
 
 
-def named_effects(decision: Decision, held_out: HeldOutErrors) -> tuple[tuple[Effect, ...], tuple[Change, ...]]:
+def named_effects(
+    decision: Decision, held_out: HeldOutErrors, drawn: Drawn | None
+) -> tuple[tuple[Effect, ...], tuple[Change, ...]]:
     """Return the named effects with parameters and held-out errors, and what changed of corrected ones."""
     named, equations = decision.named, decision.equations
-    if not named.terms:
+    if drawn is None:
         return (), ()
-    drawn = drawn_from(equations, named, blocks_of_time(equations.problem, decision.noise))
     parameters, stds = parameters_of(equations, named, drawn), law_stds_of(named, drawn)
+    # Beside something unexplained, parameters and sizes imitate a part of it.
+    posteriors = size_posteriors_of(equations, named, drawn) if not decision.unnamed else [None] * len(stds)
     effects: list[Effect] = []
     changes: list[Change] = []
     for index, (term, of_term) in enumerate(zip(named.terms, parameters, strict=True)):
@@ -142,17 +158,17 @@ def named_effects(decision: Decision, held_out: HeldOutErrors) -> tuple[tuple[Ef
             changes += changes_of(term.group.candidate, of_term, equations.problem)
         else:
             errors = held_out.without[index], held_out.with_it[index]
-            effects.append(replace(_effect(equations.problem, term, of_term, errors), law_std=stds[index]))
+            effect = _effect(equations.problem, term, of_term, errors)
+            effects.append(replace(effect, law_std=stds[index], posterior=posteriors[index]))
     return tuple(effects), tuple(changes)
 
 
-def calibrated_parameters(decision: Decision) -> tuple[CalibratedParameter, ...]:
+def calibrated_parameters(decision: Decision, drawn: Drawn | None) -> tuple[CalibratedParameter, ...]:
     """Return where the recording moved each parameter of the simulation, beside all that was found."""
     equations, fit = decision.equations, decision.whole
     problem, nuisance = equations.problem, equations.nuisance
     values = calibrated_values(equations, fit)
-    moved = equations.moments_of_errors(fit.columns) @ fit.covariance
-    by_errors = np.diag(covariance_of_scores(moved))
+    variances = np.diag(parameter_covariance(decision, drawn))
     places = {name: place for place, name in enumerate(nuisance.names)}
     found = []
     for name, prior in problem.simulation.parameters.items():
@@ -161,8 +177,7 @@ def calibrated_parameters(decision: Decision) -> tuple[CalibratedParameter, ...]
         std = 0.0
         if name in places:
             place = places[name]
-            variance = fit.covariance[place, place] + by_errors[place]
-            std = float(np.sqrt(max(variance, 0.0)) / equations.design.scale[nuisance.columns[place]])
+            std = float(np.sqrt(max(variances[place], 0.0)) / equations.design.scale[nuisance.columns[place]])
         value = float(values[name])
         low, high = value - NINETY_PERCENT_STDS * std, value + NINETY_PERCENT_STDS * std
         found.append(CalibratedParameter(name, prior.unit, prior.value, prior.std, value, low, high))

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.answer import Parameter
 from regolithd.calibration.mismatch.inference.onset_interval import onset_interval
 from regolithd.calibration.mismatch.inference.parameter_interval import interval
-from regolithd.calibration.mismatch.inference.sandwich import Linearisation, linearised, sandwich
+from regolithd.calibration.mismatch.inference.sandwich import Linearisation, Sandwich, linearised, sandwich
 from regolithd.calibration.mismatch.inference.size_interval import relative_size_interval
+from regolithd.calibration.mismatch.problem.size_posterior import SizePosterior
 from regolithd.calibration.mismatch.problem.words import ANGULAR_SPEED, in_units, speed_unit
 
 if TYPE_CHECKING:
@@ -37,20 +38,22 @@ class Drawn:
     ----------
     linearisation: what the columns of `moved` are
     moved: how far each went from where the fit stands, shape (draw, column)
+    sandwich: the density that they are from
     """
 
     linearisation: Linearisation
     moved: Array
+    sandwich: Sandwich
 
 
 def drawn_from(equations: NormalEquations, fit: Fit, blocks: Index) -> Drawn:
     """Return draws from the density of a fit's coefficients, shapes and discrepancies."""
     linearisation = linearised(equations, fit)
-    step, covariance, inverse = sandwich(equations, fit, linearisation, blocks)
-    moved = step + normal_draws(covariance, equations.thresholds.interval_draws)
+    found = sandwich(equations, fit, linearisation, blocks)
+    moved = found.step + normal_draws(found.covariance, equations.thresholds.interval_draws)
     for stated in linearisation.shares:
-        moved = stated.at_most_one(moved, inverse)
-    return Drawn(linearisation, moved)
+        moved = stated.at_most_one(moved, found.inverse)
+    return Drawn(linearisation, moved, found)
 
 
 def parameters_of(equations: NormalEquations, fit: Fit, drawn: Drawn) -> list[dict[str, Parameter]]:
@@ -74,12 +77,38 @@ def law_stds_of(fit: Fit, drawn: Drawn) -> list[float]:
     found = []
     for index in range(len(fit.terms)):
         of_law = drawn.linearisation.of_law(fit, index)
-        columns = drawn.linearisation.columns[of_law].reshape(len(of_law), -1)
-        coefficients = fit.coefficients[fit.of_term(index)]
-        law = coefficients @ columns[: len(coefficients)]
-        along = columns @ law / max(float(law @ law), 1e-300)
+        along = _along_the_law(fit, index, drawn.linearisation.columns[of_law])
         found.append(float(np.std(drawn.moved[:, of_law] @ along)))
     return found
+
+
+def size_posteriors_of(equations: NormalEquations, fit: Fit, drawn: Drawn) -> list[SizePosterior | None]:
+    """Return each term's size together with the simulation's parameters; None where these are all exact."""
+    nuisance, problem = equations.nuisance, equations.problem
+    places = [k for k, name in enumerate(nuisance.names) if name in problem.simulation.parameters]
+    if not places:
+        return [None] * len(fit.terms)
+    scale = equations.design.scale[[nuisance.columns[place] for place in places]]
+    shifts = fit.coefficients[places] / scale
+    names = [nuisance.names[place] for place in places]
+    values = {name: problem.values[name] + shift for name, shift in zip(names, shifts.tolist(), strict=True)}
+    moved = drawn.moved[:, places] / scale
+    found: list[SizePosterior | None] = []
+    for index in range(len(fit.terms)):
+        of_term = drawn.linearisation.of_term(fit, index)
+        sizes = drawn.moved[:, of_term] @ _along_the_law(fit, index, drawn.linearisation.columns[of_term])
+        found.append(
+            SizePosterior.of(values, np.asarray(np.cov(np.column_stack((moved, sizes)), rowvar=False), np.float64))
+        )
+    return found
+
+
+def _along_the_law(fit: Fit, index: int, columns: Array) -> Array:
+    """Return how much of a term a unit of each of its columns is, shape (column,); its coefficients' come first."""
+    flat = columns.reshape(len(columns), -1)
+    coefficients = fit.coefficients[fit.of_term(index)]
+    law = coefficients @ flat[: len(coefficients)]
+    return np.asarray(flat @ law / max(float(law @ law), 1e-300))
 
 
 def normal_draws(covariance: Array, count: int) -> Array:

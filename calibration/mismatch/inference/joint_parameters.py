@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import CalibratedParameter
+from regolithd.calibration.mismatch.inference.parameter_information import parameter_information
 from regolithd.calibration.mismatch.regression.nuisance import beyond_prior_predictive
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
 from regolithd.calibration.mismatch.selection.released_parameters import price_of_wrong_statement
@@ -23,6 +24,7 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from regolithd.calibration.mismatch.inference.intervals import Drawn
     from regolithd.calibration.mismatch.problem.prior import Prior
     from regolithd.calibration.mismatch.selection.decision import Decision
 
@@ -52,13 +54,13 @@ class Information:
     held: Mapping[str, float]
 
 
-def information_of(decision: Decision) -> Information:
+def information_of(decision: Decision, drawn: Drawn | None) -> Information:
     """Return what a channel's readings know of the parameters, beside all that was found in it."""
     equations, problem = decision.equations, decision.equations.problem
     nuisance, priors = equations.nuisance, problem.simulation.parameters
     kept = [place for place, name in enumerate(nuisance.names) if name in priors]
     names = tuple(nuisance.names[place] for place in kept)
-    matrix, moment = equations.information(decision.whole.terms, kept)
+    matrix, moment = parameter_information(decision, drawn, kept)
     scale = equations.design.scale[[nuisance.columns[place] for place in kept]]
     matrix, moment = matrix * np.outer(scale, scale), moment * scale
     at = np.array([problem.values[name] for name in names], np.float64)

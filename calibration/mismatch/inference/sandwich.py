@@ -192,25 +192,44 @@ def _shape_slopes(equations: NormalEquations, fit: Fit) -> Iterator[tuple[ShapeS
                 yield ShapeSlope(index, name, scale), slope / scale
 
 
-def sandwich(
-    equations: NormalEquations, fit: Fit, linearisation: Linearisation, blocks: Index
-) -> tuple[Array, Array, Array]:
-    """Return how far all would move from where they stand, their covariance, and the inverse of A.
+@dataclass(frozen=True, eq=False)
+class Sandwich:
+    """How far all of a linearisation would move from where it stands, and how well that is known.
+
+    Attributes
+    ----------
+    step: how far each column's coefficient would move, shape (column,)
+    covariance: A⁻¹ B A⁻¹, shape (column, column)
+    matrix, inverse: A, the information and the priors' precision, and A⁻¹
+    errors: moments of the columns with draws of the inputs' errors that last, shape (draw, column)
+    """
+
+    step: Array
+    covariance: Array
+    matrix: Array
+    inverse: Array
+    errors: Array
+
+
+def sandwich(equations: NormalEquations, fit: Fit, linearisation: Linearisation, blocks: Index) -> Sandwich:
+    """Return the sandwich of a fit.
 
     The fit's own coefficients are at their optimum, priors included, and do not move; what was not fitted does.
     """
     design, precision, weights = equations.design, linearisation.precision, equations.weights
     columns = design.whitened_in_time(linearisation.columns)
     information = np.einsum("atw,w,btw->ab", columns, weights, columns, optimize=True)
-    inverse = pseudo_inverse(information + precision, SINGULAR)
+    matrix = information + precision
+    inverse = pseudo_inverse(matrix, SINGULAR)
     scores = columns * (design.in_time(whitened_residual_of(equations, fit)) * weights)[None]
     sums = block_sums(scores, blocks)
     count = int(blocks.max()) + 1
     middle = sums.T @ sums * count / max(count - 1, 1) + precision
-    middle += covariance_of_scores(moments_of_errors(design, weights, columns))
+    errors = moments_of_errors(design, weights, columns)
+    middle += covariance_of_scores(errors)
     fitted = np.arange(len(information)) < len(fit.columns)
     pull = np.where(fitted, 0.0, sums.sum(axis=0)) + linearisation.pull
-    return inverse @ pull, inverse @ middle @ inverse, inverse
+    return Sandwich(inverse @ pull, inverse @ middle @ inverse, matrix, inverse, errors)
 
 
 def block_sums(scores: Array, blocks: Index) -> Array:

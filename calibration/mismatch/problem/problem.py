@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.input_doubt import InputDoubt
     from regolithd.calibration.mismatch.problem.predictor import Predictor
+    from regolithd.calibration.mismatch.problem.size_posterior import SizePosterior
 
 Array = NDArray[np.float64]
 Readings = tuple[NDArray[np.int64], tuple[slice, ...]]
@@ -58,6 +59,7 @@ class StatedEffect:
     in_simulation: whether the simulation's own prediction has it; else it is added on the output
     on_time: whether it is the delay of an input that the problem has on time, so that its prediction has it
     deviations: what one standard deviation of other numbers in its law adds, shape (time, wheel) each
+    posterior: of its size together with the simulation's parameters, from the comparison that found it
     """
 
     name: str
@@ -67,6 +69,7 @@ class StatedEffect:
     in_simulation: bool = False
     on_time: bool = False
     deviations: tuple[Array, ...] = ()
+    posterior: SizePosterior | None = None
 
 
 @dataclass(frozen=True)

@@ -139,6 +139,10 @@ class NormalEquations:
         solved = inverse @ moment
         return Fit(terms, columns, solved, inverse, float(moment @ solved) - self._explained_by_parameters)
 
+    def normal_matrix(self, fit: Fit) -> Array:
+        """Return the matrix of a fit's normal equations, the priors included, shape (column, column)."""
+        return self._normal(fit.columns)[0]
+
     @cached_property
     def _explained_by_parameters(self) -> float:
         """Return the Δχ² of the free parameters alone, of which one may act on nothing and have no prior."""

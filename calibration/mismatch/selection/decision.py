@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,7 +29,7 @@ from regolithd.calibration.mismatch.selection.sign_flip_test import entry_thresh
 from regolithd.calibration.mismatch.selection.smooth_terms import weigh_against_smooth_terms
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.regression.group import Fit, Term
@@ -74,6 +74,8 @@ class Decision:
     intermittent: of those of the smooth terms that stand for what comes and goes, when and how much
     refused: answers, by their names, of which one name lowered no held-out error
     notes: on what was decided
+    changed_or_moved: for each corrected effect that has changed, or else parameters have (`inference.same_parameters`),
+        by how much the first is ahead of the second, in Δχ²
     """
 
     equations: NormalEquations
@@ -85,6 +87,7 @@ class Decision:
     intermittent: tuple[Intermittent, ...] = ()
     refused: frozenset[frozenset[str]] = frozenset()
     notes: tuple[str, ...] = ()
+    changed_or_moved: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def late(self) -> tuple[str, float] | None:

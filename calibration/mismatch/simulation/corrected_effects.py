@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.onset_clock import FoundIn
+from regolithd.calibration.mismatch.problem.size_posterior import SizePosterior
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
 
 
 def stated_effects(tables: Mapping[str, Any]) -> tuple[Contribution, ...]:
@@ -33,6 +38,7 @@ def stated_effects(tables: Mapping[str, Any]) -> tuple[Contribution, ...]:
                     str(effect.get("channel", "")),
                     _shape_std(effect),
                     _found_in(effect),
+                    _posterior(effect),
                 )
             )
         except (KeyError, TypeError, ValueError) as error:
@@ -53,6 +59,38 @@ def _shape_std(effect: Mapping[str, Any]) -> dict[str, float]:
     if unknown := sorted(set(found) - numbers):
         raise ValueError(f"shape_std has {', '.join(unknown)}, which is no number in its shape")
     return found
+
+
+def _posterior(effect: Mapping[str, Any]) -> SizePosterior | None:
+    """Return the density of an effect's size together with the parameters.
+
+    Raises
+    ------
+    ValueError
+        When it is not as `--corrected` writes it.
+    """
+    if "posterior" not in effect:
+        return None
+    told = "posterior has parameters, values and covariance, as --corrected writes it: edit none of them, or delete it"
+    try:
+        of = dict(effect["posterior"])
+        names = tuple(str(name) for name in of["parameters"])
+        values = tuple(float(value) for value in of["values"])
+        matrix = np.array(of["covariance"], np.float64)
+    except (KeyError, TypeError, ValueError) as error:
+        raise ValueError(told) from error
+    if len(values) != len(names) or matrix.shape != (len(names) + 1,) * 2 or not _is_covariance(matrix, values):
+        raise ValueError(told)
+    return SizePosterior.of(dict(zip(names, values, strict=True)), matrix)
+
+
+def _is_covariance(matrix: NDArray[np.float64], values: Sequence[float]) -> bool:
+    """Return whether all numbers are finite, and a matrix is symmetric and positive definite."""
+    if not (np.isfinite(matrix).all() and np.isfinite(values).all()) or np.any(np.diag(matrix) <= 0):
+        return False
+    std = np.sqrt(np.diag(matrix))
+    correlation = matrix / np.outer(std, std)
+    return bool(np.allclose(correlation, correlation.T) and np.linalg.eigvalsh(correlation)[0] > 0)
 
 
 def _found_in(effect: Mapping[str, Any]) -> FoundIn | None:

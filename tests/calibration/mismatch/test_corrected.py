@@ -21,6 +21,8 @@ from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel
 from regolithd.calibration.mismatch.templates import write_templates
 from regolithd.calibration.toml_document import to_toml, with_tables
 
+UNKNOWN: dict[str, Any] = {"law_std": 0.0, "posterior": None}
+"""What an effect says of how well its law is known, where it is not."""
 CONCEALED_A = 0.037
 
 
@@ -85,7 +87,9 @@ def test_parameters_that_left_their_priors_are_written_as_they_were_run() -> Non
 def test_an_effect_without_a_relative_size_has_no_standard_deviation(size: Parameter | None) -> None:
     """Where the size is not known, or nothing, there is nothing that it could be relative to."""
     term = Contribution("coulomb-friction", {}, (0.5,), (1,), 0.1)
-    effect: Any = SimpleNamespace(parameters={} if size is None else {"relative_size": size}, law_std=0.0)
+    effect: Any = SimpleNamespace(
+        parameters={} if size is None else {"relative_size": size}, law_std=0.0, posterior=None
+    )
     servo = {"simulation": {"model": "servo:ServoAxis"}}
     tables = corrected_tables(servo, ServoAxis(), {"mass_kg": 96.0}, (term,), (effect,))
     assert [each["relative_std"] for each in tables["effects"]] == [0.0]
@@ -95,7 +99,9 @@ def test_how_well_a_law_is_known_is_written_and_read() -> None:
     """Its power has a standard deviation; when it began, is of one recording."""
     term = Contribution("bearing-drag", {"onset_s": 60.0, "power": 0.8}, (0.5,), (1,))
     told = {"onset_s": Parameter(60.0, 50.0, 70.0, "s"), "power": Parameter(0.8, 0.6, 1.0, "1")}
-    effect: Any = SimpleNamespace(parameters={"relative_size": Parameter(0.1, 0.09, 0.11, "1"), **told}, law_std=0.2)
+    effect: Any = SimpleNamespace(
+        parameters={"relative_size": Parameter(0.1, 0.09, 0.11, "1"), **told}, law_std=0.2, posterior=None
+    )
     servo = {"simulation": {"model": "servo:ServoAxis"}}
     tables = corrected_tables(servo, ServoAxis(), {"mass_kg": 96.0}, (term,), (effect,))
     (written,) = tables["effects"]

@@ -64,12 +64,12 @@ def test_the_sandwich_of_white_noise_is_the_inverse_information() -> None:
     fit = equations.fit([term_of(equations, "drag")])
     blocks = blocks_of_time(equations.problem, WHITE)
     linearisation = linearised(equations, fit)
-    step, covariance, inverse = sandwich(equations, fit, linearisation, blocks)
-    assert np.abs(step[:2]).max() < 1e-3
-    assert np.sqrt(covariance[1, 1]) == pytest.approx(np.sqrt(fit.covariance[1, 1]), rel=0.35)
+    found = sandwich(equations, fit, linearisation, blocks)
+    assert np.abs(found.step[:2]).max() < 1e-3
+    assert np.sqrt(found.covariance[1, 1]) == pytest.approx(np.sqrt(fit.covariance[1, 1]), rel=0.35)
     assert linearisation.of_term(fit, 0) == [1, *range(2, len(linearisation.columns))]
     np.testing.assert_allclose(np.diag(linearisation.precision)[2:], 1e8)
-    np.testing.assert_allclose(inverse[:2, :2], fit.covariance, rtol=0.01)
+    np.testing.assert_allclose(found.inverse[:2, :2], fit.covariance, rtol=0.01)
 
 
 def intervals(equations: NormalEquations, fit: Fit, noise: NoiseModel) -> list[dict[str, Parameter]]:
@@ -120,7 +120,7 @@ def test_a_law_may_be_wrong_by_a_share_at_each_knot_and_on_each_axis() -> None:
     np.testing.assert_allclose(np.diag(linearisation.precision), [4.0, 0.0, *[0.15**-2] * 8], rtol=1e-5)
     blocks = blocks_of_time(equations.problem, WHITE)
     deviations = [
-        np.sqrt(sandwich(each, fit, linearised(each, fit), blocks)[1][1, 1])
+        np.sqrt(sandwich(each, fit, linearised(each, fit), blocks).covariance[1, 1])
         for each in (exact_law(equations), equations)
     ]
     assert deviations[1] > 1.3 * deviations[0], "the coefficient and its discrepancies share what is known"

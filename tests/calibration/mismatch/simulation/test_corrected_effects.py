@@ -8,6 +8,7 @@ import pytest
 
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.onset_clock import FoundIn
+from regolithd.calibration.mismatch.problem.size_posterior import SizePosterior
 from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects
 
 EFFECT: dict[str, Any] = {"name": "viscous-friction", "shape": {}, "coefficients": [1], "wheels": [1, "left"]}
@@ -53,3 +54,35 @@ def test_the_recording_that_an_onset_is_of_is_read_whole(found_in: object) -> No
     (found,) = stated_effects({"effects": [{**EFFECT, "found_in": whole}]})
     assert found.found_in == FoundIn("8d", 9, 4.0)
     assert stated_effects({"effects": [EFFECT]})[0].found_in is None
+
+
+POSTERIOR: dict[str, Any] = {"parameters": ["gain"], "values": [2], "covariance": [[0.04, -0.01], [-0.01, 0.01]]}
+
+
+def test_a_posterior_is_of_named_parameters_and_the_size() -> None:
+    """Its covariance has a row for each parameter, and one for the size."""
+    (found,) = stated_effects({"effects": [{**EFFECT, "posterior": POSTERIOR}]})
+    assert found.posterior == SizePosterior(("gain",), (2.0,), ((0.04, -0.01), (-0.01, 0.01)))
+    assert stated_effects({"effects": [EFFECT]})[0].posterior is None
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        {"values": []},
+        {"values": ["two"]},
+        {"values": [float("nan")]},
+        {"covariance": [[0.04]]},
+        {"covariance": [[0.04, -0.01], [-0.01]]},
+        {"covariance": [[0.04, -0.01], [0.01, 0.01]]},
+        {"covariance": [[0.04, -0.03], [-0.03, 0.01]]},
+        {"covariance": [[0.0, 0.0], [0.0, 0.01]]},
+    ],
+)
+def test_a_posterior_that_is_none_is_told(broken: dict[str, Any]) -> None:
+    """Of another length, no number, not symmetric, or not positive definite."""
+    effect = {**EFFECT, "posterior": {**POSTERIOR, **broken}}
+    with pytest.raises(SimulationError, match=r"^effect 1 needs .*posterior has parameters, values and covariance"):
+        stated_effects({"effects": [effect]})
+    with pytest.raises(SimulationError, match=r"^effect 1 needs .*posterior has parameters, values and covariance"):
+        stated_effects({"effects": [{**EFFECT, "posterior": "known"}]})
