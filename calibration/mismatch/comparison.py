@@ -62,8 +62,9 @@ if TYPE_CHECKING:
 FURTHER_SEARCHES = 3
 """Searches at most beside the first, each linearised where the one before led (a choice: most comparisons need
 none)."""
-LATE_SEARCHES = 2
-"""Searches beside a late column, at most (a choice: parameters that move far as the delay is found move once)."""
+LATE_SEARCHES = 4
+"""Searches beside a late column, at most (a choice: most need one, parameters that move far as the delay is found two,
+and a corrected delay that has changed up to four)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,9 +270,10 @@ def _searched_beside_delays(
     values = moved_values(decision.equations, decision.whole)
     for _ in range(LATE_SEARCHES if decision.has_delay else 0):
         noise_size = decision.equations.problem.noise_size
-        problem = replace(pose(values, decision.late_inputs), late=decision.late, noise_size=noise_size)
+        posed = pose(values, decision.late_inputs)
+        problem = replace(posed, late=decision.late, noise_size=noise_size)
         if decision.is_late_alone:
-            values, late = fitted_where_late(problem)
+            values, late = fitted_where_late(problem, posed.late[1] if posed.late else 0.0)
             problem = replace(pose(values, decision.late_inputs), late=late, noise_size=noise_size)
         again = _search_at(smooth_equations(problem), found.candidates, progress)
         if not again.decision.has_delay:

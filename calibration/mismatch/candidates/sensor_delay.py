@@ -293,7 +293,7 @@ def late_with(problem: Problem, candidate: Candidate, columns: Array) -> Array:
 
 def as_shown(problem: Problem, columns: Sequence[Array]) -> Sequence[Array]:
     """Return what acts on the machine, columns of shape (time, wheel), when the predicted channel shows it."""
-    if problem.late is None:
+    if problem.late is None or problem.late[1] == 0:
         return columns
     kind, delay = problem.late
     return [np.nan_to_num(OF_CHANNEL[kind](problem.recording, bridged(column), delay)) for column in columns]

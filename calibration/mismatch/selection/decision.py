@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay, late_inputs, lateness
+from regolithd.calibration.mismatch.candidates.sensor_delay import KINDS, SensorDelay, late_inputs, lateness
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.candidate_groups import with_candidate
 from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
@@ -31,7 +31,7 @@ from regolithd.calibration.mismatch.selection.smooth_terms import weigh_against_
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.candidates.candidate import Candidate
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.signal.noise import NoiseModel
@@ -92,8 +92,17 @@ class Decision:
     @property
     def late(self) -> tuple[str, float] | None:
         """How the predicted channel is late by a named effect, and by how much [s]; None: it is not."""
-        named = [(term.name, term.group.shape) for term in self.named.terms]
+        named = [(term.name, self._shape_now(index, term)) for index, term in enumerate(self.named.terms)]
         return lateness(named, self.equations.problem.simulation.channel)
+
+    def _shape_now(self, index: int, term: Term) -> Shape:
+        """Return the shape of a named term; of a corrected delay that has changed, with the delay that it has now."""
+        if not (term.group.is_change and term.name == SensorDelay.name):
+            return term.group.shape
+        scale = float(self.equations.design.scale[term.group.columns[0]])
+        times = 1 + float(self.named.coefficients[self.named.of_term(index)][0]) / scale
+        shape = term.group.shape
+        return {**shape, **{kind: max(times, 0.0) * float(shape[kind]) for kind in KINDS if kind in shape}}
 
     @property
     def power_left(self) -> float:
