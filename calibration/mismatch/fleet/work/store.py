@@ -20,6 +20,7 @@ from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm, Sh
 from regolithd.calibration.mismatch.fleet.work.sums import Sums
 from regolithd.calibration.mismatch.inference.findings import Findings
 from regolithd.calibration.mismatch.problem.problem import LeftOut
+from regolithd.calibration.mismatch.problem.size_posterior import SizePosterior
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -40,6 +41,7 @@ KINDS: Mapping[str, type] = {
         answers.Unexplained,
         answers.CalibratedParameter,
         answers.Change,
+        SizePosterior,
     )
 }
 """Data classes that may be in a file."""

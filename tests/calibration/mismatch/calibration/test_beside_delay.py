@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from heated_room import MEMORY_s, ROWS, STEP_s, Room, response
+from heated_room import ROWS, MEMORY_s, Room, STEP_s, response
 
 from regolithd.calibration.mismatch import compare
 from regolithd.calibration.mismatch.answer import Contribution
