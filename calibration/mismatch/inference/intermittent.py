@@ -3,7 +3,8 @@
 A cable that rubs now and then, a valve that sticks three times, or an hour of tail wind adds to some readings alone.
 Its mean resembles a constant friction or offset; its spells lengthen the noise's memory, in which they would be lost.
 They are told from noise by their two levels (`signal/switching_mean.py`); few large ones, of any course, by their
-skewness (`signal/skewness.py`).
+skewness (`signal/skewness.py`). Where the simulation has a state, what comes and goes may act on that (a mist that
+cools a greenhouse), and the readings follow it slowly: it is looked for in what acted on the state, too.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.problem.state_memory import before_state, memory_s
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC
 from regolithd.calibration.mismatch.selection.decision import Intermittent
@@ -74,6 +76,9 @@ def wheels_with_spells(decision: Decision) -> dict[tuple[int, ...], TimedSpells]
     direction = np.nan_to_num(problem.covariates.get("direction", np.ones(left.shape)))
     ways = (np.ones(left.shape), direction) if np.ptp(direction[problem.mask]) else (direction,)
     as_it_acts = [_Courses(problem, left, explained, along) for along in ways]
+    if (memory := memory_s(problem)) > 0:
+        (acted, known), (beside, _) = (before_state(problem, course, memory) for course in (left, explained))
+        as_it_acts.append(_Courses(problem, acted, beside, known.astype(np.float64)))
     alone = ((wheel, _likeliest(courses.spells_on((wheel,)) for courses in as_it_acts)) for wheel in every)
     found: dict[tuple[int, ...], TimedSpells] = {(wheel,): spells for wheel, spells in alone if spells}
     if len(every) > 1 and not found and (spells := _likeliest(courses.spells_on(every) for courses in as_it_acts)):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.principal_axes import switches
+from regolithd.calibration.mismatch.signal.means import running_mean
 from regolithd.calibration.mismatch.signal.recursion import recursion
 
 if TYPE_CHECKING:
@@ -24,6 +25,9 @@ Array = NDArray[np.float64]
 SHARE = 0.1
 """Size of the changes, in standard deviations of the input (a choice: small beside it, and far above rounding)."""
 NOW, BEFORE = slice(1, None), slice(None, -1)
+PARTS = 8
+"""Means of readings in the time that a state remembers, of which what acted on it is taken back (a choice: of single
+readings it would be noise alone, and means of the whole time would not show spells that are as short)."""
 RANK = 1e-6
 """Relative singular value below which columns are dependent: without a state, the response is the change."""
 SHORTEST, LONGEST = 2.0, 0.2
@@ -81,3 +85,26 @@ def through_state(problem: Problem, column: Array, memory: float) -> Array:
     same_run = np.diff(recording.run, prepend=recording.run[0])[:, None] == 0
     keeps = np.where(same_run, np.exp(-np.maximum(steps, 0.0) / memory), 0.0)
     return recursion(keeps, (1 - keeps) * column)
+
+
+def before_state(problem: Problem, shown: Array, memory: float) -> tuple[Array, NDArray[np.bool_]]:
+    """Return what acted on a state with this memory [s] for it to show a course, and where that is known.
+
+    Both have the shape (time, wheel). It is the reverse of `through_state`, of means over a part of the memory that
+    follow each other, at the last reading of each.
+    """
+    recording = problem.recording
+    length = max(int(memory / recording.step_s / PARTS), 1)
+    kept = float(np.exp(-length * recording.step_s / memory))
+    acted, known = np.zeros(shown.shape), np.zeros(shown.shape, bool)
+    later = slice(2 * length - 1, None)
+    if len(shown) < 2 * length:
+        return acted, known
+    same_run = recording.run[later] == recording.run[: len(shown) - 2 * length + 1]
+    for wheel in range(shown.shape[1]):
+        means = running_mean(shown[:, wheel], length)
+        acted[later, wheel] = (means[length:] - kept * means[:-length]) / (1 - kept)
+        read = running_mean(problem.mask[:, wheel].astype(np.float64), 2 * length)
+        known[later, wheel] = same_run & (read > 1 - 0.5 / (2 * length))
+    ends = np.arange(len(shown)) % length == length - 1
+    return acted, known & ends[:, None]

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
-from heated_room import MEMORY_s, Room, STEP_s, recorded
+from heated_room import ROWS, TRUE, MEMORY_s, Room, STEP_s, recorded, response
 
 from regolithd.calibration.mismatch import Prior, compare
+from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.empirical.written import with_curves
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.build import build_problem
-from regolithd.calibration.mismatch.problem.state_memory import memory_s, through_state
+from regolithd.calibration.mismatch.problem.state_memory import before_state, memory_s, through_state
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -72,3 +73,47 @@ def test_a_draught_is_located_over_the_wind(seed: int) -> None:
     with pytest.raises(SimulationError, match="acts on a state of the simulation, and no curve over it is fitted"):
         with_curves(found, comparison.evidence)
     assert compare(recorded(seed, error_A=0.0), Room()).answer.verdict == "consistent"
+
+
+def test_what_acted_on_a_state_is_taken_back_from_what_it_shows() -> None:
+    """Means of it, where all readings of a run are there."""
+    recording = recorded(3)
+    problem = build_problem(recording, Room())
+    acting = np.repeat(np.random.default_rng(1).uniform(-1, 1, ROWS // 100), 100)[:, None]
+    acted, known = before_state(problem, through_state(problem, acting, MEMORY_s), MEMORY_s)
+    length = int(MEMORY_s / STEP_s / 8)
+    assert np.flatnonzero(known[:, 0])[:3].tolist() == [2 * length - 1, 3 * length - 1, 4 * length - 1]
+    steady = known & (np.arange(ROWS) % 100 >= 2 * length)[:, None]
+    np.testing.assert_allclose(acted[steady], acting[steady], atol=0.02)
+    assert not before_state(problem, acting[:length], MEMORY_s)[1].any()
+
+
+def _aired(seed: int, lost_K: float, noise_memory: float = 0.0) -> Recording:
+    """Return a recording of a room whose window is open now and then; noise of 0.5 K, a half of it slow."""
+    random = np.random.default_rng(seed)
+    current = np.repeat(random.uniform(8, 20, ROWS // 50), 50)
+    is_open, rows = np.zeros(ROWS), 0
+    while rows < ROWS:
+        shut, aired = random.exponential(120), random.uniform(20, 50)
+        is_open[int(rows + shut) : int(rows + shut + aired)] = 1
+        rows += int(shut + aired)
+    slow = np.zeros(ROWS)
+    for row in range(1, ROWS):
+        slow[row] = noise_memory * slow[row - 1] + np.sqrt(1 - noise_memory**2) * random.normal()
+    room = response(current, TRUE, lost_K * is_open) + 0.35 * slow + 0.35 * random.normal(size=ROWS)
+    columns = {"t_s": STEP_s * np.arange(ROWS), "heater_A": current, "wind_m_s": np.full(ROWS, 3.0)}
+    return from_columns({**columns, "room_degC": room})
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_what_comes_and_goes_before_a_state_is_unexplained(seed: int) -> None:
+    """A window that is opened now and then: the temperature follows slowly, as slow noise does."""
+    answer = compare(_aired(seed, 8.0, 0.9), Room()).answer
+    assert (answer.verdict, [each.covariate for each in answer.unexplained]) == ("unexplained", ["time"])
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("noise_memory", [0.0, 0.9, 0.98])
+def test_slow_noise_of_a_state_is_nothing_that_comes_and_goes(seed: int, noise_memory: float) -> None:
+    """Also where it is as slow as the state itself."""
+    assert compare(_aired(seed, 0.0, noise_memory), Room()).answer.verdict == "consistent"
