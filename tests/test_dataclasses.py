@@ -77,6 +77,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "Linearisation",
         "Sandwich",
         "_LateSearch",
+        "Late",
         "_Weighed",
         "_Readings",
         "StatedShare",

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 Array = NDArray[np.float64]
+Wheels = tuple[int | str, ...]
 
 RELATIVE_CHANGE = "relative_change"
 """The change's coefficient: 0 is unchanged, 1 twice as large, −1 gone."""
@@ -213,20 +214,37 @@ def stated_in(
 
 
 def _merged(effects: Sequence[Contribution]) -> list[Contribution]:
-    """Return the effects with those of one name, shape and wheels summed: a correction of a correction."""
-    found: dict[tuple[str, str, tuple[int | str, ...]], Contribution] = {}
+    """Return the effects with those of one name and shape summed on each wheel: a correction of a correction.
+
+    An effect of which a part of the wheels was corrected again is one on these, and one on the others.
+    """
+    alike: dict[tuple[str, str], list[Contribution]] = {}
     for effect in effects:
-        key = (effect.name, repr((sorted(effect.shape.items(), key=str), effect.found_in)), effect.wheels)
-        if key not in found:
-            found[key] = effect
-            continue
-        before = found[key]
-        total = np.add(before.coefficients, effect.coefficients)
-        sizes = [float(np.linalg.norm(each.coefficients)) for each in (before, effect)]
-        spread = float(np.hypot(before.relative_std * sizes[0], effect.relative_std * sizes[1]))
-        relative = spread / max(float(np.linalg.norm(total)), 1e-300)
-        found[key] = replace(before, coefficients=tuple(total.tolist()), relative_std=relative, posterior=None)
-    return list(found.values())
+        key = effect.name, repr((sorted(effect.shape.items(), key=str), effect.found_in))
+        alike.setdefault(key, []).append(effect)
+    return [part for several in alike.values() for part in _summed_on_wheels(several)]
+
+
+def _summed_on_wheels(effects: Sequence[Contribution]) -> list[Contribution]:
+    """Return effects of one name and shape, each on wheels of its own."""
+    acting: dict[int | str, tuple[int, ...]] = {}
+    for place, effect in enumerate(effects):
+        for wheel in effect.wheels:
+            acting[wheel] = (*acting.get(wheel, ()), place)
+    on: dict[tuple[int, ...], list[int | str]] = {}
+    for wheel, places in acting.items():
+        on.setdefault(places, []).append(wheel)
+    return [replace(_summed([effects[k] for k in places]), wheels=tuple(wheels)) for places, wheels in on.items()]
+
+
+def _summed(effects: Sequence[Contribution]) -> Contribution:
+    """Return the sum of effects of one name and shape, with the spread of all their sizes."""
+    if len(effects) == 1:
+        return effects[0]
+    total = np.sum([each.coefficients for each in effects], axis=0)
+    spread = np.hypot.reduce([each.relative_std * float(np.linalg.norm(each.coefficients)) for each in effects])
+    relative = float(spread) / max(float(np.linalg.norm(total)), 1e-300)
+    return replace(effects[0], coefficients=tuple(total.tolist()), relative_std=relative, posterior=None)
 
 
 def corrected_problem(problem: Problem, stated: Sequence[Stated]) -> Problem:
@@ -260,31 +278,39 @@ def stated_late_inputs(stated: Sequence[Stated], inputs: Sequence[str]) -> dict[
 def with_changes(problem: Problem, candidates: Sequence[Candidate], stated: Sequence[Stated]) -> tuple[Candidate, ...]:
     """Return the candidates, with a change of each stated effect in the place of the effect itself.
 
-    Where an effect is on some wheels alone, it is still looked for on the others. One that had begun before this
-    recording acts as what it is `once_begun`, and may begin another time.
+    Where an effect is on some wheels alone, it is still looked for on the others; a delay in other columns. One that
+    had begun before this recording acts as what it is `once_begun`, and may begin another time.
     """
     measured = {name for k, name in enumerate(problem.recording.wheels) if problem.mask[:, k].any()}
-    covered, changes = set(), []
+    covered: dict[str, list[Shape]] = {}
+    changes = []
     for place, each in enumerate(stated):
         acts_as: Candidate | None = each.candidate
         if is_later(problem, each.contribution.found_in):
             acts_as = next((other for other in candidates if other.name == each.candidate.once_begun), None)
         if acts_as and measured <= set(each.contribution.wheels):
-            covered.add(acts_as.name)
+            covered.setdefault(acts_as.name, []).append(each.contribution.shape)
         changes.append(ChangedSize(each, place, acts_as))
-    return (*(candidate for candidate in candidates if candidate.name not in covered), *changes)
+    beside = [each.beside(covered[each.name]) if each.name in covered else each for each in candidates]
+    return (*(candidate for candidate in beside if candidate is not None), *changes)
 
 
-def contribution_of_change(change: ChangedSize, relative_change: float) -> Contribution:
-    """Return what a corrected simulation has to add for the change."""
+def contribution_of_change(change: ChangedSize, relative_change: float, wheels: Wheels) -> Contribution:
+    """Return what a corrected simulation has to add for the change, on those of these wheels that have the effect."""
     of = change.stated.contribution
+    if all(each.sign for each in change.stated.candidate.coefficients):
+        relative_change = max(relative_change, -1.0)  # what has one sign alone is nothing at least
     coefficients = tuple(relative_change * value for value in of.coefficients)
-    return replace(of, coefficients=coefficients, relative_std=0.0, posterior=None)
+    changed = _both(of.wheels, wheels)
+    return replace(of, coefficients=coefficients, wheels=changed, relative_std=0.0, posterior=None)
 
 
-def changes_of(change: ChangedSize, parameters: Mapping[str, Parameter], problem: Problem) -> tuple[Change, ...]:
-    """Return, for each coefficient of the effect, what was corrected and what it is now."""
+def changes_of(
+    change: ChangedSize, parameters: Mapping[str, Parameter], problem: Problem, wheels: Wheels
+) -> tuple[Change, ...]:
+    """Return, for each coefficient of the effect, what was corrected and what it is now, on wheels where it changed."""
     of, candidate = change.stated.contribution, change.stated.candidate
+    changed = _both(of.wheels, wheels)
     relative, simulation = parameters[RELATIVE_CHANGE], problem.simulation
     named = candidate.parameters(of.shape, list(of.coefficients))
     found = []
@@ -292,21 +318,29 @@ def changes_of(change: ChangedSize, parameters: Mapping[str, Parameter], problem
         if coefficient.name not in named:
             continue
         value = named[coefficient.name]
-        low, high = sorted((value * (1 + relative.low), value * (1 + relative.high)))
+        now, *ends = (value * (1 + each) for each in (relative.value, relative.low, relative.high))
+        if coefficient.sign:  # what has one sign alone is nothing at least
+            now, *ends = (max(each * coefficient.sign, 0.0) * coefficient.sign for each in (now, *ends))
+        low, high = sorted(ends)
         told = Change(
             name=of.name,
             parameter=coefficient.name,
             corrected=value,
-            now=value * (1 + relative.value),
+            now=now,
             low=low,
             high=high,
             unit=in_units(coefficient.unit, simulation.unit, problem.labels),
             channel=simulation.channel,
-            wheels=of.wheels,
+            wheels=changed,
         )
-        where = on_wheels(of.wheels, len(problem.recording.wheels), simulation.wheel_column)
+        where = on_wheels(changed, len(problem.recording.wheels), simulation.wheel_column)
         found.append(replace(told, statement=change_in_words(told, where)))
     return tuple(found)
+
+
+def _both(one: Wheels, other: Wheels) -> Wheels:
+    """Return the wheels that are in both."""
+    return tuple(wheel for wheel in one if wheel in other)
 
 
 def direction_of(change: Change) -> Literal["gone", "larger", "smaller"]:

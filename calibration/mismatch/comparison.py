@@ -271,16 +271,18 @@ def _searched_beside_delays(
     for _ in range(LATE_SEARCHES if decision.has_delay else 0):
         noise_size = decision.equations.problem.noise_size
         posed = pose(values, decision.late_inputs)
-        problem = replace(posed, late=decision.late, noise_size=noise_size)
+        problem = replace(posed, late=decision.late or posed.late, noise_size=noise_size)
         if decision.is_late_alone:
-            values, late = fitted_where_late(problem, posed.late[1] if posed.late else 0.0)
-            problem = replace(pose(values, decision.late_inputs), late=late, noise_size=noise_size)
+            fitted = fitted_where_late(problem, decision.late_inputs, posed.late[1] if posed.late else 0.0)
+            values = fitted.values
+            problem = replace(pose(values, fitted.inputs), late=fitted.channel, noise_size=noise_size)
         again = _search_at(smooth_equations(problem), found.candidates, progress)
         if not again.decision.has_delay:
             break
         found, decision = again, again.decision
         values = moved_values(decision.equations, decision.whole)
-        if not late_otherwise(problem, values) and put_on_time_by(problem, decision.late_inputs):
+        agrees = put_on_time_by(problem, decision.late_inputs, decision.late)
+        if agrees and not late_otherwise(problem, values):
             break
     return found
 

@@ -1,4 +1,4 @@
-"""The parameters and the delay of the predicted channel, fitted together by the simulation itself.
+"""The parameters and the delays of the predicted channel and of inputs, fitted together by the simulation itself.
 
 Parameters that are fitted without a delay stand for a part of it: a longer time constant is late as well.
 """
@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.calibration.search import Search
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay, as_shown
 from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.problem.delayed import shifted
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from regolithd.calibration.mismatch.problem.problem import Problem
 
@@ -26,28 +27,55 @@ ITERATIONS = 8
 """Steps of a search at most (a choice: it begins near, and each costs a run of the simulation for each parameter)."""
 
 
-def fitted_where_late(problem: Problem, corrected_s: float) -> tuple[dict[str, float], tuple[str, float]]:
-    """Return the parameters' values and the delay with which the simulation fits best, the predicted channel late.
+@dataclass(frozen=True, eq=False)
+class Late:
+    """Where the simulation fits best with late columns.
 
-    The search begins at the problem's values and delay: those that were fitted without it stand for a part of it. It
-    goes to no delay, and to twice the delay or the delay and that which the simulation was corrected by, `corrected_s`.
+    Attributes
+    ----------
+    values: of the parameters
+    channel: how, and by how much [s], the predicted channel is late
+    inputs: how late inputs are [s], by name
+    """
+
+    values: dict[str, float]
+    channel: tuple[str, float]
+    inputs: dict[str, float]
+
+
+def fitted_where_late(problem: Problem, inputs: Iterable[str], corrected_s: float) -> Late:
+    """Return the parameters' values and the delays with which the simulation fits best, the predicted channel late.
+
+    `inputs` are those of which the delays are fitted with it; the problem has them on time.
+
+    The search begins at the problem's values and delays: those that were fitted without them stand for a part of it.
+    The channel's goes to none, and to its double or that and the one that the simulation was corrected by,
+    `corrected_s`.
     """
     assert problem.late is not None  # noqa: S101  # a search of late problems alone
-    search = replace(_LateSearch.of(problem), unit_s=max(problem.late[1], corrected_s))
+    search = replace(_LateSearch.of(problem), inputs=tuple(inputs), unit_s=max(problem.late[1], corrected_s))
     with np.errstate(all="ignore"):  # a prediction may overflow on the way
         _, place = search.minimum(search.place(problem.values), ITERATIONS)
-    return search.values(place), search.late(place)
+    return Late(search.values(place), search.late(place), search.late_inputs(place))
 
 
 @dataclass(frozen=True, eq=False)
 class _LateSearch(Search):
-    """The search of a problem whose predicted channel is late; the first coordinate is the delay's change over a unit.
+    """The search of a problem whose predicted channel is late.
 
-    The delay has no prior: what the prior of a coordinate adds to the objective is 1 at most, a unit away. It is the
-    first to be changed for a difference quotient, for which the prediction that was made last is shown later.
+    The first coordinate is the change of the channel's delay over a unit, the next are those of `inputs` over theirs.
+    Delays have no prior: what the prior of a coordinate adds to the objective is 1 at most, a unit
+    away. The channel's is the first to be changed for a difference quotient, for which the prediction that was made
+    last is shown later.
     """
 
+    inputs: tuple[str, ...] = ()
     unit_s: float = 1.0
+
+    @property
+    def delays(self) -> int:
+        """How many coordinates are delays."""
+        return 1 + len(self.inputs)
 
     def late(self, place: Array) -> tuple[str, float]:
         """Return how, and by how much, the channel is late at a place."""
@@ -55,18 +83,23 @@ class _LateSearch(Search):
         kind, delay = self.problem.late
         return kind, max(delay + self.unit_s * float(place[0]), 0.0)
 
+    def late_inputs(self, place: Array) -> dict[str, float]:
+        """Return how late the inputs are at a place."""
+        changes = zip(self.inputs, place[1 : self.delays].tolist(), strict=True)
+        return {name: self.problem.on_time[name] * (1 + change) for name, change in changes}
+
     def values(self, place: Array) -> dict[str, float]:
         """Return the parameters' values at a place."""
-        return super().values(place[1:])
+        return super().values(place[self.delays :])
 
     def place(self, values: Mapping[str, float]) -> Array:
-        """Return the place of the parameters' values with the delay of the problem."""
-        return np.concatenate(([0.0], super().place(values)))
+        """Return the place of the parameters' values with the delays of the problem."""
+        return np.concatenate((np.zeros(self.delays), super().place(values)))
 
     def within(self, place: Array) -> Array:
-        """Return a place as far as the parameters may be moved, and the delay to nothing or a unit more."""
+        """Return a place as far as the parameters may be moved, and each delay to nothing or a unit more."""
         found = super().within(place)
-        found[0] = np.clip(place[0], -1.0, 1.0)  # `late` holds it at nothing
+        found[: self.delays] = np.clip(place[: self.delays], -1.0, 1.0)  # `late` holds it at nothing
         return found
 
     def left(self, place: Array) -> Array:
@@ -74,11 +107,23 @@ class _LateSearch(Search):
 
         A delay that the simulation was corrected by is not added to it: it is the one that is sought.
         """
-        problem, values = replace(self.problem, late=self.late(place)), self.values(place)
+        values, inputs = self.values(place), self.late_inputs(place)
+        problem = replace(self.problem, late=self.late(place))
         try:
-            on_time = self.problem.lately(f"on time {values}", lambda: problem.changed(**values) - problem.added)
+            on_time = self.problem.lately(f"on time {values} {inputs}", lambda: self._on_time(values, inputs))
             (shown,) = as_shown(problem, [on_time])
         except SimulationError:
             return np.full(len(self.wheel), np.nan)
         others = tuple(effect for effect in problem.stated if effect.name != SensorDelay.name)
         return np.asarray((problem.measured - shown - replace(problem, stated=others).added)[problem.mask])
+
+    def _on_time(self, values: Mapping[str, float], inputs: Mapping[str, float]) -> Array:
+        """Return the prediction without any delay, of inputs that are so late."""
+        problem, recording = self.problem, self.problem.recording
+        moved = {
+            name: shifted(recording, recording.channels[name], delay - problem.on_time[name])
+            for name, delay in inputs.items()
+            if delay != problem.on_time[name]
+        }
+        moved_problem = replace(problem, recording=recording.with_channels(**moved)) if moved else problem
+        return moved_problem.changed(**values) - problem.added

@@ -18,7 +18,7 @@ from regolithd.calibration.mismatch.calibration.step import Step, power
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.inference.statements import after_number
 from regolithd.calibration.mismatch.regression.equations import free_parameter_equations, smooth_equations
-from regolithd.calibration.mismatch.regression.nuisance import stated_name
+from regolithd.calibration.mismatch.regression.nuisance import stated_names
 from regolithd.calibration.mismatch.regression.residuals import contribution
 from regolithd.calibration.mismatch.selection.noise_estimation import fit_of_significant_terms
 
@@ -115,7 +115,7 @@ def beyond_their_doubt(equations: NormalEquations, fit: Fit) -> frozenset[str]:
     A change is looked for beside what the uncertainty allows, and would hardly be seen beside it.
     """
     nuisance, furthest = equations.nuisance, equations.thresholds.furthest_prior_stds
-    sizes = {stated_name(effect.name) for effect in equations.problem.stated}
+    sizes = set(stated_names(equations.problem))
     away = zip(nuisance.names, nuisance.prior_stds_away(fit), strict=True)
     return frozenset(name for name, stds in away if name in sizes and stds > furthest)
 
@@ -139,7 +139,14 @@ def late_otherwise(problem: Problem, values: Mapping[str, float]) -> bool:
     return power(then - now) > share**2 * power(now)
 
 
-def put_on_time_by(problem: Problem, late: Mapping[str, float]) -> bool:
-    """Return whether a problem has all these inputs on time that are late by so much [s]."""
+def put_on_time_by(problem: Problem, late: Mapping[str, float], channel: tuple[str, float] | None) -> bool:
+    """Return whether a problem has all these inputs on time that are late by so much [s].
+
+    Beside late inputs, the channel has to be as late as it was found to be, too: each delay is found beside the other.
+    """
     within = ON_TIME_WITHIN * problem.recording.step_s
+    if late and channel and problem.late:
+        (kind, delay), (found, now) = problem.late, channel
+        if kind != found or abs(now - delay) > within:
+            return False
     return all(abs(delay - problem.on_time.get(name, 0.0)) <= within for name, delay in late.items())

@@ -194,6 +194,15 @@ class Candidate:
         """Return the candidate in the form that it has for a simulation; by default it has only one."""
         return self
 
+    def beside(self, corrected: Sequence[Shape]) -> Candidate | None:  # noqa: ARG002  # subclasses look
+        """Return what is still looked for where the simulation was corrected by this effect on all wheels.
+
+        Parameters
+        ----------
+        corrected: the shapes that it has there; None comes back where only a change of these is left to look for
+        """
+        return None
+
     def words_for(self, shape: Shape) -> str:  # noqa: ARG002  # subclasses look
         """Return the words for one shape, where that says more (which channel is late); by default `words`."""
         return self.words

@@ -101,10 +101,10 @@ def _contributions(equations: NormalEquations, fit: Fit) -> tuple[Contribution, 
     named, changed = [], []
     for i, term in enumerate(fit.terms):
         coefficients = (fit.coefficients[fit.of_term(i)] / scale[list(term.group.columns)]).tolist()
+        wheels = wheel_names(equations.problem, term.wheels)
         if isinstance(term.group.candidate, ChangedSize):
-            changed.append(contribution_of_change(term.group.candidate, coefficients[0]))
+            changed.append(contribution_of_change(term.group.candidate, coefficients[0], wheels))
         else:
-            wheels = wheel_names(equations.problem, term.wheels)
             contribution = Contribution(term.name, term.group.shape, tuple(coefficients), wheels)
             begins = Candidate.change_point in term.group.shape
             named.append(replace(contribution, found_in=found_here(equations.problem)) if begins else contribution)

@@ -155,7 +155,8 @@ def named_effects(
     changes: list[Change] = []
     for index, (term, of_term) in enumerate(zip(named.terms, parameters, strict=True)):
         if isinstance(term.group.candidate, ChangedSize):
-            changes += changes_of(term.group.candidate, of_term, equations.problem)
+            wheels = wheel_names(equations.problem, term.wheels)
+            changes += changes_of(term.group.candidate, of_term, equations.problem, wheels)
         else:
             errors = held_out.without[index], held_out.with_it[index]
             effect = _effect(equations.problem, term, of_term, errors)

@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.inference.likelier_names import likelier_nam
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_candidate,
+    family_of,
     passes_entry_test,
 )
 from regolithd.calibration.mismatch.selection.cross_validation import squares_left, training_equations
@@ -83,7 +84,7 @@ def held_out_errors(
         before += squares_left(train, train.fit(()), fold)
         after += squares_left(train, train.fit(chosen), fold)
         for index, term in enumerate(named.terms):
-            rest = tuple(other for other in chosen if other.name != term.name)
+            rest = tuple(other for other in chosen if other.group.subject != term.group.subject)
             without[index] += squares_left(train, without_term(train, term, rest), fold)
     counts = equations.design.counts.sum(axis=0)
     on = [list(term.wheels) for term in named.terms]
@@ -118,7 +119,7 @@ def _or_as_named(
     """
     terms: tuple[Term, ...] = ()
     for one in named.terms:
-        family = [group for group in groups if group.named and group.law == one.group.law]
+        family = family_of(one, [other for other in named.terms if other is not one], groups)
         found = [(gain, term) for gain, term in train.further(terms, family) if term.wheels == one.wheels]
         if not found:
             return train, chosen

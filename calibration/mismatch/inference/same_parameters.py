@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.changes import ChangedSize
 from regolithd.calibration.mismatch.inference.alternatives import Alternative
 from regolithd.calibration.mismatch.inference.statements import after_number, listed
-from regolithd.calibration.mismatch.regression.nuisance import EXACT, stated_name
+from regolithd.calibration.mismatch.regression.nuisance import EXACT, stated_names
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
 from regolithd.calibration.mismatch.selection.decision import answer_names
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
@@ -31,7 +31,6 @@ from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from regolithd.calibration.mismatch.problem.problem import StatedEffect
     from regolithd.calibration.mismatch.regression.group import Group, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.selection.decision import Decision
@@ -40,8 +39,8 @@ Array = NDArray[np.float64]
 
 SINGULAR = 1e-12
 """Relative eigenvalue below which a direction counts as undetermined (double precision)."""
-TOLD_STDS = 1.0
-"""Standard deviations of what was known of a parameter, beyond which its move is told (a choice: less is chance)."""
+TOLD_SHARE = 0.5
+"""Share of the furthest move, in standard deviations of what was known, beyond which another is told too (a choice)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +108,7 @@ def _weighed(decision: Decision) -> Iterator[_Weighed]:
     for place, effect in enumerate(equations.problem.stated):
         change = tuple(group for group in equations.design.groups if _place(group) == place)
         if place not in changed and change and effect.posterior is not None:
-            weighed = _weigh(equations, decision.whole.terms, effect, change)
+            weighed = _weigh(equations, decision.whole.terms, place, change)
             if weighed is not None and not _leaves_its_prior(decision, weighed):
                 yield weighed
 
@@ -120,11 +119,11 @@ def _place(group: Group) -> int | None:
 
 
 def _weigh(
-    equations: NormalEquations, terms: tuple[Term, ...], effect: StatedEffect, change: tuple[Group, ...]
+    equations: NormalEquations, terms: tuple[Term, ...], place: int, change: tuple[Group, ...]
 ) -> _Weighed | None:
-    """Return how the three explanations of one effect compare beside all that was found."""
-    problem, nuisance, posterior = equations.problem, equations.nuisance, effect.posterior
-    size = stated_name(effect.name)
+    """Return how the three explanations of the effect in one place compare beside all that was found."""
+    problem, nuisance, effect = equations.problem, equations.nuisance, equations.problem.stated[place]
+    posterior, size = effect.posterior, stated_names(problem)[place]
     assert posterior is not None  # noqa: S101  # only such effects come here
     kept = [k for k, name in enumerate(posterior.parameters) if name in nuisance.names]
     if not kept or size not in nuisance.names:
@@ -227,15 +226,16 @@ def _with_notes_on_rivals(decision: Decision, found: list[_Weighed]) -> Decision
 
 
 def _moved_in_words(decision: Decision, weighed: _Weighed) -> str:
-    """Return where `moved` has the parameters that go further than they were known, and where they were."""
-    problem, nuisance = decision.equations.problem, decision.equations.nuisance
-    stds = np.sqrt(np.diag(weighed.covariance))[:-1]
-    away = np.abs(weighed.moved - weighed.mean)[:-1] / stds
+    """Return where `moved` has the parameters that go furthest from where they were, beside a size as it has it."""
+    problem, nuisance, covariance = decision.equations.problem, decision.equations.nuisance, weighed.covariance
+    follows = covariance[:-1, -1] / covariance[-1, -1]
+    was = weighed.mean[:-1] + follows * (weighed.moved[-1] - weighed.mean[-1])
+    stds = np.sqrt(np.maximum(np.diag(covariance)[:-1] - follows * covariance[:-1, -1], 1e-300))
+    away = np.abs(weighed.moved[:-1] - was) / stds
     told: list[str] = []
     for k in np.argsort(-away):
         name = nuisance.names[weighed.places[k]]
         prior, at = problem.simulation.parameters[name], problem.values[name]
-        if away[k] > TOLD_STDS or not told:
-            was, now = at + weighed.mean[k], at + weighed.moved[k]
-            told.append(f"{name} = {now:.4g}{after_number(prior.unit)} instead of {was:.4g}")
+        if away[k] > TOLD_SHARE * away.max():
+            told.append(f"{name} = {at + weighed.moved[k]:.4g}{after_number(prior.unit)} instead of {at + was[k]:.4g}")
     return listed(told)

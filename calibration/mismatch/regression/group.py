@@ -61,6 +61,11 @@ class Group:
         return self.candidate is not None and self.candidate.stated_size > 0
 
     @property
+    def subject(self) -> tuple[str, object]:
+        """What a wheel has once: an effect, and of delays the column that is late."""
+        return self.name, self.shape.get("late")
+
+    @property
     def law(self) -> tuple[str, bool]:
         """What tells candidates apart: a change of a corrected effect has the name of the effect itself."""
         return self.name, self.is_change

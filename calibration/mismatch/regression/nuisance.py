@@ -117,7 +117,7 @@ def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:
     # The coefficient of a column that was divided by its scale is the parameter's shift times that scale.
     precision = 1 / (np.array(stds) * design.scale[list(places)]) ** 2 if places else np.zeros(0)
     centre = away * design.scale[list(places)] if places else np.zeros(0)
-    about = tuple(stated_name(effect.name) for effect in design.problem.stated)
+    about = stated_names(design.problem)
     stated = frozenset(name for name in names if name.startswith(about))
     return design, Nuisance(tuple(names), places, precision, centre, stated)
 
@@ -140,8 +140,7 @@ def tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
             names += [own_name(name, wheel) for wheel in wheels]
             stds += [problem.thresholds.own_share * free[name]] * len(wheels)
             found += [np.where(np.array(wheels) == wheel, of_parameter[name], 0.0) for wheel in wheels]
-    for effect in problem.stated:
-        about = stated_name(effect.name)
+    for effect, about in zip(problem.stated, stated_names(problem), strict=True):
         if effect.relative_std > 0 and about not in problem.held:
             names, stds, found = [*names, about], [*stds, effect.relative_std], [*found, effect.column]
         names += [f"{about}, {number}" for number in range(1, len(effect.deviations) + 1)]
@@ -150,6 +149,13 @@ def tangents(problem: Problem) -> tuple[list[str], list[float], list[Array]]:
     return names, stds, found
 
 
-def stated_name(effect: str) -> str:
-    """Return the nuisance parameter's name of the relative size of an effect that the simulation was corrected by."""
-    return f"{effect} as corrected"
+def stated_names(problem: Problem) -> tuple[str, ...]:
+    """Return the nuisance parameters' names of the relative sizes of effects that the simulation was corrected by.
+
+    Effects of one name, on other wheels or of other columns that are late, are numbered.
+    """
+    names = [effect.name for effect in problem.stated]
+    return tuple(
+        f"{name} as corrected" + (f" ({place + 1})" if names.count(name) > 1 else "")
+        for place, name in enumerate(names)
+    )

@@ -22,8 +22,8 @@ def full_penalty(term: Term, wheel_count: int, thresholds: Thresholds) -> float:
     group, acting = term.group, term.group.acting
     count = len(group.columns) if acting is None else np.sum(acting[:, list(term.wheels)].any(axis=1))
     total = thresholds.coefficient_penalty * float(count) + group.selection_penalty
-    # Where a corrected effect is, was known before: the wheels of its change were not chosen.
-    if len(term.wheels) < wheel_count and not group.is_change:
+    # Where a corrected effect is on one wheel, that was known before: the wheel of its change was not chosen.
+    if len(term.wheels) < wheel_count and not (group.is_change and "all" not in group.sharing):
         total += 2 * log(2 * wheel_count)
         # One wheel alone is the rule for some faults and the exception for what all wheels are built with.
         total += thresholds.single_wheel_penalty if "all" in group.sharing else 0.0

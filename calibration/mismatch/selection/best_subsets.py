@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.regression.gains import Gains
-    from regolithd.calibration.mismatch.regression.group import Fit, Term
+    from regolithd.calibration.mismatch.regression.group import Fit, Group, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 Scored = tuple[float, "Term"]
@@ -33,7 +33,7 @@ def best_of_each_candidate(equations: NormalEquations, given: Sequence[Term]) ->
     alone = [_one_wheel_shows_alone(equations, gains, place) for place in range(len(gains.groups))]
     refused = np.outer(several, np.array(alone, np.bool_))
     for term in given:
-        same = np.array([group.name == term.name for group in gains.groups], np.bool_)
+        same = np.array([group.subject == term.group.subject for group in gains.groups], np.bool_)
         refused |= np.outer([not set(wheels).isdisjoint(term.wheels) for wheels in gains.sets], same)
     return _best_of_each(equations, gains.where(~refused).families(lambda group: group.law))
 
@@ -149,11 +149,17 @@ def optimised_shapes(equations: NormalEquations, terms: Sequence[Term]) -> tuple
     for _ in range(2 if len(terms) > 1 else 1):
         for index, term in enumerate(terms):
             others = terms[:index] + terms[index + 1 :]
-            family = [group for group in equations.design.groups if group.named and group.law == term.group.law]
+            family = family_of(term, others, equations.design.groups)
             found = [(gain, t) for gain, t in equations.further(others, family) if t.wheels == term.wheels]
             best = _largest_of_worthwhile_kind(equations, others, found) if found else term
             equations, terms[index] = optimised_shape(equations, others, best)
     return equations, tuple(terms)
+
+
+def family_of(term: Term, others: Sequence[Term], groups: Sequence[Group]) -> list[Group]:
+    """Return the groups of a term's law in other shapes; of delays not those of a column that is late already."""
+    taken = {other.group.subject for other in others}
+    return [group for group in groups if group.named and group.law == term.group.law and group.subject not in taken]
 
 
 def _largest_of_worthwhile_kind(equations: NormalEquations, others: Sequence[Term], found: Sequence[Scored]) -> Term:
@@ -174,23 +180,25 @@ def best_subsets(equations: NormalEquations) -> tuple[NormalEquations, list[Fit]
     limits, none = equations.thresholds, equations.fit(())
     first = best_of_each_candidate(equations, ())[: limits.polished_singles]
     equations, singles = _best_optimised(equations, [(term,) for _, term in first])
-    if not singles:
+    # Of two columns that are late, one alone may fit badly where the simulation is linearised with both on time.
+    late = [] if equations.problem.late is None else [term for _, term in first if term.settled_in(equations.problem)]
+    if not (singles or late):
         return equations, [none]
     rest = best_of_each_candidate(equations, ())[limits.polished_singles :]
-    seeds = [fit.terms[0] for fit in singles] + [term for score, term in rest if score > 0]
+    seeds = [fit.terms[0] for fit in singles] + [term for score, term in rest if score > 0] + late
     pairs = [
         (seed, term) for seed in seeds for _, term in best_of_each_candidate(equations, (seed,))[: limits.pair_breadth]
     ]
     equations, best_pairs = _best_optimised(equations, _distinct(equations, pairs)[: limits.polished_pairs])
     if not best_pairs:
-        return equations, [none, singles[0]]
+        return equations, [none, *singles[:1]]
     triples = [
         (*fit.terms, term)
         for fit in best_pairs[: limits.triple_breadth]
         for _, term in best_of_each_candidate(equations, fit.terms)[: limits.triple_breadth]
     ]
     equations, best_triples = _best_optimised(equations, _distinct(equations, triples)[:1])
-    return equations, [none, singles[0], best_pairs[0], *best_triples[:1]]
+    return equations, [none, *singles[:1], best_pairs[0], *best_triples[:1]]
 
 
 def _distinct(equations: NormalEquations, sets: Sequence[tuple[Term, ...]]) -> list[tuple[Term, ...]]:

@@ -111,8 +111,8 @@ class Decision:
 
     @property
     def is_late_alone(self) -> bool:
-        """Whether the predicted channel is late, and nothing else was found."""
-        return self.late is not None and len(self.whole.terms) == 1
+        """Whether the predicted channel is late, and nothing else was found but late inputs."""
+        return self.late is not None and all(term.name == SensorDelay.name for term in self.whole.terms)
 
     @property
     def has_delay(self) -> bool:
