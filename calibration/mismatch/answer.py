@@ -198,7 +198,7 @@ class Change:
     Attributes
     ----------
     parameter, unit: the coefficient that `corrected` and `now` are values of
-    channel, wheels: where the effect acts
+    channel, wheels: where it changed
     statement: the change in one sentence
     """
 
