@@ -6,6 +6,7 @@ Parameters that are fitted without a delay stand for a part of it: a longer time
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -64,9 +65,8 @@ class _LateSearch(Search):
     """The search of a problem whose predicted channel is late.
 
     The first coordinate is the change of the channel's delay over a unit, the next are those of `inputs` over theirs.
-    Delays have no prior: what the prior of a coordinate adds to the objective is 1 at most, a unit
-    away. The channel's is the first to be changed for a difference quotient, for which the prediction that was made
-    last is shown later.
+    Delays have no prior: what the prior of a coordinate adds to the objective is 1 at most, a unit away. The channel's
+    is the first to be changed for a difference quotient, for which the prediction that was made last is shown later.
     """
 
     inputs: tuple[str, ...] = ()
@@ -114,8 +114,13 @@ class _LateSearch(Search):
             (shown,) = as_shown(problem, [on_time])
         except SimulationError:
             return np.full(len(self.wheel), np.nan)
-        others = tuple(effect for effect in problem.stated if effect.name != SensorDelay.name)
-        return np.asarray((problem.measured - shown - replace(problem, stated=others).added)[problem.mask])
+        return np.asarray((problem.measured - shown - self.added_by_others)[problem.mask])
+
+    @cached_property
+    def added_by_others(self) -> Array:
+        """What corrected effects other than delays add on the output, shape (time, wheel)."""
+        others = tuple(effect for effect in self.problem.stated if effect.name != SensorDelay.name)
+        return replace(self.problem, stated=others).added
 
     def _on_time(self, values: Mapping[str, float], inputs: Mapping[str, float]) -> Array:
         """Return the prediction without any delay, of inputs that are so late."""

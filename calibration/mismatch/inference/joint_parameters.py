@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import CalibratedParameter
-from regolithd.calibration.mismatch.inference.parameter_information import parameter_information
+from regolithd.calibration.mismatch.inference.parameter_information import SINGULAR, parameter_information
 from regolithd.calibration.mismatch.regression.nuisance import beyond_prior_predictive
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
 from regolithd.calibration.mismatch.selection.released_parameters import price_of_wrong_statement
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 Array = NDArray[np.float64]
-
-SINGULAR = 1e-12
-"""Relative eigenvalue below which a direction counts as undetermined (double precision; the priors are in the sum)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.changes import ChangedSize
 from regolithd.calibration.mismatch.inference.alternatives import Alternative
+from regolithd.calibration.mismatch.inference.parameter_information import SINGULAR
 from regolithd.calibration.mismatch.inference.statements import after_number, listed
 from regolithd.calibration.mismatch.regression.nuisance import EXACT, stated_names
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
@@ -37,8 +38,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SINGULAR = 1e-12
-"""Relative eigenvalue below which a direction counts as undetermined (double precision)."""
 TOLD_SHARE = 0.5
 """Share of the furthest move, in standard deviations of what was known, beyond which another is told too (a choice)."""
 
