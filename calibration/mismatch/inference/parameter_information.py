@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.inference.intervals import drawn_from
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.lasting_errors import covariance_of_scores
-from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
+from regolithd.calibration.mismatch.regression.normal_equations import information_of_some
+from regolithd.calibration.mismatch.regression.schur import pseudo_inverse
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,21 +58,10 @@ def parameter_information(decision: Decision, drawn: Drawn | None, kept: Sequenc
     equations, fit = decision.equations, decision.whole
     if drawn is None or decision.unnamed:
         return equations.information(fit.terms, kept)
-    nuisance, matrix = equations.nuisance, _matrix(decision, drawn)
-    own, rest = np.array(kept, np.int64), np.setdiff1d(np.arange(len(matrix)), kept)
-    cross = matrix[np.ix_(rest, own)]
-    inverse = pseudo_inverse(matrix[np.ix_(rest, rest)], SINGULAR)
-    with_priors = schur_complement(matrix[np.ix_(own, own)], cross, inverse)
-    precision = nuisance.precision[own]
-    left = with_priors - np.diag(precision)
-    # The fit is the optimum of readings and priors, the shapes included.
-    vector = with_priors @ fit.coefficients[own] - precision * nuisance.centre[own]
-    errors = drawn.sandwich.errors
-    if not len(errors):
-        return left, vector
-    added = covariance_of_scores(errors[:, own] - errors[:, rest] @ inverse @ cross)
-    share = left @ pseudo_inverse(left + added, SINGULAR)
-    return share @ left, share @ vector
+    matrix = _matrix(decision, drawn)
+    # The fit is the optimum of readings and priors, the shapes included: these do not move.
+    moment = matrix[:, : len(fit.columns)] @ fit.coefficients
+    return information_of_some(matrix, moment, drawn.sandwich.errors, equations.nuisance, kept, SINGULAR)
 
 
 def _matrix(decision: Decision, drawn: Drawn) -> Array:

@@ -156,21 +156,9 @@ class NormalEquations:
         the covariance M + V, where errors of the inputs that last add V: what it knows is M (M + V)⁻¹ M.
         """
         columns = self._columns(tuple(terms))
-        matrix, moment = self._normal(columns)
-        own, rest = np.array(kept, np.int64), np.setdiff1d(np.arange(len(matrix)), kept)
-        precision = self.nuisance.precision[own]
-        matrix[own, own] -= precision
-        moment[own] -= precision * self.nuisance.centre[own]
-        cross = matrix[np.ix_(rest, own)]
-        inverse = pseudo_inverse(matrix[np.ix_(rest, rest)], SINGULAR)
-        left = schur_complement(matrix[np.ix_(own, own)], cross, inverse)
-        vector = moment[own] - cross.T @ inverse @ moment[rest]
-        if not has_lasting_errors(self.problem):
-            return left, vector
-        errors = self.moments_of_errors(columns)
-        added = covariance_of_scores(errors[:, own] - errors[:, rest] @ inverse @ cross)
-        share = left @ pseudo_inverse(left + added, SINGULAR)
-        return share @ left, share @ vector
+        return information_of_some(
+            *self._normal(columns), self.moments_of_errors(columns), self.nuisance, kept, SINGULAR
+        )
 
     def moments_of_errors(self, columns: Columns) -> Array:
         """Return the moments of a fit's columns with draws of errors that last, shape (draw, column)."""
@@ -314,6 +302,32 @@ def normal_equations(
 ) -> NormalEquations:
     """Return the equations on some folds; on all of them where none are given."""
     return NormalEquations(design, nuisance, weights, tuple(range(design.folds) if folds is None else folds))
+
+
+def information_of_some(
+    matrix: Array, moment: Array, errors: Array, nuisance: Nuisance, kept: Sequence[int], singular: float
+) -> tuple[Array, Array]:
+    """Return the information matrix and vector of some free parameters beside all other columns, without their priors.
+
+    Parameters
+    ----------
+    matrix, moment: of the normal equations, the priors included; the free parameters are the first columns
+    errors: moments of the columns with draws of the inputs' errors that last, shape (draw, column)
+    nuisance: the priors
+    kept: places of the parameters
+    singular: relative eigenvalue below which a direction counts as undetermined
+    """
+    own, rest = np.array(kept, np.int64), np.setdiff1d(np.arange(len(matrix)), kept)
+    precision = nuisance.precision[own]
+    cross = matrix[np.ix_(rest, own)]
+    inverse = pseudo_inverse(matrix[np.ix_(rest, rest)], singular)
+    left = schur_complement(matrix[np.ix_(own, own)] - np.diag(precision), cross, inverse)
+    vector = moment[own] - precision * nuisance.centre[own] - cross.T @ inverse @ moment[rest]
+    if not len(errors):
+        return left, vector
+    added = covariance_of_scores(errors[:, own] - errors[:, rest] @ inverse @ cross)
+    share = left @ pseudo_inverse(left + added, singular)
+    return share @ left, share @ vector
 
 
 def membership(columns: Columns, wheel_count: int) -> Array:
