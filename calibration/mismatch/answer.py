@@ -15,9 +15,9 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.candidates.candidate import Candidate
+    from regolithd.calibration.mismatch.contribution import Contribution
     from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve, StatedCurve
-    from regolithd.calibration.mismatch.problem.onset_clock import FoundIn
     from regolithd.calibration.mismatch.problem.problem import LeftOut, Problem
     from regolithd.calibration.mismatch.problem.size_posterior import SizePosterior
 
@@ -131,6 +131,7 @@ class Indistinguishable:
     Attributes
     ----------
     effects: names of the effects, and of parameters of the simulation
+    beside: those of them that would act beside the first, not in its place
     experiment: what to do, as text
     vary: the same for a program: the covariates to vary, each apart from the others
     duration_s: for how long in all
@@ -142,6 +143,12 @@ class Indistinguishable:
     vary: tuple[str, ...] = ()
     duration_s: float = 0.0
     lift: bool = False
+    beside: tuple[str, ...] = ()
+
+    @property
+    def alone(self) -> tuple[str, ...]:
+        """Names of those of which each explains the recording without the others."""
+        return tuple(name for name in self.effects if name not in self.beside)
 
 
 @dataclass(frozen=True)
@@ -285,33 +292,6 @@ def _plain(value: object) -> Any:  # noqa: ANN401  # JSON has no narrower type
     if isinstance(value, float | np.floating):
         return float(value) if np.isfinite(value) else None
     return value
-
-
-@dataclass(frozen=True)
-class Contribution:
-    """One effect's term in the corrected simulation: enough to add it to any recording.
-
-    Attributes
-    ----------
-    shape: the candidate's shape parameters
-    coefficients: one for each of its columns
-    wheels: the names of the wheels that have it
-    relative_std: relative standard deviation of its size
-    shape_std: standard deviations of shape parameters, by name
-    channel: the predicted channel that it acts on; empty where there is one alone
-    found_in: the recording whose clock its onset is on; None: each recording's own
-    posterior: of its size together with the simulation's parameters, from the recording in which it was found
-    """
-
-    name: str
-    shape: Shape
-    coefficients: tuple[float, ...]
-    wheels: tuple[int | str, ...]
-    relative_std: float = 0.0
-    channel: str = ""
-    shape_std: Mapping[str, float] = field(default_factory=dict)
-    found_in: FoundIn | None = None
-    posterior: SizePosterior | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import Change, Contribution
+from regolithd.calibration.mismatch.answer import Change
 from regolithd.calibration.mismatch.candidates.candidate import SHAPE_TOLERANCE, Candidate, Coefficient, Shape
 from regolithd.calibration.mismatch.candidates.motion import REVERSAL_KEYS
 from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of, late_inputs, lateness
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw
 from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
 from regolithd.calibration.mismatch.inference.statements import after_number, on_wheels

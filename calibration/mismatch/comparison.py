@@ -48,9 +48,9 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from regolithd.calibration.mismatch.answer import Contribution
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.changes import Stated
+    from regolithd.calibration.mismatch.contribution import Contribution
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Group

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from regolithd.calibration.mismatch.answer import Answer, Contribution, Effect, Evidence
+    from regolithd.calibration.mismatch.answer import Answer, Effect, Evidence
+    from regolithd.calibration.mismatch.contribution import Contribution
     from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 

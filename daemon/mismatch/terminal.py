@@ -104,7 +104,9 @@ def _interval(parameter: Parameter) -> str:
 def _not_distinguished(found: Indistinguishable, answer: Answer, labels: Labels) -> str:
     """Return a set of effects with its experiment; of one that has no finding in it, that nothing was found."""
     named = {effect.name for effect in answer.effects}
-    names = " or ".join(labels.if_changed(name, named, name) for name in found.effects)
+    names = " or ".join(labels.if_changed(name, named, name) for name in found.alone)
+    if found.beside:
+        names += f", or {found.alone[0]} with {' or '.join(found.beside)} beside it"
     if named.union(change.name for change in answer.changes).intersection(found.effects):
         return f"{names}: this recording does not distinguish them. {found.experiment}"
     return f"not found: {names}. If there were one, this recording would not tell which. {found.experiment}"

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch import Prior, compare, direction_of
-from regolithd.calibration.mismatch.answer import Contribution
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.data.recording import TIME_UNITS_S, read_recording
 from regolithd.calibration.mismatch.data.slow_channels import filled_between
 from regolithd.calibration.mismatch.simulation.checked import checked

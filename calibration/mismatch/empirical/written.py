@@ -14,7 +14,8 @@ from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.answer import Answer, Contribution, Evidence
+    from regolithd.calibration.mismatch.answer import Answer, Evidence
+    from regolithd.calibration.mismatch.contribution import Contribution
     from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve, StatedCurve
 
 

@@ -46,6 +46,7 @@ class Hypothesis:
     name: of the effect, or of the parameter as an effect
     term: the law; None: a parameter
     coefficients: of the law's columns as the candidate returns them
+    more, more_coefficients: a second law that acts beside it, and its coefficients; None: there is none
     place: of the parameter among the free ones
     shift: by how much it would have to be wrong
     """
@@ -53,8 +54,17 @@ class Hypothesis:
     name: str
     term: Term | None = None
     coefficients: tuple[float, ...] = ()
+    more: Term | None = None
+    more_coefficients: tuple[float, ...] = ()
     place: int | None = None
     shift: float = 0.0
+
+    def adds_to(self, other: Hypothesis) -> bool:
+        """Return whether this is the law of another answer with a second one beside it."""
+        alone = self.more is not None and other.more is None
+        return (
+            alone and self.term is not None and other.term is not None and self.term.group.law == other.term.group.law
+        )
 
 
 def of_effect(equations: NormalEquations, given: Sequence[Term], term: Term) -> Hypothesis:
@@ -69,6 +79,17 @@ def of_effect(equations: NormalEquations, given: Sequence[Term], term: Term) -> 
     factor = _at_least(equations, fit, index)
     columns = list(term.group.columns)
     return Hypothesis(term.name, term, tuple((factor * scaled / equations.design.scale[columns]).tolist()))
+
+
+def of_both(equations: NormalEquations, given: Sequence[Term], law: Term, more: Term) -> Hypothesis:
+    """Return the hypothesis that a law acts in this shape and `more` beside it, each as large as the recording says."""
+    fit = equations.fit((*(each for each in given if each is not law), law, more))
+    sizes = [
+        fit.coefficients[fit.of_term(len(fit.terms) - 2 + place)] / equations.design.scale[list(term.group.columns)]
+        for place, term in enumerate((law, more))
+    ]
+    of_law, of_more = (tuple(size.tolist()) for size in sizes)
+    return Hypothesis(f"{law.name} with {more.name}", law, of_law, more, of_more)
 
 
 def of_parameter(equations: NormalEquations, given: Sequence[Term], effect_name: str) -> Hypothesis | None:
@@ -123,7 +144,8 @@ class Expected:
     def margins(self, duration_s: float) -> dict[Pair, float]:
         """Return the Δχ² that is expected of such a duration between every two effects, or an effect and parameters.
 
-        It is the mean of the two cases, since nobody knows which of the two is true; 0 where the sums overflow.
+        It is the mean of the two cases, since nobody knows which of the two is true; 0 where the sums overflow. Where
+        one of them is the other with a second law, it is what that law would show: without it, both explain the same.
         """
         count = len(self.hypotheses)
         finite = bool(np.isfinite(self.gram).all() and np.isfinite(self.precision).all())
@@ -133,7 +155,15 @@ class Expected:
         effects = [place for place, one in enumerate(self.hypotheses) if one.term is not None]
         counted = effects if len(effects) > 1 else range(len(names))
         pairs = [(a, b) for a, b in combinations(counted, 2) if a in effects or b in effects]
-        return {(names[a], names[b]): 0.5 * float(left[a, b] + left[b, a]) for a, b in pairs}
+
+        def margin(a: int, b: int) -> float:
+            if self.hypotheses[a].adds_to(self.hypotheses[b]):
+                return float(left[b, a])
+            if self.hypotheses[b].adds_to(self.hypotheses[a]):
+                return float(left[a, b])
+            return 0.5 * float(left[a, b] + left[b, a])
+
+        return {(names[a], names[b]): margin(a, b) for a, b in pairs}
 
     def _left_by(self, other: int, duration_s: float) -> Array:
         """Return what an answer, in the best of its shapes, leaves of each one's prediction, shape (hypothesis,)."""
@@ -180,10 +210,14 @@ def expected_of(
             of_law.append(())
             predicted += _added(columns, [one.shift * drive.tangents[one.place or 0]])
             continue
-        shown = _columns(drive, one.term, one.term.group.shape)
-        predicted += _added(columns, [np.asarray(np.tensordot(one.coefficients, shown, 1), np.float64)])
+        shown = np.tensordot(one.coefficients, _columns(drive, one.term, one.term.group.shape), 1)
+        second: tuple[int, ...] = ()
+        if one.more is not None:
+            of_more = _columns(drive, one.more, one.more.group.shape)
+            shown, second = shown + np.tensordot(one.more_coefficients, of_more, 1), _added(columns, of_more)
+        predicted += _added(columns, [np.asarray(shown, np.float64)])
         shapes = _shapes(drive, one.term)
-        of_law.append(tuple(_added(columns, _columns(drive, one.term, shape)) for shape in shapes))
+        of_law.append(tuple((*_added(columns, _columns(drive, one.term, shape)), *second) for shape in shapes))
     known = drive.problem.mask
     weights = np.sqrt(information_per_s / np.maximum(known.sum(axis=0), 1))
     # Single precision of the recording's own columns is not needed here: there are few rows.

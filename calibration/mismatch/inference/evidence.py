@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import Contribution, Curve, EmpiricalFit, Evidence
+from regolithd.calibration.mismatch.answer import Curve, EmpiricalFit, Evidence
 from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.changes import ChangedSize, contribution_of_change
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
 from regolithd.calibration.mismatch.problem.onset_clock import found_here
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import sqrt
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.answer import Indistinguishable
 from regolithd.calibration.mismatch.experiments.drives import DIRECTION, SPEED
-from regolithd.calibration.mismatch.experiments.margins import of_effect, of_parameter, predictable
+from regolithd.calibration.mismatch.experiments.margins import of_both, of_effect, of_parameter, predictable
 from regolithd.calibration.mismatch.inference.statements import capital, listed
 from regolithd.calibration.mismatch.problem.words import in_words, label_of_column, unit_in_label, word_for
 from regolithd.calibration.mismatch.regression.as_read import long_run_weights
@@ -33,8 +34,24 @@ LIKELY_MARGIN = 6.0
 """Margin of evidence up to which another answer is held against a set of effects: odds of one in twenty (a choice)."""
 NEXT_TO_NOTHING = 1e-3
 """Share of the other end of a range below which an end is told as 0 (a choice: two digits are told)."""
+AS_GOOD_AS_REACHED = 0.05
+"""Share by which a margin may be short of what is needed (a choice: both are told in whole numbers)."""
 MOST_OTHERS = 4
 """Other answers that are held against a set (a choice: computing time)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Addition:
+    """An effect that may act beside a named one, which then has another shape and size.
+
+    Attributes
+    ----------
+    law: the named effect, as it is beside the other
+    more: the other
+    """
+
+    law: Term
+    more: Term
 
 
 def with_experiment(
@@ -43,19 +60,23 @@ def with_experiment(
     given: Sequence[Term],
     members: Sequence[Term],
     others: Sequence[Alternative] = (),
+    beside: Sequence[Addition] = (),
 ) -> Indistinguishable:
     """Return a set of effects with the experiment that tells its members, and other likely answers, apart.
+
+    `names` are those that may be true alone, `members` the effects among them; those of `beside` come after them.
 
     It is the predicted drive with the largest expected margin between the two closest of them. What follows from no
     drive (a fault that grows with time), and all where drives cannot be predicted, is told by its own experiment.
     """
     equations = experimenter.equations
     choice = experimenter.choose(
-        _hypotheses(names, experimenter.equations, given, members, others),
+        _hypotheses(names, experimenter.equations, given, members, others, beside),
         [term for term in given if predictable(term)],
     )
     if choice is None:
-        return _own_experiments(names, experimenter, given, members)
+        return _own_experiments(names, experimenter, given, members, beside)
+    members, names = _with_additions(members, names, beside)
     problem, unloaded = equations.problem, equations.problem.simulation.unloaded_experiment
     left = [member.group.candidate for member in members if not predictable(member)]
     apart = [candidate for candidate in left if candidate is not None]
@@ -69,6 +90,7 @@ def with_experiment(
     ranges = listed([range_in_words(problem, setting) for setting in choice.settings]) if choice.settings else ""
     return Indistinguishable(
         effects=names,
+        beside=tuple(addition.more.name for addition in beside),
         experiment=f"{capital(sentence)}; {in_all} in all{ranges and f' ({ranges})'}. {_expectation(choice)}",
         vary=tuple(dict.fromkeys((*choice.varied, *(name for each in apart for name in varied_by(each, problem))))),
         duration_s=duration_s,
@@ -82,9 +104,13 @@ def _hypotheses(
     given: Sequence[Term],
     members: Sequence[Term],
     others: Sequence[Alternative],
+    beside: Sequence[Addition],
 ) -> list[Hypothesis]:
-    """Return what may be true: the members, the parameters among the names, and other likely answers."""
+    """Return what may be true: the members, the parameters among the names, additions, and other likely answers."""
     found = {member.name: of_effect(equations, given, member) for member in members if predictable(member)}
+    for addition in beside:
+        if predictable(addition.law) and predictable(addition.more):
+            found[addition.more.name] = of_both(equations, given, addition.law, addition.more)
     effects = {member.name for member in members}
     parameters = [of_parameter(equations, given, name) for name in names if name not in effects]
     kept = {term.name for term in given}
@@ -146,18 +172,31 @@ def range_in_words(problem: Problem, setting: Setting) -> str:
 
 def _expectation(choice: Choice) -> str:
     """Return how well the closest pair is told apart."""
-    times = int(np.ceil(choice.needed / max(choice.margin, 1e-9)))
+    times = int(np.ceil(choice.needed / max(choice.margin, 1e-9) - AS_GOOD_AS_REACHED))
     told = f"{choice.needed:.0f} tells them apart nine times in ten" + (f": {times} times as long" if times > 1 else "")
     return f"Expected Δχ² between {listed(choice.pair)}, the closest two: {choice.margin:.0f} ({told})."
 
 
+def _with_additions(
+    members: Sequence[Term], names: tuple[str, ...], beside: Sequence[Addition]
+) -> tuple[list[Term], tuple[str, ...]]:
+    """Return all effects of a set, and all its names."""
+    more = [addition.more for addition in beside]
+    return [*members, *more], (*names, *(term.name for term in more))
+
+
 def _own_experiments(
-    names: tuple[str, ...], experimenter: Experimenter, given: Sequence[Term], members: Sequence[Term]
+    names: tuple[str, ...],
+    experimenter: Experimenter,
+    given: Sequence[Term],
+    members: Sequence[Term],
+    beside: Sequence[Addition],
 ) -> Indistinguishable:
     """Return a set with the experiments that its members' candidates state, where none can be predicted.
 
     Where the simulation's free parameters can imitate a member, a part without load is added: there they have no part.
     """
+    members, names = _with_additions(members, names, beside)
     equations = experimenter.equations
     problem = equations.problem
     candidates = [member.group.candidate for member in members if member.group.candidate is not None]
@@ -170,6 +209,7 @@ def _own_experiments(
     why = experimenter.unpredictable or "none of the experiments that can be simulated here does"
     return Indistinguishable(
         effects=names,
+        beside=tuple(addition.more.name for addition in beside),
         experiment=f"{capital(sentence)}; {in_all} in all. How well that tells them apart is not predicted: {why}.",
         vary=tuple(dict.fromkeys(name for candidate in candidates for name in varied_by(candidate, problem))),
         duration_s=duration_s,

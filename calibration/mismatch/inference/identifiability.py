@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.experiments.choice import experimenter_of
 from regolithd.calibration.mismatch.inference.collinearity import collinear_sets, parameters_like
-from regolithd.calibration.mismatch.inference.experiment import with_experiment
-from regolithd.calibration.mismatch.regression.candidate_groups import implausibility
+from regolithd.calibration.mismatch.inference.experiment import Addition, with_experiment
+from regolithd.calibration.mismatch.regression.candidate_groups import implausibility, with_candidate
+from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.residuals import relative_size
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Indistinguishable
     from regolithd.calibration.mismatch.experiments.choice import Experimenter
     from regolithd.calibration.mismatch.inference.alternatives import Alternative
-    from regolithd.calibration.mismatch.regression.group import Fit, Group, Term
+    from regolithd.calibration.mismatch.regression.group import Fit, Group
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 
@@ -51,10 +52,10 @@ def rivals(
         equations, members = _in_its_place(equations, named, index)
         taken = {member.name for member in (*named.terms, *members)}
         equations, additions = _takes_over(equations, named, index)
-        members += [more for more in additions if more.name not in taken]
+        beside = [addition for addition in additions if addition.more.name not in taken]
         names = (*(member.name for member in members), *parameters_like(equations, rest, members))
-        if len(names) > 1:
-            found.append(with_experiment(names, experimenter.on(equations), rest, members, others))
+        if len(names) + len(beside) > 1:
+            found.append(with_experiment(names, experimenter.on(equations), rest, members, others, beside))
     return equations, tuple(found)
 
 
@@ -106,25 +107,49 @@ def _gains_as_much(equations: NormalEquations, named: Fit, rival: Fit, index: in
     return apart <= 1e-9 or wrong_choice_rate(behind, apart) > limits.confusion_rate
 
 
-def _takes_over(equations: NormalEquations, named: Fit, index: int) -> tuple[NormalEquations, list[Term]]:
+def _takes_over(equations: NormalEquations, named: Fit, index: int) -> tuple[NormalEquations, list[Addition]]:
     """Return the effects that may be there as well: beside them the named one is smaller, and the fit as good.
 
-    A law with a free shape can stand for two: drag that falls with temperature holds a drag that does not.
+    A law with a free shape can stand for two: drag that falls with temperature holds a drag that does not. Beside the
+    other effect it may have another shape, from which no gain leads to the one that was fitted: each of the grid's
+    values is tried too.
     """
-    limits, found = equations.thresholds, []
-    before = relative_size(equations, named, index)
-    scored = best_of_each_candidate(equations, named.terms)
-    likely = [more for _, more in scored if more.group.own_channel is None]
-    for more in likely[: limits.additions_tried]:
-        equations, terms = optimised_shapes(equations, (*named.terms, more))
-        fit = equations.fit(terms)
-        if not acceptable(equations, fit) or equations.score(fit) < equations.score(named) - limits.lead_margin:
-            continue
-        left, taken = relative_size(equations, fit, index), relative_size(equations, fit, len(named.terms))
-        least = limits.taken_over_share * before
-        if before - left > least and taken > least:
-            found.append(fit.terms[-1])
-    return equations, found
+    limits, others = equations.thresholds, named.without(index)
+    before, best = relative_size(equations, named, index), dict[str, tuple[float, Addition]]()
+    equations, laws = _of_other_values(equations, named.terms[index])
+    for law in (named.terms[index], *laws):
+        scored = best_of_each_candidate(equations, (*others, law))
+        likely = [more for _, more in scored if more.group.own_channel is None]
+        for more in likely[: limits.additions_tried]:
+            terms: tuple[Term, ...] = (*others, law, more)
+            if law is named.terms[index]:
+                equations, terms = optimised_shapes(equations, terms)
+            fit = equations.fit(terms)
+            score = equations.score(fit)
+            if not acceptable(equations, fit) or score < equations.score(named) - limits.lead_margin:
+                continue
+            left, taken = (relative_size(equations, fit, place) for place in (len(others), len(others) + 1))
+            least = limits.taken_over_share * before
+            if before - left > least and taken > least and score > best.get(more.name, (-float("inf"),))[0]:
+                best[more.name] = score, Addition(*fit.terms[-2:])
+    return equations, [addition for _, addition in best.values()]
+
+
+def _of_other_values(equations: NormalEquations, term: Term) -> tuple[NormalEquations, list[Term]]:
+    """Return a law with one of its free parameters at another of the grid's values, and equations with the columns.
+
+    Not of an onset, which other effects do not take over, nor of a law that states its coefficient.
+    """
+    candidate, now = term.group.candidate, term.group.shape
+    if candidate is None or candidate.stated_coefficient(now) is not None:
+        return equations, []
+    free = [name for name in candidate.free if name in now and name != candidate.change_point]
+    grid = [shape for shape in candidate.shapes(equations.problem) if free and shape.keys() == now.keys()]
+    tried = [{**now, name: value} for name in free for value in {shape[name]: None for shape in grid}]
+    there = [group for group in equations.design.groups if group.law == term.group.law and group.shape in tried]
+    known = [now, *(group.shape for group in there)]
+    design, new = with_candidate(equations.design, candidate, [shape for shape in tried if shape not in known])
+    return equations.over(design), [Term(group, term.wheels) for group in (*there, *new) if group.shape != now]
 
 
 def _could_be_true(equations: NormalEquations, named: Fit, rival: Fit, index: int) -> bool:

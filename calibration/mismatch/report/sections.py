@@ -15,7 +15,15 @@ from regolithd.calibration.mismatch.report.empirical import EmpiricalSection, em
 from regolithd.calibration.mismatch.report.figures import curve_figure, fit_figure, interval_figure, map_figure
 
 if TYPE_CHECKING:
-    from regolithd.calibration.mismatch.answer import Answer, Change, Curve, Effect, Evidence, Unexplained
+    from regolithd.calibration.mismatch.answer import (
+        Answer,
+        Change,
+        Curve,
+        Effect,
+        Evidence,
+        Indistinguishable,
+        Unexplained,
+    )
     from regolithd.calibration.mismatch.report.labels import Labels
 
 MOST_CURVES, MOST_OTHER_CURVES = 3, 8
@@ -246,13 +254,14 @@ def confusions(answer: Answer, labels: Labels) -> tuple[ConfusionRow, ...]:
     """Return what this recording cannot tell apart."""
     named = {effect.name for effect in answer.effects}
     found = named | {change.name for change in answer.changes}
+
+    def of_set(one: Indistinguishable) -> str:
+        alone = listed([labels.if_changed(name, named, labels.effect(name)) for name in one.alone])
+        more = " or ".join(labels.effect(name) for name in one.beside)
+        return capital(f"{alone}, or {labels.effect(one.alone[0])} with {more} beside it" if more else alone)
+
     return tuple(
-        ConfusionRow(
-            capital(listed([labels.if_changed(name, named, labels.effect(name)) for name in one.effects])),
-            not found.isdisjoint(one.effects),
-            one.experiment,
-        )
-        for one in answer.indistinguishable
+        ConfusionRow(of_set(one), not found.isdisjoint(one.effects), one.experiment) for one in answer.indistinguishable
     )
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from regolithd.calibration.mismatch.answer import Contribution
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.data.recording import Recording
 from regolithd.calibration.mismatch.errors import RecordingError, SimulationError, did_you_mean
 from regolithd.calibration.mismatch.simulation.checked_candidate import checked_candidate

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from regolithd.calibration.mismatch.answer import Contribution
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.onset_clock import FoundIn
 from regolithd.calibration.mismatch.problem.size_posterior import SizePosterior

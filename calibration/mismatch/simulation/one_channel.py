@@ -14,8 +14,8 @@ from regolithd.calibration.mismatch.simulation.simulation import Simulation
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.answer import Contribution
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
+    from regolithd.calibration.mismatch.contribution import Contribution
     from regolithd.calibration.mismatch.data.recording import Recording
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
 from regolithd.calibration.drivetrain.torque import motor_current
-from regolithd.calibration.mismatch.answer import Contribution
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.errors import RecordingError, SimulationError, did_you_mean
 from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.problem.prior import Prior, SensorError, own_name

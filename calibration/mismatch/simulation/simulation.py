@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    from regolithd.calibration.mismatch.answer import Contribution
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
+    from regolithd.calibration.mismatch.contribution import Contribution
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.data.slow_channels import Between
     from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve

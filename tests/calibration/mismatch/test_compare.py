@@ -13,10 +13,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rover_drives import TABLES, columns, recording, simulation
 
-from regolithd.calibration.mismatch.answer import Answer, Contribution
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in
 from regolithd.calibration.mismatch.comparison import compare
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
@@ -26,6 +26,7 @@ from regolithd.calibration.toml_document import to_toml
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from regolithd.calibration.mismatch.answer import Answer
     from regolithd.calibration.mismatch.result import Comparison
 
 

@@ -10,8 +10,9 @@ import pytest
 from rover_drives import TABLES, columns, simulation
 from servo import ServoAxis
 
-from regolithd.calibration.mismatch.answer import CalibratedParameter, Contribution, Parameter
+from regolithd.calibration.mismatch.answer import CalibratedParameter, Parameter
 from regolithd.calibration.mismatch.comparison import compare
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects, write_corrected
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.result import Comparison

@@ -12,10 +12,10 @@ import pytest
 import winch
 from winch import Winch
 
-from regolithd.calibration.mismatch.answer import Answer, Contribution
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, with_changes
 from regolithd.calibration.mismatch.comparison import compare
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.data.joined import joined
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.fleet.comparison import compare as compare_fleet
@@ -26,6 +26,7 @@ from regolithd.calibration.mismatch.problem.onset_clock import FoundIn, found_he
 from regolithd.calibration.mismatch.simulation.load import load_simulation
 
 if TYPE_CHECKING:
+    from regolithd.calibration.mismatch.answer import Answer
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 ROWS, STEP_S, ONSET_S, DRAG_A, ON = 2400, 0.5, 500.0, 0.3, np.array([0.0, 1.0])

@@ -8,7 +8,13 @@ from types import SimpleNamespace
 
 from rich.console import Console
 
-from regolithd.calibration.mismatch.answer import CalibratedParameter, Parameter, Suggestion, Unexplained
+from regolithd.calibration.mismatch.answer import (
+    CalibratedParameter,
+    Indistinguishable,
+    Parameter,
+    Suggestion,
+    Unexplained,
+)
 from regolithd.calibration.mismatch.inference.statements import NO_HELP
 from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.report.labels import Labels
@@ -35,6 +41,7 @@ FRICTION = {
     "onset_s": Parameter(3.0, 1.0, 9.0, "s"),
     "relative_size": Parameter(0.2, 0.1, 0.3, "1"),
 }
+WITH_MORE = "coulomb-friction with more beside it"
 
 
 def answer_with(**parts: object) -> SimpleNamespace:
@@ -60,9 +67,9 @@ def test_mismatch_prints_the_answer() -> None:
         ],
         changes=[GROWN],
         indistinguishable=[
-            SimpleNamespace(effects=("coulomb-friction", "other"), experiment="Drive backwards."),
-            SimpleNamespace(effects=("quadratic-drag", "viscous-friction"), experiment="Drive up."),
-            SimpleNamespace(effects=("one", "stribeck-friction"), experiment="Drive fast."),
+            Indistinguishable(("coulomb-friction", "other", "more"), "Drive backwards.", beside=("more",)),
+            Indistinguishable(("quadratic-drag", "viscous-friction"), "Drive up."),
+            Indistinguishable(("one", "stribeck-friction"), "Drive fast."),
         ],
         fit=SimpleNamespace(
             channel="current", held_out_rmse_before=0.00412345, held_out_rmse_after=0.001, noise_floor_rmse=0.0009
@@ -91,7 +98,7 @@ def test_mismatch_prints_the_answer() -> None:
         "  unexplained: 40 % of the residual follows the height of the bale, on zone 1, 0 to 9 s",
         "    empirical curve over the height of the bale, 0.1 to 0.7 m: held-out error 50.0 % smaller with it",
         "    suggestion 1: Δcurrent = c height; c = 2.5 A/m; 47.5 % smaller",
-        "  coulomb-friction or other: this recording does not distinguish them. Drive backwards.",
+        f"  coulomb-friction or other, or {WITH_MORE}: this recording does not distinguish them. Drive backwards.",
         "  quadratic-drag or viscous-friction (changed): this recording does not distinguish them. Drive up.",
         f"  not found: one or stribeck-friction (changed). {WERE_THERE} Drive fast.",
         "  probability of this answer: 0.91; next: other + something unexplained (0.05)",

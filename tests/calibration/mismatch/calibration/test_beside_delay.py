@@ -9,7 +9,7 @@ import pytest
 from heated_room import ROWS, MEMORY_s, Room, STEP_s, response
 
 from regolithd.calibration.mismatch import compare
-from regolithd.calibration.mismatch.answer import Contribution
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.delayed import shifted
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
-from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.errors import SimulationError

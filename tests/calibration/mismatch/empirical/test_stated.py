@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from linear_machine import problem_of, table
 
-from regolithd.calibration.mismatch.answer import Contribution
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw, beyond_the_range, name_of
 from regolithd.calibration.mismatch.empirical.written import summed, with_changed_sizes
 from regolithd.calibration.mismatch.errors import SimulationError

@@ -18,6 +18,7 @@ from regolithd.calibration.mismatch.experiments.choice import experimenter_of
 from regolithd.calibration.mismatch.experiments.drives import DIRECTION, SPEED, UNLOADED, Drives
 from regolithd.calibration.mismatch.experiments.margins import (
     expected_of,
+    of_both,
     of_effect,
     of_parameter,
     precisions,
@@ -212,6 +213,24 @@ def test_the_margin_is_the_energy_that_the_other_law_leaves() -> None:
     whole = AXES * 100.0 / STEP_S * drag.coefficients[0] ** 2 / NOISE**2
     assert expected.margins(100.0)["drag", "power"] == pytest.approx(whole / 2, rel=0.05)
     assert expected.margins(200.0)["drag", "power"] == pytest.approx(whole, rel=0.05)
+
+
+def test_of_a_law_with_and_without_another_the_margin_is_what_the_other_adds() -> None:
+    """It is not halved as between two laws: alone, the first explains no more than both."""
+    equations = equations_of(problem_of(table(drag=0.3, factor=0.2)), (Drag(), Power()))
+    experimenter = experimenter_of(equations, THRESHOLD)
+    assert experimenter.drives is not None
+    drag, power = term_of(equations, "drag"), term_of(equations, "power")
+    alone, both = of_effect(equations, (), power), of_both(equations, (power,), power, drag)
+    assert (both.name, both.adds_to(alone), alone.adds_to(both)) == ("power with drag", True, False)
+    assert (both.coefficients[0], both.more_coefficients[0]) == pytest.approx((0.2, 0.3), rel=0.1)
+    drive = experimenter.drives(frozenset({DIRECTION}))
+    information = experimenter.information_per_s
+    for answers in ((alone, both), (both, alone)):
+        expected = expected_of(drive, answers, (), precision=np.array([0.0]), information_per_s=information)
+        ((_, margin),) = expected.margins(100.0).items()
+        whole = AXES * 100.0 / STEP_S * both.more_coefficients[0] ** 2 / NOISE**2
+        assert margin == pytest.approx(whole, rel=0.05)
 
 
 def test_the_sizes_are_the_recordings_or_the_smallest_worth_an_experiment() -> None:

@@ -12,9 +12,9 @@ import winch
 from tram import DELAY_S
 
 from regolithd.calibration.mismatch import compare, load_simulation
-from regolithd.calibration.mismatch.answer import Contribution
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import stated_in
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.problem.delayed import filtered
 

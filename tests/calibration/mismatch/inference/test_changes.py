@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
-from regolithd.calibration.mismatch.answer import Change, Contribution
+from regolithd.calibration.mismatch.answer import Change
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import (
     SECANT_CHANGE,
@@ -20,6 +20,7 @@ from regolithd.calibration.mismatch.changes import (
     stated_in,
     with_changes,
 )
+from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.problem.build import build_problem

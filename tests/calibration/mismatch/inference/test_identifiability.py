@@ -23,12 +23,14 @@ from regolithd.calibration.mismatch.inference.experiment import rounded_up, seco
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable, rivals, wrong_choice_rate
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities, smallest_detectable
 from regolithd.calibration.mismatch.regression.candidate_groups import with_candidate
+from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.selection.best_subsets import acceptable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch import Problem, Shape
+    from regolithd.calibration.mismatch.regression.group import Fit
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 THRESHOLD = 8.0
@@ -73,6 +75,48 @@ def test_what_a_free_parameter_hides_is_in_a_set_with_it() -> None:
     assert parameters_like(equations, (), [drag]) == []
     assert parameters_like(equations, (), [offset, drag]) == []
     assert equations.nuisance.precision[0] == pytest.approx(4.0, rel=1e-6)
+
+
+class Waning(Drag):
+    """A drag that falls with time, by any rate."""
+
+    name = "waning"
+    free: ClassVar = {"rate": (0.0, 6.0)}
+    shape_keys: ClassVar = {"rate": "1/length"}
+    rates = (1.0, 2.0, 4.0)
+
+    def shapes(self, problem: Problem) -> Sequence[Shape]:  # noqa: ARG002
+        """Return three rates."""
+        return [{"rate": rate} for rate in self.rates]
+
+    def bounds(self, problem: Problem, shape: Shape) -> dict[str, tuple[float, float]]:  # noqa: ARG002
+        """Return all rates."""
+        return dict(self.free)
+
+    def columns(self, problem: Problem, shape: Shape) -> np.ndarray:
+        """Return sign(ω) exp(−rate t / length)."""
+        part = (problem.time_s - problem.time_s.min()) / problem.length_s
+        return super().columns(problem, shape) * np.exp(-float(shape["rate"]) * part)
+
+
+def waning(law: float, steady: float, rate: float, fitted: float) -> tuple[NormalEquations, Fit]:
+    """Return equations of a waning drag with a steady one beside it, and a fit of the waning one alone."""
+    columns = table()
+    part, sign = (columns["t_s"] - columns["t_s"][0]) / np.ptp(columns["t_s"]), np.sign(columns["speed_rad_s"])
+    columns = {**columns, "reading_V": columns["reading_V"] + sign * (law * np.exp(-rate * part) + steady)}
+    equations = equations_of(problem_of(columns), (Drag(), Waning()))
+    design, (group,) = with_candidate(equations.design, Waning(), [{"rate": fitted}])
+    equations = equations.over(design)
+    return equations, equations.fit([Term(group, tuple(range(AXES)))])
+
+
+def test_a_law_with_a_free_shape_may_stand_for_itself_and_for_another() -> None:
+    """At a rate between that of the waning drag and 0 nothing is left for the steady one; alone it is what it is."""
+    equations, named = waning(0.3, 0.3, 1.0, 0.38)
+    _, (found,) = rivals(equations, named, experimenter_of(equations, THRESHOLD))
+    assert (found.effects, found.beside, found.alone) == (("waning", "drag"), ("drag",), ("waning",))
+    equations, named = waning(0.6, 0.0, 4.0, 4.0)
+    assert rivals(equations, named, experimenter_of(equations, THRESHOLD))[1] == ()
 
 
 def test_energy_apart_is_the_gain_at_the_size_worth_telling_apart() -> None:

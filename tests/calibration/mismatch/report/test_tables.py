@@ -56,13 +56,13 @@ def test_what_cannot_be_told_apart_is_told_as_found_or_not() -> None:
     """An effect that the simulation has already could only change."""
     sets = (
         Indistinguishable(("coulomb-friction", "viscous-friction"), "Drive."),
-        Indistinguishable(("quadratic-drag", "rotor-inertia"), "Start."),
+        Indistinguishable(("quadratic-drag", "rotor-inertia"), "Start.", beside=("rotor-inertia",)),
     )
     answer = replace(CHANGED, indistinguishable=sets)
     rows = confusions(answer, Labels(corrected=frozenset({"coulomb-friction", "quadratic-drag"})))
     assert [(row.effects, row.found) for row in rows] == [
         ("Coulomb friction (changed) and viscous friction", True),
-        ("Quadratic drag (changed) and rotor inertia", False),
+        ("Quadratic drag (changed), or quadratic drag with rotor inertia beside it", False),
     ]
 
 
