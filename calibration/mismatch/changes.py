@@ -83,7 +83,7 @@ class Stated:
 
     def _deviation(self, problem: Problem, name: str, std: float) -> Array:
         """Return what one standard deviation of a shape parameter adds beside a change of the effect's size."""
-        least, most = self.candidate.free.get(name, (-np.inf, np.inf))
+        least, most = {**self.candidate.refined, **self.candidate.free}.get(name, (-np.inf, np.inf))
         at = float(self.contribution.shape[name])
         low, high = (float(np.clip(at + far, least, most)) for far in (-std, std))
         ends = [

@@ -150,7 +150,8 @@ def _with_stds(term: Contribution, effect: Effect) -> Contribution:
     told = {
         name: each for name, each in effect.parameters.items() if name in term.shape and name != Candidate.change_point
     }
-    shape_std = {name: std_of_interval(each.low, each.high) for name, each in told.items()}
+    # A number that has its usual value has no interval: nothing was fitted.
+    shape_std = {name: std_of_interval(each.low, each.high) for name, each in told.items() if np.isfinite(each.low)}
     return replace(term, relative_std=relative_std, shape_std=shape_std, posterior=effect.posterior)
 
 

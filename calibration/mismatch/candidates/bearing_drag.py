@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
-from regolithd.calibration.mismatch.candidates.candidate import (
+from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.growth import (
     GROWTH_KEYS,
+    GROWTH_POWERS,
     GROWTHS,
-    Array,
-    Candidate,
-    Coefficient,
-    Shape,
     growth,
     growth_form,
+    growth_ranges,
     onset_grid,
     onset_range,
 )
@@ -58,6 +57,7 @@ class BearingDrag(Candidate):
     sharing: ClassVar = ("one",)
     shape_keys: ClassVar = {**GROWTH_KEYS, **REVERSAL_KEYS}
     free: ClassVar = {"onset_s": (0.0, float("inf"))}
+    refined: ClassVar = {"rise_s": (0.0, float("inf")), "power": GROWTH_POWERS}
 
     def form_of(self, shape: Shape) -> str:
         """Return how the drag grows after its onset."""
@@ -83,6 +83,10 @@ class BearingDrag(Candidate):
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
         """Return the recording without its ends: drag must be seen without and with the fault."""
         return {"onset_s": onset_range(problem)}
+
+    def refinable(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
+        """Return the range of the time constant, or of the power of time."""
+        return growth_ranges(problem, shape)
 
 
 def _wear(problem: Problem, power: float) -> Shape:

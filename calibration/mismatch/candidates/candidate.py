@@ -25,12 +25,6 @@ SHAPE_TOLERANCE = 0.02
 the usual 90 % interval; a smaller one costs iterations)."""
 UNLIKELY_SHAPE_PENALTY = 9.2
 """Δχ² charged for a shape that has odds of one in a hundred before the recording: 2 ln 100."""
-ONSET_COUNT = 24
-"""Onsets in the grid of a candidate (a choice: one in each 4 % of the recording, refined later)."""
-EARLIEST_ONSET, LATEST_ONSET = 0.05, 0.95
-"""Ends of that grid, as shares of the recording: what is before and after an onset must both be seen (a choice)."""
-FIRST_ONSET, LAST_ONSET = 0.05, 0.97
-"""Range of the optimised onset, as shares of the recording (a choice): what is there from the start is no change."""
 Shape = dict[str, float | str]
 """Values of the shape parameters by name. Numbers may be continuous (`free`), strings are kinds."""
 Sharing = Literal["all", "one"]
@@ -152,6 +146,9 @@ class Candidate:
     free: ClassVar[Mapping[str, tuple[float, float]]] = {}
     """Continuous shape parameters with their least and greatest value. The ending of the name is the unit: `_s`, `_K`,
     `_degC`, `_rad_s`; without one of these it has none."""
+    refined: ClassVar[Mapping[str, tuple[float, float]]] = {}
+    """Further numbers of a shape, with their least and greatest value. They have usual values, those in the grid: the
+    engine moves away from these only where a recording demands it. The ending of a name is its unit, as of `free`."""
     scaled_by: ClassVar[str] = ""
     """The shape parameter that multiplies the columns, where there is one: a coefficient makes up for it."""
     shape_keys: ClassVar[Mapping[str, str]] = {}
@@ -259,6 +256,23 @@ class Candidate:
         """
         return self.free
 
+    def refinable(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:  # noqa: ARG002
+        """Return the range of each number of a shape that a recording may move away from its usual values."""
+        return {name: ends for name, ends in self.refined.items() if name in shape}
+
+    def unusual(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
+        """Return the range of each number of a shape that was moved away from its usual values."""
+        usual = self.shapes(problem) if self.refined else ()
+        return {
+            name: ends
+            for name, ends in self.refinable(problem, shape).items()
+            if not any(np.isclose(float(shape[name]), float(each.get(name, np.nan)), rtol=1e-9) for each in usual)
+        }
+
+    def continuous(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
+        """Return the range of each number of a shape that was fitted: those that are free, and unusual values."""
+        return {**self.bounds(problem, shape), **self.unusual(problem, shape)}
+
     def search_range(
         self, problem: Problem, shape: Shape, name: str, bounds: tuple[float, float]
     ) -> tuple[float, float]:
@@ -280,7 +294,8 @@ class Candidate:
         """
         names = [coefficient.name for coefficient in self.coefficients[: len(values)]]
         found = {name: float(value) for name, value in zip(names, values, strict=True)}
-        return {**found, **{name: float(shape[name]) for name in self.free if name in shape}}
+        numbers = [name for name in (*self.free, *self.refined) if name in shape]
+        return {**found, **{name: float(shape[name]) for name in numbers}}
 
     def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
         """Return the Δχ² that a shape must gain beyond others, for contradicting what was known before."""
@@ -350,49 +365,3 @@ class Candidate:
     def own_channel_evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array] | None:  # noqa: ARG002
         """Return Δχ² and coefficient of the fault in its own `channel`, shape (wheel,) each; None: there is no such."""
         return None
-
-
-def onset_grid(problem: Problem, count: int = ONSET_COUNT) -> list[float]:
-    """Return times at which something may begin [s], evenly spread over the recording without its ends."""
-    return [float(t) for t in problem.length_s * np.linspace(EARLIEST_ONSET, LATEST_ONSET, count)]
-
-
-def onset_range(problem: Problem) -> tuple[float, float]:
-    """Return the times between which an onset is optimised [s]: what was before it and after it must be seen."""
-    return FIRST_ONSET * problem.length_s, LAST_ONSET * problem.length_s
-
-
-GROWTH_KEYS = {
-    "onset_s": "when it begins in the course that fits best; `parameters.onset_s` is the median of all courses",
-    "rise_s": "time constant of the exponential rise (0: a step)",
-    "full_at_s": "when the power of time is 1",
-    "power": "of the time since the onset",
-}
-"""What the keys of a shape with a `growth` mean."""
-GROWTHS = ("step", "exponential rise", "power of time")
-"""Names of the forms that `growth` has."""
-
-
-def growth_form(shape: Shape) -> str:
-    """Return which of `GROWTHS` a shape has."""
-    step, rise, power = GROWTHS
-    if "full_at_s" in shape:
-        return power
-    return rise if shape["rise_s"] else step
-
-
-def growth(problem: Problem, shape: Shape) -> Array:
-    """Return growth from 0 at the shape's `onset_s`, shape (time, 1).
-
-    With `full_at_s`, by a `power` of the time since the onset, and 1 at that time; with `rise_s`, an exponential
-    approach to 1 with that time constant, and a step where it is 0.
-    """
-    onset_s = float(shape["onset_s"])
-    after = np.maximum(problem.time_s - onset_s, 0.0)
-    if "full_at_s" in shape:
-        relative = after / max(float(shape["full_at_s"]) - onset_s, 1e-9)
-        return np.asarray(relative ** float(shape.get("power", 1.0)))
-    rise_s = float(shape["rise_s"])
-    if rise_s == 0:
-        return (problem.time_s >= onset_s).astype(np.float64)
-    return -np.expm1(-after / rise_s)

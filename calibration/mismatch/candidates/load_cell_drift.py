@@ -6,13 +6,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.candidate import (
+from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.growth import (
     GROWTH_KEYS,
     GROWTHS,
-    Array,
-    Candidate,
-    Coefficient,
-    Shape,
     growth,
     growth_form,
     onset_grid,

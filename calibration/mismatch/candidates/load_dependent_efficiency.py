@@ -25,13 +25,18 @@ if TYPE_CHECKING:
 SAME_AS_GAIN = 0.95
 """Cosine between a loss in proportion to the torque and the torque itself, above which it is a wrong gain (a choice:
 the load drives the motor for a fortieth of the torque's energy at most)."""
+LIGHTEST, HEAVIEST = 0.1, 3.0
+"""Ends of the decay scale, in reference torques (a choice: of the first nothing is left at a third of the reference, of
+the second a third at three times it)."""
+LEAST_POWER = 0.2
+"""Least power of the torque that is told from a constant share (a choice)."""
 LARGEST_LOSS = 2 / 3
 """Largest share of the stated efficiency that may be lost at any torque (a choice: a third is left)."""
 USUAL_TORQUE_QUANTILE = 0.98
 """Quantile of the torques up to which a loss has to be possible (a choice: one reading in fifty may be disturbed)."""
 LESS_THAN_PREDICTED = "less than is predicted, by a share that depends on the transmitted torque"
 """What a loss below zero is."""
-POWERS, LIGHT_LOADS, SLOPES = (0.0, 0.5, 1.0, 2.0), (0.5, 1.0), (-0.2, 0.0, 0.3)
+POWERS, LIGHT_LOADS, SLOPES = (0.0, 0.5, 1.0, 2.0), (0.25, 0.5, 1.0), (-0.2, 0.0, 0.3)
 """Grid of the three forms: powers of torque, decay scales in reference torques, slopes of the efficiency (a choice).
 What is lost grows with the cube of the torque at most: teeth and bearings lose in proportion to it, a motor's winding
 with its square, and a steeper law is that of a threshold, such as a tyre that gives way."""
@@ -74,6 +79,7 @@ class LoadDependentEfficiency(Candidate):
         **REVERSAL_KEYS,
     }
     coefficients: ClassVar = (Coefficient("relative_loss", "1", 0),)
+    refined: ClassVar = {"power": (LEAST_POWER, max(POWERS)), "light": (LIGHTEST, HEAVIEST)}
 
     def words_with(self, shape: Shape, values: Mapping[str, float]) -> str:
         """Return what a negative coefficient means, which is no loss."""
@@ -98,6 +104,10 @@ class LoadDependentEfficiency(Candidate):
         reference = max(float(np.mean(np.abs(problem.filled[problem.mask]))), 1e-30)
         return [{**reversal_of(problem), **form, "reference_size": reference} for form in (*curved, *light, *bent)]
 
+    def refinable(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
+        """Return the range of the power or of the scale; a constant share has neither."""
+        return super().refinable(problem, shape) if shape.get("power") != 0 else {}
+
     def self_consistent_shape(self, problem: Problem, shape: Shape, values: Sequence[float]) -> Shape:
         """Return the linear efficiency with the fitted slope, as long as at least a third of the efficiency is left."""
         if "bent" not in shape:
@@ -120,9 +130,16 @@ class LoadDependentEfficiency(Candidate):
         return (_against_motion(problem, shape) * _of_size(problem, shape))[None]
 
     def plausible(self, problem: Problem, shape: Shape, values: Sequence[float]) -> bool:
-        """Return whether at the usual torques at least a third of the efficiency is left, and no more is gained."""
+        """Return whether at the usual torques at least a third of the efficiency is left, and no more is gained.
+
+        What is lost at light load may exceed the load, as the loss of a gear without any does: where the loss decays
+        with the torque, it is held against the reference torque.
+        """
         usual = (1 - USUAL_TORQUE_QUANTILE, USUAL_TORQUE_QUANTILE)
-        lost = values[0] * np.quantile(_of_size(problem, shape)[problem.mask], usual)
+        of_size = _of_size(problem, shape)
+        if "light" in shape and values[0] > 0:
+            of_size = of_size * np.minimum(_relative(problem, shape), 1.0)
+        lost = values[0] * np.quantile(of_size[problem.mask], usual)
         return bool(lost.min() >= -LARGEST_LOSS and lost.max() <= LARGEST_LOSS / (1 - LARGEST_LOSS))
 
 

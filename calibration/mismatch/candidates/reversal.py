@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +26,9 @@ TRANSITIONS = (0.0025, 0.005, 0.01, 0.02, 0.04)
 """Speeds at which the friction has reversed by three quarters, as shares of the highest usual speed (a choice: from
 where it is a step for most readings to where it would be taken for viscous friction); the best is refined between its
 neighbours."""
+DECAYS = (0.05, 0.1, 0.2, 0.4)
+"""Speeds over which friction that decays from standstill does, as shares of the highest usual speed (a choice: from
+where the slowest reversals are)."""
 DISPLACEMENTS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
 """Displacements after which all but 1/e has reversed, as shares of the usual one from a reversal to the next (a choice,
 as above)."""
@@ -66,29 +69,48 @@ def _best_reversal(problem: Problem) -> Shape:
     beside = _beside_a_step(problem)
     if not (step := beside.squares_left({})) > 0:
         return {}  # a drive that was simulated without noise
-    of_kind = {next(iter(shape)): shape for shape in sorted(tried, key=beside.squares_left, reverse=True)}
-    best, left = min((_refined(beside, shape) for shape in of_kind.values()), key=lambda pair: pair[1])
-    gain = beside.independent * (1 - left / step)
+    gradual = _best_of(beside, tried)
+    # Drag near standstill that decays with speed resembles a gradual reversal, with as many numbers.
+    decaying = min(
+        (replace(beside, decay=each) for each in range(2 * len(DECAYS))), key=lambda each: each.squares_left({})
+    )
+    left = decaying.squares_left({})
+    if beside.gain(left, gradual[1]) > LEAST_GAIN:
+        beside, step, gradual = decaying, left, _best_of(decaying, tried)
+    shape, left = gradual
     of_friction = beside.independent * (beside.squares_without_friction / left - 1)
     is_there = of_friction > quantile(beside.laws, problem.thresholds.single_test_level)
-    return best if is_there and gain > LEAST_GAIN else {}
+    return shape if is_there and beside.gain(left, step) > LEAST_GAIN else {}
+
+
+def _best_of(beside: _Beside, tried: Sequence[Shape]) -> tuple[Shape, float]:
+    """Return the best of these shapes, the best of each kind refined, and the sum of squares that it leaves."""
+    of_kind = {next(iter(shape)): shape for shape in sorted(tried, key=beside.squares_left, reverse=True)}
+    return min((_refined(beside, shape) for shape in of_kind.values()), key=lambda pair: pair[1])
 
 
 def _shapes(problem: Problem) -> Iterator[Shape]:
     """Yield what is tried: speeds, and displacements where the machine reverses often enough."""
-    speed = np.abs(problem.covariates["wheel_speed"][problem.mask])
-    if (speed > 0).any():
-        usual = float(np.nanquantile(speed[speed > 0], USUAL_SPEED_QUANTILE))
-        for share in TRANSITIONS:
-            yield {TRANSITION: share * usual}
-    displacement, direction = displacement_of(problem), problem.known("direction")
-    swings = []
-    for of_axis, turned in zip(np.where(np.isfinite(displacement), displacement, 0.0).T, direction.T, strict=True):
-        signs = turned[turned != 0]
-        if (reversals := np.count_nonzero(np.diff(signs))) >= FEWEST_REVERSALS:
-            swings.append(float(of_axis.sum()) / reversals)
+    usual = _usual_speed(problem)
+    for share in TRANSITIONS if usual > 0 else ():
+        yield {TRANSITION: share * usual}
+    displacement = displacement_of(problem)
+    travelled = np.where(np.isfinite(displacement), displacement, 0.0).sum(axis=0)
+    of_axes = zip(travelled.tolist(), _reversals(problem), strict=True)
+    swings = [way / reversals for way, reversals in of_axes if reversals >= FEWEST_REVERSALS]
     for share in DISPLACEMENTS if swings else ():
         yield {PRESLIDING: share * float(np.median(swings))}
+
+
+def _reversals(problem: Problem) -> list[int]:
+    """Return how often each axis reverses."""
+    return [int(np.count_nonzero(np.diff(turned[turned != 0]))) for turned in problem.known("direction").T]
+
+
+def _usual_speed(problem: Problem) -> float:
+    """Return the highest usual speed, 0 where nothing moves."""
+    speed = np.abs(problem.covariates["wheel_speed"][problem.mask])
+    return float(np.nanquantile(speed[speed > 0], USUAL_SPEED_QUANTILE)) if (speed > 0).any() else 0.0
 
 
 def _share_within(problem: Problem, shape: Shape, moving: NDArray[np.bool_]) -> float:
@@ -111,6 +133,7 @@ class _Beside:
     free: columns of the free parameters, and of what else acts about reversals, shape (column, reading)
     residual: shape (1, reading)
     laws: how many friction may follow
+    decay: which of the laws that decay from standstill is among them; None: none
     """
 
     problem: Problem
@@ -120,16 +143,30 @@ class _Beside:
     free: Array
     residual: Array
     laws: int
+    decay: int | None = None
+
+    def gain(self, left: float, step: float) -> float:
+        """Return the Δχ² of what leaves one sum of squares over what leaves another."""
+        return self.independent * (1 - left / step)
 
     @property
     def squares_without_friction(self) -> float:
         """Return the sum of squares that the free parameters alone leave."""
-        return float(np.sum(_left(self.free, self.residual) ** 2))
+        return float(np.sum(_left(self.free, self.residual)[0] ** 2))
 
     def squares_left(self, shape: Shape) -> float:
-        """Return the sum of squares that the free parameters and friction of any usual law leave, with this shape."""
-        laws = _in_order(self.problem, _laws(self.problem, shape), self.whitening, self.deviation)
-        return float(np.sum(_left(np.concatenate((self.free, laws)), self.residual) ** 2))
+        """Return the sum of squares that the free parameters and friction of any usual law leave, with this shape.
+
+        What decays from standstill is drag beyond the other laws: less drag there would be a gradual reversal.
+        """
+        laws = _laws(self.problem, shape)
+        if self.decay is not None:
+            laws.append(_decays(self.problem, shape)[self.decay])
+        columns = np.concatenate((self.free, _in_order(self.problem, laws, self.whitening, self.deviation)))
+        left, last = _left(columns, self.residual)
+        if self.decay is not None and last < 0:
+            left, _ = _left(columns[:-1], self.residual)
+        return float(np.sum(left**2))
 
 
 def _beside_a_step(problem: Problem) -> _Beside:
@@ -139,7 +176,7 @@ def _beside_a_step(problem: Problem) -> _Beside:
     ones = np.ones(residual.shape[1])
     laws = _laws(problem, {})
     as_read = _in_order(problem, [residual, *free, *laws], NOT_WHITENED, ones)
-    left = _left(as_read[1:], as_read[:1])[0]
+    left = _left(as_read[1:], as_read[:1])[0][0]
     ends = np.cumsum([len(rows) for rows, _ in problem.courses])[:-1]
     parts = np.split(left, ends)
     deviation = np.array([np.sqrt(np.mean(part**2)) if part.size else 0.0 for part in parts])
@@ -174,7 +211,7 @@ def _about_reversals(problem: Problem) -> list[Array]:
 
 
 def _laws(problem: Problem, shape: Shape) -> list[Array]:
-    """Return friction that is constant on each axis, grows with the root of speed, with it, or the load.
+    """Return friction that is constant on each axis, grows with the root of speed, with it, its square, or the load.
 
     The first three change with the temperature and with time: they would seem to reverse with a long displacement. A
     late channel shows friction late: on time, it would seem to reverse with the displacement.
@@ -184,8 +221,16 @@ def _laws(problem: Problem, shape: Shape) -> list[Array]:
     if problem.has("temperature"):
         slow.append(problem.known("temperature"))
     factors = [of_speed * each for of_speed in (1.0, np.sqrt(speed), speed) for each in slow]
+    factors.append(speed**2)
     of_axis = np.eye(speed.shape[1])[:, None] if speed.shape[1] > 1 else ()  # one axis alone may have friction
     return list(as_shown(problem, [direction * factor for factor in (*factors, np.abs(problem.filled), *of_axis)]))
+
+
+def _decays(problem: Problem, shape: Shape) -> list[Array]:
+    """Return friction that decays with speed, as an exponential and as a Gaussian, over each of `DECAYS`."""
+    direction, speed, usual = along_motion(problem, shape), np.abs(problem.known("wheel_speed")), _usual_speed(problem)
+    over = [speed / (share * usual) for share in DECAYS] if usual > 0 else []
+    return list(as_shown(problem, [direction * np.exp(-(each**power)) for each in over for power in (1, 2)]))
 
 
 def _in_order(problem: Problem, columns: Sequence[Array], whitening: Whitening, deviation: Array) -> Array:
@@ -197,12 +242,12 @@ def _in_order(problem: Problem, columns: Sequence[Array], whitening: Whitening, 
     return np.concatenate(parts, axis=1)
 
 
-def _left(columns: Array, residual: Array) -> Array:
-    """Return what the columns leave of a residual, shape (1, reading), by least squares."""
+def _left(columns: Array, residual: Array) -> tuple[Array, float]:
+    """Return what the columns leave of a residual, shape (1, reading), by least squares, and the last one's sign."""
     size = np.sqrt(np.sum(columns**2, axis=1))
     columns = columns[size > 0] / size[size > 0, None]
     fitted = np.linalg.lstsq(columns @ columns.T, columns @ residual[0], rcond=SINGULAR)[0]
-    return residual - fitted @ columns
+    return residual - fitted @ columns, float(np.sign(fitted[-1])) if len(fitted) else 0.0
 
 
 def _refined(beside: _Beside, shape: Shape) -> tuple[Shape, float]:

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, onset_grid
+from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.growth import onset_grid
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

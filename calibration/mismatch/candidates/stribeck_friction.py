@@ -11,19 +11,22 @@ from regolithd.calibration.mismatch.candidates.motion import REVERSAL_KEYS, TRAN
 from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 
-FADES: dict[str, Callable[[Array], Array]] = {
-    "exponent 1": lambda ratio: np.exp(-ratio),
-    "exponent 2": lambda ratio: np.exp(-(ratio**2)),
-    "quotient": lambda ratio: 1 / (1 + ratio**2),
-}
-"""Share of the extra drag that is left, as a function of speed over the Stribeck speed."""
-FORMS = {"exponent 1": "exponential", "exponent 2": "Gaussian", "quotient": "quotient"}
-"""Names of these laws in the answer."""
+QUOTIENT = "quotient"
+"""What `fades` is of the law that is no exponential."""
+USUAL_EXPONENTS = (1.0, 2.0)
+"""Exponents δ that are searched: of an exponential and of a Gaussian."""
+OF_FADES = {"exponent 1": 1.0, "exponent 2": 2.0}
+"""The exponents as files of version 0.2.0 name them."""
+EXPONENTS = (0.4, 3.0)
+"""Ends of the exponent δ: 0.5 to 2 were measured (Bo and Pavelescu, 1982; Armstrong-Hélouvry, 1991), and more where
+the film builds up at once."""
+STRETCHED = "stretched exponential"
+"""The law between the exponential and the Gaussian, and beyond them."""
 SPEED_COUNT = 7
 """Stribeck speeds that are searched, in geometric steps (a choice)."""
 SLOWEST, FASTEST = (0.5, 0.02), (0.5, 0.98)
@@ -50,20 +53,24 @@ class StribeckFriction(Candidate):
     source = "Armstrong-Hélouvry, Dupont and Canudas de Wit (1994): δ from 1 to 2; Hess and Soom (1990): the quotient"
     requires = ("wheel_speed",)
     loads = True
-    forms = tuple(FORMS.values())
+    forms = ("exponential", "Gaussian", "quotient", STRETCHED)
     label = "Stribeck friction"
     parameter_labels: ClassVar = {"stribeck_current": "Stribeck friction", "stribeck_speed_rad_s": "Stribeck speed"}
     coefficients: ClassVar = (Coefficient("stribeck_current", "{unit}"),)
     shape_keys: ClassVar = {
         "stribeck_speed_rad_s": "ω_s",
-        "fades": "`exponent 1` (δ = 1, exponential), `exponent 2` (δ = 2, Gaussian) or `quotient`",
+        "exponent": "δ: 1 of an exponential, 2 of a Gaussian",
+        "fades": "`quotient`, in the place of an exponent",
         **REVERSAL_KEYS,
     }
     free: ClassVar = {"stribeck_speed_rad_s": (0.0, np.inf)}
+    refined: ClassVar = {"exponent": EXPONENTS}
 
     def form_of(self, shape: Shape) -> str:
         """Return how the drag decays with speed."""
-        return FORMS[str(shape["fades"])]
+        exponential, gaussian, quotient, stretched = self.forms
+        exponent = _exponent(shape)
+        return quotient if exponent is None else {1.0: exponential, 2.0: gaussian}.get(exponent, stretched)
 
     def shapes(self, problem: Problem) -> Sequence[Shape]:
         """Return Stribeck speeds between the slowest and half of the highest speed, in three forms.
@@ -74,10 +81,12 @@ class StribeckFriction(Candidate):
         """
         transition = reversal_of(problem)
         ways_to_turn: list[Shape] = [{}, transition] if transition else [{}]
+        laws: list[Shape] = [{"exponent": exponent} for exponent in USUAL_EXPONENTS]
+        laws.append({"fades": QUOTIENT})
         return [
-            {**turn, "stribeck_speed_rad_s": float(speed), "fades": fades}
+            {**turn, "stribeck_speed_rad_s": float(speed), **law}
             for turn in ways_to_turn
-            for fades in FADES
+            for law in laws
             for low, high in [self._range(problem, turn)]
             for speed in (np.geomspace(low, high, SPEED_COUNT) if low < high else ())
         ]
@@ -85,8 +94,9 @@ class StribeckFriction(Candidate):
     def columns(self, problem: Problem, shape: Shape) -> Array:
         """Return sign(ω) times the share of the extra drag that is left at this speed."""
         speed = problem.covariates["wheel_speed"]
-        ratio = np.abs(speed) / float(shape["stribeck_speed_rad_s"])
-        return (along_motion(problem, shape) * FADES[str(shape["fades"])](ratio))[None]
+        ratio, exponent = np.abs(speed) / float(shape["stribeck_speed_rad_s"]), _exponent(shape)
+        left = 1 / (1 + ratio**2) if exponent is None else np.exp(-(ratio**exponent))
+        return (along_motion(problem, shape) * left)[None]
 
     def bounds(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
         """Return the range in which it can be told from nothing, from a transition, and from a constant."""
@@ -97,3 +107,10 @@ class StribeckFriction(Candidate):
         speed = speed[speed > 0]
         low, high = (factor * float(np.quantile(speed, quantile)) for factor, quantile in (SLOWEST, FASTEST))
         return max(low, float(shape.get(TRANSITION, 0.0))), high
+
+
+def _exponent(shape: Shape) -> float | None:
+    """Return δ; None: of the quotient, which has none."""
+    if "exponent" in shape:
+        return float(shape["exponent"])
+    return OF_FADES.get(str(shape["fades"]))

@@ -112,16 +112,19 @@ def _is_large(decision: Decision, named: Fit, curve: Term) -> bool:
 
 
 def _is_a_laws_misfit(decision: Decision, fit: Fit, named: Fit, curve: Term) -> bool:
-    """Return whether a curve gains no more than an inexact law leaves.
+    """Return whether a curve gains no more than an inexact law leaves, beside a set's names or in the place of others.
 
-    That is beside a set's own names, or in the place of the answer's, of which none has another covariate.
+    Where the answer's names leave nothing, and the set lacks some of them, the curve stands in their place. Alone, a
+    curve of their covariate always does.
     """
-    instead_of = named if named.terms or decision.unnamed else decision.named
+    missing = [term for term in decision.named.terms if term.name not in answer_names(named.terms)]
+    in_place = bool(missing) and not decision.unnamed
+    if in_place and not named.terms and all(covariate_of(term) == curve.name for term in missing):
+        return True
+    instead_of = decision.named if in_place else named
     if not instead_of.terms:
         return False
-    share = law_misfit(decision.equations, instead_of, fit)
-    of_its_covariate = not named.terms and all(covariate_of(term) == curve.name for term in instead_of.terms)
-    return of_its_covariate or share < decision.equations.thresholds.form_misfit
+    return law_misfit(decision.equations, instead_of, fit) < decision.equations.thresholds.form_misfit
 
 
 def _evidence(decision: Decision, fit: Fit) -> float:

@@ -142,16 +142,31 @@ def _of_term(
             drawn[name].append(value)
     channel, labels = equations.problem.simulation.unit, equations.problem.labels
     units = {c.name: in_units(c.unit, channel, labels) for c in candidate.coefficients}
-    units |= {name: unit_of(name, labels) for name in candidate.free}
+    units |= {name: unit_of(name, labels) for name in (*candidate.free, *candidate.refined)}
     signs = zip(candidate.coefficients, term.group.signs, strict=False)  # both phases of a ripple are one amplitude
-    limits = {c.name: OF_SIGN[sign] for c, sign in signs if sign} | dict(candidate.bounds(equations.problem, shape))
+    bounds, fitted = candidate.bounds(equations.problem, shape), candidate.continuous(equations.problem, shape)
+    limits = {c.name: OF_SIGN[sign] for c, sign in signs if sign} | dict(bounds)
     found = {
         name: interval(value, drawn[name], units.get(name, "1"), limits.get(name)) for name, value in central.items()
     }
+    for name in candidate.refined:
+        if name in found:
+            found[name] = _within(found[name], fitted[name]) if name in fitted else held(central[name], units[name])
     onset = candidate.change_point
     if onset in shape and onset in candidate.free:
         found[onset] = Parameter(*onset_interval(equations, fit, index), unit_of(onset, labels))
     return found
+
+
+def _within(found: Parameter, ends: tuple[float, float]) -> Parameter:
+    """Return a value that is told as it was fitted, with its interval within its range."""
+    low, high = np.clip((found.low, found.high), *ends).tolist()
+    return Parameter(found.value, min(low, found.value), max(high, found.value), found.unit)
+
+
+def held(value: float, unit: str) -> Parameter:
+    """Return a usual value that the recording did not move: it has no interval."""
+    return Parameter(value, float("nan"), float("nan"), unit)
 
 
 def unit_of(name: str, labels: Mapping[str, str]) -> str:

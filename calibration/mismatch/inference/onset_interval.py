@@ -54,7 +54,8 @@ def onset_interval(equations: NormalEquations, fit: Fit, index: int) -> tuple[fl
     profile = shape_profile(equations, fit.without(index), candidate, term.wheels)
     onset = candidate.change_point
     at, length_s = float(shape[onset]), problem.length_s
-    developments = candidate.onset_profiles(problem)
+    # The fitted one too: its numbers may be no usual ones.
+    developments = [*candidate.onset_profiles(problem), {name: value for name, value in shape.items() if name != onset}]
 
     def gains(onset_s: float) -> list[float]:
         return [profile({**development, onset: onset_s}) for development in developments]

@@ -177,7 +177,7 @@ def _shape_slopes(equations: NormalEquations, fit: Fit) -> Iterator[tuple[ShapeS
         if candidate is None:
             continue
         values = fit.coefficients[fit.of_term(index)] / design.scale[list(term.group.columns)]
-        for name, (low, high) in candidate.bounds(problem, shape).items():
+        for name, (low, high) in candidate.continuous(problem, shape).items():
             if name not in shape or name == candidate.change_point:
                 continue
             reach = max(0.5 * equations.thresholds.slope_step * (high - low), candidate.resolution(problem))

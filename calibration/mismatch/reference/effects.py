@@ -118,14 +118,16 @@ def _needs(candidate: Candidate) -> str:
 
 def _parameters(candidate: Candidate, labels: Mapping[str, str], unit: str) -> Iterator[str]:
     units = {each.name: in_units(each.unit, unit, labels) for each in candidate.coefficients}
-    units |= {name: unit_of(name, labels) for name in candidate.free}
+    units |= {name: unit_of(name, labels) for name in (*candidate.free, *candidate.refined)}
     yield from (f"`{name}`" + (f" [{units[name]}]" if units[name] != "1" else "") for name in _told(candidate, units))
 
 
 def _told(candidate: Candidate, names: Collection[str]) -> Collection[str]:
     """Return the parameters that the answer has: a candidate may keep one of its shape to itself (`parameters`)."""
     try:
-        return candidate.parameters(dict.fromkeys(candidate.free, 1.0), [1.0] * len(candidate.coefficients))
+        return candidate.parameters(
+            dict.fromkeys((*candidate.free, *candidate.refined), 1.0), [1.0] * len(candidate.coefficients)
+        )
     except KeyError:  # it asks for more of a shape than what is free
         return names
 

@@ -36,12 +36,18 @@ def of_grid(problem: Problem, groups: Sequence[Group]) -> Sequence[Group]:
 def implausibility(problem: Problem, candidate: Candidate, shape: Shape) -> float:
     """Return the Δχ² that a candidate must gain for being hardly possible on this machine, or in this shape.
 
-    Beside effects that the simulation was corrected by, what is new is charged: that these changed is more likely.
+    Beside effects that the simulation was corrected by, what is new is charged: that these changed is more likely. So
+    is each number that is no usual one, as much as it had to gain.
     """
     unlikely = candidate.name in problem.simulation.unlikely_effects
     new = bool(problem.stated) and not candidate.stated_size
     charged = problem.thresholds.unlikely_penalty * unlikely + problem.thresholds.new_effect_penalty * new
-    return candidate.prior_penalty(problem, shape) + charged
+    return candidate.prior_penalty(problem, shape) + charged + cost_of_unusual_numbers(problem, candidate, shape)
+
+
+def cost_of_unusual_numbers(problem: Problem, candidate: Candidate, shape: Shape) -> float:
+    """Return the Δχ² that a shape has to gain for its numbers that are no usual ones."""
+    return problem.thresholds.lead_margin * len(candidate.unusual(problem, shape))
 
 
 def with_candidate(

@@ -206,7 +206,7 @@ def _parameter_rows(found: Effect, labels: Labels) -> tuple[ParameterRow, ...]:
         factor, unit = (100.0, "%") if name == "relative_size" else labels.scaled(parameter.unit)
         value, low, high = (factor * each for each in (parameter.value, parameter.low, parameter.high))
         if np.isfinite(value):
-            drawing = _safe(interval_figure(value, low, high))
+            drawing = _safe(interval_figure(value, low, high) if np.isfinite(low) else "")
             label = labels.parameter(found.name, name)
             rows.append(ParameterRow(label, number(value), number(low), number(high), unit, drawing))
     return tuple(rows)

@@ -25,6 +25,11 @@ if TYPE_CHECKING:
 
 Scored = tuple[float, "Term"]
 
+MOST_ROUNDS = 8
+"""Rounds in which the shapes of several terms are optimised, at most (a choice: two are usual at usual noise)."""
+WORTH_A_ROUND = 0.5
+"""Gain of the score from which another round is worth its time (a choice: e^0.25 in odds)."""
+
 
 def best_of_each_candidate(equations: NormalEquations, given: Sequence[Term]) -> list[Scored]:
     """Return each candidate's best shape and wheels beside `given`, with Δχ² less penalty, best first."""
@@ -144,15 +149,21 @@ def _agrees_with_own_channel(equations: NormalEquations, fit: Fit, index: int) -
 
 
 def optimised_shapes(equations: NormalEquations, terms: Sequence[Term]) -> tuple[NormalEquations, tuple[Term, ...]]:
-    """Return the terms with each one's shape, from the grid and between its points, at its best; two rounds."""
-    terms = list(terms)
-    for _ in range(2 if len(terms) > 1 else 1):
+    """Return the terms with each one's shape, from the grid and between its points, at its best.
+
+    The terms are optimised one after the other, in rounds, as long as these gain: what two of them have in common, one
+    gives up to the other in small steps.
+    """
+    terms, reached = list(terms), -float("inf")
+    for _ in range(MOST_ROUNDS if len(terms) > 1 else 1):
         for index, term in enumerate(terms):
             others = terms[:index] + terms[index + 1 :]
             family = family_of(term, others, equations.design.groups)
             found = [(gain, t) for gain, t in equations.further(others, family) if t.wheels == term.wheels]
-            best = _largest_of_worthwhile_kind(equations, others, found) if found else term
-            equations, terms[index] = optimised_shape(equations, others, best)
+            equations, terms[index] = _best_of_kinds(equations, others, found) if found else (equations, term)
+        before, reached = reached, equations.score(equations.fit(terms))
+        if reached - before < WORTH_A_ROUND:
+            break
     return equations, tuple(terms)
 
 
@@ -162,34 +173,54 @@ def family_of(term: Term, others: Sequence[Term], groups: Sequence[Group]) -> li
     return [group for group in groups if group.named and group.law == term.group.law and group.subject not in taken]
 
 
-def _largest_of_worthwhile_kind(equations: NormalEquations, others: Sequence[Term], found: Sequence[Scored]) -> Term:
-    """Return the shape with most Δχ² less its prior's, of a kind in which the effect is large enough, if any is."""
-    kinds: dict[frozenset[str], Term] = {}
-    for _, term in sorted(found, key=lambda pair: pair[1].group.selection_penalty - pair[0]):
-        kinds.setdefault(frozenset(term.group.shape), term)
-    best = list(kinds.values())
-    for term in best if len(best) > 1 else ():
-        fit = equations.fit((*others, term))
-        if relative_size(equations, fit, len(others)) >= equations.thresholds.smallest_effect:
-            return term
-    return best[0]
+def _best_of_kinds(
+    equations: NormalEquations, others: Sequence[Term], found: Sequence[Scored]
+) -> tuple[NormalEquations, Term]:
+    """Return the shape with most Δχ² less its prior's, optimised, and equations that have its columns.
+
+    A shape of another kind, with other numbers, is optimised too where it is behind by no more than the points of its
+    grid miss. A kind in which the effect is too small is left out, if there is another.
+    """
+    best: dict[frozenset[str], tuple[float, Term]] = {}
+    for gain, term in found:
+        scored = gain - term.group.selection_penalty, term
+        kind = frozenset(term.group.shape)
+        best[kind] = max(best.get(kind, scored), scored, key=lambda pair: pair[0])
+    kinds = sorted(best.values(), key=lambda pair: -pair[0])
+    large = [each for each in kinds if _is_large(equations, others, each[1])] if len(kinds) > 1 else []
+    best_fit = equations.fit((*others, (large or kinds)[0][1]))
+    near = (large or kinds)[0][0] - equations.thresholds.form_misfit * best_fit.delta_chi2
+    optimised: list[tuple[float, Term]] = []
+    for score, term in large or kinds[:1]:
+        if score >= near:
+            equations, shaped = optimised_shape(equations, others, term)
+            optimised.append((equations.score(equations.fit((*others, shaped))), shaped))
+    return equations, max(optimised, key=lambda pair: pair[0])[1]
+
+
+def _is_large(equations: NormalEquations, others: Sequence[Term], term: Term) -> bool:
+    fit = equations.fit((*others, term))
+    return relative_size(equations, fit, len(others)) >= equations.thresholds.smallest_effect
 
 
 def best_subsets(equations: NormalEquations) -> tuple[NormalEquations, list[Fit]]:
     """Return the best acceptable set of each size, from none to three effects, shapes optimised."""
     limits, none = equations.thresholds, equations.fit(())
     first = best_of_each_candidate(equations, ())[: limits.polished_singles]
-    equations, singles = _best_optimised(equations, [(term,) for _, term in first])
+    equations, polished = _optimised(equations, [(term,) for _, term in first])
+    singles = [fit for fit in polished if acceptable(equations, fit)]
     # Of two columns that are late, one alone may fit badly where the simulation is linearised with both on time.
     late = [] if equations.problem.late is None else [term for _, term in first if term.settled_in(equations.problem)]
-    if not (singles or late):
+    # Alone, one of two effects may have the wrong sign, or less than it gains without its covariate.
+    seeds = [fit.terms[0] for fit in polished if equations.score(fit) > 0 or acceptable(equations, fit)] + late
+    if not seeds:
         return equations, [none]
     rest = best_of_each_candidate(equations, ())[limits.polished_singles :]
-    seeds = [fit.terms[0] for fit in singles] + [term for score, term in rest if score > 0] + late
+    seeds += [term for score, term in rest if score > 0]
     pairs = [
         (seed, term) for seed in seeds for _, term in best_of_each_candidate(equations, (seed,))[: limits.pair_breadth]
     ]
-    equations, best_pairs = _best_optimised(equations, _distinct(equations, pairs)[: limits.polished_pairs])
+    equations, best_pairs = _best_optimised(equations, _worth_polishing(equations, _distinct(equations, pairs)))
     if not best_pairs:
         return equations, [none, *singles[:1]]
     triples = [
@@ -199,6 +230,17 @@ def best_subsets(equations: NormalEquations) -> tuple[NormalEquations, list[Fit]
     ]
     equations, best_triples = _best_optimised(equations, _distinct(equations, triples)[:1])
     return equations, [none, *singles[:1], best_pairs[0], *best_triples[:1]]
+
+
+def _worth_polishing(equations: NormalEquations, pairs: Sequence[tuple[Term, ...]]) -> Sequence[tuple[Term, ...]]:
+    """Return the best of pairs that are ordered by score: as many as usual, and more that are behind by little.
+
+    Where the noise is small, that is what the shapes of the grid miss of a law.
+    """
+    limits = equations.thresholds
+    scores = [equations.score(equations.fit(pair)) for pair in pairs[: limits.most_polished_pairs]]
+    least = scores[0] * (1 - limits.further_share) if scores else 0.0
+    return pairs[: max(sum(score > least for score in scores), limits.polished_pairs)]
 
 
 def _distinct(equations: NormalEquations, sets: Sequence[tuple[Term, ...]]) -> list[tuple[Term, ...]]:
@@ -212,11 +254,17 @@ def _distinct(equations: NormalEquations, sets: Sequence[tuple[Term, ...]]) -> l
 
 def _best_optimised(equations: NormalEquations, sets: Sequence[tuple[Term, ...]]) -> tuple[NormalEquations, list[Fit]]:
     """Return the acceptable ones of these sets with optimised shapes, by score."""
+    equations, fits = _optimised(equations, sets)
+    return equations, [fit for fit in fits if acceptable(equations, fit)]
+
+
+def _optimised(equations: NormalEquations, sets: Sequence[tuple[Term, ...]]) -> tuple[NormalEquations, list[Fit]]:
+    """Return these sets with optimised shapes, by score."""
     fits = []
     for terms in sets:
         equations, optimised = optimised_shapes(equations, terms)
         fits.append(equations.fit(optimised))
-    return equations, sorted((fit for fit in fits if acceptable(equations, fit)), key=equations.score, reverse=True)
+    return equations, sorted(fits, key=equations.score, reverse=True)
 
 
 def passes_entry_test(equations: NormalEquations, more: Fit, less: Fit, entry_threshold: float) -> bool:

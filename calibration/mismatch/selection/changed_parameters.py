@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape, growth
+from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.growth import growth
 from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.selection.shape_optimisation import shape_profile
 

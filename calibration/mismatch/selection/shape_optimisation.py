@@ -9,13 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
-from regolithd.calibration.mismatch.regression.candidate_groups import coefficient_signs, with_candidate
+from regolithd.calibration.mismatch.regression.candidate_groups import (
+    coefficient_signs,
+    cost_of_unusual_numbers,
+    with_candidate,
+)
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.normal_equations import membership
 from regolithd.calibration.mismatch.regression.schur import delta_chi2_together, schur_complement
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
     from regolithd.calibration.mismatch.regression.design_matrix import Course
@@ -34,6 +38,10 @@ CLOSEST = 1 / 840
 its standard error)."""
 MOST_STEPS = 30
 """Steps of that, at most; most take five."""
+MOST_EVALUATIONS = 150
+"""Of the search for several numbers together (a choice: two take 40 to 60)."""
+NEAR = 3
+"""Readings about an onset at which another development is tried too (a choice)."""
 MISFORESEEN = 0.5
 """Share of a parabola's gain by which a smooth function may differ from it (a choice: it shrinks with each step)."""
 LEAST_GAIN = 0.05
@@ -148,20 +156,68 @@ def optimised_shape(equations: NormalEquations, others: Sequence[Term], term: Te
     candidate = term.group.candidate
     if candidate is None:
         return equations, term
-    if not any(name in term.group.shape for name in candidate.free):
+    if not any(name in term.group.shape for name in (*candidate.free, *candidate.refined)):
         return _self_consistent(equations, others, term)
     if candidate.stated_coefficient(term.group.shape) is not None:
         return _at_its_coefficient(equations, others, term, candidate)
     profile = shape_profile(equations, others, candidate, term.wheels)
-    best, gain = dict(term.group.shape), profile.less_prior(term.group.shape)
-    for name, bounds in candidate.bounds(equations.problem, best).items():
+    best, gain = _with_free_at_best(profile, dict(term.group.shape))
+    best = _refined(profile, best, gain)
+    equations, term = _reshaped(equations, term, best)
+    return _self_consistent(equations, others, term)
+
+
+def _with_free_at_best(profile: ShapeProfile, shape: Shape) -> tuple[Shape, float]:
+    """Return a shape with each free number in turn at the largest Δχ² less its prior's, and that Δχ²."""
+    problem, candidate = profile.equations.problem, profile.candidate
+    return _at_best(profile, shape, candidate.bounds(problem, shape))
+
+
+def _at_best(profile: ShapeProfile, shape: Shape, ranges: Mapping[str, tuple[float, float]]) -> tuple[Shape, float]:
+    """Return a shape with each number that has a range, in turn, at the largest Δχ² less its prior's, and that Δχ²."""
+    best, gain = shape, profile.less_prior(shape)
+    for name, bounds in ranges.items():
         if name in best:
-            between = candidate.search_range(equations.problem, best, name, bounds)
+            between = profile.candidate.search_range(profile.equations.problem, best, name, bounds)
             value, found = maximise(profile.along(best, name), *between)
             if found > gain:
                 best, gain = {**best, name: value}, found
-    equations, term = _reshaped(equations, term, best)
-    return _self_consistent(equations, others, term)
+    return best, gain
+
+
+def _refined(profile: ShapeProfile, shape: Shape, gain: float) -> Shape:
+    """Return a shape with other numbers than usual ones where these gain more than the choice among shapes by chance.
+
+    All of its numbers are optimised together then: an exponent and a speed make up for each other.
+    """
+    problem, candidate = profile.equations.problem, profile.candidate
+    ranges = candidate.refinable(problem, shape)
+    other, reached = _at_best(profile, shape, ranges)
+    if reached - gain < LEAST_GAIN:
+        return shape
+    ends = {**candidate.bounds(problem, shape), **ranges}
+    other, reached = _together_at_best(profile, other, {name: ends[name] for name in ends if name in shape})
+    return other if reached - gain > cost_of_unusual_numbers(problem, candidate, other) else shape
+
+
+def _together_at_best(
+    profile: ShapeProfile, shape: Shape, ranges: Mapping[str, tuple[float, float]]
+) -> tuple[Shape, float]:
+    """Return a shape with all numbers that have a range at the largest Δχ² less its prior's, and that Δχ² (simplex)."""
+    from scipy.optimize import minimize  # noqa: PLC0415  # only where a recording demands unusual numbers
+
+    def of(point: Array) -> Shape:
+        return {**shape, **dict(zip(ranges, point.tolist(), strict=True))}
+
+    start = np.array([float(shape[name]) for name in ranges])
+    found = minimize(
+        lambda point: -profile.less_prior(of(point)),
+        start,
+        method="Nelder-Mead",
+        bounds=list(ranges.values()),
+        options={"fatol": LEAST_GAIN, "xatol": np.inf, "maxfev": MOST_EVALUATIONS},
+    )
+    return of(np.asarray(found.x)), -float(found.fun)
 
 
 def with_best_developments(
@@ -185,11 +241,14 @@ def _best_developed(equations: NormalEquations, others: Sequence[Term], term: Te
     if onset not in candidate.bounds(problem, shape):
         return equations, term
     profile = shape_profile(equations, others, candidate, term.wheels)
-    best, gain = shape, profile.less_prior(shape)
+    best, gain = shape, profile.less_prior(shape) - cost_of_unusual_numbers(problem, candidate, shape)
     for development in candidate.developments(problem):
         tried = {**development, onset: shape[onset]}
         between = candidate.search_range(problem, tried, onset, candidate.bounds(problem, tried)[onset])
-        value, reached = maximise(profile.along(tried, onset), *between)
+        along = profile.along(tried, onset)
+        # A steep rise begins within a few readings of a step, which the scan's points may step over.
+        near = np.clip(float(shape[onset]) + problem.recording.step_s * np.arange(-NEAR, NEAR + 1), *between).tolist()
+        value, reached = max((maximise(along, *between), *((at, along(at)) for at in near)), key=lambda pair: pair[1])
         if reached > gain:
             best, gain = {**tried, onset: value}, reached
     return _reshaped(equations, term, best)

@@ -52,12 +52,14 @@ def _shape_std(effect: Mapping[str, Any]) -> dict[str, float]:
     Raises
     ------
     ValueError
-        When one is of no number in its shape.
+        When one is of no number in its shape, or no standard deviation.
     """
     found = {str(name): float(std) for name, std in dict(effect.get("shape_std", {})).items()}
     numbers = {name for name, value in dict(effect["shape"]).items() if isinstance(value, int | float)}
     if unknown := sorted(set(found) - numbers):
         raise ValueError(f"shape_std has {', '.join(unknown)}, which is no number in its shape")
+    if wrong := [name for name, std in found.items() if not 0 <= std < float("inf")]:
+        raise ValueError(f"shape_std of {wrong[0]} is {found[wrong[0]]:g}: it is a number from 0 on")
     return found
 
 

@@ -124,6 +124,9 @@ class SelectionThresholds:
     polished_singles: int = threshold(5, "Single effects whose shape is optimised.", f"{CHOICE}: computing time")
     pair_breadth: int = threshold(4, "Second effects tried beside each first.", f"{CHOICE}: computing time")
     polished_pairs: int = threshold(4, "Pairs whose shapes are optimised.", f"{CHOICE}: computing time")
+    most_polished_pairs: int = threshold(
+        10, "The same of pairs that are behind by no more than a law's misfit, `further_share`.", f"{CHOICE}: time"
+    )
     triple_breadth: int = threshold(
         2, "Pairs to which a third effect is added, and third effects for each.", f"{CHOICE}: computing time"
     )

@@ -97,9 +97,10 @@ def test_an_effect_without_a_relative_size_has_no_standard_deviation(size: Param
 
 
 def test_how_well_a_law_is_known_is_written_and_read() -> None:
-    """Its power has a standard deviation; when it began, is of one recording."""
-    term = Contribution("bearing-drag", {"onset_s": 60.0, "power": 0.8}, (0.5,), (1,))
+    """Its power has a standard deviation; when it began is of one recording, and a usual number was not fitted."""
+    term = Contribution("bearing-drag", {"onset_s": 60.0, "power": 0.8, "rise_s": 5.0}, (0.5,), (1,))
     told = {"onset_s": Parameter(60.0, 50.0, 70.0, "s"), "power": Parameter(0.8, 0.6, 1.0, "1")}
+    told["rise_s"] = Parameter(5.0, float("nan"), float("nan"), "s")
     effect: Any = SimpleNamespace(
         parameters={"relative_size": Parameter(0.1, 0.09, 0.11, "1"), **told}, law_std=0.2, posterior=None
     )

@@ -193,6 +193,10 @@ def test_inertia_may_come_late(problem: Problem) -> None:
 def test_every_shape_has_one_of_the_forms(candidate: Candidate, problem: Problem) -> None:
     """Each form that is documented is searched, and each shape that is searched has a documented form."""
     shapes = [*candidate.shapes(problem), *candidate.propose_shapes(problem, np.where(problem.mask, 0.001, 0.0))]
+    # Numbers that are no usual ones may be of a form of their own.
+    shapes += [
+        {**shape, name: sum(ends) / 2} for shape in shapes for name, ends in candidate.refinable(problem, shape).items()
+    ]
     assert {candidate.form_of(shape) for shape in shapes} == set(candidate.forms or {""})
 
 
@@ -203,6 +207,9 @@ def test_every_shape_has_one_of_the_forms(candidate: Candidate, problem: Problem
         ("sensor-delay", {"late": "torque_Nm", "filter_s": 0.1}, "first-order filter"),
         ("sensor-delay", {"late": "load_N", "input_secant_s": 0.1}, "dead time"),
         ("load-dependent-efficiency", {"power": 0.0}, "constant share"),
+        ("stribeck-friction", {"exponent": 1.0}, "exponential"),
+        ("stribeck-friction", {"exponent": 1.4}, "stretched exponential"),
+        ("stribeck-friction", {"fades": "exponent 2"}, "Gaussian"),
         ("load-dependent-efficiency", {"power": 0.5}, "power of the torque"),
         ("load-dependent-efficiency", {"light": 0.5}, "exponential decay with the torque"),
         ("load-dependent-efficiency", {"bent": 0.0}, "linear efficiency"),

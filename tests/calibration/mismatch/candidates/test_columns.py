@@ -25,7 +25,7 @@ from law_problem import (
     problem,
 )
 
-from regolithd.calibration.mismatch.candidates.candidate import growth, onset_grid
+from regolithd.calibration.mismatch.candidates.growth import growth, onset_grid
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.candidates.load_cell_drift import OFFSETS, DriftOfPredictedLoad, LoadCellDrift
 from regolithd.calibration.mismatch.problem.problem import Problem
@@ -48,6 +48,7 @@ LAWS: list[tuple[str, Shape, Array]] = [
     ("viscous-friction", {"power": 0.7}, SIGN * np.abs(SPEED) ** 0.7),
     ("stribeck-friction", {"stribeck_speed_rad_s": 0.1, "fades": "exponent 1"}, SIGN * np.exp(-np.abs(SPEED) / 0.1)),
     ("stribeck-friction", {"stribeck_speed_rad_s": 0.1, "fades": "exponent 2"}, SIGN * np.exp(-((SPEED / 0.1) ** 2))),
+    ("stribeck-friction", {"stribeck_speed_rad_s": 0.1, "exponent": 1.5}, SIGN * np.exp(-(np.abs(SPEED / 0.1) ** 1.5))),
     ("stribeck-friction", {"stribeck_speed_rad_s": 0.1, "fades": "quotient"}, SIGN / (1 + (SPEED / 0.1) ** 2)),
     (
         "cold-lubricant-friction",

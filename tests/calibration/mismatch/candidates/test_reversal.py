@@ -31,15 +31,14 @@ def test_a_step_stays_a_step() -> None:
     assert reversal_of(problem_of(with_friction(0.0))) == {}
 
 
-def test_extra_drag_near_standstill_is_tried_as_a_step_as_well() -> None:
-    """On a machine that turns one way a drag that fades with speed is taken for a gradual reversal."""
+def test_drag_that_decays_from_standstill_is_no_gradual_reversal() -> None:
+    """On a machine that turns one way, and on one that reverses at once."""
     columns = table(noise=0.02)
-    speed = np.abs(columns["speed_rad_s"])
-    drag = 0.8 / (1 + (speed / (0.05 * FASTEST)) ** 2)
-    problem = problem_of({**columns, "speed_rad_s": speed, "reading_V": columns["reading_V"] + drag})
-    assert reversal_of(problem) != {}
-    turns = {"transition_rad_s" in shape for shape in StribeckFriction().shapes(problem)}
-    assert turns == {False, True}
+    for speed in (np.abs(columns["speed_rad_s"]), columns["speed_rad_s"]):
+        drag = np.sign(speed) * (0.2 + 0.8 * np.exp(-((speed / (0.1 * FASTEST)) ** 2)))
+        problem = problem_of({**columns, "speed_rad_s": speed, "reading_V": columns["reading_V"] + drag})
+        assert reversal_of(problem) == {}
+        assert not any("transition_rad_s" in shape for shape in StribeckFriction().shapes(problem))
 
 
 def test_a_stribeck_effect_fades_after_the_friction_has_turned_round() -> None:

@@ -134,7 +134,7 @@ def test_a_change_is_told_over_the_transition_that_the_recording_shows() -> None
     """A friction that was corrected as a step reverses gradually: more of it is a change, and no further name."""
     recording = moving(7, 0.0)
     speed, force = recording.channels["speed_m_s"], recording.channels["force_N"]
-    answer = compare(recording.with_channels(force_N=force + np.tanh(speed / 0.15)), Axis(), effects=[COULOMB]).answer
+    answer = compare(recording.with_channels(force_N=force + np.tanh(speed / 0.1)), Axis(), effects=[COULOMB]).answer
     (change,) = answer.changes
     assert change.low < 1.0 < change.high
     assert (answer.verdict, answer.effects) == ("missing-physics", ())

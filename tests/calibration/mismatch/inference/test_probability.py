@@ -77,6 +77,22 @@ def test_the_alternatives_are_one_name_away() -> None:
     assert min(margins) > 0
 
 
+def test_a_curve_in_the_place_of_a_law_that_is_a_little_wrong_is_no_alternative() -> None:
+    """Where the noise is small it follows what the law misses, and has more evidence for that."""
+    columns = table(drag=0.5, factor=0.4, power=1.5, noise=0.02)
+    missed = 0.02 * np.sin(5 * np.abs(columns["speed_rad_s"]))
+    equations = equations_of(problem_of({**columns, "reading_V": columns["reading_V"] + missed}))
+    decision = decide(equations.over(with_smooth_terms(equations.design)), CANDIDATES)
+    assert {term.name for term in decision.whole.terms} == {"drag", "power"}
+    assert alternatives(decision) == ()
+    exact = replace(equations.thresholds, form_misfit=0.0)
+    problem = replace(decision.equations.problem, thresholds=exact)
+    strict = replace(decision, equations=decision.equations.over(replace(decision.equations.design, problem=problem)))
+    (other,) = alternatives(strict)
+    assert other.effects == ("drag", "unexplained")
+    assert other.margin < 0
+
+
 def test_what_held_out_readings_refused_is_no_alternative() -> None:
     """However much evidence it has: it could not have been the answer."""
     decision = decided(drag=0.035)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
-from linear_machine import INSTANTS, Array, Level, Power, equations_of, group_of, problem_of, table, term_of
+from linear_machine import INSTANTS, Array, Drag, Level, Power, equations_of, group_of, problem_of, table, term_of
 
 from regolithd.calibration.mismatch import Prior
 from regolithd.calibration.mismatch.data.recording import from_columns
@@ -25,7 +25,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch import Problem, Shape
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
@@ -88,6 +88,73 @@ def test_the_best_sets_of_one_and_two_effects_are_the_true_ones(equations: Norma
     assert passes_entry_test(extended, subsets[2], subsets[1], 8.0)
     if len(subsets) > 3:
         assert not passes_entry_test(extended, subsets[3], subsets[2], 8.0)
+
+
+class LightDrag(Drag):
+    """A drag that cannot be large."""
+
+    name = "light-drag"
+
+    def plausible(self, problem: Problem, shape: Shape, values: Sequence[float]) -> bool:  # noqa: ARG002
+        """Return whether it is below 0.4 V."""
+        return values[0] < 0.4
+
+
+class Growing(LightDrag):
+    """Another that grows with the speed."""
+
+    name = "growing"
+
+    def columns(self, problem: Problem, shape: Shape) -> Array:
+        """Return ω."""
+        return super().columns(problem, shape) * np.abs(problem.covariates["wheel_speed"])[None]
+
+
+def test_of_two_effects_each_may_be_impossible_alone() -> None:
+    """Alone, one stands for the other as well, and is too large."""
+    speed = np.abs(table()["speed_rad_s"]).reshape(INSTANTS, 2)
+    equations = equations_of(problem_of(table(drag=0.3 + 0.3 * speed)), (LightDrag(), Growing()))
+    for name in ("light-drag", "growing"):
+        assert not acceptable(equations, equations.fit([term_of(equations, name)]))
+    _, subsets = best_subsets(equations)
+    assert {term.name for term in subsets[-1].terms} == {"light-drag", "growing"}
+
+
+class TwoKinds(Power):
+    """A power of the speed, or a saturation, of which the grid is coarse."""
+
+    name = "two-kinds"
+    free: ClassVar = {"power": (0.5, 3.0), "knee": (0.05, 3.0)}
+
+    def shapes(self, problem: Problem) -> list[Shape]:  # noqa: ARG002
+        """Return a power that is nearly right, and a knee that is far off."""
+        return [{"power": 0.5}, {"knee": 0.4}]
+
+    def search_range(
+        self,
+        problem: Problem,  # noqa: ARG002
+        shape: Shape,  # noqa: ARG002
+        name: str,  # noqa: ARG002
+        bounds: tuple[float, float],
+    ) -> tuple[float, float]:
+        """Return the whole range."""
+        return bounds
+
+    def columns(self, problem: Problem, shape: Shape) -> Array:
+        """Return |ω|^p, or 1 − exp(−|ω|/k)."""
+        speed = np.abs(problem.covariates["wheel_speed"])[None]
+        return speed ** float(shape["power"]) if "power" in shape else 1 - np.exp(-speed / float(shape["knee"]))
+
+
+def test_each_kind_of_shape_that_is_near_is_optimised() -> None:
+    """On the grid the power is ahead of the knee, which is the law."""
+    columns = table()
+    law = 0.6 * (1 - np.exp(-np.abs(columns["speed_rad_s"]) / 0.75))
+    equations = equations_of(problem_of({**columns, "reading_V": columns["reading_V"] + law}), (TwoKinds(),))
+    power, knee = (equations.fit([term_of(equations, "two-kinds", place=k)]) for k in (0, 1))
+    assert power.delta_chi2 > knee.delta_chi2
+    _, (term,) = optimised_shapes(equations, [power.terms[0]])
+    assert float(term.group.shape["knee"]) == pytest.approx(0.75, rel=0.25)
 
 
 def test_where_nothing_is_missing_no_effect_passes() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
@@ -113,6 +113,30 @@ def test_a_shape_is_made_to_agree_with_its_coefficients() -> None:
     extended, term = optimised_shape(equations, (), term_of(equations, "self-consistent"))
     assert term.group.shape == {"bent": 0.3}
     assert extended.design.size == equations.design.size + 1
+
+
+class Bend(Power):
+    """A power of the speed that is 1 or 2 unless a recording demands another."""
+
+    name = "bend"
+    free: ClassVar = {}
+    refined: ClassVar = {"power": (0.5, 3.0)}
+
+
+@pytest.mark.parametrize(("factor", "power", "moves"), [(0.8, 1.5, True), (0.8, 2.0, False), (0.15, 1.9, False)])
+def test_a_usual_number_is_left_where_a_recording_demands_it(factor: float, power: float, *, moves: bool) -> None:
+    """A number that is no usual one is charged what it had to gain, and has an interval."""
+    equations = equations_of(problem_of(table(factor=factor, power=power)), (Bend(),))
+    best = max((term_of(equations, "bend", place=k) for k in (0, 1)), key=lambda term: equations.fit([term]).delta_chi2)
+    extended, term = optimised_shape(equations, (), best)
+    problem, limits = equations.problem, equations.thresholds
+    assert (term.group.shape != best.group.shape) is moves
+    assert set(Bend().unusual(problem, term.group.shape)) == ({"power"} if moves else set())
+    assert term.group.selection_penalty - best.group.selection_penalty == (limits.lead_margin if moves else 0.0)
+    if moves:
+        assert float(term.group.shape["power"]) == pytest.approx(power, abs=0.1)
+        gained = extended.fit([term]).delta_chi2 - equations.fit([best]).delta_chi2
+        assert gained > limits.lead_margin
 
 
 def test_an_onset_is_sought_near_its_place_in_the_grid() -> None:

@@ -33,9 +33,11 @@ def test_an_effect_that_lacks_something_is_told_by_its_number(number: int) -> No
         stated_effects({"effects": effects})
 
 
-@pytest.mark.parametrize("shape_std", [{"pover": 0.1}, {"fades": 0.1}, {"power": "wide"}, 0.1])
+@pytest.mark.parametrize(
+    "shape_std", [{"pover": 0.1}, {"fades": 0.1}, {"power": "wide"}, {"power": float("nan")}, {"power": -0.1}, 0.1]
+)
 def test_a_deviation_of_no_number_of_the_law_is_told(shape_std: object) -> None:
-    """Misspelt, of a choice, or no number itself."""
+    """Misspelt, of a choice, or no standard deviation itself."""
     effect = {**EFFECT, "shape": {"power": 0.9, "fades": "quotient"}, "shape_std": shape_std}
     with pytest.raises(SimulationError, match=r"^effect 1 needs"):
         stated_effects({"effects": [effect]})
