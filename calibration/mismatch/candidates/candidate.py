@@ -294,8 +294,9 @@ class Candidate:
         """
         names = [coefficient.name for coefficient in self.coefficients[: len(values)]]
         found = {name: float(value) for name, value in zip(names, values, strict=True)}
-        numbers = [name for name in (*self.free, *self.refined) if name in shape]
-        return {**found, **{name: float(shape[name]) for name in numbers}}
+        # A step has no time constant, and a constant share no power: 0 stands for neither.
+        numbers = [*self.free, *(name for name in self.refined if shape.get(name))]
+        return {**found, **{name: float(shape[name]) for name in numbers if name in shape}}
 
     def prior_penalty(self, problem: Problem, shape: Shape) -> float:  # noqa: ARG002
         """Return the Δχ² that a shape must gain beyond others, for contradicting what was known before."""

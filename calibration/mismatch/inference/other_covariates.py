@@ -38,8 +38,9 @@ def notes_on_other_covariates(decision: Decision) -> tuple[str, ...]:
         return ()
     here = word_for(told.name, problem.labels)
     there = " and the ".join(word_for(name, problem.labels) for name in others)
-    note = f"What is unexplained over the {here} follows the {there} nearly as well: they go together in this recording"
-    return (f"{note}. One has to vary without the other to tell which it depends on.",)
+    note = f"What is unexplained over the {here} follows the {there} nearly as well"
+    why = "they go together in this recording, or it hardly depends on any of them"
+    return (f"{note}: {why}. One has to vary without the other to tell which it depends on.",)
 
 
 def _scores_over(decision: Decision, told: Term) -> dict[str, float]:

@@ -30,7 +30,8 @@ def interval(
     """Return a value with the bounds of its draws; a value outside of them widens the interval beyond itself.
 
     Where `bounds` are declared, draws beyond them are impossible: those within are the posterior. A best value near a
-    bound is then no centre of it, and the nearest in the middle half of the posterior is returned instead.
+    bound is then no centre of it, and the nearest in the middle half of the posterior is returned instead. Where so
+    many draws are beyond one bound that its equal-tailed interval would leave the bound out, the interval ends there.
     """
     least, most = bounds or (-np.inf, np.inf)
     everywhere = np.asarray(drawn, np.float64)
@@ -38,11 +39,26 @@ def interval(
     bounded = len(inside) < len(everywhere)
     if len(inside) < FEWEST_DRAWS_WITHIN:
         inside = np.clip(_tail(everywhere, least, most), least, most)
-    low, high = (float(bound) for bound in np.quantile(inside, NINE_TENTHS))
+    low, high = _ends(inside, everywhere, least, most)
     if bounded or not least < value < most:
         value = float(np.clip(value, *np.quantile(inside, MIDDLE_HALF)))
     margin = LEAST_MARGIN * (high - low)
     return Parameter(value, max(min(low, value - margin), least), min(max(high, value + margin), most), unit)
+
+
+def _ends(inside: Array, everywhere: Array, least: float, most: float) -> tuple[float, float]:
+    """Return what nine tenths of the draws within the bounds are between: a bound, where a tail is beyond that one.
+
+    A power that is exactly 1, or a drag that is gone, is at its bound: an interval between 5 and 95 % never holds it.
+    """
+    tail, whole = NINE_TENTHS[0], NINE_TENTHS[1] - NINE_TENTHS[0]
+    at_least, at_most = bool(np.mean(everywhere < least) > tail), bool(np.mean(everywhere > most) > tail)
+    if at_least == at_most:
+        low, high = np.quantile(inside, NINE_TENTHS)
+        return float(low), float(high)
+    if at_least:
+        return least, float(np.quantile(inside, whole))
+    return float(np.quantile(inside, 1 - whole)), most
 
 
 def _tail(drawn: Array, least: float, most: float) -> Array:

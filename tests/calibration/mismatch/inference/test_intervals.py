@@ -271,7 +271,18 @@ def test_of_draws_beyond_a_bound_the_tail_is_left(mean: float, bounds: tuple[flo
     found = interval(0.0, drawn, "s", bounds)
     assert min(abs(found.low), abs(found.high)) < abs(found.value) < max(abs(found.low), abs(found.high))
     assert found.value * sign == pytest.approx(0.2 * np.log(4 / 3), rel=0.2)
-    assert max(found.low * sign, found.high * sign) == pytest.approx(0.2 * np.log(20), rel=0.2)
+    assert max(found.low * sign, found.high * sign) == pytest.approx(0.2 * np.log(10), rel=0.2)
+    assert 0.0 in (found.low, found.high)
+
+
+def test_an_interval_holds_a_bound_that_a_tail_is_beyond() -> None:
+    """A power of 1 that nothing may exceed: nine tenths of the draws within are above its lower end."""
+    drawn = np.random.default_rng(1).normal(0.98, 0.05, 400)
+    inside = drawn[drawn <= 1.0]
+    found = interval(0.99, drawn, "1", (0.0, 1.0))
+    assert found.high == 1.0
+    assert found.low == pytest.approx(np.quantile(inside, 0.1))
+    assert interval(0.5, drawn - 0.48, "1", (0.0, 1.0)).high < 1.0
 
 
 @pytest.mark.parametrize(
