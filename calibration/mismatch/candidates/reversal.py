@@ -60,7 +60,7 @@ def reversal_of(problem: Problem) -> Shape:
 
 
 def _best_reversal(problem: Problem) -> Shape:
-    if not problem.has("wheel_speed", "direction"):
+    if not problem.has("wheel_speed", "direction") or not any(_reversals(problem)):
         return {}
     moving = problem.mask & (problem.known("direction") != 0)
     tried = [shape for shape in _shapes(problem) if _share_within(problem, shape, moving) > LEAST_WITHIN]
