@@ -262,12 +262,19 @@ class Candidate:
 
     def unusual(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
         """Return the range of each number of a shape that was moved away from its usual values."""
-        usual = self.shapes(problem) if self.refined else ()
         return {
             name: ends
             for name, ends in self.refinable(problem, shape).items()
-            if not any(np.isclose(float(shape[name]), float(each.get(name, np.nan)), rtol=1e-9) for each in usual)
+            if not np.isclose(float(shape[name]), self._usual(problem, name), rtol=1e-9).any()
         }
+
+    def _usual(self, problem: Problem, name: str) -> Array:
+        """Return the values that a number of a shape has in the grid, which is asked for with each shape of it."""
+
+        def of_grid() -> Array:
+            return np.array([float(shape[name]) for shape in self.shapes(problem) if name in shape])
+
+        return problem.once(f"usual {name} of {self.name}, {type(self).__qualname__}", of_grid)
 
     def continuous(self, problem: Problem, shape: Shape) -> Mapping[str, tuple[float, float]]:
         """Return the range of each number of a shape that was fitted: those that are free, and unusual values."""
