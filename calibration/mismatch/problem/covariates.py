@@ -67,7 +67,7 @@ def covariates_of(
     if "wheel_speed" in found and np.isfinite(found["wheel_speed"]).any():
         speed = found["wheel_speed"]
         read = speed if as_read is None else simulation.covariates(as_read)["wheel_speed"]
-        found["direction"] = direction_of(read)
+        found["direction"] = _direction(speed, read)
         rate, angle = _derivative(speed, recording), _integral(speed, recording)
         given = found.get("wheel_acceleration", rate)
         found["wheel_acceleration"] = np.where(np.isfinite(given), given, rate)
@@ -90,6 +90,22 @@ def direction_of(speed: Array, std: float | None = None) -> Array:
     """
     directions = [np.where(np.abs(column) > _reach(column, std), np.sign(column), 0.0) for column in speed.T]
     return np.where(np.isfinite(speed), np.stack(directions, axis=1), np.nan)
+
+
+def _direction(speed: Array, read: Array) -> Array:
+    """Return the sign of a speed (time, wheel), smoothed or as it was `read`; 0 where its noise has none.
+
+    The noise at standstill is that of the readings. Of its variance, smoothing leaves what it does not take out.
+    """
+    if speed is read:
+        return direction_of(read)
+    signs = []
+    for smooth, column in zip(speed.T, read.T, strict=True):
+        reach = _noise_at_standstill(column)
+        taken_out = float(np.nanmean((column - smooth) ** 2)) if np.isfinite(column - smooth).any() else 0.0
+        left = max(1 - taken_out / (reach / STANDSTILL_DEVIATIONS) ** 2, 0.0) if reach else 0.0
+        signs.append(np.where(np.abs(smooth) > np.sqrt(left) * reach, np.sign(smooth), 0.0))
+    return np.where(np.isfinite(speed), np.stack(signs, axis=1), np.nan)
 
 
 def _reach(speed: Array, std: float | None) -> float:

@@ -4,14 +4,15 @@ The error of an input biases the prediction and every candidate that is computed
 way: the residual correlates with candidates though no physics is missing. Replacing a reading by E[truth | recording]
 removes this; the error that remains is of Berkson's kind, uncorrelated with what is computed from it (Carroll et al.,
 2006, chapter 4). The truth is modelled as first-order autoregressive about its mean, with the correlation of the
-recording, so that a signal that jumps is hardly smoothed. With a stated error of 0 nothing changes. Where the error is
-relative to the reading, all this is on a scale on which it is not (`reading_scale.py`).
+recording, so that a signal that jumps is hardly smoothed; where it moves smoothly, and its readings show that a
+smoothing spline is clearly nearer to it, by that. With a stated error of 0 nothing changes. Where the error is relative
+to the reading, all this is on a scale on which it is not (`reading_scale.py`).
 
 A normal density is wrong for a truth that is 0 for half of the time, or has few levels, and shrinks it wrongly. So the
 density of the truth's values is estimated too, and used in two more models: in the place of the autoregression's normal
 density, and for a truth that keeps its value for a while and then takes another. The readings tell how far each is from
-the truth, and how to combine them (`signal/stein.py`); where that is no clear gain, the autoregression stays alone. It
-also stays for what the speed is computed from: a speed is differentiated, and its sign is the direction of friction.
+the truth, and how to combine them (`signal/stein.py`); where that is no clear gain, the normal model stays alone. It
+also does for what the speed is computed from: a speed is differentiated, and its sign is the direction of friction.
 
 A sensor with noise does not read exactly 0 twice: where it does, it is at rest or within its dead band, and stays 0. A
 simulation may have a step there, as friction has.
@@ -27,7 +28,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
-from regolithd.calibration.mismatch.problem.true_values import NormalTruth, refined_by_density
+from regolithd.calibration.mismatch.problem.true_values import (
+    NormalTruth,
+    refined_by_density,
+    smooth_where_better,
+    still_at_rest,
+)
 from regolithd.calibration.mismatch.signal.recursion import recursion
 
 if TYPE_CHECKING:
@@ -85,13 +91,16 @@ def expected_inputs(
     truths = normal_truths(stabilised, np.array([scale.deviation for scale in scales]) ** 2, starts)
     smooth = truths.mean.copy()
     for k, name in enumerate(owners):
-        if name in normal:
-            continue
         if k and owners[k - 1] == name and np.array_equal(values[:, k - 1], values[:, k], equal_nan=True):
             smooth[:, k] = smooth[:, k - 1]  # a sensor of the whole machine
             continue
-        moving = np.where(rest[:, k], np.nan, stabilised[:, k])
-        smooth[:, k] = refined_by_density(moving, scales[k].deviation, starts, truths.column(k))
+        moving, deviation = np.where(rest[:, k], np.nan, stabilised[:, k]), scales[k].deviation
+        before = truths.column(k)
+        truth = smooth_where_better(moving, deviation, recording.time_s, recording.run, before)
+        if name not in normal:
+            smooth[:, k] = refined_by_density(moving, deviation, starts, truth)
+        elif truth is not before:
+            smooth[:, k] = still_at_rest(moving, deviation, truth).mean
     expected = np.stack([scale.readings(column) for scale, column in zip(scales, smooth.T, strict=True)], axis=1)
     parts = np.split(np.where(rest, 0.0, expected), len(names), axis=1)
     return recording.with_channels(**dict(zip(names, parts, strict=True)))

@@ -1,4 +1,4 @@
-"""One noisy input's true values, by the density of its values beside the autoregression's normal one."""
+"""One noisy input's true values: by a smoothing spline, and by the density of its values, beside an autoregression."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.signal.jump_chain import JumpChain, Windows, windows_of
 from regolithd.calibration.mismatch.signal.mixing_density import MixingDensity, mixing_density
+from regolithd.calibration.mismatch.signal.smoothing_spline import best_spline, fitted_rows, stretches
 from regolithd.calibration.mismatch.signal.stein import (
     BATCH,
     FEWEST_BATCHES,
@@ -28,6 +29,13 @@ LEAST_ERROR = 0.001
 """Error in standard deviations of the truth below which no density is asked for (a choice). An error of a twentieth
 biases a coefficient by a quarter of a percent, but where a column rests at a level for most of the time, its readings
 there are nothing but error, and all that is left of a residual follows them."""
+REST_DEVIATIONS = 3.0
+"""Posterior standard deviations within which a smoothed value may be 0, and of a mean about it (1 in 370 is beyond)."""
+SLOWEST_CREEP = 0.25
+"""Mean in standard deviations of the readings' error below which nothing moves (a choice): a sensor's zero is no
+better than a part of its error."""
+FEWEST_AT_REST = 9
+"""Readings one after the other that must be so (a choice): fewer are passed on the way from one sign to the other."""
 LEAST_POSTERIOR = 1e-6
 """A posterior's variance in error variances is at least this, that of a million readings: less is rounding."""
 
@@ -49,14 +57,63 @@ class NormalTruth:
     persistence: float
 
 
+def smooth_where_better(
+    readings: Array, deviation: float, time: Array, run: NDArray[np.int64], normal: NormalTruth
+) -> NormalTruth:
+    """Return what a smoothing spline says of the truth where that is clearly nearer to it; else `normal`.
+
+    `readings` (time,), NaN where there are none, have normal errors of this deviation.
+    """
+    known = np.isfinite(readings)
+    if not _matters(deviation, known, normal):
+        return normal
+    centred = np.where(known, readings - normal.prior_mean, np.nan)
+    parts = fitted_rows(len(readings))
+    rows = np.concatenate([np.arange(len(readings))[part] for part in parts])
+    times = [each for part in parts for each in stretches(time[part], run[part])]
+    spline = best_spline(centred[rows], deviation, times)
+    new = _at(spline.estimate(centred[rows], deviation, times), known[rows])
+    old = _at(Estimate((normal.mean - normal.prior_mean)[rows], normal.variance[rows]), known[rows])
+    read = centred[rows][known[rows]]
+    if not (clearly_better(read, deviation**2, new, old, 2) and consistent(read, deviation**2, new)):
+        return normal
+    everywhere = spline.estimate(centred, deviation, stretches(time, run))
+    mean = np.where(np.isfinite(normal.mean), everywhere.mean + normal.prior_mean, np.nan)
+    return replace(normal, mean=mean, variance=everywhere.variance)
+
+
+def still_at_rest(readings: Array, deviation: float, smooth: NormalTruth) -> NormalTruth:
+    """Return the same with 0 wherever a column stays at it.
+
+    What is left of the noise at standstill after smoothing wanders slowly about 0. A simulation that takes its sign
+    for a direction would let friction reverse there.
+    """
+    near = np.abs(np.nan_to_num(smooth.mean, nan=np.inf)) <= REST_DEVIATIONS * np.sqrt(smooth.variance)
+    edges = np.flatnonzero(np.diff(near.astype(np.int8), prepend=0, append=0))
+    mean = smooth.mean.copy()
+    for first, last in edges.reshape(-1, 2).tolist():
+        read = readings[first:last]
+        read = read[np.isfinite(read)]
+        if len(read) < FEWEST_AT_REST:
+            continue
+        if abs(read.mean()) <= deviation * max(REST_DEVIATIONS / np.sqrt(len(read)), SLOWEST_CREEP):
+            mean[first:last] = 0.0
+    return replace(smooth, mean=mean)
+
+
+def _matters(deviation: float, known: NDArray[np.bool_], normal: NormalTruth) -> bool:
+    """Return whether an error is one of which more is asked, and the readings are enough for it."""
+    variance = deviation**2
+    told_apart = LEAST_VARIANCE * variance < normal.prior_variance < variance / LEAST_ERROR**2
+    return bool(told_apart and known.sum() >= BATCH * FEWEST_BATCHES)
+
+
 def refined_by_density(readings: Array, deviation: float, starts: NDArray[np.int64], normal: NormalTruth) -> Array:
     """Return the truth's conditional expectation, shape (time,); `normal.mean` where a density is no clear gain.
 
     `readings` (time,), NaN where there are none, have normal errors of this deviation; runs begin at `starts`.
     """
-    variance, known = deviation**2, np.isfinite(readings)
-    told_apart = LEAST_VARIANCE * variance < normal.prior_variance < variance / LEAST_ERROR**2
-    if not told_apart or known.sum() < BATCH * FEWEST_BATCHES:
+    if not _matters(deviation, np.isfinite(readings), normal):
         return normal.mean
     # About its mean, a column far from 0 has all its digits in its squares.
     centred = replace(normal, mean=normal.mean - normal.prior_mean, prior_mean=0.0)

@@ -17,7 +17,12 @@ from regolithd.calibration.mismatch.problem.errors_in_variables import (
     normal_truths,
 )
 from regolithd.calibration.mismatch.problem.prior import SensorError
-from regolithd.calibration.mismatch.problem.true_values import refined_by_density
+from regolithd.calibration.mismatch.problem.true_values import (
+    NormalTruth,
+    refined_by_density,
+    smooth_where_better,
+    still_at_rest,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -200,3 +205,60 @@ def test_it_takes_a_tenth_of_a_second_of_the_processor() -> None:
         before = time.process_time()
         refined_by_density(readings, 0.2, START, normal)
         assert time.process_time() - before < 0.5
+
+
+TIME = 0.02 * np.arange(COUNT)
+ONE_RUN = np.zeros(COUNT, np.int64)
+
+
+def to_and_fro() -> Array:
+    """Return the speed of an oscillation of which the amplitude changes."""
+    return np.sin(np.pi * TIME) * (1 + 0.3 * np.sin(TIME / 7))
+
+
+def smoothed(truth: Array, error: float, stated: float = 1.0) -> tuple[Array, NormalTruth, NormalTruth]:
+    """Return readings of a truth, the autoregression's estimate of it, and what the spline says where it is better."""
+    readings = truth + np.random.default_rng(20).normal(0, error, truth.shape)
+    deviation = stated * error
+    normal = normal_truths(readings[:, None], np.array([deviation**2]), START).column(0)
+    return readings, normal, smooth_where_better(readings, deviation, TIME, ONE_RUN, normal)
+
+
+@pytest.mark.parametrize("error", [0.003, 0.01, 0.05])
+def test_a_smooth_motion_has_a_speed_and_an_acceleration(error: float) -> None:
+    """An eighth of the noise's power is left, where an autoregression leaves half and more, and it is as much as said.
+
+    Of the acceleration, which a difference of readings has ten times as noisy, 3 % is left at most.
+    """
+    truth = to_and_fro()
+    _, normal, found = smoothed(truth, error)
+    left = float(np.mean((found.mean - truth) ** 2))
+    assert left < error**2 / 8 < np.mean((normal.mean - truth) ** 2) / 2
+    assert left == pytest.approx(float(np.mean(found.variance)), rel=0.4)
+    rate, of_estimate = np.gradient(truth), np.gradient(found.mean)
+    assert np.std(of_estimate - rate) < 0.03 * np.std(rate)
+
+
+@pytest.mark.parametrize("truth", [autoregressive(20.0), levels()], ids=["autoregressive", "levels"])
+@pytest.mark.parametrize("error", [0.01, 0.1])
+def test_what_jumps_is_not_smoothed(truth: Array, error: float) -> None:
+    """The autoregression's estimate stays, to the last digit."""
+    _, normal, found = smoothed(truth, error)
+    assert found is normal
+
+
+def test_an_error_that_is_stated_four_times_too_large_smooths_nothing() -> None:
+    """Readings that scatter by less than that contradict it."""
+    _, normal, found = smoothed(to_and_fro(), 0.01, stated=4.0)
+    assert found is normal
+
+
+def test_a_column_that_stays_at_zero_is_zero_there() -> None:
+    """And nowhere else: not where it passes, nor where it creeps at two standard deviations of its noise."""
+    dwells = np.where(TIME % 20 < 6, 0.0, np.sin(np.pi * (TIME % 20 - 6)))
+    readings, _, found = smoothed(dwells, 0.05)
+    rests = still_at_rest(readings, 0.05, found).mean == 0
+    assert np.mean(rests[dwells == 0]) > 0.98
+    assert np.max(np.abs(dwells[rests])) < 0.1
+    readings, _, found = smoothed(np.where(TIME % 20 < 6, 0.1, dwells), 0.05)
+    assert not np.any(still_at_rest(readings, 0.05, found).mean == 0)
