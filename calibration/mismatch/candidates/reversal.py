@@ -29,6 +29,8 @@ neighbours."""
 DECAYS = (0.05, 0.1, 0.2, 0.4)
 """Speeds over which friction that decays from standstill does, as shares of the highest usual speed (a choice: from
 where the slowest reversals are)."""
+DECAY_POWERS = (1, 2)
+"""Exponents of that: an exponential, and a Gaussian."""
 DISPLACEMENTS = (0.005, 0.01, 0.02, 0.04, 0.08, 0.16)
 """Displacements after which all but 1/e has reversed, as shares of the usual one from a reversal to the next (a choice,
 as above)."""
@@ -36,6 +38,11 @@ FEWEST_REVERSALS = 8
 """Reversals of an axis from which a displacement is looked for (a choice: one may be a stop)."""
 REFINED_TO = 0.05
 """Relative tolerance of the refined shape (a choice: its effect on the residual is of second order)."""
+FIRST_STEP = 0.35
+"""First step of the search for the shape, in natural logarithms (a choice: half of the way to the next that is tried).
+"""
+MOST_EVALUATIONS = 40
+"""Of that search, at most (a choice: one number takes 10, two take 25)."""
 LEAST_WITHIN = 0.01
 """Share of the readings in motion that must be within a reversal, to tell it from a step (a choice)."""
 LEAST_GAIN = 10.8
@@ -67,26 +74,33 @@ def _best_reversal(problem: Problem) -> Shape:
     if not tried:
         return {}
     beside = _beside_a_step(problem)
-    if not (step := beside.squares_left({})) > 0:
+    step = _Turn({}, beside.squares_left({}))
+    if not step.left > 0:
         return {}  # a drive that was simulated without noise
     gradual = _best_of(beside, tried)
-    # Drag near standstill that decays with speed resembles a gradual reversal, with as many numbers.
-    decaying = min(
-        (replace(beside, decay=each) for each in range(2 * len(DECAYS))), key=lambda each: each.squares_left({})
-    )
-    left = decaying.squares_left({})
-    if beside.gain(left, gradual[1]) > LEAST_GAIN:
-        beside, step, gradual = decaying, left, _best_of(decaying, tried)
-    shape, left = gradual
-    of_friction = beside.independent * (beside.squares_without_friction / left - 1)
+    # Drag near standstill that decays with speed resembles a gradual reversal, with as many numbers, or hides how
+    # gradual it is.
+    decaying_step = _with_decay(beside, {})
+    others = (gradual.shape, _best_of(replace(beside, decay=decaying_step.decay), tried).shape)
+    decaying = min((_with_decay(beside, shape) for shape in others), key=lambda turn: turn.left)
+    if beside.gain(min(decaying_step.left, decaying.left), gradual.left) > LEAST_GAIN:
+        step, gradual = decaying_step, decaying
+    of_friction = beside.independent * (beside.squares_without_friction / gradual.left - 1)
     is_there = of_friction > quantile(beside.laws, problem.thresholds.single_test_level)
-    return shape if is_there and beside.gain(left, step) > LEAST_GAIN else {}
+    return gradual.shape if is_there and beside.gain(gradual.left, step.left) > LEAST_GAIN else {}
 
 
-def _best_of(beside: _Beside, tried: Sequence[Shape]) -> tuple[Shape, float]:
-    """Return the best of these shapes, the best of each kind refined, and the sum of squares that it leaves."""
+def _best_of(beside: _Beside, tried: Sequence[Shape]) -> _Turn:
+    """Return the best of these shapes, the best of each kind refined."""
     of_kind = {next(iter(shape)): shape for shape in sorted(tried, key=beside.squares_left, reverse=True)}
-    return min((_refined(beside, shape) for shape in of_kind.values()), key=lambda pair: pair[1])
+    return min((_refined(beside, shape) for shape in of_kind.values()), key=lambda turn: turn.left)
+
+
+def _with_decay(beside: _Beside, shape: Shape) -> _Turn:
+    """Return the best of the drags that decay from standstill, beside friction that reverses with a shape like this."""
+    usual = _usual_speed(beside.problem)
+    tried = [replace(beside, decay=_Decay(share * usual, power)) for share in DECAYS for power in DECAY_POWERS]
+    return _refined(min(tried, key=lambda each: each.squares_left(shape)), shape)
 
 
 def _shapes(problem: Problem) -> Iterator[Shape]:
@@ -119,6 +133,23 @@ def _share_within(problem: Problem, shape: Shape, moving: NDArray[np.bool_]) -> 
     return float(np.mean(along[moving] < TURNED)) if moving.any() else 0.0
 
 
+@dataclass(frozen=True)
+class _Decay:
+    """Drag that decays from standstill, as exp(−(|ω|/speed)^power)."""
+
+    speed: float
+    power: int
+
+
+@dataclass(frozen=True)
+class _Turn:
+    """How friction may reverse: its shape, the sum of squares that is left, and what decays beside it, if anything."""
+
+    shape: Shape
+    left: float
+    decay: _Decay | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class _Beside:
     """A recording, whitened by the noise that friction which reverses at once leaves.
@@ -133,7 +164,7 @@ class _Beside:
     free: columns of the free parameters, and of what else acts about reversals, shape (column, reading)
     residual: shape (1, reading)
     laws: how many friction may follow
-    decay: which of the laws that decay from standstill is among them; None: none
+    decay: drag that decays from standstill among them; None: none
     """
 
     problem: Problem
@@ -143,7 +174,7 @@ class _Beside:
     free: Array
     residual: Array
     laws: int
-    decay: int | None = None
+    decay: _Decay | None = None
 
     def gain(self, left: float, step: float) -> float:
         """Return the Δχ² of what leaves one sum of squares over what leaves another."""
@@ -161,7 +192,7 @@ class _Beside:
         """
         laws = _laws(self.problem, shape)
         if self.decay is not None:
-            laws.append(_decays(self.problem, shape)[self.decay])
+            laws.append(_decaying(self.problem, shape, self.decay))
         columns = np.concatenate((self.free, _in_order(self.problem, laws, self.whitening, self.deviation)))
         left, last = _left(columns, self.residual)
         if self.decay is not None and last < 0:
@@ -226,11 +257,11 @@ def _laws(problem: Problem, shape: Shape) -> list[Array]:
     return list(as_shown(problem, [direction * factor for factor in (*factors, np.abs(problem.filled), *of_axis)]))
 
 
-def _decays(problem: Problem, shape: Shape) -> list[Array]:
-    """Return friction that decays with speed, as an exponential and as a Gaussian, over each of `DECAYS`."""
-    direction, speed, usual = along_motion(problem, shape), np.abs(problem.known("wheel_speed")), _usual_speed(problem)
-    over = [speed / (share * usual) for share in DECAYS] if usual > 0 else []
-    return list(as_shown(problem, [direction * np.exp(-(each**power)) for each in over for power in (1, 2)]))
+def _decaying(problem: Problem, shape: Shape, decay: _Decay) -> Array:
+    """Return drag that decays with speed."""
+    left = np.exp(-((np.abs(problem.known("wheel_speed")) / decay.speed) ** decay.power))
+    (column,) = as_shown(problem, [along_motion(problem, shape) * left])
+    return column
 
 
 def _in_order(problem: Problem, columns: Sequence[Array], whitening: Whitening, deviation: Array) -> Array:
@@ -250,15 +281,24 @@ def _left(columns: Array, residual: Array) -> tuple[Array, float]:
     return residual - fitted @ columns, float(np.sign(fitted[-1])) if len(fitted) else 0.0
 
 
-def _refined(beside: _Beside, shape: Shape) -> tuple[Shape, float]:
-    """Return the best shape between half and twice this one, and the sum of squares that it leaves."""
-    from scipy.optimize import minimize_scalar  # noqa: PLC0415  # most recordings need none, and no SciPy for it
+def _refined(beside: _Beside, shape: Shape) -> _Turn:
+    """Return the best shape, and decay, with each number between half and twice this one's."""
+    from scipy.optimize import minimize  # noqa: PLC0415  # most recordings need none, and no SciPy for it
 
-    ((name, value),) = shape.items()
-    found = minimize_scalar(
-        lambda log: beside.squares_left({name: float(np.exp(log))}),
-        bounds=(np.log(float(value) / 2), np.log(2 * float(value))),
-        method="bounded",
-        options={"xatol": REFINED_TO},
+    def at(point: Array) -> tuple[_Beside, Shape]:
+        numbers = iter(np.exp(point).tolist())
+        moved = {name: next(numbers) for name in shape}
+        decay = beside.decay and replace(beside.decay, speed=next(numbers))
+        return replace(beside, decay=decay), moved
+
+    start = np.log([float(value) for value in shape.values()] + ([beside.decay.speed] if beside.decay else []))
+    simplex = np.vstack((start, start + FIRST_STEP * np.eye(len(start))))
+    found = minimize(
+        lambda point: at(point)[0].squares_left(at(point)[1]),
+        start,
+        method="Nelder-Mead",
+        bounds=[(value - np.log(2), value + np.log(2)) for value in start],
+        options={"xatol": REFINED_TO, "fatol": np.inf, "maxfev": MOST_EVALUATIONS, "initial_simplex": simplex},
     )
-    return {name: float(np.exp(found.x))}, float(found.fun)
+    best, moved = at(found.x)
+    return _Turn(moved, float(found.fun), best.decay)

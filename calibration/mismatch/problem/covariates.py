@@ -36,6 +36,9 @@ ONE_STD_QUANTILE = 0.6827
 LEVEL_READINGS = 9
 """Slow readings one after the other in the middle of which noise is looked for (a choice): those beside fast ones are
 the ends of ramps, which bend by more than the noise where they are sampled coarsely."""
+STANDING_READINGS = 5
+"""Readings one after the other within a smoothed speed's noise from which an axis stands (a choice): a reversal is
+through in fewer."""
 ALTERNATING_SHARE = 0.15
 """Share of the highest usual speed below which what alternates is noise (a choice: with three standard deviations of a
 noise that reaches further, hardly a start or stop would be left)."""
@@ -93,9 +96,10 @@ def direction_of(speed: Array, std: float | None = None) -> Array:
 
 
 def _direction(speed: Array, read: Array) -> Array:
-    """Return the sign of a speed (time, wheel), smoothed or as it was `read`; 0 where its noise has none.
+    """Return the sign of a speed (time, wheel), smoothed or as it was `read`; 0 where an axis stands.
 
-    The noise at standstill is that of the readings. Of its variance, smoothing leaves what it does not take out.
+    The noise at standstill is that of the readings. Of its variance, smoothing leaves what it does not take out. A
+    smoothed speed has a sign also on its way from one direction to the other.
     """
     if speed is read:
         return direction_of(read)
@@ -104,7 +108,7 @@ def _direction(speed: Array, read: Array) -> Array:
         reach = _noise_at_standstill(column)
         taken_out = float(np.nanmean((column - smooth) ** 2)) if np.isfinite(column - smooth).any() else 0.0
         left = max(1 - taken_out / (reach / STANDSTILL_DEVIATIONS) ** 2, 0.0) if reach else 0.0
-        signs.append(np.where(np.abs(smooth) > np.sqrt(left) * reach, np.sign(smooth), 0.0))
+        signs.append(np.where(_stays_within(smooth, np.sqrt(left) * reach), 0.0, np.sign(smooth)))
     return np.where(np.isfinite(speed), np.stack(signs, axis=1), np.nan)
 
 
@@ -148,6 +152,15 @@ def _stays_below(speed: Array, limit: float, count: int) -> NDArray[np.bool_]:
     if len(speed) >= count:
         found[count // 2 : len(speed) - count // 2] = sliding_window_view(np.abs(speed) < limit, count).all(axis=1)
     return found
+
+
+def _stays_within(speed: Array, reach: float) -> NDArray[np.bool_]:
+    """Return where a speed (time,) is within a reach of 0, and stays so for some readings."""
+    within = np.abs(speed) <= reach
+    edges = np.flatnonzero(np.diff(within.astype(np.int8), prepend=0, append=0)).reshape(-1, 2)
+    for first, last in edges[np.diff(edges, axis=1)[:, 0] < STANDING_READINGS].tolist():
+        within[first:last] = False
+    return within
 
 
 def quantity(channel: str) -> str:

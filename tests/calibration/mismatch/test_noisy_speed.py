@@ -77,4 +77,4 @@ def test_inertia_is_no_delay_of_the_speed() -> None:
 
 def test_nothing_is_found_where_nothing_is_missing() -> None:
     """Neither friction nor inertia stands for what the speed's noise does."""
-    assert compare(swung(lambda speed, rate: 0.0 * rate), Damper()).answer.verdict == "consistent"
+    assert compare(swung(lambda _, rate: 0.0 * rate), Damper()).answer.verdict == "consistent"

@@ -137,6 +137,20 @@ def test_a_speed_that_is_smoothed_stands_where_it_was_read_as_zero() -> None:
     assert np.any(problem.recording.channels["speed_m_s"][~standing, 0] != read[~standing])
 
 
+def test_a_smoothed_speed_has_its_sign_up_to_the_reversal() -> None:
+    """Where a reading may have the other sign by its noise; and none where the axis stands for some readings."""
+    time = 0.02 * np.arange(4000)
+    true = np.where(time % 20 < 5, 0.0, np.sin(np.pi * (time % 20 - 5)))
+    read = true + np.random.default_rng(4).normal(0, 0.1, len(time))
+    columns = {"t_s": time, "speed_m_s": read, "current_A": np.sign(true)}
+    found = build_problem(from_columns(columns), Belt()).covariates["direction"][:, 0]
+    moving = true != 0
+    assert (
+        np.mean(found[moving] == np.sign(true[moving])) > 0.98 > np.mean(np.sign(read[moving]) == np.sign(true[moving]))
+    )
+    assert np.mean(found[~moving] == 0) > 0.98
+
+
 class Encoder(Belt):
     """A belt whose angle, and whose acceleration, are measured."""
 
