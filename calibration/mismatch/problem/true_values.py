@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.signal.jump_chain import JumpChain, Windows, windows_of
 from regolithd.calibration.mismatch.signal.mixing_density import MixingDensity, mixing_density
-from regolithd.calibration.mismatch.signal.smoothing_spline import best_spline, fitted_rows, stretches
+from regolithd.calibration.mismatch.signal.smoothing_spline import best_spline, differences, fitted_rows
 from regolithd.calibration.mismatch.signal.stein import (
     BATCH,
     FEWEST_BATCHES,
@@ -29,6 +29,8 @@ LEAST_ERROR = 0.001
 """Error in standard deviations of the truth below which no density is asked for (a choice). An error of a twentieth
 biases a coefficient by a quarter of a percent, but where a column rests at a level for most of the time, its readings
 there are nothing but error, and all that is left of a residual follows them."""
+LEAST_LEFT = 0.01
+"""Share of the error's variance that a spline leaves, at least (a choice: a mean of a hundred readings has no less)."""
 REST_DEVIATIONS = 3.0
 """Posterior standard deviations within which a smoothed value may be 0, and of a mean about it (1 in 370 is beyond)."""
 SLOWEST_CREEP = 0.25
@@ -67,19 +69,23 @@ def smooth_where_better(
     known = np.isfinite(readings)
     if not _matters(deviation, known, normal):
         return normal
-    centred = np.where(known, readings - normal.prior_mean, np.nan)
+    centred = readings - normal.prior_mean
     parts = fitted_rows(len(readings))
     rows = np.concatenate([np.arange(len(readings))[part] for part in parts])
-    times = [each for part in parts for each in stretches(time[part], run[part])]
-    spline = best_spline(centred[rows], deviation, times)
-    new = _at(spline.estimate(centred[rows], deviation, times), known[rows])
+    part_of = np.concatenate([np.full(part.stop - part.start, number) for number, part in enumerate(parts)])
+    runs = run[rows] * len(parts) + part_of
+    spline = best_spline(centred[rows], deviation, time[rows], runs)
+    there = spline.estimate(centred[rows], deviation, differences(time[rows], runs, spline.order))
+    new = _at(there, known[rows])
     old = _at(Estimate((normal.mean - normal.prior_mean)[rows], normal.variance[rows]), known[rows])
     read = centred[rows][known[rows]]
     if not (clearly_better(read, deviation**2, new, old, 2) and consistent(read, deviation**2, new)):
         return normal
-    everywhere = spline.estimate(centred, deviation, stretches(time, run))
-    mean = np.where(np.isfinite(normal.mean), everywhere.mean + normal.prior_mean, np.nan)
-    return replace(normal, mean=mean, variance=everywhere.variance)
+    smooth = spline.mean(centred, deviation, differences(time, run, spline.order)) + normal.prior_mean
+    variance = max(float(new.variance.mean()), LEAST_LEFT * deviation**2)
+    return replace(
+        normal, mean=np.where(np.isfinite(normal.mean), smooth, np.nan), variance=np.full(smooth.shape, variance)
+    )
 
 
 def still_at_rest(readings: Array, deviation: float, smooth: NormalTruth) -> NormalTruth:

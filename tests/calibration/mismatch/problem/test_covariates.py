@@ -148,7 +148,7 @@ def test_a_smoothed_speed_has_its_sign_up_to_the_reversal() -> None:
     assert (
         np.mean(found[moving] == np.sign(true[moving])) > 0.98 > np.mean(np.sign(read[moving]) == np.sign(true[moving]))
     )
-    assert np.mean(found[~moving] == 0) > 0.98
+    assert np.mean(found[~moving] == 0) > 0.95
 
 
 class Encoder(Belt):

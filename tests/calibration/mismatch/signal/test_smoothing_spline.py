@@ -8,87 +8,128 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.signal.smoothing_spline import (
     CORE,
+    HEAVY_ORDERS,
+    HEAVY_WIDTHS,
     MOST_FITTED,
     ORDERS,
+    WIDTHS,
     SmoothingSpline,
     best_spline,
+    differences,
     fitted_rows,
-    stretches,
 )
+from regolithd.calibration.mismatch.signal.stein import squared_error
 
 Array = NDArray[np.float64]
 COUNT = 400
 TIME = 0.02 * np.arange(COUNT)
 
 
-def dense(readings: Array, spline: SmoothingSpline, parts: list[Array]) -> tuple[Array, Array]:
+ONE_RUN = np.zeros(COUNT, np.int64)
+
+
+def dense(readings: Array, spline: SmoothingSpline, run: NDArray[np.int64]) -> tuple[Array, Array]:
     """Return the posterior mean, and variance over the error's, by the whole inverse matrix."""
     known = np.isfinite(readings)
-    precision, first = np.diag(known.astype(np.float64)), 0
-    for times in parts:
-        rows = np.diff(np.eye(len(times)), spline.order, axis=0)
-        there = slice(first, first + len(times))
-        precision[there, there] += spline.penalty * rows.T @ rows
-        first += len(times)
-    inverse = np.linalg.inv(precision)
+    rows = np.diff(np.eye(len(readings)), spline.order, axis=0)
+    rows[np.any([run[spline.order :] != run[k : len(run) - spline.order + k] for k in range(spline.order)], axis=0)] = 0
+    inverse = np.linalg.inv(np.diag(known.astype(np.float64)) + spline.penalty * rows.T @ rows)
     return inverse @ np.where(known, readings, 0.0), np.diag(inverse)
 
 
 @pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("penalty", [0.3, 30.0])
-def test_a_spline_is_the_posterior_mean_of_integrated_noise(order: int, penalty: float) -> None:
+@pytest.mark.parametrize("width", [0.8, 2.2])
+def test_a_spline_is_the_posterior_mean_of_integrated_noise(order: int, width: float) -> None:
     """With blanks, and two runs; the variance as it is away from their ends and the blanks."""
     random = np.random.default_rng(1)
     readings = np.sin(TIME) + random.normal(0, 0.1, COUNT)
     readings[200:203] = np.nan
-    parts = [TIME[:100], TIME[100:]]
-    spline = SmoothingSpline(order, penalty)
-    mean, share = dense(readings, spline, parts)
-    found = spline.estimate(readings, 0.1, parts)
-    np.testing.assert_allclose(found.mean, mean, atol=1e-6)
+    run = np.repeat([0, 1], [100, COUNT - 100])
+    spline = SmoothingSpline(order, width)
+    mean, share = dense(readings, spline, run)
+    found = spline.estimate(readings, 0.1, differences(TIME, run, order))
+    np.testing.assert_allclose(found.mean, mean, atol=1e-4)
     np.testing.assert_allclose(found.variance[40:60], 0.01 * share[40:60], rtol=1e-3)
 
 
 @pytest.mark.parametrize("order", ORDERS)
 def test_a_polynomial_below_the_order_stays(order: int) -> None:
-    """Its differences of that order are 0, also where the steps of time vary by a third."""
+    """Its differences of that order are 0, also where the steps of time vary by a fifth."""
     times = np.cumsum(np.random.default_rng(2).uniform(0.8, 1.2, COUNT))
-    polynomial = 3.0 + 0.2 * times + (0.01 * times**2 if order == 3 else 0.0)
-    found = SmoothingSpline(order, 1e3).estimate(polynomial, 1.0, [times])
-    np.testing.assert_allclose(found.mean, polynomial, rtol=1e-6)
+    polynomial = 3.0 + 0.2 * times + (0.01 * times**2 if order > 2 else 0.0)
+    for heavy in (False, True):
+        found = SmoothingSpline(order, 4.0, heavy).mean(polynomial, 1.0, differences(times, ONE_RUN, order))
+        np.testing.assert_allclose(found, polynomial, rtol=1e-5)
 
 
 def test_nothing_is_smoothed_across_a_gap_or_a_new_run() -> None:
     """A level that is another after a gap of time, or in the next run, keeps its step."""
     level = np.where(np.arange(COUNT) < 150, 0.0, 5.0)
-    gap = np.where(np.arange(COUNT) < 150, TIME, TIME + 100.0)
-    runs = stretches(TIME, np.where(np.arange(COUNT) < 150, 0, 1))
-    for parts in ([gap], runs):
-        np.testing.assert_allclose(SmoothingSpline(2, 1e3).estimate(level, 1.0, parts).mean, level, atol=1e-9)
-    smeared = SmoothingSpline(2, 1e3).estimate(level, 1.0, [TIME]).mean
+    gap = differences(np.where(level == 0, TIME, TIME + 100.0), ONE_RUN, 2)
+    runs = differences(TIME, np.where(level == 0, 0, 1), 2)
+    for rows in (gap, runs):
+        np.testing.assert_allclose(SmoothingSpline(2, 5.6).mean(level, 1.0, rows), level, atol=1e-9)
+    smeared = SmoothingSpline(2, 5.6).mean(level, 1.0, differences(TIME, ONE_RUN, 2))
     assert np.max(np.abs(smeared - level)) > 1
 
 
 def test_times_that_do_not_advance_are_no_error() -> None:
-    """Two rows at one time have no difference between them."""
+    """Two rows at one time have no difference between them; nor have two rows in all."""
     times = np.repeat(TIME[: COUNT // 2], 2)
-    found = SmoothingSpline(3, 10.0).estimate(np.ones(COUNT), 1.0, [times, np.zeros(0)])
-    np.testing.assert_allclose(found.mean, 1.0)
+    np.testing.assert_allclose(SmoothingSpline(3, 1.5).mean(TIME, 1.0, differences(times, ONE_RUN, 3)), TIME)
+    assert differences(TIME[:2], ONE_RUN[:2], 2).shape == (0, 3)
 
 
-def test_the_best_spline_is_nearly_that_of_who_knows_the_truth() -> None:
-    """Its mean square error is within a tenth of the least among all that are tried."""
-    truth = np.sin(2 * np.pi * 0.5 * 0.02 * np.arange(4000))
-    readings = truth + np.random.default_rng(3).normal(0, 0.05, 4000)
-    parts = [0.02 * np.arange(4000)]
+def test_a_long_blank_is_no_error() -> None:
+    """Whatever the order and the width; what was read on either side stays."""
+    readings = np.where((np.arange(COUNT) > 100) & (np.arange(COUNT) < 300), np.nan, 2.0)
+    for order, width, heavy in ((2, 10.0, True), (3, 10.0, True), (5, 5.0, False)):
+        rows = differences(TIME, ONE_RUN, order)
+        found = SmoothingSpline(order, width, heavy).mean(readings, 0.1, rows)
+        np.testing.assert_allclose(found[np.isfinite(readings)], 2.0, rtol=1e-4)
+
+
+def corners() -> Array:
+    """Return a speed in ramps, dwells and cruises."""
+    random, at = np.random.default_rng(4), [0.0]
+    while len(at) < 4000:
+        level, ramp, still = random.choice([0.0, 1.0, -1.0, 0.5]), 15, int(random.integers(30, 90))
+        at += np.linspace(at[-1], level, ramp + 1)[1:].tolist() + [level] * still
+    return np.array(at[:4000])
+
+
+OSCILLATION = np.sin(2 * np.pi * 0.5 * 0.02 * np.arange(4000))
+
+
+@pytest.mark.parametrize(("truth", "heavy"), [(OSCILLATION, False), (corners(), True)], ids=["smooth", "corners"])
+def test_the_best_spline_is_nearly_that_of_who_knows_the_truth(truth: Array, heavy: bool) -> None:
+    """Normal noise for what has no corners, heavy tails for what has; a tenth of the readings' error is left."""
+    readings = truth + np.random.default_rng(3).normal(0, 0.03, 4000)
+    time, run = 0.02 * np.arange(4000), np.zeros(4000, np.int64)
+    rows = {order: differences(time, run, order) for order in ORDERS}
 
     def error(spline: SmoothingSpline) -> float:
-        return float(np.mean((spline.estimate(readings, 0.05, parts).mean - truth) ** 2))
+        return float(np.mean((spline.mean(readings, 0.03, rows[spline.order]) - truth) ** 2))
 
-    chosen = best_spline(readings, 0.05, parts)
-    tried = [SmoothingSpline(order, penalty) for order in ORDERS for penalty in 10.0 ** np.arange(-1, 6.1, 0.5)]
-    assert error(chosen) < 1.1 * min(map(error, tried))
-    assert error(chosen) < 0.1 * 0.05**2
+    chosen = best_spline(readings, 0.03, time, run)
+    assert chosen.heavy == heavy
+    tried = [SmoothingSpline(order, each) for order in ORDERS for each in WIDTHS[:-4]]
+    tried += [SmoothingSpline(order, each, heavy=True) for order in HEAVY_ORDERS for each in HEAVY_WIDTHS]
+    assert error(chosen) < 1.2 * min(map(error, tried))
+    assert error(chosen) < 0.1 * 0.03**2
+
+
+@pytest.mark.parametrize("truth", [OSCILLATION, corners()], ids=["smooth", "corners"])
+def test_the_change_with_the_readings_tells_the_error_of_heavy_tails(truth: Array) -> None:
+    """Also where they do not fit and the error is large; with fixed weights it would seem to be nothing."""
+    readings = truth + np.random.default_rng(5).normal(0, 0.03, 4000)
+    spline = SmoothingSpline(2, 1.8, heavy=True)
+    given = readings, 0.03, differences(0.02 * np.arange(4000), np.zeros(4000, np.int64), 2)
+    estimate = spline.estimate(*given)
+    true = float(np.mean((estimate.mean - truth) ** 2))
+    assert float(np.mean(squared_error(readings, 0.03**2, estimate))) == pytest.approx(true, abs=0.1 * 0.03**2)
+    seeming = spline.with_fixed_weights(*given)
+    assert float(np.mean(squared_error(readings, 0.03**2, seeming))) < 0.9 * true
 
 
 def test_a_long_recording_is_fitted_in_few_parts() -> None:
