@@ -43,7 +43,8 @@ LEAST_STDS = 3.0
 LEAST_OF_PAST = 1 / 2
 """Slope with the past, as a share of that with what is new, from which on it is physics: half way between feedback,
 which has 0, and physics, which has 1. (−0.1 to 0.4 in 22 simulated chambers whose controller acts on the noise, which
-may have a memory; 0.8 to 2.7 of a cart's roll, a propeller's height, and a chamber's duty that acts by its square.)"""
+may have a memory; 0.8 to 2.7 of a cart's roll, a propeller's height, and a chamber's duty that acts by its square.)
+A slope with what is new above 1 counts as 1: a smooth curve over a slow covariate has too little of what is quick."""
 
 
 def fed_back(decision: Decision) -> frozenset[str]:
@@ -99,4 +100,4 @@ def _follows_the_new_alone(parts: Array, left: Array, blocks: NDArray[np.int64])
     sums = block_sums(parts * (left - np.einsum("a,atw->tw", slopes, parts)), blocks)
     covariance = inverse @ (sums.T @ sums) @ inverse
     apart, spread = slopes[-1] - slopes[0], np.sqrt(covariance[0, 0] + covariance[-1, -1] - 2 * covariance[0, -1])
-    return bool(slopes[0] < LEAST_OF_PAST * slopes[-1] and apart > LEAST_STDS * spread)
+    return bool(slopes[0] < LEAST_OF_PAST * min(slopes[-1], 1.0) and apart > LEAST_STDS * spread)

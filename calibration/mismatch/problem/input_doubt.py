@@ -68,10 +68,10 @@ def input_doubt(
 ) -> InputDoubt | None:
     """Return how uncertain the prediction from expected inputs is by the errors of their readings.
 
-    Two runs of the simulation for each input with an error: at each instant one standard deviation up or down, by lot,
-    since a simulation that integrates would add up an error that stays, and the other way round. Of one that
-    integrates the error lasts: it is drawn `DRAWS` times more, with all inputs at once. None where no input has an
-    error.
+    Two runs of the simulation for each input with an error: at each instant one standard deviation of what smoothing
+    leaves up or down, by lot, since a simulation that integrates would add up an error that stays, and the other way
+    round. Of one that integrates the error lasts: it is drawn `DRAWS` times more, whole, with all inputs at once. None
+    where no input has an error.
     """
     inputs = complete_inputs(expected)
     scales = {
@@ -86,13 +86,14 @@ def input_doubt(
     alone, together, bias = (np.zeros(before.shape) for _ in range(3))
     random, lasting = np.random.default_rng(0), False
     for name, error in stated.items():
-        lot = error * random.choice([-1.0, 1.0], size=(len(before), 1))
+        left = _left_by_smoothing(as_read.channels[name] - inputs[name], error)
+        # By what is left, not by a share of what the whole error would do: a step of the prediction is further away.
+        lot = np.sqrt(left) * error * random.choice([-1.0, 1.0], size=(len(before), 1))
         moved = (simulation.predict({**inputs, name: inputs[name] + sign * lot}, values) for sign in (1.0, -1.0))
         one, other = (np.nan_to_num(each - before) for each in moved)
-        left = _left_by_smoothing(as_read.channels[name] - inputs[name], error)
-        alone += left * (one**2 + other**2) / 2
-        together += wheels_in_common(inputs[name]) * (one**2 + other**2) / 2
-        bias += left * (one + other) / 2
+        alone += (one**2 + other**2) / 2
+        together += wheels_in_common(inputs[name]) * (one**2 + other**2) / (2 * left)
+        bias += (one + other) / 2
         lasting |= _lasts(one - other)
     draws = np.zeros((DRAWS if lasting else 0, *before.shape))
     for place in range(len(draws)):
