@@ -140,13 +140,16 @@ def late_otherwise(problem: Problem, values: Mapping[str, float]) -> bool:
 
 
 def put_on_time_by(problem: Problem, late: Mapping[str, float], channel: tuple[str, float] | None) -> bool:
-    """Return whether a problem has all these inputs on time that are late by so much [s].
+    """Return whether a problem has these inputs on time that are late by so much [s], and no others.
 
-    Beside late inputs, the channel has to be as late as it was found to be, too: each delay is found beside the other.
+    None but those that the simulation was corrected by. Beside late inputs, the channel has to be as late as it was
+    found to be, too: each delay is found beside the other.
     """
     within = ON_TIME_WITHIN * problem.recording.step_s
     if late and channel and problem.late:
         (kind, delay), (found, now) = problem.late, channel
         if kind != found or abs(now - delay) > within:
             return False
+    if len(problem.on_time.keys() - late.keys()) > sum(effect.on_time for effect in problem.stated):
+        return False
     return all(abs(delay - problem.on_time.get(name, 0.0)) <= within for name, delay in late.items())

@@ -208,15 +208,27 @@ def _change(problem: Problem, name: str, delay_s: float) -> Array:
     """
     already, step = problem.on_time.get(name, 0.0), problem.recording.step_s
     whole, part = divmod((delay_s - already) / step, 1.0)
+    # Of several late inputs each has its own change, of the recording with those before it as they were recorded:
+    # together they are what all of them change.
+    before = list(problem.on_time)[: list(problem.on_time).index(name)] if already else []
+    recorded = {each: _moved(problem, each, -problem.on_time[each]) for each in before}
 
     def moved(readings: float) -> Array:
-        if not readings:
+        if not (readings or recorded):
             return problem.filled
-        further = shifted(problem.recording, problem.recording.channels[name], readings * step)
-        return problem.run_once(f"{name} late", already + readings * step, lambda: problem.with_input(name, further))
+        further = {**recorded, name: _moved(problem, name, readings * step)}
+        known_as = f"{name} late, and {before} as recorded" if before else f"{name} late"
+        return problem.run_once(known_as, already + readings * step, lambda: problem.with_inputs(further))
 
     found = moved(whole) if not part else (1 - part) * moved(whole) + part * moved(whole + 1)
+    if len(problem.on_time) > 1 and already:
+        return np.asarray(found - moved(-already / step))
     return np.asarray(found - (problem.as_simulated if already else problem.filled))
+
+
+def _moved(problem: Problem, name: str, later_s: float) -> Array:
+    """Return an input as it would have been recorded so much earlier [s], shape (time, wheel)."""
+    return shifted(problem.recording, problem.recording.channels[name], later_s)
 
 
 def _slope(problem: Problem, name: str) -> Array:

@@ -39,6 +39,8 @@ the ends of ramps, which bend by more than the noise where they are sampled coar
 STANDING_READINGS = 5
 """Readings one after the other within a smoothed speed's noise from which an axis stands (a choice): a reversal is
 through in fewer."""
+MOST_LEFT = 0.5
+"""Share of the noise's variance up to which a speed is smooth (a choice: splines leave less, autoregressions more)."""
 ALTERNATING_SHARE = 0.15
 """Share of the highest usual speed below which what alternates is noise (a choice: with three standard deviations of a
 noise that reaches further, hardly a start or stop would be left)."""
@@ -98,8 +100,8 @@ def direction_of(speed: Array, std: float | None = None) -> Array:
 def _direction(speed: Array, read: Array) -> Array:
     """Return the sign of a speed (time, wheel), smoothed or as it was `read`; 0 where an axis stands.
 
-    The noise at standstill is that of the readings. Of its variance, smoothing leaves what it does not take out. A
-    smoothed speed has a sign also on its way from one direction to the other.
+    The noise at standstill is that of the readings. Of its variance, smoothing leaves what it does not take out. Where
+    that is little, a speed has a sign also on its way from one direction to the other.
     """
     if speed is read:
         return direction_of(read)
@@ -108,7 +110,10 @@ def _direction(speed: Array, read: Array) -> Array:
         reach = _noise_at_standstill(column)
         taken_out = float(np.nanmean((column - smooth) ** 2)) if np.isfinite(column - smooth).any() else 0.0
         left = max(1 - taken_out / (reach / STANDSTILL_DEVIATIONS) ** 2, 0.0) if reach else 0.0
-        signs.append(np.where(_stays_within(smooth, np.sqrt(left) * reach), 0.0, np.sign(smooth)))
+        if left > MOST_LEFT:
+            signs.append(np.where(np.abs(column) > reach, np.sign(column), 0.0))
+        else:
+            signs.append(np.where(_stays_within(smooth, np.sqrt(left) * reach), 0.0, np.sign(smooth)))
     return np.where(np.isfinite(speed), np.stack(signs, axis=1), np.nan)
 
 

@@ -9,6 +9,7 @@ stated one, or clearly worse. Else what is stated holds.
 
 from __future__ import annotations
 
+from math import comb
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,8 +37,8 @@ LEAST_SCATTER = 1e-3
 NEAR = 1.4
 """Factor between scatter and stated error up to which the statement is asked no further (a choice: the variance is
 twice as large)."""
-OF_SECOND_DIFFERENCE = 6.0**-0.5
-"""Standard deviation of white noise over that of its second differences."""
+ORDERS = (2, 3, 4, 5)
+"""Orders of the differences that tell the scatter (a choice: of the higher ones little of a smooth course is left)."""
 
 
 def shown_errors(
@@ -83,13 +84,18 @@ def _by_scatter(readings: Array, run: NDArray[np.int64], stated: SensorError) ->
 
 
 def scatter(values: Array, run: NDArray[np.int64]) -> float:
-    """Return the standard deviation of white noise in readings (time, wheel), by second differences within a run.
+    """Return the standard deviation of white noise in readings (time, wheel), by differences within a run.
 
-    Their median does not see steps. 0 where more than half of them are 0: a column that is set, or rounded.
+    Their median does not see steps. What the column itself does adds to them, the less the higher their order is, and
+    noise adds the same to each: the least counts. 0 where more than half of them are 0: a column that is set, or
+    rounded.
     """
-    same = (run[2:] == run[:-2])[:, None]
-    second = np.where(same, values[2:] - 2 * values[1:-1] + values[:-2], np.nan)
-    return OF_SECOND_DIFFERENCE * robust_std(second[np.isfinite(second)])
+    found = []
+    for order in ORDERS:
+        same = (run[order:] == run[: len(run) - order])[:, None]
+        each = np.where(same, np.diff(values, order, axis=0), np.nan)
+        found.append(robust_std(each[np.isfinite(each)]) / np.sqrt(comb(2 * order, order)))
+    return float(min(found))
 
 
 def notes_on_errors(

@@ -31,8 +31,15 @@ LEAST_PASSES = 3.0
 """Length of the way over its range, from which a place is more than another name of the time (a choice)."""
 SAME_COURSE = 0.999
 """Correlation of two covariates above which they are one quantity (a choice: a thousandth of the power differs)."""
-PERIODIC = "drag, periodic"
-"""Coupling of a sine over time."""
+PERIODIC, PERIODIC_OFFSET = "drag, periodic", "offset, periodic"
+"""Couplings of a sine over time, or over a covariate: along the motion, and whatever the motion."""
+FEWEST_CYCLES, MOST_CYCLES = 2.5, 24.0
+"""Cycles of a sine over a covariate's range: fewer are followed by the knots of its smooth term (a choice: three knots
+a cycle), and more are seldom passed slowly enough (a choice)."""
+USUAL = (0.005, 0.995)
+"""Quantiles of a covariate between which its range is (a choice)."""
+PLACES = 512
+"""Places of that range at which a residual is summed (a choice: twenty a cycle)."""
 
 
 def with_smooth_terms(design: DesignMatrix) -> DesignMatrix:
@@ -170,22 +177,52 @@ def varies_with_time(problem: Problem, values: Array) -> bool:
 
 
 def with_periodic_terms(design: DesignMatrix, residual: Array) -> DesignMatrix:
-    """Add the strongest sine over time in a residual [time, wheel], acting as drag: of all wheels, and of each."""
+    """Add the strongest sines in a residual [time, wheel]: over time, of all and of each wheel, and over covariates."""
     problem, limits = design.problem, design.problem.thresholds
     along = motion_of(problem)
     time_s, step_s = problem.time_s[:, 0], problem.recording.step_s
     lowest_Hz, highest_Hz = limits.fewest_periods / problem.length_s, 1 / (limits.shortest_period * step_s)
-    if lowest_Hz >= highest_Hz:
-        return design
-    place = np.rint(time_s / step_s).astype(np.int64)
-    length = padded_length(int(place[-1]))
-    frequency_Hz = np.fft.rfftfreq(length, step_s)
-    searched = (frequency_Hz >= lowest_Hz) & (frequency_Hz <= highest_Hz)
-    power = np.stack([power_of_sums(place, values, length) for values in (residual * along * problem.mask).T])
-    # As many frequencies were open to choice as the recording resolves.
-    selection_penalty = 2 * float(np.log(problem.length_s * highest_Hz))
-    for of_wheels in (power.sum(axis=0), *power):
-        phase = 2 * np.pi * frequency_Hz[np.argmax(np.where(searched, of_wheels, 0.0))] * problem.time_s
-        sines = [along * np.cos(phase), along * np.sin(phase)]
-        design = with_group(design, "time", sines, PERIODIC, selection_penalty=selection_penalty)
+    if lowest_Hz < highest_Hz:
+        place = np.rint(time_s / step_s).astype(np.int64)
+        length = padded_length(int(place[-1]))
+        frequency_Hz = np.fft.rfftfreq(length, step_s)
+        searched = (frequency_Hz >= lowest_Hz) & (frequency_Hz <= highest_Hz)
+        power = np.stack([power_of_sums(place, values, length) for values in (residual * along * problem.mask).T])
+        # As many frequencies were open to choice as the recording resolves.
+        selection_penalty = 2 * float(np.log(problem.length_s * highest_Hz))
+        for of_wheels in (power.sum(axis=0), *power):
+            phase = 2 * np.pi * frequency_Hz[np.argmax(np.where(searched, of_wheels, 0.0))] * problem.time_s
+            sines = [along * np.cos(phase), along * np.sin(phase)]
+            design = with_group(design, "time", sines, PERIODIC, selection_penalty=selection_penalty)
+    return _with_sines_over_covariates(design, residual)
+
+
+def _with_sines_over_covariates(design: DesignMatrix, residual: Array) -> DesignMatrix:
+    """Add, over each covariate that has a smooth term, the strongest sine that its few knots cannot follow."""
+    problem = design.problem
+    couplings = {PERIODIC: motion_of(problem)}
+    if "direction" in problem.covariates:
+        couplings[PERIODIC_OFFSET] = np.ones(problem.mask.shape)
+    selection_penalty = 2 * float(np.log(MOST_CYCLES - FEWEST_CYCLES))
+    for name, signed in problem.covariates.items():
+        if name == "time" or not has_smooth_term(problem, name) or not varies_with_time(problem, signed):
+            continue
+        values = np.abs(signed) if name == "wheel_speed" else signed
+        known = problem.mask & np.isfinite(values)
+        low, high = np.quantile(values[known], USUAL)
+        if not high > low:
+            continue
+        share = np.clip((np.where(known, values, low) - low) / (high - low), 0.0, 1.0)
+        place = np.rint(PLACES * share).astype(np.int64)
+        length = padded_length(PLACES)
+        cycles = np.fft.rfftfreq(length, 1 / PLACES)
+        searched = (cycles >= FEWEST_CYCLES) & (cycles <= MOST_CYCLES)
+        for coupling, factor in couplings.items():
+            left = np.where(known, residual * factor, 0.0)
+            power = np.sum(
+                [power_of_sums(at, of_wheel, length) for at, of_wheel in zip(place.T, left.T, strict=True)], 0
+            )
+            phase = 2 * np.pi * cycles[np.argmax(np.where(searched, power, 0.0))] * share
+            sines = [factor * np.cos(phase), factor * np.sin(phase)]
+            design = with_group(design, name, sines, coupling, selection_penalty=selection_penalty)
     return design

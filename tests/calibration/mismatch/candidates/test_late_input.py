@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import replace
 from functools import partial
 from hashlib import sha256
 from typing import TYPE_CHECKING
@@ -14,9 +15,11 @@ import tram
 from tram import COUNT, DELAY_S, Array, Tram, driven
 
 from regolithd.calibration.mismatch import Member, compare, load_simulation, read_recording
+from regolithd.calibration.mismatch.calibration.linearised import put_on_time_by
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.fleet.comparison import compare_fleet
 from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.problem.problem import StatedEffect
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -69,6 +72,32 @@ def test_a_delay_may_be_longer_than_its_input_takes_to_change(delay_s: float) ->
         assert delay.high - delay.low < 1.0
         assert delay.value == pytest.approx(delay_s, abs=0.1)
         assert found.unexplained == ()
+
+
+def test_each_of_two_late_inputs_has_its_own_change() -> None:
+    """With both on time, of the first it is that of it alone; together they are what both of them change."""
+    recording, delay = driven(2), SensorDelay()
+    late = {"grade": DELAY_S, "speed_m_s": 20.0}
+    before = build_problem(recording, Tram())
+    both = build_problem(recording, Tram(), late=late)
+    shapes = [{"late": name, "input_secant_s": late_by} for name, late_by in late.items()]
+    changes = [late_by * delay.columns(both, shape)[0] for shape, late_by in zip(shapes, late.values(), strict=True)]
+    within = slice(30, COUNT - 30)  # the ends are held
+    np.testing.assert_allclose(sum(changes)[within], (both.filled - before.filled)[within], atol=1e-9)
+    speed_on_time = both.recording.channels["speed_m_s"]
+    of_grade = (
+        both.values["weight"] * speed_on_time * (both.recording.channels["grade"] - before.recording.channels["grade"])
+    )
+    np.testing.assert_allclose(changes[0][within], of_grade[within], atol=1e-9)
+
+
+def test_inputs_on_time_of_which_none_is_named_late_are_searched_again() -> None:
+    """What is on time has to be told as late, but for what the simulation was corrected by."""
+    problem = build_problem(driven(2), Tram(), late={"grade": DELAY_S, "speed_m_s": 20.0})
+    assert put_on_time_by(problem, {"grade": DELAY_S, "speed_m_s": 20.0}, None)
+    assert not put_on_time_by(problem, {"grade": DELAY_S}, None)
+    stated = StatedEffect("sensor-delay", problem.recording.wheels, np.zeros(problem.mask.shape), 0.1, on_time=True)
+    assert put_on_time_by(replace(problem, stated=(stated,)), {"grade": DELAY_S}, None)
 
 
 def test_the_change_is_interpolated_between_delays_of_whole_readings() -> None:

@@ -132,3 +132,40 @@ def test_what_parameters_take_up_of_a_curve_is_no_sign_of_feedback(seed: int) ->
     found = compare(rolling(seed), Cart()).answer
     assert "roll" in {place.covariate for place in found.unexplained}
     assert not [note for note in found.notes if "controller" in note]
+
+
+class Supply(Simulation):
+    """The voltage of a motor: what its speed induces, and what its current loses."""
+
+    channel, unit = "voltage_V", "V"
+    inputs = ("speed_rad_s", "current_A")
+    parameters: ClassVar = {
+        "constant_V_s": Prior(0.5, 0.005, "V s/rad"),
+        "resistance_Ohm": Prior(0.8, 0.03, "Ω"),
+    }
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the sum of both."""
+        return values["constant_V_s"] * inputs["speed_rad_s"] + values["resistance_Ohm"] * inputs["current_A"]
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the humidity."""
+        return {"humidity": inputs["humidity_pct"]}
+
+
+def test_a_slow_quantity_of_which_the_noise_is_quick_is_no_feedback() -> None:
+    """A sine over the humidity, which a smooth curve follows too little where it is quick: a slope above 1 there."""
+    random, time = np.random.default_rng(1), 0.025 * np.arange(3000)
+    speed = 25 * np.sin(2 * np.pi * time / 1.7) * (1 + 0.4 * np.sin(time / 9))
+    humidity = 60 + 20 * np.sin(2 * np.pi * time / 31) + 9 * np.sin(2 * np.pi * time / 17 + 1)
+    current = 2 + 0.5 * np.sin(time / 3) + random.normal(0, 0.03, len(time))
+    voltage = 0.5 * speed + 0.8 * current + 1.7 * np.sin(2 * np.pi * humidity / 32)
+    columns = {
+        "t_s": time,
+        "speed_rad_s": speed,
+        "current_A": current,
+        "humidity_pct": humidity + random.normal(0, 0.02, len(time)),
+        "voltage_V": voltage + random.normal(0, 0.2, len(time)),
+    }
+    found = compare(from_columns(columns), Supply()).answer
+    assert [place.covariate for place in found.unexplained] == ["humidity"]

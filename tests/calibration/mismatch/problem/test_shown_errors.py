@@ -58,6 +58,8 @@ def test_scatter_is_white_noise_and_neither_steps_nor_slow_courses() -> None:
     steps = np.repeat(random.uniform(0, 100, COUNT // 20), 20)[:, None]
     assert scatter(noise + steps + np.linspace(0, 50, COUNT)[:, None], run) == pytest.approx(1.0, rel=0.15)
     assert scatter(steps, run) == 0
+    swing = 100 * np.sin(np.arange(COUNT) / 12)[:, None]  # its second differences are as large as those of the noise
+    assert scatter(noise + swing, run) == pytest.approx(1.0, rel=0.15)
 
 
 @pytest.mark.parametrize("said", [0.0, 1.5])

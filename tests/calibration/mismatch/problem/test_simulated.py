@@ -9,8 +9,9 @@ import numpy as np
 from regolithd.calibration.mismatch import Prior, SensorError, Simulation, compare
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
-from regolithd.calibration.mismatch.problem.errors_in_variables import conditional_expectation
+from regolithd.calibration.mismatch.problem.errors_in_variables import normal_truths
 from regolithd.calibration.mismatch.problem.simulated import inputs_of, simulated
+from regolithd.calibration.mismatch.problem.true_values import smooth_where_better, still_at_rest
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -132,15 +133,19 @@ class Winch(Static):
         return {"wheel_speed": turns, "power": inputs["power_W"]}
 
 
-def test_what_the_speed_is_computed_from_is_smoothed_as_a_normal_signal() -> None:
-    """Both columns have few levels: densities are used for the one that is no speed."""
+def test_what_the_speed_is_computed_from_has_no_density() -> None:
+    """Both columns have few levels: densities are used for the one that is no speed, a spline for both."""
     random = np.random.default_rng(2)
     power, rpm = (random.choice([0.0, 50.0, 90.0], ROWS // 20).repeat(20) + random.normal(0, 2, ROWS) for _ in "ab")
     recording = from_columns({"t_s": TIME_S, "reading_V": 0.05 * power, "power_W": power, "motor_rpm": rpm})
     found = simulated(inputs_of(recording, Winch()), Winch(), {"gain_V_W": 0.05}, THRESHOLDS).recording
-    normal = conditional_expectation(np.column_stack((power, rpm)), np.full(2, 4.0), np.array([0]))
-    np.testing.assert_allclose(found.channels["motor_rpm"][:, 0], normal[:, 1])
-    assert np.std(found.channels["power_W"][:, 0] - normal[:, 0]) > 1.0
+    normal = normal_truths(np.column_stack((power, rpm)), np.full(2, 4.0), np.array([0]))
+    splines = [
+        smooth_where_better(each, 2.0, TIME_S, found.run, normal.column(k)) for k, each in enumerate((power, rpm))
+    ]
+    rpm_alone = still_at_rest(rpm, 2.0, splines[1]).mean
+    np.testing.assert_allclose(found.channels["motor_rpm"][:, 0], rpm_alone)
+    assert np.std(found.channels["power_W"][:, 0] - splines[0].mean) > 0.1
 
 
 def test_what_is_undefined_of_the_readings_is_not_compared() -> None:
