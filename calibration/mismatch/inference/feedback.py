@@ -40,6 +40,9 @@ strangers' trials the slope with the past of a controller's output fell from 0.3
 readings to 0.1 at eight; that of curves of physics stayed at 0.7 to 1.1 from two readings to twelve.)"""
 LEAST_STDS = 3.0
 """Standard deviations by which the residual follows what is new more than the past (a choice: one in 700 by chance)."""
+STDS_OF_PAST = 2.0
+"""Standard deviations by which the slope with the past is below that of physics, where what is new is too little for
+the slope with it to be known (a choice: one in forty by chance)."""
 LEAST_OF_PAST = 1 / 2
 """Slope with the past, as a share of that with what is new, from which on it is physics: half way between feedback,
 which has 0, and physics, which has 1. (−0.1 to 0.4 in 22 simulated chambers whose controller acts on the noise, which
@@ -100,4 +103,6 @@ def _follows_the_new_alone(parts: Array, left: Array, blocks: NDArray[np.int64])
     sums = block_sums(parts * (left - np.einsum("a,atw->tw", slopes, parts)), blocks)
     covariance = inverse @ (sums.T @ sums) @ inverse
     apart, spread = slopes[-1] - slopes[0], np.sqrt(covariance[0, 0] + covariance[-1, -1] - 2 * covariance[0, -1])
-    return bool(slopes[0] < LEAST_OF_PAST * min(slopes[-1], 1.0) and apart > LEAST_STDS * spread)
+    physics = LEAST_OF_PAST * min(slopes[-1], 1.0)
+    is_below = physics - slopes[0] > STDS_OF_PAST * np.sqrt(covariance[0, 0])
+    return bool(slopes[0] < physics and (apart > LEAST_STDS * spread or is_below))

@@ -36,6 +36,9 @@ PERIODIC, PERIODIC_OFFSET = "drag, periodic", "offset, periodic"
 FEWEST_CYCLES, MOST_CYCLES = 2.5, 24.0
 """Cycles of a sine over a covariate's range: fewer are followed by the knots of its smooth term (a choice: three knots
 a cycle), and more are seldom passed slowly enough (a choice)."""
+LEAST_SHARE = 0.1
+"""Share of what the parameters leave that such a sine has to explain (a choice: a tenth of the mean reading beside a
+noise of three tenths; less is also what a controller that follows the noise of the reading gives)."""
 USUAL = (0.005, 0.995)
 """Quantiles of a covariate between which its range is (a choice)."""
 PLACES = 512
@@ -197,6 +200,13 @@ def with_periodic_terms(design: DesignMatrix, residual: Array) -> DesignMatrix:
     return _with_sines_over_covariates(design, residual)
 
 
+def _share_explained(columns: Sequence[Array], values: Array) -> float:
+    """Return the share of the power of values (reading,) that columns explain by least squares."""
+    matrix = np.stack(columns, axis=1)
+    fitted = matrix @ np.linalg.lstsq(matrix, values, rcond=None)[0]
+    return float(np.sum(fitted**2) / max(np.sum(values**2), 1e-300))
+
+
 def _with_sines_over_covariates(design: DesignMatrix, residual: Array) -> DesignMatrix:
     """Add, over each covariate that has a smooth term, the strongest sine that its few knots cannot follow."""
     problem = design.problem
@@ -224,5 +234,6 @@ def _with_sines_over_covariates(design: DesignMatrix, residual: Array) -> Design
             )
             phase = 2 * np.pi * cycles[np.argmax(np.where(searched, power, 0.0))] * share
             sines = [factor * np.cos(phase), factor * np.sin(phase)]
-            design = with_group(design, name, sines, coupling, selection_penalty=selection_penalty)
+            if _share_explained([sine[known] for sine in sines], residual[known]) > LEAST_SHARE:
+                design = with_group(design, name, sines, coupling, selection_penalty=selection_penalty)
     return design

@@ -229,10 +229,7 @@ def smoothed(truth: Array, error: float, stated: float = 1.0) -> tuple[Array, No
 
 @pytest.mark.parametrize("error", [0.003, 0.01, 0.05])
 def test_a_smooth_motion_has_a_speed_and_an_acceleration(error: float) -> None:
-    """An eighth of the noise's power is left, where an autoregression leaves half and more, and it is as much as said.
-
-    Of the acceleration, which a difference of readings has ten times as noisy, 3 % is left at most.
-    """
+    """An eighth of the noise's power is left, as much as is said, and of the rate's noise hardly anything."""
     truth = to_and_fro()
     _, normal, found = smoothed(truth, error)
     left = float(np.mean((found.mean - truth) ** 2))
