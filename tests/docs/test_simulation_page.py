@@ -161,7 +161,7 @@ def stop_and_go() -> dict[str, Array]:
 
 
 def test_friction_in_a_predict_is_written_as_the_page_says() -> None:
-    """NaN at rest, an effect that is stated and a sign are consistent with such a machine; a law over a range is not."""
+    """NaN at rest, a stated effect and a sign are consistent with such a machine; a law over a range is not."""
     recording = stop_and_go()
     resting = Joint(lambda speed: np.where(direction_of(speed) == 0, np.nan, np.sign(speed)))
     assert compare(recording, resting).answer.verdict == "consistent"
