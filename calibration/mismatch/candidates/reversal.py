@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,6 +43,8 @@ FIRST_STEP = 0.35
 """
 MOST_EVALUATIONS = 40
 """Of that search, at most (a choice: one number takes 10, two take 25)."""
+MOST_KEPT = 3
+"""Shapes of which the columns are kept (a choice: the step, the best, and the one that is tried)."""
 LEAST_WITHIN = 0.01
 """Share of the readings in motion that must be within a reversal, to tell it from a step (a choice)."""
 LEAST_GAIN = 10.8
@@ -80,11 +82,12 @@ def _best_reversal(problem: Problem) -> Shape:
     gradual = _best_of(beside, tried)
     # Drag near standstill that decays with speed resembles a gradual reversal, with as many numbers, or hides how
     # gradual it is.
-    decaying_step = _with_decay(beside, {})
-    others = (gradual.shape, _best_of(replace(beside, decay=decaying_step.decay), tried).shape)
-    decaying = min((_with_decay(beside, shape) for shape in others), key=lambda turn: turn.left)
-    if beside.gain(min(decaying_step.left, decaying.left), gradual.left) > LEAST_GAIN:
-        step, gradual = decaying_step, decaying
+    beside_step, beside_gradual = (_with_best_decay(beside, shape) for shape in ({}, gradual.shape))
+    least = min(beside_step.squares_left({}), beside_gradual.squares_left(gradual.shape))
+    if beside.gain(least, gradual.left) > LEAST_GAIN:
+        step = _refined(beside_step, {})
+        others = (_refined(beside_gradual, gradual.shape), _best_of(beside_step, tried))
+        gradual = min(others, key=lambda turn: turn.left)
     of_friction = beside.independent * (beside.squares_without_friction / gradual.left - 1)
     is_there = of_friction > quantile(beside.laws, problem.thresholds.single_test_level)
     return gradual.shape if is_there and beside.gain(gradual.left, step.left) > LEAST_GAIN else {}
@@ -96,11 +99,11 @@ def _best_of(beside: _Beside, tried: Sequence[Shape]) -> _Turn:
     return min((_refined(beside, shape) for shape in of_kind.values()), key=lambda turn: turn.left)
 
 
-def _with_decay(beside: _Beside, shape: Shape) -> _Turn:
-    """Return the best of the drags that decay from standstill, beside friction that reverses with a shape like this."""
+def _with_best_decay(beside: _Beside, shape: Shape) -> _Beside:
+    """Return the same with the best of the drags that decay from standstill, reversing with a shape."""
     usual = _usual_speed(beside.problem)
     tried = [replace(beside, decay=_Decay(share * usual, power)) for share in DECAYS for power in DECAY_POWERS]
-    return _refined(min(tried, key=lambda each: each.squares_left(shape)), shape)
+    return min(tried, key=lambda each: each.squares_left(shape))
 
 
 def _shapes(problem: Problem) -> Iterator[Shape]:
@@ -143,11 +146,10 @@ class _Decay:
 
 @dataclass(frozen=True)
 class _Turn:
-    """How friction may reverse: its shape, the sum of squares that is left, and what decays beside it, if anything."""
+    """How friction may reverse: its shape, and the sum of squares that is left."""
 
     shape: Shape
     left: float
-    decay: _Decay | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +167,7 @@ class _Beside:
     residual: shape (1, reading)
     laws: how many friction may follow
     decay: drag that decays from standstill among them; None: none
+    made: columns of the other laws by the shape with which they reverse, of the last few shapes
     """
 
     problem: Problem
@@ -175,6 +178,7 @@ class _Beside:
     residual: Array
     laws: int
     decay: _Decay | None = None
+    made: dict[tuple[tuple[str, object], ...], Array] = field(default_factory=dict)
 
     def gain(self, left: float, step: float) -> float:
         """Return the Δχ² of what leaves one sum of squares over what leaves another."""
@@ -190,14 +194,23 @@ class _Beside:
 
         What decays from standstill is drag beyond the other laws: less drag there would be a gradual reversal.
         """
-        laws = _laws(self.problem, shape)
+        columns = np.concatenate((self.free, self._laws_of(shape)))
         if self.decay is not None:
-            laws.append(_decaying(self.problem, shape, self.decay))
-        columns = np.concatenate((self.free, _in_order(self.problem, laws, self.whitening, self.deviation)))
+            decaying = _decaying(self.problem, shape, self.decay)
+            columns = np.concatenate((columns, _in_order(self.problem, [decaying], self.whitening, self.deviation)))
         left, last = _left(columns, self.residual)
         if self.decay is not None and last < 0:
             left, _ = _left(columns[:-1], self.residual)
         return float(np.sum(left**2))
+
+    def _laws_of(self, shape: Shape) -> Array:
+        """Return the columns of all laws but one that decays, whitened, shape (column, reading)."""
+        key = tuple(shape.items())
+        if key not in self.made:
+            while len(self.made) >= MOST_KEPT:
+                del self.made[next(iter(self.made))]
+            self.made[key] = _in_order(self.problem, _laws(self.problem, shape), self.whitening, self.deviation)
+        return self.made[key]
 
 
 def _beside_a_step(problem: Problem) -> _Beside:
@@ -300,5 +313,5 @@ def _refined(beside: _Beside, shape: Shape) -> _Turn:
         bounds=[(value - np.log(2), value + np.log(2)) for value in start],
         options={"xatol": REFINED_TO, "fatol": np.inf, "maxfev": MOST_EVALUATIONS, "initial_simplex": simplex},
     )
-    best, moved = at(found.x)
-    return _Turn(moved, float(found.fun), best.decay)
+    _, moved = at(found.x)
+    return _Turn(moved, float(found.fun))
