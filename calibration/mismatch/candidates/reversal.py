@@ -86,8 +86,11 @@ def _best_reversal(problem: Problem) -> Shape:
     least = min(beside_step.squares_left({}), beside_gradual.squares_left(gradual.shape))
     if beside.gain(least, gradual.left) > LEAST_GAIN:
         step = _refined(beside_step, {})
-        others = (_refined(beside_gradual, gradual.shape), _best_of(beside_step, tried))
-        gradual = min(others, key=lambda turn: turn.left)
+        others = (_refined(beside_gradual, gradual.shape), _best_of(replace(beside, decay=step.decay), tried))
+        # Each search goes a factor of two at most: once more from where it led.
+        gradual = min(
+            (_refined(replace(beside, decay=turn.decay), turn.shape) for turn in others), key=lambda turn: turn.left
+        )
     of_friction = beside.independent * (beside.squares_without_friction / gradual.left - 1)
     is_there = of_friction > quantile(beside.laws, problem.thresholds.single_test_level)
     return gradual.shape if is_there and beside.gain(gradual.left, step.left) > LEAST_GAIN else {}
@@ -146,10 +149,11 @@ class _Decay:
 
 @dataclass(frozen=True)
 class _Turn:
-    """How friction may reverse: its shape, and the sum of squares that is left."""
+    """How friction may reverse: its shape, the sum of squares that is left, and what decays beside it, if anything."""
 
     shape: Shape
     left: float
+    decay: _Decay | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -313,5 +317,5 @@ def _refined(beside: _Beside, shape: Shape) -> _Turn:
         bounds=[(value - np.log(2), value + np.log(2)) for value in start],
         options={"xatol": REFINED_TO, "fatol": np.inf, "maxfev": MOST_EVALUATIONS, "initial_simplex": simplex},
     )
-    _, moved = at(found.x)
-    return _Turn(moved, float(found.fun))
+    best, moved = at(found.x)
+    return _Turn(moved, float(found.fun), best.decay)
