@@ -264,6 +264,18 @@ def test_an_error_that_is_stated_four_times_too_large_smooths_nothing() -> None:
     assert found is normal
 
 
+def test_a_column_that_was_read_for_a_part_of_the_time_is_no_error() -> None:
+    """Also where that part is none of those in which a spline is found."""
+    time = 0.02 * np.arange(50 * COUNT)
+    readings = np.full(len(time), np.nan)
+    some = slice(10 * COUNT, 11 * COUNT)
+    readings[some] = to_and_fro() + np.random.default_rng(21).normal(0, 0.05, COUNT)
+    normal = normal_truths(readings[:, None], np.array([0.0025]), START).column(0)
+    found = smooth_where_better(readings, 0.05, time, np.zeros(len(time), np.int64), normal)
+    np.testing.assert_array_equal(np.isfinite(found.mean), np.isfinite(readings))
+    assert np.std(found.mean[some] - to_and_fro()) < 0.05
+
+
 def test_a_column_that_stays_at_zero_is_zero_there() -> None:
     """And nowhere else: not where it passes, nor where it creeps at two standard deviations of its noise."""
     dwells = np.where(TIME % 20 < 6, 0.0, np.sin(np.pi * (TIME % 20 - 6)))
