@@ -62,9 +62,9 @@ if TYPE_CHECKING:
 FURTHER_SEARCHES = 3
 """Searches at most beside the first, each linearised where the one before led (a choice: most comparisons need
 none)."""
-LATE_SEARCHES = 6
+LATE_SEARCHES = 4
 """Searches beside a late column, at most (a choice: most need one, parameters that move far as the delay is found two,
-a corrected delay that has changed up to four, and one that was taken for another column's at first up to five)."""
+a corrected delay that has changed, or one that was taken for another column's at first, up to four)."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -82,15 +82,11 @@ def _best_reversal(problem: Problem) -> Shape:
     gradual = _best_of(beside, tried)
     # Drag near standstill that decays with speed resembles a gradual reversal, with as many numbers, or hides how
     # gradual it is.
-    beside_step, beside_gradual = (_with_best_decay(beside, shape) for shape in ({}, gradual.shape))
-    least = min(beside_step.squares_left({}), beside_gradual.squares_left(gradual.shape))
-    if beside.gain(least, gradual.left) > LEAST_GAIN:
-        step = _refined(beside_step, {})
-        others = (_refined(beside_gradual, gradual.shape), _best_of(replace(beside, decay=step.decay), tried))
-        # Each search goes a factor of two at most: once more from where it led.
-        gradual = min(
-            (_refined(replace(beside, decay=turn.decay), turn.shape) for turn in others), key=lambda turn: turn.left
-        )
+    decaying_step = _with_decay(beside, {})
+    others = (gradual.shape, _best_of(replace(beside, decay=decaying_step.decay), tried).shape)
+    decaying = min((_with_decay(beside, shape) for shape in others), key=lambda turn: turn.left)
+    if beside.gain(min(decaying_step.left, decaying.left), gradual.left) > LEAST_GAIN:
+        step, gradual = decaying_step, decaying
     of_friction = beside.independent * (beside.squares_without_friction / gradual.left - 1)
     is_there = of_friction > quantile(beside.laws, problem.thresholds.single_test_level)
     return gradual.shape if is_there and beside.gain(gradual.left, step.left) > LEAST_GAIN else {}
@@ -102,11 +98,11 @@ def _best_of(beside: _Beside, tried: Sequence[Shape]) -> _Turn:
     return min((_refined(beside, shape) for shape in of_kind.values()), key=lambda turn: turn.left)
 
 
-def _with_best_decay(beside: _Beside, shape: Shape) -> _Beside:
-    """Return the same with the best of the drags that decay from standstill, reversing with a shape."""
+def _with_decay(beside: _Beside, shape: Shape) -> _Turn:
+    """Return the best of the drags that decay from standstill, beside friction that reverses with a shape like this."""
     usual = _usual_speed(beside.problem)
     tried = [replace(beside, decay=_Decay(share * usual, power)) for share in DECAYS for power in DECAY_POWERS]
-    return min(tried, key=lambda each: each.squares_left(shape))
+    return _refined(min(tried, key=lambda each: each.squares_left(shape)), shape)
 
 
 def _shapes(problem: Problem) -> Iterator[Shape]:
