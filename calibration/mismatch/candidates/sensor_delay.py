@@ -226,9 +226,9 @@ def _change(problem: Problem, name: str, delay_s: float) -> Array:
     return np.asarray(found - (problem.as_simulated if already else problem.filled))
 
 
-def _moved(problem: Problem, name: str, later_s: float) -> Array:
+def _moved(problem: Problem, name: str, earlier_s: float) -> Array:
     """Return an input as it would have been recorded so much earlier [s], shape (time, wheel)."""
-    return shifted(problem.recording, problem.recording.channels[name], later_s)
+    return shifted(problem.recording, problem.recording.channels[name], earlier_s)
 
 
 def _slope(problem: Problem, name: str) -> Array:

@@ -93,7 +93,7 @@ def direction_of(speed: Array, std: float | None = None) -> Array:
     with it. NaN stays NaN. `std` is the noise's standard deviation in the unit of the speed, where it is known. Else it
     is estimated from the readings that are given, so give whole recordings.
     """
-    directions = [np.where(np.abs(column) > _reach(column, std), np.sign(column), 0.0) for column in speed.T]
+    directions = [_sign_beyond(column, _reach(column, std)) for column in speed.T]
     return np.where(np.isfinite(speed), np.stack(directions, axis=1), np.nan)
 
 
@@ -111,7 +111,7 @@ def _direction(speed: Array, read: Array) -> Array:
         taken_out = float(np.nanmean((column - smooth) ** 2)) if np.isfinite(column - smooth).any() else 0.0
         left = max(1 - taken_out / (reach / STANDSTILL_DEVIATIONS) ** 2, 0.0) if reach else 0.0
         if left > MOST_LEFT:
-            signs.append(np.where(np.abs(column) > reach, np.sign(column), 0.0))
+            signs.append(_sign_beyond(column, reach))
         else:
             signs.append(np.where(_stays_within(smooth, np.sqrt(left) * reach), 0.0, np.sign(smooth)))
     return np.where(np.isfinite(speed), np.stack(signs, axis=1), np.nan)
@@ -157,6 +157,11 @@ def _stays_below(speed: Array, limit: float, count: int) -> NDArray[np.bool_]:
     if len(speed) >= count:
         found[count // 2 : len(speed) - count // 2] = sliding_window_view(np.abs(speed) < limit, count).all(axis=1)
     return found
+
+
+def _sign_beyond(speed: Array, reach: float) -> Array:
+    """Return the sign of a speed (time,), 0 within a reach of 0."""
+    return np.where(np.abs(speed) > reach, np.sign(speed), 0.0)
 
 
 def _stays_within(speed: Array, reach: float) -> NDArray[np.bool_]:

@@ -180,24 +180,30 @@ def varies_with_time(problem: Problem, values: Array) -> bool:
 
 
 def with_periodic_terms(design: DesignMatrix, residual: Array) -> DesignMatrix:
-    """Add the strongest sines in a residual [time, wheel]: over time, of all and of each wheel, and over covariates."""
+    """Add the strongest sines in a residual [time, wheel], over time and over covariates."""
+    return _with_sines_over_covariates(_with_sines_over_time(design, residual), residual)
+
+
+def _with_sines_over_time(design: DesignMatrix, residual: Array) -> DesignMatrix:
+    """Add the strongest sine over time, acting as drag: of all wheels, and of each."""
     problem, limits = design.problem, design.problem.thresholds
     along = motion_of(problem)
     time_s, step_s = problem.time_s[:, 0], problem.recording.step_s
     lowest_Hz, highest_Hz = limits.fewest_periods / problem.length_s, 1 / (limits.shortest_period * step_s)
-    if lowest_Hz < highest_Hz:
-        place = np.rint(time_s / step_s).astype(np.int64)
-        length = padded_length(int(place[-1]))
-        frequency_Hz = np.fft.rfftfreq(length, step_s)
-        searched = (frequency_Hz >= lowest_Hz) & (frequency_Hz <= highest_Hz)
-        power = np.stack([power_of_sums(place, values, length) for values in (residual * along * problem.mask).T])
-        # As many frequencies were open to choice as the recording resolves.
-        selection_penalty = 2 * float(np.log(problem.length_s * highest_Hz))
-        for of_wheels in (power.sum(axis=0), *power):
-            phase = 2 * np.pi * frequency_Hz[np.argmax(np.where(searched, of_wheels, 0.0))] * problem.time_s
-            sines = [along * np.cos(phase), along * np.sin(phase)]
-            design = with_group(design, "time", sines, PERIODIC, selection_penalty=selection_penalty)
-    return _with_sines_over_covariates(design, residual)
+    if lowest_Hz >= highest_Hz:
+        return design
+    place = np.rint(time_s / step_s).astype(np.int64)
+    length = padded_length(int(place[-1]))
+    frequency_Hz = np.fft.rfftfreq(length, step_s)
+    searched = (frequency_Hz >= lowest_Hz) & (frequency_Hz <= highest_Hz)
+    power = np.stack([power_of_sums(place, values, length) for values in (residual * along * problem.mask).T])
+    # As many frequencies were open to choice as the recording resolves.
+    selection_penalty = 2 * float(np.log(problem.length_s * highest_Hz))
+    for of_wheels in (power.sum(axis=0), *power):
+        phase = 2 * np.pi * frequency_Hz[np.argmax(np.where(searched, of_wheels, 0.0))] * problem.time_s
+        sines = [along * np.cos(phase), along * np.sin(phase)]
+        design = with_group(design, "time", sines, PERIODIC, selection_penalty=selection_penalty)
+    return design
 
 
 def _share_explained(columns: Sequence[Array], values: Array) -> float:

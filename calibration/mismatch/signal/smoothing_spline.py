@@ -24,7 +24,6 @@ from math import factorial
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.linalg import solveh_banded
 
 from regolithd.calibration.mismatch.signal.stein import Estimate, squared_error
 
@@ -102,7 +101,7 @@ class SmoothingSpline:
         """Return the estimate as if its weights did not depend on the readings: one whose error seems too small."""
         mean, band = self._fitted(readings, deviation, rows)
         (lot,) = _lots(1, len(mean))
-        return Estimate(mean, deviation**2 * lot * solveh_banded(band, lot))
+        return Estimate(mean, deviation**2 * lot * _solved(band, lot))
 
     def _fitted(self, readings: Array, deviation: float, rows: Array) -> tuple[Array, Array]:
         """Return the estimate, and the matrix of its equations in SciPy's upper form."""
@@ -121,12 +120,12 @@ class SmoothingSpline:
                 for j in range(i, self.order + 1):
                     band[self.order - (j - i), j : j + len(rows)] += weighted[:, i] * rows[:, j]
             band[-1] += of_reading
-            found = solveh_banded(band, of_reading * read)
+            found = _solved(band, of_reading * read)
             if self.heavy:
                 parts = np.stack([found[k : k + len(rows)] for k in range(self.order + 1)], axis=1)
                 difference = np.einsum("tk,tk->t", rows, parts)
                 weights = 2 / (1 + penalty * (difference / deviation) ** 2)
-        return np.asarray(found), band
+        return found, band
 
 
 def best_spline(readings: Array, deviation: float, time: Array, run: NDArray[np.int64]) -> SmoothingSpline:
@@ -151,6 +150,13 @@ def best_spline(readings: Array, deviation: float, time: Array, run: NDArray[np.
             break
         least, best = min((least, best), (error(spline.estimate(*given(spline))), spline), key=lambda pair: pair[0])
     return best
+
+
+def _solved(band: Array, right: Array) -> Array:
+    """Return the solution of equations whose matrix is in SciPy's upper form."""
+    from scipy.linalg import solveh_banded  # noqa: PLC0415  # reading a recording must not load SciPy
+
+    return np.asarray(solveh_banded(band, right))
 
 
 def _lots(count: int, length: int) -> Array:
