@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from hashlib import sha256
+from hashlib import file_digest
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.errors import MismatchError
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from regolithd.calibration.mismatch.answer import Answer
+    from regolithd.calibration.mismatch.fleet.comparison import FleetComparison
     from regolithd.calibration.mismatch.result import Comparison
 
 
@@ -49,10 +50,27 @@ def write_json(path: Path, answer: Answer) -> None:
 def write_page(path: Path, found: Comparison, recordings: Sequence[Path], simulation: Path) -> None:
     """Write the report, with names and SHA-256 of the files that it came from."""
     # Most comparisons write no page.
-    from regolithd.calibration.mismatch.report.page import Provenance, write_report  # noqa: PLC0415
+    from regolithd.calibration.mismatch.report.page import write_report  # noqa: PLC0415
+    from regolithd.calibration.mismatch.report.template import Provenance  # noqa: PLC0415
 
-    digests = [sha256(file.read_bytes()).hexdigest() for file in (*recordings, simulation)]
+    digests = [_digest_of(file) for file in (*recordings, simulation)]
     names = [recording.name for recording in recordings]
     command = f"regolithd mismatch {' '.join(names)} --simulation {simulation.name} --report {path.name}"
     source = Provenance(", ".join(names), simulation.name, ", ".join(digests[:-1]), digests[-1], command)
     write_report(path, found.answer, found.evidence, source)
+
+
+def write_fleet_page(path: Path, found: FleetComparison, recordings: Sequence[Path], simulation: Path) -> None:
+    """Write the report of many recordings, with names and SHA-256 of the files that it came from."""
+    from regolithd.calibration.mismatch.fleet.report.page import FleetProvenance, fleet_report  # noqa: PLC0415
+
+    short = len({recording.name for recording in recordings}) == len(recordings)
+    digests = {recording.name if short else str(recording): _digest_of(recording) for recording in recordings}
+    command = f"regolithd mismatch RECORDINGS --simulation {simulation.name} --report {path.name}"
+    source = FleetProvenance(digests, simulation.name, _digest_of(simulation), command)
+    path.write_text(fleet_report(found.answer, found.evidence, source), encoding="utf-8")
+
+
+def _digest_of(path: Path) -> str:
+    with path.open("rb") as content:
+        return file_digest(content, "sha256").hexdigest()

@@ -23,10 +23,8 @@ from regolithd.calibration.mismatch.fleet.comparison import Member, compare_flee
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER, date_in
 from regolithd.calibration.mismatch.fleet.work.store import Store
 from regolithd.calibration.mismatch.fleet.work.workers import AllCores, DaskCluster, Workers
-from regolithd.calibration.mismatch.inference.statements import noun_of
-from regolithd.calibration.mismatch.report.labels import Labels
 from regolithd.calibration.mismatch.simulation.load import load_simulation, model_folder, read_tables
-from regolithd.daemon.mismatch.files import write_json
+from regolithd.daemon.mismatch.files import write_fleet_page, write_json
 from regolithd.daemon.mismatch.recordings import read_one
 from regolithd.daemon.mismatch.terminal import print_answer
 from regolithd.daemon.recording.export import recorded_snapshots
@@ -191,10 +189,10 @@ def run_fleet(files: Sequence[RoverFile], simulation: Path, outputs: Outputs, op
         When no recording can be compared, or the simulation cannot be used.
     """
     outputs.check()
-    if outputs.report or outputs.corrected:
+    if outputs.corrected:
         raise MismatchError(
-            "--report and --corrected are of one rover, and of a recording that is compared at once; a fleet, and a "
-            f"recording of more than {LONGEST_AT_ONCE} rows, has --json and --catalogue"
+            "--corrected is of one rover, and of a recording that is compared at once; a fleet, and a recording of "
+            f"more than {LONGEST_AT_ONCE} rows, has --json, --report and --catalogue"
         )
     simulated = load_simulation(simulation, announce=partial(typer.echo, err=True))
     store = Store(_kept_beside(options.catalogue)) if options.catalogue else None
@@ -218,9 +216,10 @@ def run_fleet(files: Sequence[RoverFile], simulation: Path, outputs: Outputs, op
         write_json(outputs.json, answer)
     if options.catalogue:
         found.write_catalogue(options.catalogue)
-    corrected = frozenset(effect.name for effect in (*simulated.corrected_effects, *simulated.stated_effects()))
-    labels = Labels(noun_of(simulated.wheel_column), simulated.covariate_labels, corrected=corrected)
-    print_answer(Console(), answer, labels)
+    if outputs.report:
+        paths = list(dict.fromkeys(file.path for file in files))
+        write_fleet_page(outputs.report, replace(found, answer=answer), paths, simulation)
+    print_answer(Console(), answer, found.evidence.labels)
     return answer
 
 

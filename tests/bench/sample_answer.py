@@ -18,7 +18,7 @@ from regolithd.calibration.mismatch.answer import (
     Unexplained,
 )
 from regolithd.calibration.mismatch.inference.findings import Findings
-from regolithd.calibration.mismatch.report.page import Provenance
+from regolithd.calibration.mismatch.report.template import Provenance
 
 FROM = Provenance("drive.csv", "SIM.toml", "ab" * 32, "cd" * 32, "regolithd mismatch drive.csv --simulation SIM.toml")
 WORN = Effect(

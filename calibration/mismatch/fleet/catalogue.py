@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.fleet.told.estimates import estimates_of, parameter_alone
 from regolithd.calibration.mismatch.inference.statements import parameters_found
+from regolithd.calibration.mismatch.problem.words import in_units
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def _rows_of_fleet(chosen: Chosen, answer: FleetAnswer) -> Iterator[CatalogueRow
                     value=estimate.value,
                     low=estimate.value - reach,
                     high=estimate.value + reach,
-                    unit=coefficient.unit.replace("{unit}", chosen.simulation.unit),
+                    unit=in_units(coefficient.unit, chosen.simulation.unit, chosen.labels),
                 )
 
 

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 from regolithd.calibration.mismatch import comparison as single
 from regolithd.calibration.mismatch.data.recording import as_recording
 from regolithd.calibration.mismatch.errors import MismatchError, RecordingError
-from regolithd.calibration.mismatch.fleet.catalogue import CatalogueRow, catalogue_rows, write_catalogue
+from regolithd.calibration.mismatch.fleet.catalogue import catalogue_rows, write_catalogue
 from regolithd.calibration.mismatch.fleet.choice.chance import entry_threshold
 from regolithd.calibration.mismatch.fleet.choice.earned import earned
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, Level, fleet_equations
 from regolithd.calibration.mismatch.fleet.choice.released import with_released
 from regolithd.calibration.mismatch.fleet.choice.search import places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
+from regolithd.calibration.mismatch.fleet.evidence import FleetEvidence
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
 from regolithd.calibration.mismatch.fleet.told.findings import Chosen, Names, answer_of_fleet
 from regolithd.calibration.mismatch.fleet.work.found import Found, found_in, one_channel
@@ -27,6 +28,8 @@ from regolithd.calibration.mismatch.fleet.work.kept_columns import KeptColumns
 from regolithd.calibration.mismatch.fleet.work.sums import Laws, Sums, forms_of, sums_of
 from regolithd.calibration.mismatch.fleet.work.workers import ThisProcess, Workers
 from regolithd.calibration.mismatch.inference.several_channels import joined
+from regolithd.calibration.mismatch.inference.statements import noun_of
+from regolithd.calibration.mismatch.report.labels import Labels
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -65,10 +68,10 @@ class Member:
 
 @dataclass(frozen=True)
 class FleetComparison:
-    """The answer of a fleet, and what was found in which recording; a notebook shows it as a table."""
+    """The answer of a fleet, and what was found in which recording; a notebook shows it as the report."""
 
     answer: FleetAnswer
-    rows: tuple[CatalogueRow, ...] = field(repr=False)
+    evidence: FleetEvidence = field(repr=False)
 
     def to_json(self) -> dict[str, Any]:
         """Return what `regolithd mismatch --json` writes."""
@@ -76,13 +79,14 @@ class FleetComparison:
 
     def write_catalogue(self, path: Path) -> None:
         """Write what was found in which recording as a Parquet file."""
-        write_catalogue(path, self.rows)
+        write_catalogue(path, self.evidence.rows)
 
     def _repr_html_(self) -> str:
-        from html import escape  # noqa: PLC0415
+        # A notebook alone shows the report; the command line starts sooner without it.
+        from regolithd.calibration.mismatch.fleet.report.page import fleet_report  # noqa: PLC0415
+        from regolithd.calibration.mismatch.report.notebook import in_frame  # noqa: PLC0415
 
-        lines = "".join(f"<li>{escape(effect.statement)}</li>" for effect in self.answer.effects)
-        return f"<p><b>{self.answer.verdict}</b>, {len(self.answer.rovers)} rovers</p><ul>{lines}</ul>"
+        return in_frame(fleet_report(self.answer, self.evidence))
 
 
 @overload
@@ -167,7 +171,17 @@ def compare_fleet(
         row for chosen, answer in zip(compared, answers, strict=True) for row in catalogue_rows(chosen, answer)
     )
     answer = answers[0] if len(answers) == 1 else joined(answers)
-    return FleetComparison(replace(answer, notes=(*answer.notes, *dict.fromkeys(work.notes))), rows)
+    units = {channel: chosen.simulation.unit for channel, chosen in zip(channels, compared, strict=True)}
+    wheels = tuple(dict.fromkeys(wheel for chosen in compared for wheel in chosen.equations.wheels))
+    evidence = FleetEvidence(rows, _labels_of(simulation, compared), units, wheels)
+    return FleetComparison(replace(answer, notes=(*answer.notes, *dict.fromkeys(work.notes))), evidence)
+
+
+def _labels_of(simulation: Simulation, compared: Sequence[Chosen]) -> Labels:
+    """Return what a fleet's report calls axes, covariates and effects."""
+    corrected = frozenset(effect.name for effect in (*simulation.corrected_effects, *simulation.stated_effects()))
+    covariates = {name: label for chosen in compared for name, label in chosen.labels.items()}
+    return Labels(noun_of(simulation.wheel_column), covariates, in_minutes=False, corrected=corrected)
 
 
 @dataclass

@@ -139,7 +139,7 @@ def verdict_sentence(answer: Answer, labels: Labels | None = None) -> str:
     left_out = _left_out_sentence(answer, labels)
     changed = [f"{capital(labels.effect(change.name))} is {_than_corrected(change)}." for change in answer.changes]
     found = parameters_found(answer.parameters, unexplained=answer.verdict == "unexplained")
-    moved = [f"The parameter {had_to_leave_its_prior(each.name)}." for each in found]
+    moved = [f"The parameter {had_to_leave_its_prior(each.told_name)}." for each in found]
     return " ".join(sentence for sentence in (left_out, *dict.fromkeys(changed), *moved) if sentence)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
-from regolithd.calibration.mismatch.report.page import Provenance, render_report
+from regolithd.calibration.mismatch.report.page import render_report
+from regolithd.calibration.mismatch.report.template import Provenance
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Answer, Evidence
@@ -17,5 +18,10 @@ IN_MEMORY = Provenance("a recording in memory", "a simulation in memory", "", ""
 
 def notebook_html(answer: Answer, evidence: Evidence) -> str:
     """Return the report as HTML for a notebook's cell (`_repr_html_`)."""
-    page = escape(render_report(answer, evidence, IN_MEMORY), quote=True)
-    return f'<iframe srcdoc="{page}" style="width: 100%; height: {HEIGHT_PX}px; border: 0" title="report"></iframe>'
+    return in_frame(render_report(answer, evidence, IN_MEMORY))
+
+
+def in_frame(page: str) -> str:
+    """Return a whole page as HTML for a notebook's cell."""
+    style = f"width: 100%; height: {HEIGHT_PX}px; border: 0"
+    return f'<iframe srcdoc="{escape(page, quote=True)}" style="{style}" title="report"></iframe>'

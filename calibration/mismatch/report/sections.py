@@ -195,11 +195,12 @@ def effect(found: Effect, evidence: Evidence, labels: Labels, *, several: bool =
         _unbroken(capital(found.statement)),
         found.equation,
         tuple(fact for fact in facts if fact),
-        _parameter_rows(found, labels),
+        parameter_rows(found, labels),
     )
 
 
-def _parameter_rows(found: Effect, labels: Labels) -> tuple[ParameterRow, ...]:
+def parameter_rows(found: Effect, labels: Labels) -> tuple[ParameterRow, ...]:
+    """Return the rows of an effect's table, with a drawing of each interval."""
     rows = []
     for name, parameter in found.parameters.items():
         # Shares are read in percent.

@@ -3,7 +3,7 @@
     python -m regolithd.calibration.validation.fleet_study --drives 20 --check 10 --figures build/figures/fleet.json
 
 Prints what was found beside what is concealed, and the largest relative difference between the results of single
-recordings on the cluster and in this process.
+recordings on the cluster and in this process. Beside the recordings, `report.html` is the report of the season.
 """
 
 from __future__ import annotations
@@ -25,9 +25,11 @@ from distributed import LocalCluster
 from regolithd.calibration.mismatch.data.recording import read_recording
 from regolithd.calibration.mismatch.fleet.comparison import FleetComparison, Member, compare_fleet
 from regolithd.calibration.mismatch.fleet.member import date_in
+from regolithd.calibration.mismatch.fleet.report.page import FleetProvenance, fleet_report
 from regolithd.calibration.mismatch.fleet.work.store import Store
 from regolithd.calibration.mismatch.fleet.work.workers import DaskCluster, ThisProcess
 from regolithd.calibration.mismatch.simulation.load import load_simulation
+from regolithd.calibration.validation.blind_trials.figures.report_screenshot import screenshot
 from regolithd.calibration.validation.fleet_study.season import DAYS, ROVERS, START, drives, write_season
 
 if TYPE_CHECKING:
@@ -138,6 +140,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=len(os.sched_getaffinity(0)))
     parser.add_argument("--check", type=int, default=0, help="compare only every n-th recording again in this process")
     parser.add_argument("--figures", type=Path, default=Path("build/figures/fleet.json"))
+    parser.add_argument("--picture", type=Path, help="write a screenshot of the report's head here (needs chromium)")
     chosen = parser.parse_args()
     folder = FOLDER / f"{chosen.seed}-{chosen.drives}-{chosen.minutes:g}"
     paths = list(write_season(folder, chosen.seed, chosen.drives, 60 * chosen.minutes))
@@ -147,6 +150,11 @@ def main() -> None:
     found.write_catalogue(folder / "season.parquet")
     answer = found.to_json()
     (folder / "answer.json").write_text(json.dumps(answer, indent=1))
+    report = folder / "report.html"
+    source = FleetProvenance(simulation="SIM.toml")
+    report.write_text(fleet_report(found.answer, found.evidence, source), encoding="utf-8")
+    if chosen.picture:
+        screenshot(report, chosen.picture)
     figures = {"recordings": float(len(paths)), "wall_s": wall_s, "workers_killed": float(killed), **score(answer)}
     figures["largest_difference"] = _difference(paths, folder, chosen.check or 1, answer)
     chosen.figures.parent.mkdir(parents=True, exist_ok=True)

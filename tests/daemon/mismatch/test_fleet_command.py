@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from datetime import UTC, datetime, timedelta
 from functools import partial
+from hashlib import sha256
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, NoReturn
 
@@ -48,13 +49,17 @@ def two(tmp_path: Path) -> list[Path]:
 def test_recordings_of_two_rovers_are_told_apart(two: list[Path], tmp_path: Path) -> None:
     """By their column, without an option; the catalogue and the answer say whose the friction is."""
     simulation, out = fleet_arm.write_simulation(tmp_path), tmp_path / "out.json"
-    catalogue = tmp_path / "season.parquet"
-    done = call(*two, "--simulation", simulation, "--json", out, "--catalogue", catalogue)
+    catalogue, report = tmp_path / "season.parquet", tmp_path / "season.html"
+    done = call(*two, "--simulation", simulation, "--json", out, "--catalogue", catalogue, "--report", report)
     assert done.exit_code == 0, done.output
     (effect,) = json.loads(out.read_text())["effects"]
     assert (effect["name"], effect["rovers"]) == ("coulomb-friction", ["bruno"])
     assert {row["rover"] for row in pyarrow.parquet.read_table(catalogue).to_pylist()} == {"asper", "bruno"}
     assert len(list(catalogue.with_suffix(".parts").iterdir())) == 4
+    page = report.read_text()
+    assert effect["statement"][1:] in page.replace("\u00a0", " ")
+    for path in two:
+        assert f"<td>{path.name}</td><td><code>{sha256(path.read_bytes()).hexdigest()}</code></td>" in page
 
 
 def test_a_file_may_hold_several_rovers(two: list[Path], tmp_path: Path) -> None:
@@ -91,7 +96,8 @@ def test_the_time_of_a_recording_is_in_its_name(two: list[Path]) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("--report", "out.html"), "are of one rover"),
+        (("--corrected", "NEW.toml"), "is of one rover"),
+        (("--report", "nowhere/out.html"), "there is no folder"),
         (("--catalogue", "season.csv"), "name it .parquet"),
         (("--catalogue", "nowhere/season.parquet"), "there is no folder"),
     ],

@@ -19,7 +19,8 @@ from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.corrected import corrected_tables, stated_effects
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.reference.effects import effect_sections
-from regolithd.calibration.mismatch.report.page import Provenance, render_report
+from regolithd.calibration.mismatch.report.page import render_report
+from regolithd.calibration.mismatch.report.template import Provenance
 from regolithd.calibration.toml_document import to_toml
 
 if TYPE_CHECKING:

@@ -196,7 +196,7 @@ def test_the_catalogue_answers_since_when_and_where(fleet: FleetComparison, tmp_
 
 def test_the_size_in_each_recording_follows_the_wear(fleet: FleetComparison) -> None:
     """The catalogue has the size in every recording alone, before the onset too."""
-    sizes = [row.value for row in fleet.rows if row.effect == "bearing-drag"]
+    sizes = [row.value for row in fleet.evidence.rows if row.effect == "bearing-drag"]
     assert len(sizes) == DRIVES
     assert sizes[-1] == pytest.approx(0.15, abs=0.04)
     assert abs(sizes[0] or 1) < 0.04

@@ -31,8 +31,9 @@ from regolithd.calibration.mismatch.report.axes import number, ticks
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.labels import Labels, verdict_sentence
 from regolithd.calibration.mismatch.report.notebook import notebook_html
-from regolithd.calibration.mismatch.report.page import equation, render_report
+from regolithd.calibration.mismatch.report.page import render_report
 from regolithd.calibration.mismatch.report.sections import certainty
+from regolithd.calibration.mismatch.report.template import equation
 
 WORN = replace(
     sample_answer.WORN,
