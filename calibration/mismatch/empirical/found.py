@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Parameter, Suggestion
-from regolithd.calibration.mismatch.empirical.spline import KNOTS, TIME_KNOTS, fit_spline, knots_of
+from regolithd.calibration.mismatch.empirical.spline import CLOSE_KNOTS, KNOTS, fit_spline, knots_of
 from regolithd.calibration.mismatch.empirical.suggestions import (
     SUGGESTED,
     FittedForm,
@@ -22,6 +22,7 @@ from regolithd.calibration.mismatch.empirical.sums import points_beside, profile
 from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.problem.words import divided, product, unit_in_label, word_for
 from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
+from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, PERIODIC_OFFSET
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
 if TYPE_CHECKING:
@@ -69,16 +70,25 @@ def curves_of(decision: Decision) -> tuple[FoundCurve, ...]:
     """Return the curves of what stays unexplained; a sine over time, and what was before, have none."""
     places: dict[tuple[str, str, tuple[int, ...]], list[Term]] = {}
     for term in decision.unnamed:
-        if term.group.coupling not in WITHOUT_CURVE:
-            places.setdefault((term.name, term.group.coupling, term.wheels), []).append(term)
-    return tuple(_found(decision, tuple(terms)) for terms in places.values())
+        if (coupling := _coupling_of_curve(decision.equations.problem, term)) is not None:
+            places.setdefault((term.name, coupling, term.wheels), []).append(term)
+    return tuple(_found(decision, tuple(terms), coupling) for (_, coupling, _), terms in places.items())
 
 
-def _found(decision: Decision, terms: tuple[Term, ...]) -> FoundCurve:
-    term = terms[0]
+def _coupling_of_curve(problem: Problem, term: Term) -> str | None:
+    """Return how a term acts; of a sine over a covariate how its curve does. None: it is no curve."""
+    coupling = term.group.coupling
+    if term.name != "time" and coupling in {PERIODIC, PERIODIC_OFFSET}:
+        return "drag" if coupling == PERIODIC and "direction" in problem.covariates else "offset"
+    return None if coupling in WITHOUT_CURVE else coupling
+
+
+def _found(decision: Decision, terms: tuple[Term, ...], coupling: str) -> FoundCurve:
+    term = replace(terms[0], group=replace(terms[0].group, coupling=coupling))
     sums = sums_of(decision.equations, decision.named, term)
     whole = profile(sums)
-    knots = knots_of(sums, TIME_KNOTS if term.name == "time" else KNOTS)
+    closely = term.name == "time" or any(each.group.coupling in WITHOUT_CURVE for each in terms)
+    knots = knots_of(sums, CLOSE_KNOTS if closely else KNOTS)
     spline = fit_spline(whole, sums.at, knots)
     curve = _curve(decision.equations.problem, term, spline, _held_out(sums, knots))
     others = whole.others(spline.in_bins)

@@ -24,8 +24,11 @@ AWAY_FROM_ZERO = 0.05
 NARROWEST, WIDEST = 0.03, 3.0
 """Widths and lengths that are searched, as shares of the covariate's range (a choice: from less than a knot of a curve
 to what is all but a straight line)."""
-FEWEST_CYCLES, MOST_CYCLES = 0.5, 8.0
-"""Cycles of a sine within the range (a choice: fewer are a parabola, more are noise to eight knots)."""
+FEWEST_CYCLES, MOST_CYCLES = 0.5, 24.0
+"""Cycles of a sine within the range (a choice: fewer are a parabola; more are not looked for, see
+`regression/smooth_groups.py`)."""
+TRIED_A_CYCLE = 6
+"""Points of the grid for each further cycle (a choice: what is found is refined)."""
 VALUES_A_CYCLE = 3
 """Values of a covariate that has few, in each cycle of a sine (a choice: one more than Nyquist's two)."""
 WIDTHS, PLACES = 12, 21
@@ -201,11 +204,16 @@ def _sine() -> ClosedForm:
         "sine",
         "c cos(2π x/k) + d sin(2π x/k)",
         lambda x, s: np.stack((np.cos(2 * np.pi * x / s[0]), np.sin(2 * np.pi * x / s[0]))),
-        lambda span: (span.width / np.linspace(FEWEST_CYCLES, span.most_cycles, 46))[:, None],
+        _periods,
         ("k",),
         suits=lambda span: span.most_cycles > FEWEST_CYCLES,
         coefficients=("c", "d"),
     )
+
+
+def _periods(span: Span) -> Array:
+    points = 2 + int(TRIED_A_CYCLE * (span.most_cycles - FEWEST_CYCLES))
+    return np.asarray((span.width / np.linspace(FEWEST_CYCLES, span.most_cycles, points))[:, None])
 
 
 def _anywhere(_: Span) -> bool:

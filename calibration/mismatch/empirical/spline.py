@@ -21,9 +21,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-KNOTS, TIME_KNOTS = 24, 96
-"""Knots of a curve, and of one over time (a choice: the penalty, not their number, limits how much it bends; what comes
-and goes with time may do so within a hundredth of the recording)."""
+KNOTS, CLOSE_KNOTS = 24, 96
+"""Knots of a curve, and of one over time or that is periodic over its covariate (a choice: the penalty, not their
+number, limits how much it bends; what comes and goes with time may do so within a hundredth of the recording, and of
+the most cycles that are looked for each has four)."""
 SMOOTHNESS = np.logspace(-8, 6, 57)
 """Precisions of the bends that are compared, relative to what the recording says of the values (four in a decade)."""
 LEVEL_SHARE = 1e-6

@@ -68,6 +68,10 @@ def left_out(
         (faults.isolated, "single, isolated readings far outside all others"),
         (faults.codes, "a few in a row that are far out of the range of all others, as codes for faults are"),
         (faults.limited, "reading and prediction are at a limit that both have, or near to it"),
+        (
+            faults.saturated,
+            "at the end of the sensor's range, where the furthest readings are all the same, or predicted near it",
+        ),
         *((blank, f"{word_for(name, labels)} was not measured there") for name, blank in blanks.items()),
     ]
     return tuple(LeftOut(channel, int(where.sum()), reason) for where, reason in reasons if where.any())

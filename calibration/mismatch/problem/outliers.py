@@ -1,4 +1,4 @@
-"""Readings that are faults: single outliers, codes of a few in a row, and what is at a limit that both have."""
+"""Readings that are faults: single outliers, codes of a few in a row, and what is at a limit of the sensor."""
 
 from __future__ import annotations
 
@@ -25,6 +25,20 @@ SAME_LIMIT = 1e-6
 """Relative difference of two limits up to which they are one: digits of a file."""
 LIMIT_DEVIATIONS = 3.0
 """Standard deviations of the residual below a limit, from which no noise reaches it (normal density: 1 in 740)."""
+FEWEST_SATURATED = 5
+"""Readings of one wheel, or of all, at exactly the same extreme value, from which on they are saturated (a choice)."""
+MOST_SATURATED, MOST_NEAR_LIMIT = 0.1, 0.3
+"""Share of a wheel's readings that are saturated, and that are not compared for it, at most (a choice): more is a limit
+of the machine that the simulation leaves out, and is compared."""
+PILED_UP = 3
+"""Times that as many readings are at the limit as at any of the next values, with as many values (a choice): of
+quantised noise, the furthest value is the rarest."""
+NEAR_LIMIT_DEVIATIONS = 1.5
+"""Standard deviations of the residual below a limit, from which a mean reading is hardly lowered by it (normal density:
+by 0.03 of them)."""
+LEAST_SPREAD = 0.25
+"""Standard deviation of what is predicted of saturated readings, in those of the residual, at least (a choice): where
+one value is predicted, the machine rests there."""
 OUT_OF_RANGE = 1.0
 """Ranges of all other readings beyond which a reading is out of range (a choice)."""
 
@@ -38,12 +52,14 @@ class FaultyReadings:
     isolated: single readings far from the prediction
     codes: a few in a row that are out of the range of all others
     limited: at a limit that the prediction has too
+    saturated: at a limit that the prediction does not have, or predicted to be near it
     compared: far readings that are compared all the same
     """
 
     isolated: Mask
     codes: Mask
     limited: Mask
+    saturated: Mask
     compared: Mask
 
     @classmethod
@@ -55,13 +71,15 @@ class FaultyReadings:
         far = far_from_prediction(residual, thresholds)
         isolated = isolated_outliers(far, compared, run, thresholds)
         codes = codes_in_a_row(measured, far, compared, run, thresholds) & ~isolated
-        limited = at_common_limit(measured, np.where(compared, prediction, np.nan), residual) & ~isolated & ~codes
-        return cls(isolated, codes, limited, far & ~isolated & ~codes & ~limited)
+        taken, predicted = isolated | codes, np.where(compared, prediction, np.nan)
+        limited = at_common_limit(measured, predicted, residual) & ~taken
+        saturated = at_own_limit(measured, np.where(taken | limited, np.nan, predicted), residual)
+        return cls(isolated, codes, limited, saturated, far & ~taken & ~limited & ~saturated)
 
     @property
     def all(self) -> Mask:
         """Where a reading is not compared, for any of the reasons."""
-        return self.isolated | self.codes | self.limited
+        return self.isolated | self.codes | self.limited | self.saturated
 
 
 def far_from_prediction(residual: Array, thresholds: Thresholds) -> Mask:
@@ -157,6 +175,42 @@ def at_common_limit(measured: Array, prediction: Array, residual: Array) -> Mask
             if common and enough and limit != 0:
                 found[:, wheel] |= known & (same | (sign * predicted > limit - near))
     return found
+
+
+def at_own_limit(measured: Array, prediction: Array, residual: Array) -> Mask:
+    """Return where readings are at a limit that the prediction does not have, or predicted to be near it (time, wheel).
+
+    A sensor at the end of its range reads exactly the same again and again. What is left out is told by the prediction:
+    left out by the reading, what is just below the limit would keep its noise of one sign. Saturated readings of which
+    less is predicted stay: they are hardly lowered.
+    """
+    found, known = np.zeros(measured.shape, np.bool_), np.isfinite(measured) & np.isfinite(prediction)
+    for sign in (1.0, -1.0):
+        of_all = _piled_up_at(sign * measured[known])  # sensors of one kind end alike
+        for wheel in np.flatnonzero(known.any(axis=0)):
+            here = known[:, wheel]
+            read, predicted = sign * measured[here, wheel], sign * prediction[here, wheel]
+            limit, deviation = _piled_up_at(read) or of_all, robust_std(residual[here, wheel])
+            if limit is None or not deviation > 0:
+                continue
+            saturated = np.isclose(read, limit, rtol=SAME_LIMIT, atol=0.0)
+            near = predicted > limit - NEAR_LIMIT_DEVIATIONS * deviation
+            varied = saturated.any() and float(np.std(predicted[saturated])) > LEAST_SPREAD * deviation
+            if (varied or saturated.sum() < FEWEST_SATURATED) and near.sum() <= MOST_NEAR_LIMIT * len(near):
+                found[here, wheel] |= near & saturated.any()
+    return found
+
+
+def _piled_up_at(values: Array) -> float | None:
+    """Return the largest of some values, not 0, if more of them are equal to it than noise explains; else None."""
+    if not len(values):
+        return None
+    each, counts = np.unique(values, return_counts=True)
+    limit = float(each[-1])
+    same = np.isclose(each, limit, rtol=SAME_LIMIT, atol=0.0)
+    count, beside = int(counts[same].sum()), counts[~same][-PILED_UP:]
+    enough = FEWEST_SATURATED <= count <= MOST_SATURATED * len(values)
+    return limit if enough and limit != 0 and count >= PILED_UP * int(beside.max(initial=0)) else None
 
 
 def note_on_far_readings(channel: str, far: Mask, compared: Mask, thresholds: Thresholds) -> tuple[str, ...]:

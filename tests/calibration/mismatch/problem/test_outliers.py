@@ -1,4 +1,4 @@
-"""Only single, isolated readings, codes, and readings at a common limit are left out."""
+"""Only single, isolated readings, codes, and readings at a limit are left out."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch.problem.outliers import (
+    FEWEST_SATURATED,
+    NEAR_LIMIT_DEVIATIONS,
     at_common_limit,
+    at_own_limit,
     codes_in_a_row,
     far_from_prediction,
     isolated_outliers,
@@ -107,6 +110,50 @@ def test_readings_at_a_limit_that_both_have_are_left_out() -> None:
     noisy = prediction + noise
     assert not at_common_limit(noisy, prediction, noise).any()
     assert not at_common_limit(measured, current, measured - current).any()  # a limit that is not simulated is physics
+
+
+def course(noise: float = 0.3, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Return a prediction and readings with noise, (time, wheel), of two wheels of which one carries less."""
+    truth = 2 + np.sin(np.arange(COUNT) / 20.0)[:, None] * [1.0, 0.8]
+    return truth, truth + np.random.default_rng(seed).normal(0, noise, truth.shape)
+
+
+def test_readings_at_the_end_of_a_sensor_s_range_are_left_out_by_their_prediction() -> None:
+    """Whether they are saturated or not, on each wheel that reaches it; what is left has noise of either sign."""
+    truth, measured = course()
+    limit = float(np.quantile(measured[:, 0], 0.95))
+    for sign in (1.0, -1.0):
+        clipped = np.minimum(measured, limit)
+        found = at_own_limit(sign * clipped, sign * truth, sign * (clipped - truth))
+        near = truth > limit - NEAR_LIMIT_DEVIATIONS * 0.3
+        assert np.mean(found == near) > 0.95
+        assert 0 < found[:, 1].sum() < found[:, 0].sum()
+        assert abs(np.mean((clipped - truth)[~found])) < 0.02
+
+
+@pytest.mark.parametrize("bits", [5, 8, 12])
+def test_quantised_readings_are_not_saturated(bits: int) -> None:
+    """The furthest value of noise is the rarest."""
+    truth, measured = course()
+    step = float(np.ptp(measured)) / 2**bits
+    read = step * np.rint(measured / step)
+    assert not at_own_limit(read, truth, read - truth).any()
+
+
+def test_where_a_machine_rests_its_reading_is_not_saturated() -> None:
+    """One value is predicted there; nor are a few equal readings, those at zero, nor many, which are a limit of it."""
+    truth, measured = course(noise=0.01)
+    rests = np.where(truth > 2.9, 3.0, truth)
+    read = np.where(truth > 2.9, 3.1, measured)
+    assert not at_own_limit(read, rests, read - rests).any()
+    few = measured.copy()
+    few[: FEWEST_SATURATED - 1] = measured.max() + 0.1
+    assert not at_own_limit(few, truth, few - truth).any()
+    for share in (0.7, 0.97):
+        limit = float(np.quantile(measured, share))
+        limited = np.minimum(measured, limit) - (limit if share > 0.9 else 0.0)
+        shifted = truth - (limit if share > 0.9 else 0.0)
+        assert not at_own_limit(limited, shifted, limited - shifted).any()
 
 
 def test_a_few_far_readings_that_are_compared_are_told() -> None:
