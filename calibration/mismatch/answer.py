@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.signal.normal_interval import std_of_interval
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
@@ -108,6 +109,7 @@ class Unexplained:
     """A structure in the residual that no candidate explains: its covariate, wheels, time and share of the power.
 
     `range` is where it is confined to a range of the covariate; None: it varies over the whole of it.
+    `period` is that of a sine over the covariate, in its unit (seconds for time); None: it is not periodic.
     `curve` is what it looks like over its covariate; None where it is periodic in time, follows what was before, or
     acts on a state.
     `suggestions` are closed forms that may describe the curve, best first.
@@ -122,6 +124,7 @@ class Unexplained:
     range: Range | None = None
     curve: EmpiricalCurve | None = None
     suggestions: tuple[Suggestion, ...] = ()
+    period: float | None = None
 
 
 @dataclass(frozen=True)
@@ -171,6 +174,10 @@ class FitImprovement:
     noise_floor_rmse: float
 
 
+NEARLY_ALL = 0.999
+"""Share of a prior's variance from which on the readings say nothing of a parameter."""
+
+
 @dataclass(frozen=True)
 class CalibratedParameter:
     """A parameter of the simulation: its prior, and where the recording moved it, with a 90 % interval."""
@@ -192,6 +199,13 @@ class CalibratedParameter:
     def prior_stds_away(self) -> float:
         """How far it is from its prior, in the prior's standard deviations; 0 where the prior is exact."""
         return abs(self.value - self.prior) / self.prior_std if self.prior_std > 0 else 0.0
+
+    @property
+    def variance_left(self) -> float:
+        """Its variance over that of its prior, from the 90 % interval; at most nearly 1."""
+        if self.prior_std <= 0:
+            return 0.0
+        return min((std_of_interval(self.low, self.high) / self.prior_std) ** 2, NEARLY_ALL)
 
     def beyond_prior(self, thresholds: Thresholds = THRESHOLDS) -> bool:
         """Return whether it had to leave its prior: a finding, whatever else was found."""

@@ -59,7 +59,7 @@ def sure_of(answer: Answer) -> str:
     if (other := answer.next_best) is None:
         return text
     names = (*other.effects, *(("something unexplained",) if other.unexplained else ()))
-    order = "next" if other.probability <= answer.probability else "by evidence alone more probable"
+    order = "next" if other.probability <= answer.probability else "refused, though likelier by evidence alone"
     return f"{text}; {order}: {' + '.join(names) or 'nothing'} ({other.probability:.2f})"
 
 
@@ -124,9 +124,7 @@ def _all_unexplained(found: Sequence[Unexplained], labels: Labels, of: int, *, s
 
 def _unexplained(rest: Unexplained, labels: Labels, of: int, *, several: bool) -> list[str]:
     """Return the line about what is unexplained, and those about its curve, indented."""
-    # Of one recording, what has no curve is periodic in time; of several, nothing has a curve.
-    periodic = of > 0 and rest.covariate == "time" and rest.curve is None
-    follows = f"{labels.the(rest.covariate)}{' periodically' if periodic else ''}"
+    follows = f"{labels.the(rest.covariate)}{labels.period(rest)}"
     line = (
         f"unexplained{f' in {rest.channel}' if several else ''}: {percent(rest.share_of_residual)} of the residual "
         f"follows {follows}{on_wheels(rest.wheels, of, labels.wheel)}, {rest.from_s:.0f} to {rest.to_s:.0f} s"

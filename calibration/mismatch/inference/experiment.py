@@ -12,7 +12,7 @@ from regolithd.calibration.mismatch.answer import Indistinguishable
 from regolithd.calibration.mismatch.experiments.drives import DIRECTION, SPEED
 from regolithd.calibration.mismatch.experiments.margins import of_both, of_effect, of_parameter, predictable
 from regolithd.calibration.mismatch.inference.statements import capital, listed
-from regolithd.calibration.mismatch.problem.words import in_words, label_of_column, unit_in_label, word_for
+from regolithd.calibration.mismatch.problem.words import column_of, in_words, label_of_column, unit_in_label, word_for
 from regolithd.calibration.mismatch.regression.as_read import long_run_weights
 
 if TYPE_CHECKING:
@@ -163,9 +163,12 @@ def varied_by(candidate: Candidate, problem: Problem) -> tuple[str, ...]:
 def range_in_words(problem: Problem, setting: Setting) -> str:
     """Return between which values a covariate is varied."""
     least = NEXT_TO_NOTHING * max(abs(setting.low), abs(setting.high))
-    ends = " to ".join(f"{each if abs(each) > least else 0.0:.2g}" for each in (setting.low, setting.high))
+    rounded = (float(f"{each:.2g}") if abs(each) > least else 0.0 for each in (setting.low, setting.high))
+    ends = " to ".join(f"{each:.6g}" for each in rounded)
     if setting.relative:
-        return f"{label_of_column(setting.channel).split(' (')[0]} {ends} times the usual"
+        covariate = column_of(problem.recording.channels[setting.channel], problem.covariates)
+        told = problem.labels.get(covariate or "", label_of_column(setting.channel))
+        return f"{told.split(' (')[0]} {ends} times the usual"
     unit = unit_in_label(setting.covariate, problem.labels)
     return f"{word_for(setting.covariate, problem.labels)} {ends} {unit}".strip()
 

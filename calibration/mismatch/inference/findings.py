@@ -228,6 +228,7 @@ def _unexplained(decision: Decision, read: AsRead, term: Term) -> Unexplained:
         to_s=last_s,
         share_of_residual=spells.share_of_residual if spells else share_of_residual(equations, read, term),
         range=range_of(decision, term),
+        period=term.group.period,
     )
 
 

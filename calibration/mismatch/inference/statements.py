@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-from math import floor, isfinite, log10
+from math import floor, isfinite, log10, sqrt
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.problem.words import in_words
+from regolithd.calibration.mismatch.regression.nuisance import LEAST_KNOWN
+from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -34,6 +36,8 @@ NO_HELP = (
 """What is said of an empirical curve that does not help on held-out readings."""
 
 
+LEAST_COST = 0.1
+"""Share of the held-out error below which 0.0 % might be told [%]."""
 LEAST_SHARE = 0.005
 """Share of the residual below which 0 % would be told."""
 
@@ -130,10 +134,11 @@ def told(value: float, low: float, high: float) -> tuple[str, str, str]:
 def size_and_cost(size: Parameter, errors: tuple[float, float]) -> str:
     """Return how large an effect is over the mean reading, and what leaving it out costs."""
     costs = 100 * (errors[0] / errors[1] - 1) if errors[1] > 0 else 0.0
+    much = f"{abs(costs):.1f} %" if abs(costs) >= LEAST_COST else f"less than {LEAST_COST} %"
     value, low, high = told(100 * size.value, 100 * size.low, 100 * size.high)
     return (
         f"{value} % of the mean reading (90 % sure: {low} to {high} %); "
-        f"left out, it makes the held-out error there {abs(costs):.1f} % {'larger' if costs >= 0 else 'smaller'}"
+        f"left out, it makes the held-out error there {much} {'larger' if costs >= 0 else 'smaller'}"
     )
 
 
@@ -170,7 +175,29 @@ def notes_on_priors(
     """Return a note on each parameter beyond its prior: a finding, or what may stand for something unexplained."""
     found = parameters_found(parameters, unexplained=unexplained, thresholds=thresholds)
     beyond = [each for each in parameters if each.beyond_prior(thresholds)]
-    return [beyond_prior_in_words(each) if each in found else _may_stand_for_it(each) for each in beyond]
+    strained = [] if unexplained else [each for each in parameters if _strains_its_prior(each, thresholds)]
+    told = [beyond_prior_in_words(each) if each in found else _may_stand_for_it(each) for each in beyond]
+    return [*told, *(_strained_in_words(each) for each in strained)]
+
+
+def _strains_its_prior(parameter: CalibratedParameter, thresholds: Thresholds) -> bool:
+    """Return whether a parameter within its prior is further from it than the prior lets expect of readings."""
+    away, variance = parameter.prior_stds_away, parameter.variance_left
+    expected = sqrt(1 - min(variance, LEAST_KNOWN))
+    return not parameter.beyond_prior(thresholds) and away > thresholds.furthest_prior_stds * expected
+
+
+def _strained_in_words(parameter: CalibratedParameter) -> str:
+    """Return where the readings alone have a parameter that its prior holds back."""
+    left = parameter.variance_left
+    alone = parameter.prior + (parameter.value - parameter.prior) / (1 - left)
+    reach = NINETY_PERCENT_STDS * parameter.prior_std * sqrt(left / (1 - left))
+    unit = after_number(parameter.unit)
+    return (
+        f"{parameter.told_name} is {parameter.prior_stds_away:.1f} standard deviations from its stated value, which "
+        f"holds it back: by the readings alone it is {alone:.4g}{unit} (90 % sure: {alone - reach:.4g} to "
+        f"{alone + reach:.4g}). A value that was stated rightly is so far from them in one recording of 370: check it."
+    )
 
 
 def _may_stand_for_it(parameter: CalibratedParameter) -> str:

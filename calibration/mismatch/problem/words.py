@@ -32,8 +32,8 @@ COVARIATES = {
 SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 SPELLINGS = {"degC": "°C", "degF": "°F", "Nm": "N·m", "percent": "%"}
 """Units whose spelling in a column's name is not the usual one."""
-TEMPERATURES = frozenset({"°C", "°F", "K"})
-"""Units of a column whose name need not say what it is: `gearbox_degC` is the gearbox's temperature."""
+QUANTITIES = {"°C": "temperature", "°F": "temperature", "K": "temperature", "V": "voltage", "bar": "pressure"}
+"""What a column of this unit is, whose name need not say it: `gearbox_degC` is the gearbox's temperature."""
 DIVISORS = frozenset({"s", "s2", "min", "h"})
 """Unit words that divide what stands before them: `m_s` is m/s."""
 ANGULAR_SPEED = "rad/s"
@@ -89,8 +89,9 @@ def label_of_column(column: str) -> str:
         joined = "/" if part in DIVISORS else "·"
         unit += (joined if unit else "") + SPELLINGS.get(base, base) + power.translate(SUPERSCRIPTS)
     words = name.replace("_", " ")
-    if unit in TEMPERATURES and "temp" not in words.lower():
-        words += " temperature"
+    what = QUANTITIES.get(unit, "")
+    if what[:4] not in words.lower():
+        words += f" {what}"
     return words + (f" ({unit})" if unit else "")
 
 

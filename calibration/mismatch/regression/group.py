@@ -33,6 +33,7 @@ class Group:
     own_channel: for a fault of another channel, Δχ² and coefficient there, shape (wheel,) each
     acting: which column is other than zero on which wheel, shape (column, wheel); None: all on all
     region: the range of the covariate outside which its columns are zero; None: they act everywhere
+    period: of a sine, in the unit of its covariate, which is seconds for time; None: it is none
     later: of a smooth term over what was before, the columns of what comes later, adjacent to its own and before them
     """
 
@@ -48,6 +49,7 @@ class Group:
     own_channel: tuple[Array, Array] | None = None
     acting: NDArray[np.bool_] | None = None
     region: Region | None = None
+    period: float | None = None
     later: tuple[int, ...] = ()
 
     @property

@@ -157,8 +157,9 @@ def with_group(
     coupling: str,
     sharing: tuple[Sharing, ...] = ("all", "one"),
     selection_penalty: float = 0.0,
+    period: float | None = None,
 ) -> DesignMatrix:
-    """Add columns of either sign as one group."""
+    """Add columns of either sign as one group, with the period that they have in common."""
     design, places = design.extended(as_shown(design.problem, columns))
     if not places:
         return design
@@ -169,6 +170,7 @@ def with_group(
         sharing=sharing,
         selection_penalty=selection_penalty,
         coupling=coupling,
+        period=period,
     )
     return design.with_groups((*design.groups, group))
 
@@ -200,9 +202,10 @@ def _with_sines_over_time(design: DesignMatrix, residual: Array) -> DesignMatrix
     # As many frequencies were open to choice as the recording resolves.
     selection_penalty = 2 * float(np.log(problem.length_s * highest_Hz))
     for of_wheels in (power.sum(axis=0), *power):
-        phase = 2 * np.pi * frequency_Hz[np.argmax(np.where(searched, of_wheels, 0.0))] * problem.time_s
+        period_s = 1 / float(frequency_Hz[np.argmax(np.where(searched, of_wheels, -1.0))])
+        phase = 2 * np.pi * problem.time_s / period_s
         sines = [along * np.cos(phase), along * np.sin(phase)]
-        design = with_group(design, "time", sines, PERIODIC, selection_penalty=selection_penalty)
+        design = with_group(design, "time", sines, PERIODIC, selection_penalty=selection_penalty, period=period_s)
     return design
 
 
@@ -238,8 +241,9 @@ def _with_sines_over_covariates(design: DesignMatrix, residual: Array) -> Design
             power = np.sum(
                 [power_of_sums(at, of_wheel, length) for at, of_wheel in zip(place.T, left.T, strict=True)], 0
             )
-            phase = 2 * np.pi * cycles[np.argmax(np.where(searched, power, 0.0))] * share
+            strongest = float(cycles[np.argmax(np.where(searched, power, -1.0))])
+            phase, period = 2 * np.pi * strongest * share, float(high - low) / strongest
             sines = [factor * np.cos(phase), factor * np.sin(phase)]
             if _share_explained([sine[known] for sine in sines], residual[known]) > LEAST_SHARE:
-                design = with_group(design, name, sines, coupling, selection_penalty=selection_penalty)
+                design = with_group(design, name, sines, coupling, selection_penalty=selection_penalty, period=period)
     return design

@@ -23,7 +23,7 @@ from regolithd.calibration.mismatch.problem.words import COVARIATES
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from regolithd.calibration.mismatch.answer import Answer, Change, Evidence
+    from regolithd.calibration.mismatch.answer import Answer, Change, Evidence, Unexplained
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
 
 PARAMETERS = {"lag_s": "lag", "onset_s": "onset", "relative_size": "share of the mean reading"}
@@ -117,6 +117,14 @@ class Labels:
     def the(self, name: str) -> str:
         """Return a covariate's name with its article, if it has one: "the belt speed", "time"."""
         return self.covariate(name) if name in {"time", "none"} else f"the {self.covariate(name)}"
+
+    def period(self, place: Unexplained) -> str:
+        """Return what is told of the period of a sine: ", with a period of 12.3 s"; nothing where there is none."""
+        if place.period is None:
+            return ""
+        in_brackets = self.axis(place.covariate).partition(" (")[2].rstrip(")")
+        factor = self.time_factor if place.covariate == "time" else 1.0
+        return f", with a period of {place.period * factor:.3g} {in_brackets}".rstrip()
 
     def parameter(self, effect: str, name: str) -> str:
         """Return the label of an effect's parameter."""

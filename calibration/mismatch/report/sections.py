@@ -230,12 +230,8 @@ def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> Unexp
         f"{percent(place.share_of_residual)} of the residual’s power",
     )
     curve = empirical_section(place, evidence, labels) if place.curve else None
-    name = labels.the(place.covariate)
-    # Of one recording, what has no curve is periodic in time.
-    periodic = place.covariate == "time" and curve is None
-    return UnexplainedSection(
-        f"{name}, periodically" if periodic else name, tuple(_unbroken(fact) for fact in facts if fact), curve
-    )
+    name = labels.the(place.covariate) + labels.period(place)
+    return UnexplainedSection(name, tuple(_unbroken(fact) for fact in facts if fact), curve)
 
 
 def fit(answer: Answer, evidence: Evidence, labels: Labels) -> FitSection:

@@ -62,7 +62,7 @@ def test_mismatch_prints_the_answer() -> None:
         verdict="effects",
         effects=[SimpleNamespace(name="coulomb-friction", statement="37 mA", parameters=FRICTION)],
         unexplained=[
-            Unexplained("current", (1, 4), "time", 3.4, 99.6, 0.123),
+            Unexplained("current", (1, 4), "time", 3.4, 99.6, 0.123, period=150.0),
             Unexplained("current", (1,), "height", 0.0, 9.0, 0.4, curve=CURVE, suggestions=SUGGESTIONS),
         ],
         changes=[GROWN],
@@ -94,7 +94,7 @@ def test_mismatch_prints_the_answer() -> None:
         "    power = 0.75",
         "  changed: viscous-friction is larger than the corrected simulation has it.",
         f"  parameter loss had to leave its prior: {LEFT}",
-        "  unexplained: 12 % of the residual follows time periodically, on zones 1 and 4, 3 to 100 s",
+        "  unexplained: 12 % of the residual follows time, with a period of 2.5 min, on zones 1 and 4, 3 to 100 s",
         "  unexplained: 40 % of the residual follows the height of the bale, on zone 1, 0 to 9 s",
         "    empirical curve over the height of the bale, 0.1 to 0.7 m: held-out error 50.0 % smaller with it",
         "    suggestion 1: Δcurrent = c height; c = 2.5 A/m; 47.5 % smaller",
@@ -185,4 +185,7 @@ def test_an_answer_that_evidence_alone_disfavours_says_so() -> None:
     console = Console(record=True, width=200, quiet=False)
     other = SimpleNamespace(effects=(), unexplained=False, probability=0.91)
     print_answer(console, answer_with(verdict="unexplained", probability=0.07, next_best=other), Labels(), (1,))
-    assert "probability of this answer: 0.07; by evidence alone more probable: nothing (0.91)" in console.export_text()
+    assert (
+        "probability of this answer: 0.07; refused, though likelier by evidence alone: nothing (0.91)"
+        in console.export_text()
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -19,6 +20,7 @@ from regolithd.calibration.mismatch.inference.statements import (
     on_wheels,
     parameters_found,
     plural,
+    size_and_cost,
     statement,
     told,
     words_of,
@@ -133,6 +135,24 @@ def test_a_parameter_beyond_its_prior_is_told_once() -> None:
 def moved_by(stds: float) -> CalibratedParameter:
     """Return an outlet that is so many deviations of its prior away."""
     return CalibratedParameter("outlet", "m", 40.0, 2.0, 40.0 + 2 * stds, 39.0 + 2 * stds, 41.0 + 2 * stds)
+
+
+def test_a_parameter_that_its_prior_holds_back_is_told_with_what_the_readings_alone_say() -> None:
+    """Where a value stated rightly is seldom so far away; not beside what stays unexplained, nor of an exact one."""
+    held = CalibratedParameter("rake_A", "A/t", 1.0, 0.1, 1.28, 1.28 - 0.5 * 0.1645, 1.28 + 0.5 * 0.1645)
+    (note,) = notes_on_priors([held, moved_by(2.5)], unexplained=False)
+    assert note.startswith("rake_A is 2.8 standard deviations from its stated value")
+    # A quarter of the prior's variance is left, so that the readings alone have it a third further away.
+    assert "by the readings alone it is 1.373 A/t (90 % sure: 1.278 to 1.468)" in note
+    assert notes_on_priors([held], unexplained=True) == []
+    assert notes_on_priors([replace(held, prior_std=0.0)], unexplained=False) == []
+
+
+def test_a_cost_that_would_be_told_as_nothing_is_told_as_less_than_what_is_told() -> None:
+    """Where parameters take an effect up, the held-out error hardly grows without it."""
+    size = Parameter(0.05, 0.04, 0.06, "1")
+    assert size_and_cost(size, (1.0002, 1.0)).endswith("the held-out error there less than 0.1 % larger")
+    assert size_and_cost(size, (1.002, 1.0)).endswith("the held-out error there 0.2 % larger")
 
 
 def test_beside_something_unexplained_only_a_clear_distance_from_the_prior_is_a_finding() -> None:

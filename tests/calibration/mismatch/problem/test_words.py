@@ -53,7 +53,7 @@ def test_the_prediction_as_a_covariate_is_called_so_or_as_the_simulation_calls_t
     """It is no column of its own."""
     size = np.full((3, 1), 48.0)
     covariates, predicted = {"pack": size.copy()}, {"pack_V": size}
-    assert labels_of({}, covariates, {}, predicted)["pack"] == "predicted pack (V)"
+    assert labels_of({}, covariates, {}, predicted)["pack"] == "predicted pack voltage (V)"
     assert labels_of({"torque": "predicted voltage (V)"}, covariates, {}, predicted)["pack"] == "predicted voltage (V)"
 
 
