@@ -72,6 +72,8 @@ def wheels_with_spells(decision: Decision) -> dict[tuple[int, ...], TimedSpells]
     explained = np.zeros(left.shape)
     for index in range(len(decision.named.terms)):
         explained += contribution(equations, decision.named, index)
+    if problem.noise_size is not None:  # where noise is larger for what is predicted, its mean is no spell
+        left, explained = (each / np.maximum(problem.noise_size, 1.0) for each in (left, explained))
     every = tuple(range(left.shape[1]))
     direction = np.nan_to_num(problem.covariates.get("direction", np.ones(left.shape)))
     ways = (np.ones(left.shape), direction) if np.ptp(direction[problem.mask]) else (direction,)
