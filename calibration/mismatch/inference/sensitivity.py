@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 
+LARGEST_TOLD = 10.0
+"""Size over the mean reading beyond which an effect does not show, however large (a choice: nobody overlooks it)."""
+
+
 def sensitivities(
     equations: NormalEquations, given: Fit, candidates: Sequence[Candidate], entry_threshold: float
 ) -> tuple[Sensitivity, ...]:
@@ -47,7 +51,10 @@ def sensitivities(
 
 
 def smallest_detectable(equations: NormalEquations, given: Sequence[Term], term: Term, entry_threshold: float) -> float:
-    """Return the root mean square whose Δχ² passes the entry threshold nine times in ten; infinite: none does."""
+    """Return the root mean square whose Δχ² passes the entry threshold nine times in ten.
+
+    Infinite: none does, or only one of many times the mean reading.
+    """
     problem, design, limits = equations.problem, equations.design, equations.thresholds
     own, complement = equations.own_and_complement(given, term)
     total = float(np.trace(own)) / len(own)
@@ -62,4 +69,5 @@ def smallest_detectable(equations: NormalEquations, given: Sequence[Term], term:
     squares = np.mean(columns**2, axis=0)[known]
     rms = float(np.sqrt(np.mean(squares)))
     least = limits.smallest_effect * problem.mean_size / active_rms(squares, limits.active_share)
-    return rms * max(float(np.sqrt(needed / outside)), least)
+    found = rms * max(float(np.sqrt(needed / outside)), least)
+    return found if found <= LARGEST_TOLD * problem.mean_size else float("inf")

@@ -235,7 +235,7 @@ def test_the_smallest_detectable_drag_is_what_its_noise_allows() -> None:
 
 
 def test_what_cannot_show_has_no_smallest_size() -> None:
-    """A candidate without columns, and one that is another's combination."""
+    """A candidate without columns, another's combination, and one that shows at many times the mean alone."""
     equations = equations_of(problem_of(table()), (Drag(),))
     found = {one.name: one for one in sensitivities(equations, equations.fit(()), CANDIDATES, THRESHOLD)}
     assert list(found) == sorted(found)
@@ -247,6 +247,7 @@ def test_what_cannot_show_has_no_smallest_size() -> None:
     named = equations.fit([twice])
     (again,) = sensitivities(equations, named, (Drag(),), THRESHOLD)
     assert again.smallest_detectable == pytest.approx(found["drag"].smallest_detectable)
+    assert smallest_detectable(equations, (), twice, 1e9) == float("inf")
 
 
 def test_at_one_size_of_speed_powers_are_one_effect() -> None:
