@@ -51,10 +51,7 @@ def write_corrected(
     SimulationError
         When the simulation does not come from a SIM.toml, or a curve cannot be carried to another recording.
     """
-    source = simulation.source
-    if source is None:
-        raise SimulationError("a corrected simulation is a SIM.toml: load the simulation from one, by load_simulation")
-    tables, terms = read_tables(source), evidence.contributions
+    tables, terms = stated_tables(simulation), evidence.contributions
     # Beside something unexplained the answer's parameters are those of the fit that has it: others would imitate it.
     imitating = bool(answer.unexplained)
     values: Mapping[str, float] = {**evidence.values, **{each.name: each.value for each in answer.parameters}}
@@ -63,6 +60,30 @@ def write_corrected(
         values, terms, curves = with_curves(answer, evidence)
         imitating = False
     new = corrected_tables(tables, simulation, values, terms, answer.effects, within_priors=imitating, curves=curves)
+    write_simulation(path, simulation, new)
+
+
+def stated_tables(simulation: Simulation) -> dict[str, Any]:
+    """Return the tables of the SIM.toml that a simulation comes from.
+
+    Raises
+    ------
+    SimulationError
+        When it comes from none.
+    """
+    return read_tables(_source_of(simulation))
+
+
+def _source_of(simulation: Simulation) -> Path:
+    if simulation.source is None:
+        raise SimulationError("a corrected simulation is a SIM.toml: load the simulation from one, by load_simulation")
+    return simulation.source
+
+
+def write_simulation(path: Path, simulation: Simulation, new: dict[str, Any]) -> None:
+    """Write a simulation's SIM.toml with new tables, in which its class or FMU is found from the new place too."""
+    source = _source_of(simulation)
+    tables = read_tables(source)
     if path.resolve().parent != source.resolve().parent and tables["simulation"]["model"] != "rover-wheel":
         folder = model_folder(tables, source.resolve().parent)
         new["simulation"] = {**new["simulation"], "path": os.path.relpath(folder.resolve(), path.resolve().parent)}

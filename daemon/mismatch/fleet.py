@@ -189,10 +189,12 @@ def run_fleet(files: Sequence[RoverFile], simulation: Path, outputs: Outputs, op
         When no recording can be compared, or the simulation cannot be used.
     """
     outputs.check()
-    if outputs.corrected:
+    if outputs.corrected and len({file.rover for file in files if not file.damaged}) > 1:
+        raise MismatchError("--corrected is of one rover: compare the recordings of one alone")
+    if outputs.empirical:
         raise MismatchError(
-            "--corrected is of one rover, and of a recording that is compared at once; a fleet, and a recording of "
-            f"more than {LONGEST_AT_ONCE} rows, has --json, --report and --catalogue"
+            "--empirical is of recordings that are compared at once: one rover's, without --catalogue, --parameters, "
+            f"--rover-from and --scheduler, and of at most {LONGEST_AT_ONCE} rows"
         )
     simulated = load_simulation(simulation, announce=partial(typer.echo, err=True))
     store = Store(_kept_beside(options.catalogue)) if options.catalogue else None
@@ -216,6 +218,8 @@ def run_fleet(files: Sequence[RoverFile], simulation: Path, outputs: Outputs, op
         write_json(outputs.json, answer)
     if options.catalogue:
         found.write_catalogue(options.catalogue)
+    if outputs.corrected:
+        found.write_corrected(outputs.corrected)
     if outputs.report:
         paths = list(dict.fromkeys(file.path for file in files))
         write_fleet_page(outputs.report, replace(found, answer=answer), paths, simulation)

@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations
 from regolithd.calibration.mismatch.fleet.choice.released import with_released
 from regolithd.calibration.mismatch.fleet.choice.search import places_of
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
+from regolithd.calibration.mismatch.fleet.corrected import acting_last, write_corrected
 from regolithd.calibration.mismatch.fleet.evidence import FleetEvidence
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
 from regolithd.calibration.mismatch.fleet.told.findings import Chosen, Names, answer_of_fleet
@@ -72,6 +73,7 @@ class FleetComparison:
 
     answer: FleetAnswer
     evidence: FleetEvidence = field(repr=False)
+    simulation: Simulation = field(repr=False)
 
     def to_json(self) -> dict[str, Any]:
         """Return what `regolithd mismatch --json` writes."""
@@ -80,6 +82,16 @@ class FleetComparison:
     def write_catalogue(self, path: Path) -> None:
         """Write what was found in which recording as a Parquet file."""
         write_catalogue(path, self.evidence.rows)
+
+    def write_corrected(self, path: Path) -> None:
+        """Write the corrected SIM.toml of one rover, as it is in its last recording.
+
+        Raises
+        ------
+        MismatchError
+            When there are several rovers, or the simulation does not come from a SIM.toml.
+        """
+        write_corrected(path, self.answer, self.evidence.acting, self.simulation)
 
     def _repr_html_(self) -> str:
         # A notebook alone shows the report; the command line starts sooner without it.
@@ -173,8 +185,13 @@ def compare_fleet(
     answer = answers[0] if len(answers) == 1 else joined(answers)
     units = {channel: chosen.simulation.unit for channel, chosen in zip(channels, compared, strict=True)}
     wheels = tuple(dict.fromkeys(wheel for chosen in compared for wheel in chosen.equations.wheels))
-    evidence = FleetEvidence(rows, _labels_of(simulation, compared), units, wheels)
-    return FleetComparison(replace(answer, notes=(*answer.notes, *dict.fromkeys(work.notes))), evidence)
+    acting = tuple(
+        told
+        for channel, chosen, one in zip(channels, compared, answers, strict=True)
+        for told in acting_last(chosen, one, channel if len(channels) > 1 else "")
+    )
+    evidence = FleetEvidence(rows, _labels_of(simulation, compared), units, wheels, acting)
+    return FleetComparison(replace(answer, notes=(*answer.notes, *dict.fromkeys(work.notes))), evidence, simulation)
 
 
 def _labels_of(simulation: Simulation, compared: Sequence[Chosen]) -> Labels:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from hashlib import sha256
@@ -62,6 +63,26 @@ def test_recordings_of_two_rovers_are_told_apart(two: list[Path], tmp_path: Path
         assert f"<td>{path.name}</td><td><code>{sha256(path.read_bytes()).hexdigest()}</code></td>" in page
 
 
+def test_a_corrected_simulation_is_of_the_rover_s_last_recording(tmp_path: Path) -> None:
+    """What began half way is in it, and its last recording agrees with it."""
+    drags = ((0.0, 0.0), (0.0, 0.0), (0.3, 0.3), (0.3, 0.3))
+    paths = [
+        fleet_arm.write_recording(tmp_path / f"2026030{day}.csv", fleet_arm.columns(day, drag), rover="asper")
+        for day, drag in enumerate(drags, 1)
+    ]
+    new, out = tmp_path / "NEW.toml", tmp_path / "out.json"
+    options = ("--catalogue", tmp_path / "season.parquet", "--corrected", new)
+    done = call(*paths, "--simulation", fleet_arm.write_simulation(tmp_path), *options)
+    assert done.exit_code == 0, done.output
+    (written,) = tomllib.loads(new.read_text())["effects"]
+    assert written["name"] == "coulomb-friction"
+    assert written["coefficients"] == pytest.approx([0.3], rel=0.1)
+    later = fleet_arm.write_recording(tmp_path / "20260309.csv", fleet_arm.columns(9, (0.3, 0.3)))
+    done = call(later, "--simulation", new, "--json", out)
+    assert done.exit_code == 0, done.output
+    assert json.loads(out.read_text())["verdict"] == "consistent"
+
+
 def test_a_file_may_hold_several_rovers(two: list[Path], tmp_path: Path) -> None:
     """Its rows are taken apart, and have the same content as a file for each."""
     both = tmp_path / "both.csv"
@@ -97,16 +118,17 @@ def test_the_time_of_a_recording_is_in_its_name(two: list[Path]) -> None:
     ("words", "told"),
     [
         (("--corrected", "NEW.toml"), "is of one rover"),
+        (("--corrected", "NEW.toml", "--empirical"), "is of one rover"),
         (("--report", "nowhere/out.html"), "there is no folder"),
         (("--catalogue", "season.csv"), "name it .parquet"),
         (("--catalogue", "nowhere/season.parquet"), "there is no folder"),
     ],
 )
 def test_what_a_fleet_has_not_is_one_message(
-    words: tuple[str, str], told: str, two: list[Path], tmp_path: Path
+    words: tuple[str, ...], told: str, two: list[Path], tmp_path: Path
 ) -> None:
     """And nothing is compared before."""
-    words = (words[0], str(tmp_path / words[1]))
+    words = (words[0], str(tmp_path / words[1]), *words[2:])
     done = call(*two, "--simulation", fleet_arm.write_simulation(tmp_path), *words)
     assert done.exit_code == 65
     assert told in done.output.replace("\n", " ")

@@ -26,6 +26,7 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
 )
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 from regolithd.calibration.mismatch.report.labels import Labels
+from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 FIRST = datetime(2026, 3, 1, 8, 0, tzinfo=UTC)
 ROVERS = ("asper", "bruno <b>")
@@ -232,4 +233,5 @@ def test_the_files_are_named_with_their_digests() -> None:
 
 def test_a_notebook_shows_the_page() -> None:
     """In a frame of its own."""
-    assert escape("<title>The simulation leaves out", quote=True) in FleetComparison(ANSWER, EVIDENCE)._repr_html_()
+    shown_there = FleetComparison(ANSWER, EVIDENCE, Simulation())._repr_html_()
+    assert escape("<title>The simulation leaves out", quote=True) in shown_there
