@@ -123,6 +123,11 @@ class Unexplained:
     curve: EmpiricalCurve | None = None
     suggestions: tuple[Suggestion, ...] = ()
 
+    @property
+    def told_where(self) -> str:
+        """Whose it is, in words: nothing for the only recording."""
+        return ""
+
 
 @dataclass(frozen=True)
 class Indistinguishable:
