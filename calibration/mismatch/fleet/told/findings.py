@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.answer import Effect, Verdict
     from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.choice.recordings import Shown
     from regolithd.calibration.mismatch.fleet.work.found import Found
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
@@ -63,6 +65,22 @@ class Names:
 
 
 @dataclass(frozen=True, eq=False)
+class Beside:
+    """Parameters and effects, fitted with what single recordings show beside them, and their standard deviations."""
+
+    equations: FleetEquations
+    fit: FleetFit
+    stds: Array
+
+    @classmethod
+    def of(cls, equations: FleetEquations, fit: FleetFit, shown: Sequence[tuple[int, int]]) -> Beside:
+        """Return them from the equations in which what is shown, by recording and place, takes up what it can."""
+        rest = equations.beside(shown)
+        again = rest.fit(fit.terms)
+        return cls(rest, again, size_stds(rest, again))
+
+
+@dataclass(frozen=True, eq=False)
 class Chosen:
     """The choice for one channel, and what it is told from."""
 
@@ -83,29 +101,22 @@ class Chosen:
         """Of the fleet."""
         return self.chooser.equations
 
+    @cached_property
+    def shown(self) -> Shown:
+        """What single recordings show beside the choice."""
+        return shown_beside(self.equations, self.fit, self.found)
 
-@dataclass(frozen=True, eq=False)
-class _Beside:
-    """Parameters and effects, fitted with what single recordings show beside them, and their standard deviations."""
-
-    equations: FleetEquations
-    fit: FleetFit
-    stds: Array
-
-    @classmethod
-    def of(cls, equations: FleetEquations, fit: FleetFit, shown: Sequence[tuple[int, int]]) -> _Beside:
-        """Return them from the equations in which what is shown, by recording and place, takes up what it can."""
-        rest = equations.beside(shown)
-        again = rest.fit(fit.terms)
-        return cls(rest, again, size_stds(rest, again))
+    @cached_property
+    def beside(self) -> Beside:
+        """The choice, fitted with what single recordings show."""
+        return Beside.of(self.equations, self.fit, self.shown.terms)
 
 
 def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
     """Return the answer of one channel."""
     equations, fit, simulation = chosen.equations, chosen.fit, chosen.simulation
     held_out = held_out_squares(equations, fit)
-    shown = shown_beside(equations, fit, chosen.found)
-    beside = _Beside.of(equations, fit, shown.terms)
+    shown, beside = chosen.shown, chosen.beside
     effects = tuple(_effect(chosen, index, beside, held_out) for index in range(len(fit.terms)))
     single = tuple(_of_recording(chosen, i, effect) for i, effect in shown.effects)
     rest = tuple(_unexplained(chosen, i, each) for i, each in shown.unexplained)
@@ -140,7 +151,7 @@ def _rms(squares: Array, counts: Array) -> float:
     return float(np.sqrt(max(float(squares.sum()), 0.0) / max(float(counts.sum()), 1.0)))
 
 
-def _effect(chosen: Chosen, index: int, beside: _Beside, held_out: HeldOutSquares) -> FleetEffect:
+def _effect(chosen: Chosen, index: int, beside: Beside, held_out: HeldOutSquares) -> FleetEffect:
     equations, fit, names = chosen.equations, chosen.fit, chosen.names
     term = fit.terms[index]
     candidate, acting = term.group.candidate, equations.factors(term).any(axis=0)
@@ -175,7 +186,7 @@ def _effect(chosen: Chosen, index: int, beside: _Beside, held_out: HeldOutSquare
     )
 
 
-def _sizes(chosen: Chosen, index: int, beside: _Beside) -> dict[str, Parameter]:
+def _sizes(chosen: Chosen, index: int, beside: Beside) -> dict[str, Parameter]:
     """Return coefficients, shape parameters and relative size with their intervals."""
     fit, stds, simulation = beside.fit, beside.stds, chosen.simulation
     found = parameters_of(beside.equations, fit, stds, index, simulation.unit, chosen.labels)
@@ -227,7 +238,7 @@ def _unexplained(chosen: Chosen, recording: int, rest: object) -> FleetUnexplain
     return FleetUnexplained(**vars(rest), rovers=(rover,), recordings=(names.recordings[recording],))
 
 
-def _parameters(chosen: Chosen, beside: _Beside) -> tuple[FleetParameter, ...]:
+def _parameters(chosen: Chosen, beside: Beside) -> tuple[FleetParameter, ...]:
     """Return each parameter where the recordings moved it: of the fleet, or of each rover; of recordings, none."""
     equations, names = chosen.equations, chosen.names
     owners: dict[str, list[tuple[str, ...]]] = {
@@ -312,12 +323,14 @@ def _left_out(chosen: Chosen) -> tuple[LeftOut, ...]:
 
 
 def _notes(chosen: Chosen) -> tuple[str, ...]:
-    """Return the notes of the recordings, each once with the recordings that it is of."""
+    """Return the notes on the recordings, each once with those that it is of.
+
+    Notes on what was decided of a recording alone are left out: the fleet's answer replaces that.
+    """
     of: dict[str, list[str]] = {}
     for name, found in zip(chosen.names.recordings, chosen.found, strict=True):
-        for note in found.findings.notes:
-            if not note.startswith("Readings of"):
-                of.setdefault(note, []).append(name)
+        for note in found.findings.notes_on_recording:
+            of.setdefault(note, []).append(name)
     count = len(chosen.names.recordings)
     return tuple(f"{_which(names, count)}: {note}" for note, names in of.items())
 
