@@ -14,7 +14,7 @@ from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm
 from regolithd.calibration.mismatch.fleet.choice.held_out import HeldOutSquares, held_out_squares
 from regolithd.calibration.mismatch.fleet.choice.intervals import onset_places, size_stds
 from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
-from regolithd.calibration.mismatch.fleet.choice.search import penalty
+from regolithd.calibration.mismatch.fleet.choice.search import may_share, penalty
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser, relative_size
 from regolithd.calibration.mismatch.fleet.told.answer import (
     FleetAnswer,
@@ -25,8 +25,9 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
 )
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
 from regolithd.calibration.mismatch.fleet.told.sizes import mean_sizes, parameters_of
-from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost, words_of
+from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost
 from regolithd.calibration.mismatch.problem.problem import LeftOut
+from regolithd.calibration.mismatch.problem.words import in_words
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -37,7 +38,9 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Effect, Verdict
     from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
     from regolithd.calibration.mismatch.fleet.choice.recordings import Shown
+    from regolithd.calibration.mismatch.fleet.choice.search import Place
     from regolithd.calibration.mismatch.fleet.work.found import Found
+    from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]
@@ -175,7 +178,7 @@ def _effect(chosen: Chosen, index: int, beside: Beside, held_out: HeldOutSquares
         parameters=parameters,
         rmse_before=errors[0],
         rmse_after=errors[1],
-        form=candidate.form_of(term.group.shape),
+        form=_form_of(term),
         shape=term.group.shape,
         rovers=rovers,
         recordings=tuple(names.recordings[i] for i in np.flatnonzero(where.any(axis=1))),
@@ -194,7 +197,17 @@ def _sizes(chosen: Chosen, index: int, beside: Beside) -> dict[str, Parameter]:
     mean, std = mean_sizes(fit.coefficients[span], stds[span], count)
     size = relative_size(chosen.equations, fit, index)
     share = NINETY_PERCENT_STDS * float(np.max(std / np.maximum(np.abs(mean), 1e-300)))
-    return {**found, "relative_size": Parameter(size, size * (1 - share), size * (1 + share), "1")}
+    course = fit.terms[index].course
+    grown = {"growth_power": Parameter(course.power, np.nan, np.nan, "1")} if course.kind == "growing" else {}
+    return {**found, **grown, "relative_size": Parameter(size, size * (1 - share), size * (1 + share), "1")}
+
+
+def _form_of(term: FleetTerm) -> str:
+    """Return the form of a law; of what begins at a date, how it goes on after that."""
+    candidate = term.group.candidate
+    if not (term.group.begins and candidate.forms):
+        return candidate.form_of(term.group.shape)
+    return "power of time" if term.course.kind == "growing" else "step"
 
 
 def _statement(
@@ -217,19 +230,32 @@ def _statement(
         "always": "",
         "since": f" since {at}",
         "until": f" until {at}",
-        "growing": f" since {at}, growing",
+        "growing": f" since {at}, growing by the time since the recording before to the power of {course.power:g}",
     }[course.kind]
-    words = words_of(term.group.candidate, term.group.shape, parameters, chosen.labels)
+    candidate, values = term.group.candidate, {name: each.value for name, each in parameters.items()}
+    form = "" if term.course.kind == "growing" else _form_of(term)
+    words = in_words(candidate.words_with(term.group.shape, values), chosen.labels) + (f" ({form})" if form else "")
     return f"{capital(words)}{wheels}{of}{when}: {size_and_cost(parameters['relative_size'], errors)}."
 
 
 def _of_recording(chosen: Chosen, recording: int, effect: Effect) -> FleetEffect:
-    """Return an effect that one recording shows beside those of the fleet."""
+    """Return an effect that one recording shows beside those of the fleet: the rover's others are without it."""
     names = chosen.names
     plain = {each.name: getattr(effect, each.name) for each in fields(effect)}
     rover = names.rovers[int(chosen.equations.rover[recording])]
     told = f"{names.recordings[recording]} of {rover}: {effect.statement}"
-    return FleetEffect(**{**plain, "statement": told}, rovers=(rover,), recordings=(names.recordings[recording],))
+    of_rover = chosen.equations.recordings_of[int(chosen.equations.rover[recording])]
+    place = of_rover.index(recording)
+    since = names.date(recording) if place else None
+    return FleetEffect(
+        **{**plain, "statement": told},
+        rovers=(rover,),
+        recordings=(names.recordings[recording],),
+        since=since,
+        since_low=since,
+        since_high=since,
+        until=names.date(of_rover[place + 1]) if recording != of_rover[-1] else None,
+    )
 
 
 def _unexplained(chosen: Chosen, recording: int, rest: object) -> FleetUnexplained:
@@ -276,14 +302,7 @@ def _sensitivities(chosen: Chosen) -> tuple[Sensitivity, ...]:
     equations, channel, unit = chosen.equations, chosen.simulation.channel, chosen.simulation.unit
     found: dict[str, float] = {}
     for group in equations.groups:
-        place = next(
-            (
-                p
-                for p in chosen.chooser.places
-                if group.candidate.sharing[0] in _KINDS[p.units.kind] and p.courses(group)
-            ),
-            None,
-        )
+        place = _first_place(chosen, group)
         if place is None:
             found.setdefault(group.candidate.name, float("inf"))
             continue
@@ -293,7 +312,18 @@ def _sensitivities(chosen: Chosen) -> tuple[Sensitivity, ...]:
     return tuple(Sensitivity(name, channel, size, unit) for name, size in sorted(found.items()))
 
 
-_KINDS = {"fleet": "all", "rover": "all", "one": "one", "some": "", "each rover": ""}
+def _first_place(chosen: Chosen, group: GridGroup) -> Place | None:
+    """Return the first place that a candidate may have: all rovers, where all wheels may have it, else of one rover."""
+    return next(
+        (
+            place
+            for place in chosen.chooser.places
+            if may_share(group, place.units, len(chosen.equations.wheels))
+            and place.courses(group)
+            and ("all" in group.candidate.sharing or len(place.units.rovers) == 1)
+        ),
+        None,
+    )
 
 
 def _smallest(chosen: Chosen, others: Sequence[FleetTerm], term: FleetTerm) -> float:

@@ -258,3 +258,23 @@ def test_the_size_in_a_recording_is_beside_what_that_shows_itself() -> None:
     one = chosen(equations, (term(DRAG, Course("always")),), of_recordings)
     sizes = [row.value for row in catalogue_rows(one, answer_of_fleet(one)) if row.found == "fleet"]
     assert sizes == pytest.approx([0.3] * 8, abs=0.03)
+
+
+def test_on_a_machine_of_one_wheel_a_fault_of_one_wheel_is_one_of_a_rover() -> None:
+    """It has a smallest size that would show."""
+    one = consistent()
+    assert one.equations.groups[1].candidate.sharing == ("one",)
+    sums = [
+        replace(
+            each,
+            wheels=("left",),
+            **{name: getattr(each, name)[:1] for name in ("gram", "moment", "fourth", "energy", "counts", "weights")},
+            blocks=each.blocks[:, :1],
+        )
+        for each in one.equations.sums
+    ]
+    equations = fleet_equations(sums, ROVER, range(8), GROUPS, "rover")
+    told = {
+        each.name: each.smallest_detectable for each in answer_of_fleet(chosen(equations, (), one.found)).sensitivity
+    }
+    assert np.isfinite(told["wear"])
