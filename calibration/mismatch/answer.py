@@ -126,6 +126,11 @@ class Unexplained:
     suggestions: tuple[Suggestion, ...] = ()
     period: float | None = None
 
+    @property
+    def told_where(self) -> str:
+        """Whose it is, in words: nothing for the only recording."""
+        return ""
+
 
 @dataclass(frozen=True)
 class Indistinguishable:

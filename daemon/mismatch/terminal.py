@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
+from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer
 from regolithd.calibration.mismatch.inference.statements import (
     NO_HELP,
     after_number,
@@ -107,9 +108,12 @@ def _not_distinguished(found: Indistinguishable, answer: Answer, labels: Labels)
     names = " or ".join(labels.if_changed(name, named, name) for name in found.alone)
     if found.beside:
         names += f", or {found.alone[0]} with {' or '.join(found.beside)} beside it"
+    many = isinstance(answer, FleetAnswer)
     if named.union(change.name for change in answer.changes).intersection(found.effects):
-        return f"{names}: this recording does not distinguish them. {found.experiment}"
-    return f"not found: {names}. If there were one, this recording would not tell which. {found.experiment}"
+        told = "these recordings do not" if many else "this recording does not"
+        return f"{names}: {told} distinguish them. {found.experiment}"
+    told = "these recordings" if many else "this recording"
+    return f"not found: {names}. If there were one, {told} would not tell which. {found.experiment}"
 
 
 def _all_unexplained(found: Sequence[Unexplained], labels: Labels, of: int, *, several: bool) -> list[str]:
@@ -125,8 +129,9 @@ def _all_unexplained(found: Sequence[Unexplained], labels: Labels, of: int, *, s
 def _unexplained(rest: Unexplained, labels: Labels, of: int, *, several: bool) -> list[str]:
     """Return the line about what is unexplained, and those about its curve, indented."""
     follows = f"{labels.the(rest.covariate)}{labels.period(rest)}"
+    where = "".join(f" in {each}" for each in (rest.channel if several else "", rest.told_where) if each)
     line = (
-        f"unexplained{f' in {rest.channel}' if several else ''}: {percent(rest.share_of_residual)} of the residual "
+        f"unexplained{where}: {percent(rest.share_of_residual)} of the residual "
         f"follows {follows}{on_wheels(rest.wheels, of, labels.wheel)}, {rest.from_s:.0f} to {rest.to_s:.0f} s"
         f"{f'; only {rest.range.statement}' if rest.range else ''}"
     )

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 JOINTS = ("elbow", "wrist")
 FIRST = datetime(2026, 3, 1, 8, 0, tzinfo=UTC)
 DAYS_APART = 7
+GEAR, RIPPLES = 20.0, 2
+"""Turns of a motor for one of its joint, and cycles of its ripple in a turn."""
 FEW = frozenset({"coulomb-friction", "viscous-friction", "cold-lubricant-friction", "bearing-drag"})
 
 
@@ -50,19 +52,42 @@ class Arm(Simulation):
         return [candidate for candidate in library if candidate.name in FEW]
 
 
-def columns(seed: int, coulomb: Sequence[float] = (0.0, 0.0), viscous: float = 0.0) -> dict[str, NDArray[Any]]:
-    """Return one recording: half a minute, with the Coulomb friction of each joint, and viscous friction of both."""
+class ArmWithAngle(Arm):
+    """The same with the motors' angles, of which friction may be a ripple."""
+
+    inputs = ("acceleration_rad_s2", "motor_rad")
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return what friction follows."""
+        of_motor = {"wheel_angle": inputs["motor_rad"], "wheel_speed": GEAR * inputs["speed_rad_s"]}
+        return {**super().covariates(inputs), **of_motor}
+
+    def candidates(self, library: Sequence[Candidate]) -> Sequence[Candidate]:
+        """Return friction and ripple."""
+        return [candidate for candidate in library if candidate.name in {*FEW, "wheel-angle-ripple"}]
+
+
+def columns(
+    seed: int, coulomb: Sequence[float] = (0.0, 0.0), viscous: float = 0.0, ripple: float = 0.0
+) -> dict[str, NDArray[Any]]:
+    """Return one recording: half a minute, with the Coulomb friction of each joint, and viscous friction of both.
+
+    The ripple has `RIPPLES` cycles a turn, at one phase in all recordings of a motor.
+    """
     rng, time_s = np.random.default_rng(seed), 0.05 * np.arange(600)
     made: dict[str, list[NDArray[Any]]] = {}
     for axis, drag in zip(JOINTS, coulomb, strict=True):
         speed = np.sin((0.7 + 0.02 * (seed % 7)) * time_s) + 0.6 * np.sin(1.9 * time_s + rng.uniform(0, 6))
         acceleration = np.gradient(speed, time_s)
+        angle = seed + GEAR * 0.05 * np.cumsum(speed)
         torque = 0.5 * acceleration + drag * np.sign(speed) + viscous * speed
+        torque += ripple * np.cos(RIPPLES * angle + JOINTS.index(axis))
         rows = {
             "t_s": time_s,
             "axis": np.full(len(time_s), axis),
             "speed_rad_s": speed,
             "acceleration_rad_s2": acceleration,
+            "motor_rad": angle,
             "torque_Nm": torque + rng.normal(0, 0.15, len(time_s)),
         }
         for name, values in rows.items():

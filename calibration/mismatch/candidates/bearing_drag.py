@@ -45,7 +45,7 @@ class BearingDrag(Candidate):
     equation = "ΔI = I_b g(t − t_0) sign(ω)"
     words = "drag that was not there at first"
     signature = "one wheel's residual along sign(ω), none before its onset, growing after"
-    experiment = "repeat the beginning of this recording as it was"
+    experiment = "repeat the beginning of what was recorded as it was"
     run_unloaded = True
     source = "reports of seal and bearing failures: from some percent of rated current up to stalling"
     requires = ("direction",)

@@ -58,7 +58,7 @@ class LoadCellDrift(Candidate):
     equation = "W = W_cell − D(t);  ΔI = −(∂I/∂W) D(t)"
     words = "a load cell whose reading drifts"
     signature = "one wheel's load departs from what pitch and roll explain, and its current does not follow"
-    experiment = "repeat the beginning of this recording as it was, with the same load"
+    experiment = "repeat the beginning of what was recorded as it was, with the same load"
     run_unloaded = True
     source = "creep and temperature drift of faulty strain gauges: some percent of full scale per hour"
     requires: ClassVar[tuple[str, ...]] = ("load", "pitch", "roll")

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer, FleetEffect
+    from regolithd.calibration.mismatch.fleet.told.estimates import Estimate
     from regolithd.calibration.mismatch.fleet.told.findings import Chosen
 
 
@@ -39,7 +40,7 @@ class CatalogueRow:
     acts: whether the effect acts in this recording, as the fleet's answer has it; of a parameter, whether the stated
         value is outside of its interval in this recording
     parameter, unit: the first coefficient of its law, or the parameter of the simulation
-    value, low, high: of that in this recording alone, with a 90 % interval
+    value, low, high: of that in this recording alone, with a 90 % interval; None where what it shows beside leaves none
     """
 
     rover: str
@@ -83,12 +84,15 @@ def _row(chosen: Chosen, recording: int, **content: object) -> CatalogueRow:
 
 
 def _rows_of_fleet(chosen: Chosen, answer: FleetAnswer) -> Iterator[CatalogueRow]:
-    """Yield each effect of the fleet in each recording of its rovers, with its size in that recording alone."""
+    """Yield each effect of the fleet in each recording of its rovers, with its size in that recording alone.
+
+    Beside what that recording shows itself, which may leave nothing to tell a size from.
+    """
     for index, term in enumerate(chosen.fit.terms):
         effect = answer.effects[index]
         coefficient = term.group.candidate.coefficients[0]
+        alone = estimates_of(chosen.beside.equations, chosen.beside.fit, index)
         for recording, estimate in estimates_of(chosen.equations, chosen.fit, index).items():
-            reach = NINETY_PERCENT_STDS * estimate.std
             for wheel in estimate.wheels:
                 yield _row(
                     chosen,
@@ -100,11 +104,15 @@ def _rows_of_fleet(chosen: Chosen, answer: FleetAnswer) -> Iterator[CatalogueRow
                     found="fleet",
                     acts=estimate.acts,
                     parameter=coefficient.name,
-                    value=estimate.value,
-                    low=estimate.value - reach,
-                    high=estimate.value + reach,
                     unit=in_units(coefficient.unit, chosen.simulation.unit, chosen.labels),
+                    **(_within(alone[recording]) if recording in alone else {}),
                 )
+
+
+def _within(estimate: Estimate) -> dict[str, float]:
+    """Return a size with its 90 % interval."""
+    reach = NINETY_PERCENT_STDS * estimate.std
+    return {"value": estimate.value, "low": estimate.value - reach, "high": estimate.value + reach}
 
 
 def _rows_of_recordings(chosen: Chosen, answer: FleetAnswer) -> Iterator[CatalogueRow]:

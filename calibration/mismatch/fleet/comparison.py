@@ -24,7 +24,7 @@ from regolithd.calibration.mismatch.fleet.evidence import FleetEvidence
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
 from regolithd.calibration.mismatch.fleet.told.findings import Chosen, Names, answer_of_fleet
 from regolithd.calibration.mismatch.fleet.work.found import Found, found_in, one_channel
-from regolithd.calibration.mismatch.fleet.work.grid import GridGroup, grid_of
+from regolithd.calibration.mismatch.fleet.work.grid import GridGroup, grid_of, placed
 from regolithd.calibration.mismatch.fleet.work.kept_columns import KeptColumns
 from regolithd.calibration.mismatch.fleet.work.sums import Laws, Sums, forms_of, sums_of
 from regolithd.calibration.mismatch.fleet.work.workers import ThisProcess, Workers
@@ -326,5 +326,4 @@ def _equations(
     when = [each.timestamp() for each in dates] if len(dates) == len(names.begins) else list(range(len(members)))
     rover = [names.rovers.index(member.rover) for member in members]
     first = len({name for each in sums for name in each.tangents})
-    placed = [replace(group, columns=tuple(first + column for column in group.columns)) for group in grid]
-    return fleet_equations(sums, rover, when, placed, level)
+    return fleet_equations(sums, rover, when, placed(grid, sums, first), level)

@@ -54,7 +54,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Findings:
-    """What a decision found by itself, as `Answer` has it, without what else could be true."""
+    """What a decision found by itself, as `Answer` has it, without what else could be true.
+
+    `notes` are of what was decided; `notes_on_recording` tell what it was decided from, whatever that was: what is
+    wrong with the recording, and what it does not allow to look for.
+    """
 
     verdict: Verdict
     effects: tuple[Effect, ...]
@@ -62,7 +66,13 @@ class Findings:
     unexplained: tuple[Unexplained, ...]
     parameters: tuple[CalibratedParameter, ...]
     left_out: tuple[LeftOut, ...]
-    notes: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+    notes_on_recording: tuple[str, ...] = ()
+
+    @property
+    def all_notes(self) -> tuple[str, ...]:
+        """Notes of what was decided, then of the recording."""
+        return (*self.notes, *self.notes_on_recording, *_not_compared(self.left_out))
 
 
 def findings_of(
@@ -87,11 +97,13 @@ def findings_of(
         left_out=problem.left_out,
         notes=(
             *notes_on_priors(parameters, unexplained=rest, thresholds=limits),
-            *problem.recording.notes,
             *decision.notes,
             *notes_on_other_covariates(decision),
             *notes_on_dynamics(decision),
-            *_about_the_mask(problem),
+        ),
+        notes_on_recording=(
+            *problem.recording.notes,
+            *_silent_wheels(problem),
             *not_looked_for(problem, candidates, {candidate.name for candidate in applicable}),
         ),
     )
@@ -124,7 +136,7 @@ def answer_of(
         left_out=found.left_out,
         probability=probability(rest, thresholds) if known else None,
         alternatives=other_answers(rest, thresholds),
-        notes=(*found.notes, *one_way_only(problem, sets)),
+        notes=(*found.all_notes, *one_way_only(problem, sets)),
     )
 
 
@@ -232,20 +244,18 @@ def _unexplained(decision: Decision, read: AsRead, term: Term) -> Unexplained:
     )
 
 
-def _about_the_mask(problem: Problem) -> list[str]:
-    """Return notes of what was left out of the comparison, and why."""
-    notes = []
+def _silent_wheels(problem: Problem) -> list[str]:
+    """Return a note of the wheels at which nothing is compared."""
     kind = problem.simulation.wheel_column
     silent = [name for k, name in enumerate(problem.recording.wheels) if not problem.mask[:, k].any()]
-    if silent:
-        notes.append(
-            f"There is nothing to compare at {kind} {', '.join(map(str, silent))}: it never turns, or is not measured."
-        )
-    notes += [
-        f"Readings of {each.channel} that are not compared: {each.readings} ({each.reason})."
-        for each in problem.left_out
-    ]
-    return notes
+    if not silent:
+        return []
+    return [f"There is nothing to compare at {kind} {', '.join(map(str, silent))}: it never turns, or is not measured."]
+
+
+def _not_compared(left_out: Sequence[LeftOut]) -> list[str]:
+    """Return notes of the readings that were left out of the comparison, and why."""
+    return [f"Readings of {each.channel} that are not compared: {each.readings} ({each.reason})." for each in left_out]
 
 
 def one_way_only(problem: Problem, sets: Sequence[Indistinguishable]) -> list[str]:

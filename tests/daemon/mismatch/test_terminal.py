@@ -10,11 +10,13 @@ from rich.console import Console
 
 from regolithd.calibration.mismatch.answer import (
     CalibratedParameter,
+    FitImprovement,
     Indistinguishable,
     Parameter,
     Suggestion,
     Unexplained,
 )
+from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer, FleetUnexplained
 from regolithd.calibration.mismatch.inference.statements import NO_HELP
 from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.report.labels import Labels
@@ -189,3 +191,21 @@ def test_an_answer_that_evidence_alone_disfavours_says_so() -> None:
         "probability of this answer: 0.07; refused, though likelier by evidence alone: nothing (0.91)"
         in console.export_text()
     )
+
+
+def test_what_a_fleet_leaves_unexplained_names_recording_and_rover() -> None:
+    """And what several recordings do not distinguish is told of several."""
+    fit = FitImprovement("current", 1.0, 1.0, 1.0)
+    rest = [
+        FleetUnexplained("current", (1,), "height", 0.0, 9.0, 0.4, rovers=(rover,), recordings=("a.csv", "b.csv"))
+        for rover in ("asper", "rover")
+    ]
+    sets = (Indistinguishable(("one", "other"), "Drive fast."),)
+    answer = FleetAnswer("unexplained", (), tuple(rest), sets, (), fit, ())
+    console = Console(record=True, width=200, quiet=False)
+    print_answer(console, answer, Labels())
+    assert console.export_text().splitlines()[1:4] == [
+        "  unexplained in a.csv and b.csv of asper: 40 % of the residual follows the height, on wheel 1, 0 to 9 s",
+        "  unexplained in a.csv and b.csv: 40 % of the residual follows the height, on wheel 1, 0 to 9 s",
+        "  not found: one or other. If there were one, these recordings would not tell which. Drive fast.",
+    ]

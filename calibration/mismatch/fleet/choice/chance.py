@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, column_map
-from regolithd.calibration.mismatch.fleet.choice.search import may_share, penalty, summed_over
+from regolithd.calibration.mismatch.fleet.choice.search import course_cost, may_share, penalty, summed_over
 from regolithd.calibration.mismatch.regression.schur import delta_chi2_of_each, schur_diagonal
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -82,5 +82,6 @@ def _largest_scores(equations: FleetEquations, fit: FleetFit, moments: Array, pl
                 moment = np.einsum("dic,i->dc", here[:, :, at], by) - fitted[:, acting] @ cross
                 complement = schur_diagonal(own, cross, summed.inverse)
                 gain = delta_chi2_of_each(moment, complement, own, signs, THRESHOLDS.least_tolerance)
-                largest = np.maximum(largest, np.max(gain - penalties, axis=1))
+                costs = penalties + course_cost(course) - course_cost(courses[-1])
+                largest = np.maximum(largest, np.max(gain - costs, axis=1))
     return largest

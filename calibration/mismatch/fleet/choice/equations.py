@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 Level = Literal["shared", "rover", "recording"]
 """Whose a parameter of the simulation is: one value for the fleet, for each rover, or for each recording."""
 SINGULAR = 1e-12
-"""Relative eigenvalue below which a direction counts as undetermined: rounding of the sums."""
+"""Relative eigenvalue or energy below which a direction counts as undetermined: rounding of the sums."""
 
 
 @dataclass(frozen=True)
@@ -199,7 +199,8 @@ class FleetEquations:
     def beside(self, terms: Iterable[tuple[int, int]]) -> FleetEquations:
         """Return the equations in which these terms, recordings and places in their `own`, take up what they can.
 
-        Their columns are free on each wheel by itself, and eliminated: what is left is outside their span.
+        Their columns are free on each wheel by itself, and eliminated: what is left is outside their span, and 0 where
+        that is rounding.
         """
         gram, moment = self.gram.copy(), self.moment.copy()
         for i, free in _columns_by_recording(self.sums, terms).items():
@@ -211,6 +212,8 @@ class FleetEquations:
                 cross = products[np.ix_(own, free)] @ inverse
                 gram[i, k][np.ix_(fleet, fleet)] -= weight * cross @ products[np.ix_(free, own)]
                 moment[i, k][fleet] -= weight * cross @ sums.moment[w, free]
+                gone = np.diag(gram[i, k]) <= SINGULAR * np.diag(self.gram[i, k])
+                gram[i, k][gone], gram[i, k][:, gone], moment[i, k][gone] = 0.0, 0.0, 0.0
         return replace(self, gram=gram, moment=moment)
 
     def explained(self, fit: FleetFit, beside: Iterable[tuple[int, int]]) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.fleet.choice.courses import courses_over
+from regolithd.calibration.mismatch.fleet.choice.search import course_cost
 from regolithd.calibration.mismatch.fleet.choice.selection import without
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -42,7 +43,7 @@ def onset_places(equations: FleetEquations, fit: FleetFit, index: int) -> tuple[
     for course in courses_over(equations.of_rovers(term.units.rovers), begins=term.group.begins):
         if course.kind in {"since", "growing"}:
             trial = equations.fit((*rest, replace(term, course=course)))
-            gains[course.first] = max(gains.get(course.first, -np.inf), trial.delta_chi2)
+            gains[course.first] = max(gains.get(course.first, -np.inf), trial.delta_chi2 - course_cost(course))
     least = max(gains.values()) - THRESHOLDS.onset_fall
     possible = [first for first in equations.of_rovers(term.units.rovers) if gains.get(first, -np.inf) >= least]
     return possible[0], possible[-1]

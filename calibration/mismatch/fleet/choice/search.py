@@ -98,6 +98,7 @@ def penalty(equations: FleetEquations, term: FleetTerm, thresholds: Thresholds =
     sizes = len(units.rovers) if units.kind == "each rover" else 1
     total = thresholds.coefficient_penalty * len(group.columns) * sizes + 2 * float(np.log(group.tried))
     total += _implausibility(equations, group)
+    total += course_cost(term.course)
     if term.course.kind != "always":
         total += 2 * float(np.log(len(courses_over(equations.of_rovers(units.rovers), begins=group.begins))))
     rovers = len(equations.recordings_of)
@@ -108,6 +109,11 @@ def penalty(equations: FleetEquations, term: FleetTerm, thresholds: Thresholds =
     if units.kind in {"one", "some"} and "all" in group.candidate.sharing:
         total += thresholds.single_wheel_penalty
     return total
+
+
+def course_cost(course: Course, thresholds: Thresholds = THRESHOLDS) -> float:
+    """Return what growth has to gain beyond a step, in Δχ²: its power, as any number of a law that is no usual one."""
+    return thresholds.lead_margin if course.kind == "growing" else 0.0
 
 
 def _implausibility(equations: FleetEquations, group: GridGroup) -> float:
@@ -161,9 +167,10 @@ def _gains(
         if not chosen or not courses:
             continue
         by = np.stack([course.factors(place.recordings, equations.when) for course in courses])
+        costs = np.array([course_cost(course) for course in courses])
         for group in chosen:
             gains = summed.gains(by, group)
-            top = int(np.argmax(gains))
+            top = int(np.argmax(gains - costs))
             yield float(gains[top]), FleetTerm(group, place.units, courses[top])
 
 

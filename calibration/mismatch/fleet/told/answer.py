@@ -8,6 +8,7 @@ from typing import Any
 
 from regolithd.calibration.mismatch.answer import Answer, CalibratedParameter, Effect, Unexplained, answer_schema
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
+from regolithd.calibration.mismatch.inference.statements import listed
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,11 @@ class FleetUnexplained(Unexplained):
 
     rovers: tuple[str, ...] = ()
     recordings: tuple[str, ...] = ()
+
+    @property
+    def told_where(self) -> str:
+        """The recording, and the rover where that has a name."""
+        return listed(self.recordings) + (f" of {self.rovers[0]}" if self.rovers[0] != ONLY_ROVER else "")
 
 
 @dataclass(frozen=True)

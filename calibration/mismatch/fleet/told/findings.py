@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm
 from regolithd.calibration.mismatch.fleet.choice.held_out import HeldOutSquares, held_out_squares
 from regolithd.calibration.mismatch.fleet.choice.intervals import onset_places, size_stds
 from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
-from regolithd.calibration.mismatch.fleet.choice.search import penalty
+from regolithd.calibration.mismatch.fleet.choice.search import may_share, penalty
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser, relative_size
 from regolithd.calibration.mismatch.fleet.told.answer import (
     FleetAnswer,
@@ -24,8 +25,9 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
 )
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
 from regolithd.calibration.mismatch.fleet.told.sizes import mean_sizes, parameters_of
-from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost, words_of
+from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost
 from regolithd.calibration.mismatch.problem.problem import LeftOut
+from regolithd.calibration.mismatch.problem.words import in_words
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -35,7 +37,10 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.answer import Effect, Verdict
     from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.choice.recordings import Shown
+    from regolithd.calibration.mismatch.fleet.choice.search import Place
     from regolithd.calibration.mismatch.fleet.work.found import Found
+    from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]
@@ -63,6 +68,22 @@ class Names:
 
 
 @dataclass(frozen=True, eq=False)
+class Beside:
+    """Parameters and effects, fitted with what single recordings show beside them, and their standard deviations."""
+
+    equations: FleetEquations
+    fit: FleetFit
+    stds: Array
+
+    @classmethod
+    def of(cls, equations: FleetEquations, fit: FleetFit, shown: Sequence[tuple[int, int]]) -> Beside:
+        """Return them from the equations in which what is shown, by recording and place, takes up what it can."""
+        rest = equations.beside(shown)
+        again = rest.fit(fit.terms)
+        return cls(rest, again, size_stds(rest, again))
+
+
+@dataclass(frozen=True, eq=False)
 class Chosen:
     """The choice for one channel, and what it is told from."""
 
@@ -83,29 +104,22 @@ class Chosen:
         """Of the fleet."""
         return self.chooser.equations
 
+    @cached_property
+    def shown(self) -> Shown:
+        """What single recordings show beside the choice."""
+        return shown_beside(self.equations, self.fit, self.found)
 
-@dataclass(frozen=True, eq=False)
-class _Beside:
-    """Parameters and effects, fitted with what single recordings show beside them, and their standard deviations."""
-
-    equations: FleetEquations
-    fit: FleetFit
-    stds: Array
-
-    @classmethod
-    def of(cls, equations: FleetEquations, fit: FleetFit, shown: Sequence[tuple[int, int]]) -> _Beside:
-        """Return them from the equations in which what is shown, by recording and place, takes up what it can."""
-        rest = equations.beside(shown)
-        again = rest.fit(fit.terms)
-        return cls(rest, again, size_stds(rest, again))
+    @cached_property
+    def beside(self) -> Beside:
+        """The choice, fitted with what single recordings show."""
+        return Beside.of(self.equations, self.fit, self.shown.terms)
 
 
 def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
     """Return the answer of one channel."""
     equations, fit, simulation = chosen.equations, chosen.fit, chosen.simulation
     held_out = held_out_squares(equations, fit)
-    shown = shown_beside(equations, fit, chosen.found)
-    beside = _Beside.of(equations, fit, shown.terms)
+    shown, beside = chosen.shown, chosen.beside
     effects = tuple(_effect(chosen, index, beside, held_out) for index in range(len(fit.terms)))
     single = tuple(_of_recording(chosen, i, effect) for i, effect in shown.effects)
     rest = tuple(_unexplained(chosen, i, each) for i, each in shown.unexplained)
@@ -140,7 +154,7 @@ def _rms(squares: Array, counts: Array) -> float:
     return float(np.sqrt(max(float(squares.sum()), 0.0) / max(float(counts.sum()), 1.0)))
 
 
-def _effect(chosen: Chosen, index: int, beside: _Beside, held_out: HeldOutSquares) -> FleetEffect:
+def _effect(chosen: Chosen, index: int, beside: Beside, held_out: HeldOutSquares) -> FleetEffect:
     equations, fit, names = chosen.equations, chosen.fit, chosen.names
     term = fit.terms[index]
     candidate, acting = term.group.candidate, equations.factors(term).any(axis=0)
@@ -164,7 +178,7 @@ def _effect(chosen: Chosen, index: int, beside: _Beside, held_out: HeldOutSquare
         parameters=parameters,
         rmse_before=errors[0],
         rmse_after=errors[1],
-        form=candidate.form_of(term.group.shape),
+        form=_form_of(term),
         shape=term.group.shape,
         rovers=rovers,
         recordings=tuple(names.recordings[i] for i in np.flatnonzero(where.any(axis=1))),
@@ -175,7 +189,7 @@ def _effect(chosen: Chosen, index: int, beside: _Beside, held_out: HeldOutSquare
     )
 
 
-def _sizes(chosen: Chosen, index: int, beside: _Beside) -> dict[str, Parameter]:
+def _sizes(chosen: Chosen, index: int, beside: Beside) -> dict[str, Parameter]:
     """Return coefficients, shape parameters and relative size with their intervals."""
     fit, stds, simulation = beside.fit, beside.stds, chosen.simulation
     found = parameters_of(beside.equations, fit, stds, index, simulation.unit, chosen.labels)
@@ -183,7 +197,17 @@ def _sizes(chosen: Chosen, index: int, beside: _Beside) -> dict[str, Parameter]:
     mean, std = mean_sizes(fit.coefficients[span], stds[span], count)
     size = relative_size(chosen.equations, fit, index)
     share = NINETY_PERCENT_STDS * float(np.max(std / np.maximum(np.abs(mean), 1e-300)))
-    return {**found, "relative_size": Parameter(size, size * (1 - share), size * (1 + share), "1")}
+    course = fit.terms[index].course
+    grown = {"growth_power": Parameter(course.power, np.nan, np.nan, "1")} if course.kind == "growing" else {}
+    return {**found, **grown, "relative_size": Parameter(size, size * (1 - share), size * (1 + share), "1")}
+
+
+def _form_of(term: FleetTerm) -> str:
+    """Return the form of a law; of what begins at a date, how it goes on after that."""
+    candidate = term.group.candidate
+    if not (term.group.begins and candidate.forms):
+        return candidate.form_of(term.group.shape)
+    return "power of time" if term.course.kind == "growing" else "step"
 
 
 def _statement(
@@ -206,19 +230,32 @@ def _statement(
         "always": "",
         "since": f" since {at}",
         "until": f" until {at}",
-        "growing": f" since {at}, growing",
+        "growing": f" since {at}, growing by the time since the recording before to the power of {course.power:g}",
     }[course.kind]
-    words = words_of(term.group.candidate, term.group.shape, parameters, chosen.labels)
+    candidate, values = term.group.candidate, {name: each.value for name, each in parameters.items()}
+    form = "" if term.course.kind == "growing" else _form_of(term)
+    words = in_words(candidate.words_with(term.group.shape, values), chosen.labels) + (f" ({form})" if form else "")
     return f"{capital(words)}{wheels}{of}{when}: {size_and_cost(parameters['relative_size'], errors)}."
 
 
 def _of_recording(chosen: Chosen, recording: int, effect: Effect) -> FleetEffect:
-    """Return an effect that one recording shows beside those of the fleet."""
+    """Return an effect that one recording shows beside those of the fleet: the rover's others are without it."""
     names = chosen.names
     plain = {each.name: getattr(effect, each.name) for each in fields(effect)}
     rover = names.rovers[int(chosen.equations.rover[recording])]
     told = f"{names.recordings[recording]} of {rover}: {effect.statement}"
-    return FleetEffect(**{**plain, "statement": told}, rovers=(rover,), recordings=(names.recordings[recording],))
+    of_rover = chosen.equations.recordings_of[int(chosen.equations.rover[recording])]
+    place = of_rover.index(recording)
+    since = names.date(recording) if place else None
+    return FleetEffect(
+        **{**plain, "statement": told},
+        rovers=(rover,),
+        recordings=(names.recordings[recording],),
+        since=since,
+        since_low=since,
+        since_high=since,
+        until=names.date(of_rover[place + 1]) if recording != of_rover[-1] else None,
+    )
 
 
 def _unexplained(chosen: Chosen, recording: int, rest: object) -> FleetUnexplained:
@@ -227,7 +264,7 @@ def _unexplained(chosen: Chosen, recording: int, rest: object) -> FleetUnexplain
     return FleetUnexplained(**vars(rest), rovers=(rover,), recordings=(names.recordings[recording],))
 
 
-def _parameters(chosen: Chosen, beside: _Beside) -> tuple[FleetParameter, ...]:
+def _parameters(chosen: Chosen, beside: Beside) -> tuple[FleetParameter, ...]:
     """Return each parameter where the recordings moved it: of the fleet, or of each rover; of recordings, none."""
     equations, names = chosen.equations, chosen.names
     owners: dict[str, list[tuple[str, ...]]] = {
@@ -265,14 +302,7 @@ def _sensitivities(chosen: Chosen) -> tuple[Sensitivity, ...]:
     equations, channel, unit = chosen.equations, chosen.simulation.channel, chosen.simulation.unit
     found: dict[str, float] = {}
     for group in equations.groups:
-        place = next(
-            (
-                p
-                for p in chosen.chooser.places
-                if group.candidate.sharing[0] in _KINDS[p.units.kind] and p.courses(group)
-            ),
-            None,
-        )
+        place = _first_place(chosen, group)
         if place is None:
             found.setdefault(group.candidate.name, float("inf"))
             continue
@@ -282,7 +312,18 @@ def _sensitivities(chosen: Chosen) -> tuple[Sensitivity, ...]:
     return tuple(Sensitivity(name, channel, size, unit) for name, size in sorted(found.items()))
 
 
-_KINDS = {"fleet": "all", "rover": "all", "one": "one", "some": "", "each rover": ""}
+def _first_place(chosen: Chosen, group: GridGroup) -> Place | None:
+    """Return the first place that a candidate may have: all rovers, where all wheels may have it, else of one rover."""
+    return next(
+        (
+            place
+            for place in chosen.chooser.places
+            if may_share(group, place.units, len(chosen.equations.wheels))
+            and place.courses(group)
+            and ("all" in group.candidate.sharing or len(place.units.rovers) == 1)
+        ),
+        None,
+    )
 
 
 def _smallest(chosen: Chosen, others: Sequence[FleetTerm], term: FleetTerm) -> float:
@@ -312,12 +353,14 @@ def _left_out(chosen: Chosen) -> tuple[LeftOut, ...]:
 
 
 def _notes(chosen: Chosen) -> tuple[str, ...]:
-    """Return the notes of the recordings, each once with the recordings that it is of."""
+    """Return the notes on the recordings, each once with those that it is of.
+
+    Notes on what was decided of a recording alone are left out: the fleet's answer replaces that.
+    """
     of: dict[str, list[str]] = {}
     for name, found in zip(chosen.names.recordings, chosen.found, strict=True):
-        for note in found.findings.notes:
-            if not note.startswith("Readings of"):
-                of.setdefault(note, []).append(name)
+        for note in found.findings.notes_on_recording:
+            of.setdefault(note, []).append(name)
     count = len(chosen.names.recordings)
     return tuple(f"{_which(names, count)}: {note}" for note, names in of.items())
 

@@ -64,6 +64,8 @@ def parameters_of(
     for name, value in candidate.parameters(own.shape, own.sizes.tolist()).items():
         if name != candidate.change_point:
             ends = np.clip([value, *(end for each in ranges for end in each[name])], *candidate.free.get(name, ANY))
+            if name in own.shape and moved.get(name) is None:  # the grid has no other value of it
+                ends = np.array([np.nan])
             told = units.get(name) or unit_of(name, labels)
             found[name] = Parameter(float(value), float(np.min(ends)), float(np.max(ends)), told)
     return found

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from regolithd.calibration.mismatch.regression.candidate_groups import coefficient_signs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
     from regolithd.calibration.mismatch.fleet.work.found import Found
+    from regolithd.calibration.mismatch.fleet.work.sums import Sums
 
 MOST_SHAPES = 6
 """Shapes of a candidate's grid (a choice: the shapes that single recordings were found to have come beside them)."""
@@ -41,8 +44,8 @@ class GridGroup:
 
     @property
     def signs(self) -> tuple[int, ...]:
-        """The coefficients' signs, 0 for either."""
-        return tuple(each.sign for each in self.candidate.coefficients)
+        """The columns' signs, 0 for either."""
+        return coefficient_signs(self.candidate, len(self.columns))
 
 
 def grid_of(candidates: Sequence[Candidate], found: Sequence[Found], first: int) -> tuple[GridGroup, ...]:
@@ -59,6 +62,20 @@ def grid_of(candidates: Sequence[Candidate], found: Sequence[Found], first: int)
             groups.append(GridGroup(candidate, shape, columns, len(shapes), begins=candidate.change_point in shape))
             first += len(columns)
     return tuple(groups)
+
+
+def placed(grid: Sequence[GridGroup], sums: Sequence[Sums], first: int) -> tuple[GridGroup, ...]:
+    """Return the groups with as many columns as the recordings have of them, which begin at place `first`.
+
+    A candidate may make more columns than it has coefficients (a ripple, sine and cosine of each wheel), and fewer in a
+    recording that lacks something.
+    """
+    found: list[GridGroup] = []
+    for place, group in enumerate(grid):
+        count = max((len(each.places[place]) for each in sums), default=0) or len(group.columns)
+        found.append(replace(group, columns=tuple(range(first, first + count))))
+        first += count
+    return tuple(found)
 
 
 def shapes_over_fleet(candidate: Candidate, found: Sequence[Found]) -> tuple[Shape, ...]:

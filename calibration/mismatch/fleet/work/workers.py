@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import threading
 from collections import deque
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from multiprocessing.connection import wait as wait_for
 from typing import TYPE_CHECKING, Protocol, Self, TypeVar
 
 from regolithd.calibration.mismatch.errors import MismatchError
@@ -87,7 +89,23 @@ class AllCores:
 
     def _pool(self) -> ProcessPoolExecutor:
         # Not forked: threads of this process (progress, linear algebra) would be copied in the middle of their work.
-        return ProcessPoolExecutor(self._processes, mp_context=multiprocessing.get_context("spawn"))
+        context = multiprocessing.get_context("spawn")
+        return ProcessPoolExecutor(self._processes, mp_context=context, initializer=_end_with_parent)
+
+
+def _end_with_parent() -> None:
+    """End this process as soon as its parent has ended, however that did; a pool's worker would wait for work forever.
+
+    One that is killed closes nothing, and each worker holds both ends of the pipe that it waits at.
+    """
+    threading.Thread(target=_ended_with_parent, daemon=True).start()
+
+
+def _ended_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait_for([parent.sentinel])
+        os._exit(1)
 
 
 class DaskCluster:

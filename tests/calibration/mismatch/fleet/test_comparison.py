@@ -210,6 +210,14 @@ def test_an_effect_of_all_rovers_is_one_effect(tmp_path: Path) -> None:
     assert effect.parameters["coulomb_current"].low < 0.05 < effect.parameters["coulomb_current"].high
 
 
+def test_a_ripple_of_all_motors_is_one_effect() -> None:
+    """It has sines of each wheel, at one phase in all of its recordings."""
+    found = compare([fleet_arm.columns(n, ripple=0.1) for n in range(3)], fleet_arm.ArmWithAngle())
+    (effect,) = found.answer.effects
+    assert (effect.name, effect.wheels) == ("wheel-angle-ripple", fleet_arm.JOINTS)
+    assert effect.parameters["order"].value == pytest.approx(fleet_arm.RIPPLES, abs=0.01)
+
+
 def test_a_fleet_without_a_finding_is_consistent(tmp_path: Path) -> None:
     """And tells how small an effect it would have shown: smaller than one recording does."""
     found = compared(tmp_path, {"a": NOTHING[:2], "b": NOTHING[:2]}).answer

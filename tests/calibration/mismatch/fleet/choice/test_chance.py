@@ -13,7 +13,7 @@ from regolithd.calibration.mismatch.fleet.choice import chance
 from regolithd.calibration.mismatch.fleet.choice.chance import entry_threshold
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, fleet_equations
-from regolithd.calibration.mismatch.fleet.choice.search import further, may_share, penalty, places_of
+from regolithd.calibration.mismatch.fleet.choice.search import course_cost, further, may_share, penalty, places_of
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -65,7 +65,8 @@ def scores_by_fits(drawn: FleetEquations, beside: tuple[FleetTerm, ...]) -> Iter
             for course in courses:
                 fit = drawn.fit((*beside, FleetTerm(group, place.units, course)))
                 gained = fit.delta_chi2 - before.delta_chi2 if fit.coefficients[-1] > 0 else 0.0
-                yield gained - penalty(drawn, FleetTerm(group, place.units, courses[-1]))
+                chosen = penalty(drawn, FleetTerm(group, place.units, courses[-1])) - course_cost(courses[-1])
+                yield gained - chosen - course_cost(course)
 
 
 @pytest.mark.parametrize("beside", [(), (term(DRAG, Course("always"), wheels=(0,)),)])

@@ -10,7 +10,14 @@ from synthetic_fleet import DRAG, GROUPS, WAVE, WEAR, drive, equations_of, on_bo
 
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, Units, fleet_equations
-from regolithd.calibration.mismatch.fleet.choice.search import further, may_share, penalty, places_of, score
+from regolithd.calibration.mismatch.fleet.choice.search import (
+    course_cost,
+    further,
+    may_share,
+    penalty,
+    places_of,
+    score,
+)
 
 ROVER = (0, 1, 0, 1, 0, 1)
 CONCEALED = {**on_both(1, 0.1), (2, 1): 0.2, (3, 0): 0.15, (4, 1): -0.1}
@@ -73,13 +80,13 @@ def test_what_a_further_term_gains_is_what_the_fit_with_it_gains(beside: tuple[F
 
 
 def test_the_course_that_gains_most_is_chosen() -> None:
-    """Of each candidate, among all that it may have on a set of units."""
+    """Of each candidate, among all that it may have on a set of units; growth has to gain what its power costs."""
     fit, places = EQUATIONS.fit(()), places_of(EQUATIONS)
     for value, one in further(EQUATIONS, fit, places):
         (place,) = [each for each in places if each.units == one.units]
         others = [replace(one, course=course) for course in place.courses(one.group)]
-        scores = [EQUATIONS.fit((other,)).delta_chi2 for other in others]
-        assert EQUATIONS.fit((one,)).delta_chi2 == pytest.approx(max(scores))
+        scores = [EQUATIONS.fit((other,)).delta_chi2 - course_cost(other.course) for other in others]
+        assert EQUATIONS.fit((one,)).delta_chi2 - course_cost(one.course) == pytest.approx(max(scores))
         assert value <= max(scores)
 
 
@@ -137,3 +144,12 @@ def test_a_candidate_says_on_which_wheels_it_may_be(group: object, kinds: set[st
     every = ("fleet", "each rover", "rover", "some", "one")
     assert {kind for kind in every if may_share(group, Units((0,), (0,), kind), 2)} == kinds  # type: ignore[arg-type]
     assert may_share(WEAR, Units((0,), (0,), "rover"), 1)
+
+
+@pytest.mark.parametrize(("last", "kind"), [(0.35, "since"), (0.6, "growing")])
+def test_growth_is_ahead_of_a_step_by_evidence_or_it_is_a_step(last: float, kind: str) -> None:
+    """Of two recordings after a date, sizes that hardly differ are one size."""
+    drives = [drive(n, {(2, 0): size, (2, 1): size}) for n, size in enumerate((0.0, 0.0, 0.0, 0.33, last))]
+    equations = equations_of(drives, (0,) * 5)
+    (_, best), *_ = further(equations, equations.fit(()), places_of(equations), [WEAR])
+    assert (best.course.kind, best.course.first) == (kind, 3)

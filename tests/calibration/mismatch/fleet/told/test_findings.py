@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 GOLDEN = Path(__file__).parent / "golden"
 FIRST = datetime(2026, 3, 1, 8, 0, tzinfo=UTC)
 ROVER = (0, 1) * 4
-SILENT = Findings("consistent", (), (), (), (), (), ())
+SILENT = Findings("consistent", (), (), (), (), ())
 
 
 class Machine(Simulation):
@@ -90,7 +90,10 @@ def season() -> Chosen:
     worn = replace(WORN, wheels=("left",), channel="current_A")
     shown = replace(SILENT, verdict="missing-physics", effects=(worn,), unexplained=(rest,))
     left_out = replace(
-        SILENT, left_out=(LeftOut("current_A", 7, "an outlier"),), notes=("Readings of one.", "It rained.")
+        SILENT,
+        left_out=(LeftOut("current_A", 7, "an outlier"),),
+        notes=("Stays unexplained.",),
+        notes_on_recording=("It rained.",),
     )
     of_recordings = [found(left_out), found(left_out), *[found()] * 6]
     of_recordings[3] = found(shown, own, curve)
@@ -233,8 +236,45 @@ def test_recordings_without_dates_are_told_by_their_names() -> None:
     ],
 )
 def test_a_note_of_several_recordings_is_told_once(rainy: Sequence[int], told: str) -> None:
-    """With the recordings that it is of."""
-    noted = found(replace(SILENT, notes=("Readings of one.", "It rained.")))
+    """With the recordings that it is of; what was decided of one recording alone is not told."""
+    noted = found(replace(SILENT, notes=("Gain had to leave its prior.",), notes_on_recording=("It rained.",)))
     of_recordings = [noted if n in rainy else found() for n in range(5)]
     answer = answer_of_fleet(chosen(equations_of([drive(n) for n in range(5)], (0,) * 5), (), of_recordings))
     assert answer.notes == (told,)
+
+
+def test_the_size_in_a_recording_is_beside_what_that_shows_itself() -> None:
+    """An effect of one recording that is like the fleet's does not count in its size there."""
+    drives = [drive(n, on_both(1, 0.3)) for n in range(4)]
+    columns = drives[3].columns.copy()
+    columns[2] = 0.6 * columns[1] + 0.8 * columns[2]
+    residual = drives[3].residual + 0.5 * columns[2]
+    sums = [each.sums() for each in (*drives[:3], replace(drives[3], columns=columns, residual=residual))]
+    sums[3] = replace(sums[3], own=((2,),))
+    own = FoundTerm("time", False, {}, (0, 1), 2.0, np.zeros((1, 1, 2), np.float32))
+    rest = Unexplained("current_A", ("left", "right"), "time", 0.0, 60.0, 0.2)
+    of_recordings = [*[found()] * 3, found(replace(SILENT, unexplained=(rest,)), own)]
+    equations = fleet_equations(sums, (0,) * 4, range(4), GROUPS, "rover")
+    one = chosen(equations, (term(DRAG, Course("always")),), of_recordings)
+    sizes = [row.value for row in catalogue_rows(one, answer_of_fleet(one)) if row.found == "fleet"]
+    assert sizes == pytest.approx([0.3] * 8, abs=0.03)
+
+
+def test_on_a_machine_of_one_wheel_a_fault_of_one_wheel_is_one_of_a_rover() -> None:
+    """It has a smallest size that would show."""
+    one = consistent()
+    assert one.equations.groups[1].candidate.sharing == ("one",)
+    sums = [
+        replace(
+            each,
+            wheels=("left",),
+            **{name: getattr(each, name)[:1] for name in ("gram", "moment", "fourth", "energy", "counts", "weights")},
+            blocks=each.blocks[:, :1],
+        )
+        for each in one.equations.sums
+    ]
+    equations = fleet_equations(sums, ROVER, range(8), GROUPS, "rover")
+    told = {
+        each.name: each.smallest_detectable for each in answer_of_fleet(chosen(equations, (), one.found)).sensitivity
+    }
+    assert np.isfinite(told["wear"])

@@ -78,3 +78,20 @@ def test_a_shape_without_another_one_has_no_interval() -> None:
     assert np.isnan([found["power"].low, found["power"].high]).all()
     reach = 1.6449 * size_stds(of, fit)[fit.spans[0]][0]
     assert found["drag"].high - found["drag"].value == pytest.approx(reach, rel=1e-3)
+
+
+class Usual(Power):
+    """The same with an exponent that has its usual values alone in the grid."""
+
+    refined: ClassVar = {"exponent": (0.5, 3.0)}
+
+
+def test_a_number_of_which_the_grid_has_usual_values_alone_has_no_interval() -> None:
+    """It was not fitted: an interval of no width would say that it is certain."""
+    of, _ = season()
+    shape = {"power": 0.75, "factor": 1.0, "exponent": 1.0}
+    groups = (replace(of.groups[0], candidate=Usual(), shape=shape), *of.groups[1:])
+    of = replace(of, groups=groups)
+    found = told(of, of.fit((term(groups[0], Course("always")),)))
+    assert found["exponent"].value == 1.0
+    assert np.isnan([found["exponent"].low, found["exponent"].high]).all()

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from sample_answer import FINDINGS
-from synthetic_fleet import DEVIATION, Drag, Wave, Wear
+from synthetic_fleet import DEVIATION, Drag, Wave, Wear, drive
 
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm, Shapes
-from regolithd.calibration.mismatch.fleet.work.grid import MOST_FOUND_SHAPES, MOST_SHAPES, grid_of, shapes_over_fleet
+from regolithd.calibration.mismatch.fleet.work.grid import (
+    MOST_FOUND_SHAPES,
+    MOST_SHAPES,
+    grid_of,
+    placed,
+    shapes_over_fleet,
+)
 
 
 class OfLoadCell(Drag):
@@ -84,3 +92,13 @@ def test_each_shape_has_columns_of_its_own() -> None:
     ]
     assert [group.shape for group in groups] == [{"power": 0.0}, {"power": 1.0}, {}, {"onset_s": 0.0}]
     assert [group.signs for group in groups] == [(1,), (1,), (0, 0), (1,)]
+
+
+def test_a_group_has_as_many_columns_as_recordings_have_of_it() -> None:
+    """A candidate may make more than it has coefficients; where no recording allows it, there are as many as those."""
+    grids = found(steady_drag=Shapes(1.0, ({},)), wave=Shapes(1.0, ({},)), wear=Shapes(0.0, ({"onset_s": 5.0},)))
+    grid = grid_of((Drag(), Wear(), Wave()), [grids], 0)
+    sums = [replace(drive(0).sums(), places=places) for places in (((1,), (), (2, 3)), ((1, 2, 3), (), ()))]
+    groups = placed(grid, sums, 1)
+    assert [group.columns for group in groups] == [(1, 2, 3), (4,), (5, 6)]
+    assert [group.signs for group in groups] == [(1, 0, 0), (1,), (0, 0)]

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
+import time
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -14,7 +18,6 @@ from regolithd.calibration.mismatch.fleet.work.workers import TASKS_EACH, AllCor
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
 
 def square(number: int) -> int:
@@ -73,3 +76,46 @@ def test_a_scheduler_that_does_not_answer_is_an_error(monkeypatch: pytest.Monkey
     monkeypatch.setattr("regolithd.calibration.mismatch.fleet.work.workers.CONNECT_S", "1s")
     with pytest.raises(MismatchError, match=r"no Dask scheduler answers at tcp://127\.0\.0\.1:1"):
         DaskCluster("tcp://127.0.0.1:1")
+
+
+def waits(folder: Path, number: int) -> int:
+    """Leave a file that is named by the own process, and wait for longer than any test."""
+    (folder / str(os.getpid())).touch()
+    time.sleep(600)
+    return number
+
+
+def compare_for_long(folder: Path) -> None:
+    """Keep two workers at work."""
+    list(AllCores(2).results(range(4), lambda n: partial(waits, folder, n)))
+
+
+def is_there(process: int) -> bool:
+    """Return whether a process runs: one that has ended, and that nobody waits for, does not."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.parametrize("by", [signal.SIGKILL, signal.SIGTERM])
+def test_workers_end_with_a_parent_that_is_killed(by: signal.Signals, tmp_path: Path) -> None:
+    """Within seconds, also in the middle of their work."""
+    code = f"import test_workers, pathlib; test_workers.compare_for_long(pathlib.Path({str(tmp_path)!r}))"
+    paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    with subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": paths}) as parent:
+        try:
+            until(lambda: len(list(tmp_path.iterdir())) == 2)
+        finally:
+            parent.send_signal(by)
+    workers = [int(path.name) for path in tmp_path.iterdir()]
+    assert len(workers) == 2
+    until(lambda: not any(map(is_there, workers)))
+
+
+def until(condition: Callable[[], bool], seconds: float = 60.0) -> None:
+    """Wait until a condition holds."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.05)
