@@ -85,7 +85,7 @@ def _coupling_of_curve(problem: Problem, term: Term) -> str | None:
 
 def _found(decision: Decision, terms: tuple[Term, ...], coupling: str) -> FoundCurve:
     term = replace(terms[0], group=replace(terms[0].group, coupling=coupling))
-    sums = sums_of(decision.equations, decision.named, term)
+    sums = sums_of(decision.equations, decision.named, term, decision.whole)
     whole = profile(sums)
     closely = term.name == "time" or any(each.group.coupling in WITHOUT_CURVE for each in terms)
     knots = knots_of(sums, CLOSE_KNOTS if closely else KNOTS)

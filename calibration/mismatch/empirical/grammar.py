@@ -21,9 +21,9 @@ Array = NDArray[np.float64]
 
 AWAY_FROM_ZERO = 0.05
 """Least magnitude of the covariate, over the greatest, for forms that are infinite at zero (a choice)."""
-NARROWEST, WIDEST = 0.03, 3.0
-"""Widths and lengths that are searched, as shares of the covariate's range (a choice: from less than a knot of a curve
-to what is all but a straight line)."""
+NARROWEST, WIDEST = 0.015, 3.0
+"""Widths and lengths that are searched, as shares of the covariate's range (a choice: from half of a knot of a curve,
+for a bump in the place of a narrow band, to what is all but a straight line)."""
 FEWEST_CYCLES, MOST_CYCLES = 0.5, 24.0
 """Cycles of a sine within the range (a choice: fewer are a parabola; more are not looked for, see
 `regression/smooth_groups.py`)."""

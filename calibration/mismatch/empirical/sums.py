@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.as_read import as_read
+from regolithd.calibration.mismatch.regression.as_read import as_read, long_run_weights
 from regolithd.calibration.mismatch.regression.smooth_groups import acting
 
 if TYPE_CHECKING:
@@ -95,9 +95,14 @@ class Profile:
         return np.asarray(np.linalg.solve(self.normal, self.against - values @ self.cross), np.float64)
 
 
-def sums_of(equations: NormalEquations, beside: Fit, term: Term) -> CovariateSums:
-    """Return the sums for a smooth term's covariate and factor, on its wheels, beside a fit."""
+def sums_of(equations: NormalEquations, beside: Fit, term: Term, whole: Fit) -> CovariateSums:
+    """Return the sums for a smooth term's covariate and factor, on its wheels, beside a fit.
+
+    What `whole`, the fit with the term, leaves is the noise: what `beside` alone leaves has the term's own course in
+    it, whose long memory would be taken for the noise's.
+    """
     design, read = equations.design, as_read(equations, beside)
+    weights = long_run_weights(equations, whole)
     values, factor = _course(equations, term)
     at, index = _bins(values, factor != 0)
     folds, wheels, bins = len(design.cuts) - 1, len(read.weights), len(at)
@@ -131,7 +136,7 @@ def sums_of(equations: NormalEquations, beside: Fit, term: Term) -> CovariateSum
         counts=design.counts,
         precision=np.concatenate((equations.nuisance.precision, beyond)),
         centre=np.concatenate((equations.nuisance.centre, beyond)),
-        weights=read.weights,
+        weights=weights,
     )
 
 

@@ -26,6 +26,7 @@ from regolithd.calibration.mismatch.online.scores import Search
 from regolithd.calibration.mismatch.online.sums import Interval
 from regolithd.calibration.mismatch.online.thresholds import ONLINE_THRESHOLDS, OnlineThresholds
 from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.regression.nuisance import tangents
 
 if TYPE_CHECKING:
@@ -192,13 +193,21 @@ def learned(
 
 
 def _check_memory(found: Linearised, problem: Problem, pieces: Sequence[Piece]) -> None:
-    """Compare the last piece as posed with all before it, and with one piece before it alone."""
-    recording, elapsed = together(pieces[-2:], found.wheels)
-    short = found.pose(recording, elapsed)
+    """Compare the last piece as predicted after all before it, and after one piece before it alone.
+
+    Both are predicted from the same inputs. Smoothed with fewer rows they would be others, and a simulation that
+    carries nothing would seem to.
+    """
+    _, elapsed = together(pieces[-2:], found.wheels)
+    last, values = slice(-len(elapsed), None), {**found.simulation.variants(), **found.values}
+    inputs = problem.recording
+    channels = {name: read[last] for name, read in inputs.channels.items()}
+    short = replace(inputs, time_s=inputs.time_s[last], run=inputs.run[last], channels=channels)
+    whole, alone = (found.simulation.predict(complete_inputs(each), values) for each in (inputs, short))
     here = elapsed >= pieces[-1].start_s
-    whole, alone = problem.filled[-len(elapsed) :][here], short.filled[here]
-    both = (problem.mask[-len(elapsed) :] & short.mask)[here]
-    apart = float(np.sqrt(np.mean((whole - alone)[both] ** 2))) if both.any() else 0.0
+    difference = (whole[last] - alone)[here][problem.mask[last][here]]
+    known = difference[np.isfinite(difference)]
+    apart = float(np.sqrt(np.mean(known**2))) if known.size else 0.0
     residual = float(np.sqrt(np.mean((problem.measured - problem.filled)[problem.mask] ** 2)))
     if apart > problem.thresholds.carried_share * residual:
         raise SimulationError(

@@ -45,8 +45,8 @@ def test_nothing_is_fitted_between_the_values_of_a_gear() -> None:
 
 
 def test_the_gaps_of_a_continuous_covariate_limit_nothing() -> None:
-    """A sine has 24 cycles at most, and widths begin at three hundredths of the range."""
+    """A sine has 24 cycles at most, and widths begin at three of two hundred parts of the range."""
     (sine,) = (form for form in grammar() if form.family == "sine")
     span = span_of(np.linspace(0.0, 1.0, 240))
     assert sine.shapes(span).min() == pytest.approx(1 / 24)
-    assert span.narrowest == pytest.approx(0.03)
+    assert span.narrowest == pytest.approx(0.015)

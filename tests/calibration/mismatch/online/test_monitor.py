@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
 from linear_machine import STEP_S, Drag, Level, table
 
-from regolithd.calibration.mismatch import SimulationError
+from regolithd.calibration.mismatch import Prior, SensorError, SimulationError
 from regolithd.calibration.mismatch.online.channels import monitors_of
 from regolithd.calibration.mismatch.online.left_out import LeftOutCount, LeftOutHere
 from regolithd.calibration.mismatch.online.linearised import learned
@@ -65,6 +65,27 @@ def test_a_change_is_reported_before_the_recording_ends() -> None:
     assert change.low < 0.3 < change.high
     assert change.first_reported_s == first.time_s
     assert "axis 2, since 200 s" in change.statement
+
+
+class ReadNoisily(Level):
+    """The level, of a gain and a speed that is read with an error."""
+
+    inputs = ("speed_rad_s",)
+    sensors: ClassVar = {"speed_rad_s": SensorError(absolute=0.2)}
+    parameters: ClassVar = {"level_V": Prior(2.0, 0.1, "V"), "gain_V_s": Prior(1.0, 0.02, "V s")}
+
+    def predict(self, inputs: Mapping[str, NDArray[np.float64]], values: Mapping[str, float]) -> NDArray[np.float64]:
+        """Return the reading, row by row."""
+        return values["level_V"] + values["gain_V_s"] * inputs["speed_rad_s"]
+
+
+def test_inputs_that_are_smoothed_give_a_simulation_no_memory() -> None:
+    """In few rows they are smoothed otherwise than in many: that is no state that is carried."""
+    columns = recorded()
+    rng = np.random.default_rng(5)
+    columns["reading_V"] = columns["reading_V"] + columns["speed_rad_s"]
+    columns["speed_rad_s"] = columns["speed_rad_s"] + rng.normal(0, 0.2, len(columns["speed_rad_s"]))
+    assert not [report.changes for report in followed(columns, ReadNoisily()) if report.changes]
 
 
 def test_the_first_pieces_are_learned_from() -> None:
