@@ -91,8 +91,9 @@ def _rows_of_fleet(chosen: Chosen, answer: FleetAnswer) -> Iterator[CatalogueRow
     for index, term in enumerate(chosen.fit.terms):
         effect = answer.effects[index]
         coefficient = term.group.candidate.coefficients[0]
-        alone = estimates_of(chosen.beside.equations, chosen.beside.fit, index)
-        for recording, estimate in estimates_of(chosen.equations, chosen.fit, index).items():
+        beside = chosen.beside
+        alone = {(i, each.wheels): each for i, each in estimates_of(beside.equations, beside.fit, index)}
+        for recording, estimate in estimates_of(chosen.equations, chosen.fit, index):
             for wheel in estimate.wheels:
                 yield _row(
                     chosen,
@@ -105,12 +106,14 @@ def _rows_of_fleet(chosen: Chosen, answer: FleetAnswer) -> Iterator[CatalogueRow
                     acts=estimate.acts,
                     parameter=coefficient.name,
                     unit=in_units(coefficient.unit, chosen.simulation.unit, chosen.labels),
-                    **(_within(alone[recording]) if recording in alone else {}),
+                    **_within(alone.get((recording, estimate.wheels))),
                 )
 
 
-def _within(estimate: Estimate) -> dict[str, float]:
-    """Return a size with its 90 % interval."""
+def _within(estimate: Estimate | None) -> dict[str, float]:
+    """Return a size with its 90 % interval, where there is one."""
+    if estimate is None:
+        return {}
     reach = NINETY_PERCENT_STDS * estimate.std
     return {"value": estimate.value, "low": estimate.value - reach, "high": estimate.value + reach}
 
