@@ -7,7 +7,7 @@ answers "since when, on which wheels of which rovers".
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.fleet.told.estimates import estimates_of, parameter_alone
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from datetime import datetime
     from pathlib import Path
 
+    from regolithd.calibration.mismatch.answer import Verdict
     from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer, FleetEffect
     from regolithd.calibration.mismatch.fleet.told.estimates import Estimate
     from regolithd.calibration.mismatch.fleet.told.findings import Chosen
@@ -32,7 +33,7 @@ class CatalogueRow:
     Attributes
     ----------
     rover, recording, begins: which; `begins` is None where it is not known
-    verdict: of this recording alone
+    verdict: of this recording, as the fleet's answer has it
     wheel: its name as text
     effect, covariate, channel: what; empty where nothing was found
     found: "fleet" for an effect of the fleet, "recording" for one that this recording alone shows, "unexplained", or
@@ -69,7 +70,15 @@ def catalogue_rows(chosen: Chosen, answer: FleetAnswer) -> list[CatalogueRow]:
     ]
     with_rows = {row.recording for row in rows}
     empty = [_row(chosen, i) for i, name in enumerate(chosen.names.recordings) if name not in with_rows]
-    return sorted((*rows, *empty), key=lambda row: chosen.names.recordings.index(row.recording))
+    acting = {row.recording: _verdict(rows, row.recording) for row in rows}
+    told = [replace(row, verdict=acting.get(row.recording, row.verdict)) for row in (*rows, *empty)]
+    return sorted(told, key=lambda row: chosen.names.recordings.index(row.recording))
+
+
+def _verdict(rows: Sequence[CatalogueRow], recording: str) -> Verdict:
+    """Return what the rows say of a recording."""
+    acting = {row.found for row in rows if row.recording == recording and row.acts}
+    return "unexplained" if "unexplained" in acting else "missing-physics" if acting else "consistent"
 
 
 def _row(chosen: Chosen, recording: int, **content: object) -> CatalogueRow:
@@ -78,7 +87,7 @@ def _row(chosen: Chosen, recording: int, **content: object) -> CatalogueRow:
         rover=names.rovers[int(chosen.equations.rover[recording])],
         recording=names.recordings[recording],
         begins=names.begins[recording],
-        verdict=chosen.found[recording].findings.verdict,
+        verdict="consistent",
         **content,  # type: ignore[arg-type]
     )
 

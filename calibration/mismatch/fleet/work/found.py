@@ -43,6 +43,7 @@ class FoundTerm:
     wheels: indices
     penalty: what it had to gain, in Δχ²
     columns: shape (column, time, wheel), 0 on other wheels and where nothing is compared
+    coupling: of a smooth term, how it acts
     """
 
     name: str
@@ -51,6 +52,7 @@ class FoundTerm:
     wheels: tuple[int, ...]
     penalty: float
     columns: Single
+    coupling: str = ""
 
 
 @dataclass(frozen=True)
@@ -153,6 +155,7 @@ def _found_term(decision: Decision, term: Term) -> FoundTerm:
         wheels=term.wheels,
         penalty=equations.penalty(term),
         columns=columns,
+        coupling=term.group.coupling,
     )
 
 
