@@ -135,9 +135,12 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
 def _responses(decision: Decision, candidates: Sequence[Candidate]) -> dict[str, Responses]:
     """Return the responses of each candidate that has some, beside all that was found but itself."""
     equations, found = decision.equations, {}
+    left = residual_of(equations, decision.whole)
     for candidate in candidates:
         rest = [term for term in decision.whole.terms if term.name != candidate.name]
-        each = candidate.responses(equations.problem, residual_of(equations, equations.fit(rest)))
+        is_named = len(rest) < len(decision.whole.terms)
+        without = residual_of(equations, equations.fit(rest)) if is_named else left
+        each = candidate.responses(equations.problem, without)
         if each is not None:
             found[candidate.name] = each
     return found
