@@ -33,10 +33,11 @@ class Responses:
 
 
 def strongest(responses: Sequence[Responses], rovers: Sequence[int | str], most: int) -> list[int]:
-    """Return the places of the strongest responses, best first: of all rovers, of one, or of one wheel of one.
+    """Return the places of the strongest responses that some recording can tell, best first.
 
-    `rovers` tells whose each recording is. The wheels of a rover have coefficients of their own, which are the same in
-    all of its recordings; a response is ranked by Δχ² less two for each coefficient (Akaike's information criterion).
+    Each is that of all rovers, of one, or of one wheel of one, whichever is strongest. `rovers` tells whose each
+    recording is. The wheels of a rover have coefficients of their own, which are the same in all of its recordings; a
+    response is ranked by Δχ² less two for each coefficient (Akaike's information criterion).
     """
     moments: dict[tuple[int | str, int | str], Array] = {}
     energies: dict[tuple[int | str, int | str], Array] = {}
@@ -51,4 +52,5 @@ def strongest(responses: Sequence[Responses], rovers: Sequence[int | str], most:
     }
     of_rovers = [sum(one for key, one in ahead.items() if key[0] == rover) for rover in dict.fromkeys(rovers)]
     best = np.max([*ahead.values(), *of_rovers, sum(of_rovers)], axis=0)
-    return [int(place) for place in np.argsort(-best, kind="stable")[:most] if best[place] > 0]
+    told = np.max(list(energies.values()), axis=0) > 0
+    return [int(place) for place in np.argsort(-best, kind="stable") if told[place]][:most]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -27,11 +29,19 @@ def response(*sizes: tuple[float, float]) -> Responses:
 )
 def test_what_has_one_phase_in_all_recordings_is_strongest(recordings: list[Responses], best: list[int]) -> None:
     """Opposite ones cancel; several wheels count together, each pays for its coefficients."""
-    assert strongest(recordings, ["a", "a"], 2) == best
+    assert strongest(recordings, ["a", "a"], len(best)) == best
 
 
 def test_machines_have_phases_of_their_own() -> None:
     """Opposite ones of two machines do not cancel."""
-    opposite = [response((0.4, 0), (0, 0), (0, 0)), response((-0.4, 0), (0, 0), (0, 0))]
-    assert strongest(opposite, ["a", "b"], 3) == [0]
-    assert strongest(opposite, ["a", "a"], 3) == []
+    opposite = [response((0, 0), (0.4, 0), (0, 0)), response((0, 0), (-0.4, 0), (0, 0))]
+    assert strongest(opposite, ["a", "b"], 3) == [1, 0, 2]
+    assert strongest(opposite, ["a", "a"], 3) == [0, 1, 2]
+
+
+def test_what_no_recording_can_tell_is_none() -> None:
+    """However few others there are."""
+    one = response((0, 0), (0, 0), (0.1, 0))
+    energy = one.energy.copy()
+    energy[:2] = 0.0
+    assert strongest([replace(one, energy=energy)], ["a"], 2) == [2]
