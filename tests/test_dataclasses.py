@@ -71,6 +71,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         "_Names",
         "Addition",
         "Beside",
+        "Responses",
         "Unnamed",
         "HeldOutSquares",
         "Usual",

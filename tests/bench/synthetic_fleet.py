@@ -98,6 +98,7 @@ class Drive:
             blocks=products.reshape(COLUMNS, BLOCKS, -1, len(WHEELS)).sum(axis=2).transpose(1, 2, 0),
             mean_size=mean_size,
             wheel_sets=wheel_sets,
+            reductions=np.ones(len(GROUPS)),
         )
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from regolithd.calibration.mismatch.candidates.responses import Responses
     from regolithd.calibration.mismatch.problem.predictor import Predictor
     from regolithd.calibration.mismatch.problem.problem import Problem
 
@@ -372,4 +373,18 @@ class Candidate:
 
     def own_channel_evidence(self, problem: Problem, shape: Shape) -> tuple[Array, Array] | None:  # noqa: ARG002
         """Return Δχ² and coefficient of the fault in its own `channel`, shape (wheel,) each; None: there is no such."""
+        return None
+
+    def columns_of_wheels(self, shape: Shape, wheels: int) -> NDArray[np.int64] | None:  # noqa: ARG002
+        """Return the places of each wheel's columns, shape (wheel, column), where each has coefficients of its own.
+
+        None: the wheels that share the effect share its coefficients.
+        """
+        return None
+
+    def responses(self, problem: Problem, residual: Array) -> Responses | None:  # noqa: ARG002
+        """Return what a residual [time, wheel] has of shapes with the same coefficients in all recordings of a machine.
+
+        Of shapes that a residual proposes, those of a fleet are found so; None: there are none.
+        """
         return None

@@ -7,12 +7,16 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate, Coefficient, Shape
+from regolithd.calibration.mismatch.candidates.responses import Responses
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
+from regolithd.calibration.mismatch.problem.covariates import angle_is_recorded
 from regolithd.calibration.mismatch.signal.means import running_mean
 from regolithd.calibration.mismatch.signal.spectrum import padded_length, power_of_sums
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from regolithd.calibration.mismatch.problem.problem import Problem
 
@@ -42,6 +46,10 @@ MOST_CYCLES = 4.0
 proportion, and an angle is seldom known better)."""
 SLOW_READINGS = 9
 """Readings whose mean is slow, and no part of a ripple that turns on between readings (a choice)."""
+NEIGHBOURS = 8
+"""Whole orders on each side of one that tell the noise around it (a choice: noise is much the same there)."""
+MEDIAN_OF_TWO = 2 * float(np.log(2))
+"""Median of χ² with two degrees of freedom."""
 ROUNDING = 1e-9
 """Share of the largest residual below which a difference is rounding."""
 NONE = 1e-4
@@ -150,6 +158,49 @@ class WheelAngleRipple(Candidate):
         amplitude = float(np.sqrt(np.mean(amplitudes[has] ** 2))) if has.any() else 0.0
         return {"amplitude": amplitude, "order": float(shape["order"])}
 
+    def columns_of_wheels(self, shape: Shape, wheels: int) -> NDArray[np.int64]:
+        """Return the places of cosine and sine of each wheel, then those of the overtone."""
+        sines = int(float(shape["sines"]))
+        places = np.arange(2 * sines * wheels).reshape(sines, wheels, 2)
+        return np.ascontiguousarray(places.transpose(1, 0, 2)).reshape(wheels, 2 * sines)
+
+    def responses(self, problem: Problem, residual: Array) -> Responses | None:
+        """Return those of whole orders, where the angle was recorded: these alone have one phase in all recordings."""
+        if not angle_is_recorded(problem.recording, problem.covariates):
+            return None
+        kinds = ("drag", "torque", "load") if "direction" in problem.covariates else ("torque",)
+        shapes: list[tuple[Shape, ...]] = []
+        moments, energies = [], []
+        for kind in kinds:
+            base: Shape = {"kind": kind, "reference_size": problem.mean_size} if kind == "load" else {"kind": kind}
+            moment, energy = self._of_whole_orders(problem, residual, self._base(problem, base))
+            # The reference differs from recording to recording.
+            by = problem.mean_size if kind == "load" else 1.0
+            moments.append(by * moment)
+            energies.append(by**2 * energy)
+            lines = [{"order": float(order), **base, "lag": 0.0} for order in range(1, HIGHEST_ORDER + 1)]
+            shapes += [tuple({**line, "sines": sines} for sines in (1.0, 2.0)) for line in lines]
+        return Responses(tuple(shapes), problem.recording.wheels, np.concatenate(moments), np.concatenate(energies))
+
+    def _of_whole_orders(self, problem: Problem, residual: Array, base: Array) -> tuple[Array, Array]:
+        """Return moment (order, wheel, 2) and energy (order, wheel) over the noise's variance around each order.
+
+        An order is looked at in the readings that resolve it; its energy is 0 where too few do.
+        """
+        cycles, orders = _cycles_per_reading(problem), np.arange(1, HIGHEST_ORDER + 1)
+        turn, wave = np.exp(1j * _angle(problem, 0.0)), np.ones(problem.mask.shape, np.complex128)
+        moment = np.zeros((len(orders), problem.mask.shape[1], 2))
+        energy = np.zeros(moment.shape[:2])
+        known = np.where(problem.mask & (cycles > 0), base, 0.0)
+        for place, order in enumerate(orders):
+            wave = wave * turn
+            if _lowest(problem) <= order <= _resolved(problem):
+                used = np.where(cycles * order * READINGS_PER_CYCLE <= 1, known, 0.0)
+                summed = np.sum(used * residual * wave, axis=0)
+                moment[place], energy[place] = np.stack((summed.real, summed.imag), axis=1), np.sum(used**2, axis=0) / 2
+        variance = _noise_around(np.sum(moment**2, axis=2), energy)
+        return moment / variance[:, None, None], energy / variance[:, None]
+
     def _base(self, problem: Problem, shape: Shape) -> Array:
         """Return the factor of the sine: 1 (torque), the direction (drag), or the relative prediction (load)."""
         if shape["kind"] == "drag":
@@ -246,6 +297,20 @@ def _less_slow(problem: Problem, residual: Array) -> Array:
         if len(values) > SLOW_READINGS:
             found[here, k] = values - running_mean(np.pad(values, half, mode="edge"), SLOW_READINGS)
     return np.where(np.abs(found) > ROUNDING * np.max(np.abs(residual)), found, 0.0)
+
+
+def _noise_around(squares: Array, energy: Array) -> Array:
+    """Return the variance of noise at each order by its neighbours' median, shape (order,); 1 where there are none.
+
+    `squares` (order, wheel) are of cosine and sine together: of noise, variance times energy times χ² of two degrees.
+    """
+    share = np.where(energy > 0, squares / np.maximum(energy, 1e-300), np.nan)
+    found = np.ones(len(share))
+    for place in range(len(share)):
+        beside = np.delete(share[max(place - NEIGHBOURS, 0) : place + NEIGHBOURS + 1], min(place, NEIGHBOURS), axis=0)
+        if np.isfinite(beside).any():
+            found[place] = max(float(np.nanmedian(beside)) / MEDIAN_OF_TWO, 1e-300)
+    return found
 
 
 def _bins_per_turn(highest: float) -> int:

@@ -7,7 +7,7 @@ answers "since when, on which wheels of which rovers".
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.fleet.told.estimates import estimates_of, parameter_alone
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from datetime import datetime
     from pathlib import Path
 
+    from regolithd.calibration.mismatch.answer import Verdict
     from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer, FleetEffect
     from regolithd.calibration.mismatch.fleet.told.estimates import Estimate
     from regolithd.calibration.mismatch.fleet.told.findings import Chosen
@@ -32,7 +33,7 @@ class CatalogueRow:
     Attributes
     ----------
     rover, recording, begins: which; `begins` is None where it is not known
-    verdict: of this recording alone
+    verdict: of this recording, as the fleet's answer has it
     wheel: its name as text
     effect, covariate, channel: what; empty where nothing was found
     found: "fleet" for an effect of the fleet, "recording" for one that this recording alone shows, "unexplained", or
@@ -69,7 +70,15 @@ def catalogue_rows(chosen: Chosen, answer: FleetAnswer) -> list[CatalogueRow]:
     ]
     with_rows = {row.recording for row in rows}
     empty = [_row(chosen, i) for i, name in enumerate(chosen.names.recordings) if name not in with_rows]
-    return sorted((*rows, *empty), key=lambda row: chosen.names.recordings.index(row.recording))
+    acting = {row.recording: _verdict(rows, row.recording) for row in rows}
+    told = [replace(row, verdict=acting.get(row.recording, row.verdict)) for row in (*rows, *empty)]
+    return sorted(told, key=lambda row: chosen.names.recordings.index(row.recording))
+
+
+def _verdict(rows: Sequence[CatalogueRow], recording: str) -> Verdict:
+    """Return what the rows say of a recording."""
+    acting = {row.found for row in rows if row.recording == recording and row.acts}
+    return "unexplained" if "unexplained" in acting else "missing-physics" if acting else "consistent"
 
 
 def _row(chosen: Chosen, recording: int, **content: object) -> CatalogueRow:
@@ -78,7 +87,7 @@ def _row(chosen: Chosen, recording: int, **content: object) -> CatalogueRow:
         rover=names.rovers[int(chosen.equations.rover[recording])],
         recording=names.recordings[recording],
         begins=names.begins[recording],
-        verdict=chosen.found[recording].findings.verdict,
+        verdict="consistent",
         **content,  # type: ignore[arg-type]
     )
 
@@ -91,8 +100,9 @@ def _rows_of_fleet(chosen: Chosen, answer: FleetAnswer) -> Iterator[CatalogueRow
     for index, term in enumerate(chosen.fit.terms):
         effect = answer.effects[index]
         coefficient = term.group.candidate.coefficients[0]
-        alone = estimates_of(chosen.beside.equations, chosen.beside.fit, index)
-        for recording, estimate in estimates_of(chosen.equations, chosen.fit, index).items():
+        beside = chosen.beside
+        alone = {(i, each.wheels): each for i, each in estimates_of(beside.equations, beside.fit, index)}
+        for recording, estimate in estimates_of(chosen.equations, chosen.fit, index):
             for wheel in estimate.wheels:
                 yield _row(
                     chosen,
@@ -105,12 +115,14 @@ def _rows_of_fleet(chosen: Chosen, answer: FleetAnswer) -> Iterator[CatalogueRow
                     acts=estimate.acts,
                     parameter=coefficient.name,
                     unit=in_units(coefficient.unit, chosen.simulation.unit, chosen.labels),
-                    **(_within(alone[recording]) if recording in alone else {}),
+                    **_within(alone.get((recording, estimate.wheels))),
                 )
 
 
-def _within(estimate: Estimate) -> dict[str, float]:
-    """Return a size with its 90 % interval."""
+def _within(estimate: Estimate | None) -> dict[str, float]:
+    """Return a size with its 90 % interval, where there is one."""
+    if estimate is None:
+        return {}
     reach = NINETY_PERCENT_STDS * estimate.std
     return {"value": estimate.value, "low": estimate.value - reach, "high": estimate.value + reach}
 

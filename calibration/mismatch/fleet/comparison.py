@@ -294,7 +294,7 @@ def _of_channel(
     )
     kept = sorted(found)
     members, results = [members[n] for n in kept], [found[n] for n in kept]
-    grid = grid_of(forms_of(simulation), results, 0)
+    grid = grid_of(forms_of(simulation), results, 0, [member.rover for member in members])
     laws: Laws = tuple((group.candidate.name, group.shape) for group in grid)
     sums = work.done(
         "summing",

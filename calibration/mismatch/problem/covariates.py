@@ -217,6 +217,11 @@ def _measured_angle(measured: Array, integrated: Array) -> Array:
     return found
 
 
+def angle_is_recorded(recording: Recording, covariates: Mapping[str, Array]) -> bool:
+    """Return whether the angle was measured: one that is integrated begins anew in each recording."""
+    return not np.array_equal(covariates["wheel_angle"], _integral(covariates["wheel_speed"], recording))
+
+
 def _integral(values: Array, recording: Recording) -> Array:
     """Return the angle turned since the start (trapezium); a gap is bridged, its angle is not known."""
     steps = np.diff(recording.time_s)

@@ -60,6 +60,14 @@ class FleetTerm:
         """The candidate's."""
         return self.group.candidate.name
 
+    @property
+    def parts(self) -> tuple[tuple[tuple[int, ...], tuple[int, ...]], ...]:
+        """Rovers and wheels that share each of its sizes."""
+        rovers, wheels = self.units.rovers, self.units.wheels
+        if self.group.of_wheels:
+            return tuple(((rover,), (wheel,)) for rover in rovers for wheel in wheels)
+        return tuple(((rover,), wheels) for rover in rovers) if self.units.kind == "each rover" else ((rovers, wheels),)
+
 
 @dataclass(frozen=True, eq=False)
 class FleetFit:
@@ -98,6 +106,8 @@ class FleetEquations:
     groups: the candidates of the grid; their columns come after the tangents
     level: whose the parameters are
     gram, moment: weighted, shape (recording, wheel, column, column), (recording, wheel, column)
+    reductions: long-run variance of the noise over that at the frequencies of each column, shape (recording, column):
+        products of such columns, and their moments, are weighted by so much more
     released: places, among the coefficients, of parameters whose priors are widened as far as a wrong statement goes
     """
 
@@ -112,6 +122,7 @@ class FleetEquations:
     gram: Array = field(repr=False)
     moment: Array = field(repr=False)
     weights: Array = field(repr=False)
+    reductions: Array = field(repr=False)
     released: frozenset[int] = frozenset()
 
     @property
@@ -132,13 +143,13 @@ class FleetEquations:
         return tuple(int(i) for i in at[np.argsort(self.when[at], kind="stable")])
 
     def factors(self, term: FleetTerm) -> Array:
-        """Return the factors of a term's sizes, shape (size, recording, wheel): one, or one for each rover."""
-        parts = [(rover,) for rover in term.units.rovers] if term.units.kind == "each rover" else [term.units.rovers]
-        found = np.zeros((len(parts), self.count, len(self.wheels)))
-        for size, rovers in enumerate(parts):
-            recordings = self.of_rovers(rovers)
-            relative = term.course.factors(recordings, self.when)
-            found[size][np.ix_(list(recordings), list(term.units.wheels))] = relative[:, None]
+        """Return the factors of a term's sizes, shape (size, recording, wheel): one for each of its parts."""
+        recordings = self.of_rovers(term.units.rovers)
+        relative = np.zeros(self.count)
+        relative[list(recordings)] = term.course.factors(recordings, self.when)
+        found = np.zeros((len(term.parts), self.count, len(self.wheels)))
+        for size, (rovers, wheels) in enumerate(term.parts):
+            found[size][:, list(wheels)] = np.where(np.isin(self.rover, rovers), relative, 0.0)[:, None]
         return found
 
     @cached_property
@@ -196,6 +207,21 @@ class FleetEquations:
             matrix[np.ix_(acting, acting)] += part
         return matrix, moment
 
+    @cached_property
+    def _counted(self) -> Array:
+        """By how much more products of columns are weighted, shape (recording, column, column).
+
+        What is beyond the long-run variance's weight is that of further readings, of which these columns know alone.
+        """
+        further = np.sqrt(self.reductions - 1)
+        return np.asarray(1 + further[:, :, None] * further[:, None, :])
+
+    def products(self, recording: int, wheel: int, at: Sequence[int] | NDArray[np.int64]) -> Array:
+        """Return the sums of products of these columns, unweighted, shape (column, column)."""
+        places = np.ix_(list(at), list(at))
+        weight = max(float(self.weights[recording, wheel]), 1e-300)
+        return np.asarray(self.gram[recording, wheel][places] / self._counted[recording][places] / weight)
+
     def beside(self, terms: Iterable[tuple[int, int]]) -> FleetEquations:
         """Return the equations in which these terms, recordings and places in their `own`, take up what they can.
 
@@ -210,8 +236,9 @@ class FleetEquations:
                 k, weight, products = self.wheels.index(name), sums.weights[w], sums.gram[w]
                 inverse = pseudo_inverse(products[np.ix_(free, free)], SINGULAR)
                 cross = products[np.ix_(own, free)] @ inverse
-                gram[i, k][np.ix_(fleet, fleet)] -= weight * cross @ products[np.ix_(free, own)]
-                moment[i, k][fleet] -= weight * cross @ sums.moment[w, free]
+                along = self._counted[i][np.ix_(fleet, fleet)] * (cross @ products[np.ix_(free, own)])
+                gram[i, k][np.ix_(fleet, fleet)] -= weight * along
+                moment[i, k][fleet] -= weight * self.reductions[i, fleet] * (cross @ sums.moment[w, free])
                 gone = np.diag(gram[i, k]) <= SINGULAR * np.diag(self.gram[i, k])
                 gram[i, k][gone], gram[i, k][:, gone], moment[i, k][gone] = 0.0, 0.0, 0.0
         return replace(self, gram=gram, moment=moment)
@@ -263,8 +290,8 @@ class FleetEquations:
                 k = self.wheels.index(name)
                 acting = np.flatnonzero(fit.factors[:, i, k])
                 sizes, at = (fit.coefficients * fit.factors[:, i, k])[acting], fit.columns[acting]
-                explained = 2 * sizes @ self.moment[i, k, at] - sizes @ self.gram[i, k][np.ix_(at, at)] @ sizes
-                total[i, k] = sums.energy[w] - explained / sums.weights[w]
+                moment = self.moment[i, k, at] / self.reductions[i, at] / sums.weights[w]
+                total[i, k] = sums.energy[w] - 2 * sizes @ moment + sizes @ self.products(i, k, at) @ sizes
         return total
 
     @cached_property
@@ -309,13 +336,19 @@ def fleet_equations(
     gram = np.zeros((len(sums), len(wheels), size, size))
     moment = np.zeros((len(sums), len(wheels), size))
     weights = np.zeros((len(sums), len(wheels)))
+    reductions = np.ones((len(sums), size))
     for i, each in enumerate(sums):
         own, fleet = column_map(each, list(stds), groups)
+        for group, reduction in zip(groups, each.reductions, strict=True):
+            reductions[i, list(group.columns)] = reduction
         for w, name in enumerate(each.wheels):
             k = wheels.index(name)
             weights[i, k] = each.weights[w]
             gram[i, k][np.ix_(fleet, fleet)] = each.weights[w] * each.gram[w][np.ix_(own, own)]
             moment[i, k][fleet] = each.weights[w] * each.moment[w, own]
+    further = np.sqrt(reductions - 1)
+    gram *= 1 + (further[:, :, None] * further[:, None, :])[:, None]
+    moment *= reductions[:, None]
     return FleetEquations(
         sums=tuple(sums),
         rover=np.array(rover, np.int64),
@@ -328,4 +361,5 @@ def fleet_equations(
         gram=gram,
         moment=moment,
         weights=weights,
+        reductions=reductions,
     )

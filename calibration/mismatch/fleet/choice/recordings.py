@@ -1,7 +1,7 @@
 """What single recordings show beside the effects of the fleet.
 
 A finding of one recording counts if it gains more than was asked of it there, with the fleet's effects in place, and
-pays for having been found in one of many recordings.
+pays for having been found in one of many recordings. The same curve in several recordings of a rover pays once.
 """
 
 from __future__ import annotations
@@ -39,23 +39,41 @@ class Shown:
 
 
 def shown_beside(equations: FleetEquations, fit: FleetFit, found: Sequence[Found]) -> Shown:
-    """Return the effects and structures that recordings show beside the fit."""
+    """Return the effects and structures that recordings show beside the fit.
+
+    Recordings of one rover that show the same curve are judged together: what each gains beyond its cost adds up.
+    """
+    chance = 2 * float(np.log(len(found)))
+    ahead = {
+        (i, k): gain_beside(equations, fit, i, k) - term.penalty
+        for i, of_recording in enumerate(found)
+        for k, term in enumerate(of_recording.terms)
+        if not _is_of_the_fleet(equations, fit, i, term)
+    }
+    together = dict[object, float]()
+    for (i, k), score in ahead.items():
+        if not found[i].terms[k].named:
+            curve = _curve_of(equations, i, found[i].terms[k])
+            together[curve] = together.get(curve, 0.0) + max(score, 0.0)
     effects, rest, own, curves = [], [], [], []
-    for i, of_recording in enumerate(found):
-        terms = of_recording.terms
-        named = [term for term in terms if term.named]
-        for k, term in enumerate(terms):
-            needed = of_recording.entry_threshold if term.named else THRESHOLDS.smooth_term_entry
-            needed += term.penalty + 2 * float(np.log(len(found)))
-            if _is_of_the_fleet(equations, fit, i, term) or gain_beside(equations, fit, i, k) <= needed:
-                continue
+    for (i, k), score in ahead.items():
+        term, findings = found[i].terms[k], found[i].findings
+        if term.named and score > found[i].entry_threshold + chance:
             own.append((i, k))
-            if term.named:
-                effects += [(i, each) for each in of_recording.findings.effects if each.name == term.name][:1]
-            else:
-                curves.append((i, k))
-                rest += [(i, each) for each in of_recording.findings.unexplained[k - len(named) : k - len(named) + 1]]
+            effects += [(i, each) for each in findings.effects if each.name == term.name][:1]
+        significant = together.get(_curve_of(equations, i, term), 0.0) > THRESHOLDS.smooth_term_entry + chance
+        if not term.named and score > 0 and significant:
+            own.append((i, k))
+            curves.append((i, k))
+            place = k - sum(each.named for each in found[i].terms)
+            rest += [(i, each) for each in findings.unexplained[place : place + 1]]
     return Shown(tuple(effects), tuple(rest), tuple(own), tuple(curves))
+
+
+def _curve_of(equations: FleetEquations, recording: int, term: FoundTerm) -> tuple[object, ...]:
+    """Return what is one curve in several recordings: its rover, covariate, coupling and wheels."""
+    wheels = tuple(equations.sums[recording].wheels[wheel] for wheel in term.wheels)
+    return int(equations.rover[recording]), term.name, term.coupling, wheels
 
 
 def _is_of_the_fleet(equations: FleetEquations, fit: FleetFit, recording: int, term: FoundTerm) -> bool:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.fleet.choice.courses import courses_over
+from regolithd.calibration.mismatch.fleet.choice.courses import Course, courses_over
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, Units
 from regolithd.calibration.mismatch.regression.schur import delta_chi2_of_each, delta_chi2_together
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
@@ -20,7 +20,6 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from regolithd.calibration.mismatch.fleet.choice.courses import Course
     from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
     from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
 
@@ -28,6 +27,7 @@ Array = NDArray[np.float64]
 
 MOST_TERMS = 24
 """Effects of a fleet at most (a choice: computing time)."""
+ALWAYS = Course("always")
 TRIED = 12
 """Best terms that are tried for each further effect (a choice: the best may be implausible or too small)."""
 
@@ -95,8 +95,7 @@ def _wheel_sets(equations: FleetEquations) -> set[tuple[int, ...]]:
 def penalty(equations: FleetEquations, term: FleetTerm, thresholds: Thresholds = THRESHOLDS) -> float:
     """Return what a term has to gain beyond chance, in Δχ²."""
     group, units = term.group, term.units
-    sizes = len(units.rovers) if units.kind == "each rover" else 1
-    total = thresholds.coefficient_penalty * len(group.columns) * sizes + 2 * float(np.log(group.tried))
+    total = thresholds.coefficient_penalty * len(group.columns) * len(term.parts) + 2 * float(np.log(group.tried))
     total += _implausibility(equations, group)
     total += course_cost(term.course)
     if term.course.kind != "always":
@@ -169,9 +168,25 @@ def _gains(
         by = np.stack([course.factors(place.recordings, equations.when) for course in courses])
         costs = np.array([course_cost(course) for course in courses])
         for group in chosen:
-            gains = summed.gains(by, group)
+            gains = _own_gains(equations, left, place, group, by) if group.of_wheels else summed.gains(by, group)
             top = int(np.argmax(gains - costs))
             yield float(gains[top]), FleetTerm(group, place.units, courses[top])
+
+
+def _own_gains(equations: FleetEquations, left: Array, place: Place, group: GridGroup, by: Array) -> Array:
+    """Return the Δχ² of a group whose coefficients are each wheel's own, with each course, shape (course,).
+
+    Parameters stay: its columns are in no direction of theirs, or it gains more than this.
+    """
+    at, total = list(group.columns), np.zeros(len(by))
+    for rovers, (wheel,) in FleetTerm(group, place.units, ALWAYS).parts:
+        here = np.isin(equations.rover[list(place.recordings)], rovers)
+        recordings = np.array(place.recordings)[here]
+        moment = by[:, here] @ left[recordings, wheel][:, at]
+        own = np.einsum("icd,mi->mcd", equations.gram[recordings, wheel][:, at][:, :, at], by[:, here] ** 2)
+        inverse = np.linalg.pinv(own, rcond=THRESHOLDS.least_tolerance, hermitian=True)
+        total += np.einsum("mc,mcd,md->m", moment, inverse, moment)
+    return total
 
 
 @dataclass(frozen=True, eq=False)

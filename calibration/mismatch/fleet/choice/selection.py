@@ -72,7 +72,7 @@ class Chooser:
             rest, old = self.equations.fit(without(fit, index)), fit.terms[index]
             near = [place for place in self.places if set(place.units.rovers) & set(old.units.rovers)]
             trials = [term for _, term in further(self.equations, rest, near)[:2]]
-            if old.units.kind == "fleet" and old.course.kind == "always":
+            if old.units.kind == "fleet" and old.course.kind == "always" and not old.group.of_wheels:
                 trials.append(replace(old, units=replace(old.units, kind="each rover")))
             for term in trials:
                 trial = self.equations.fit((*rest.terms[:index], term, *rest.terms[index:]))
@@ -110,14 +110,14 @@ class Chooser:
 
     def _transfer_margin(self, fit: FleetFit, index: int) -> float:
         """Return by how much a term's Δχ² on recordings that did not fit it passes the share that is asked for."""
-        equations, rest, units = self.equations, without(fit, index), fit.terms[index].units
-        of_one_size = [(rover,) for rover in units.rovers] if units.kind == "each rover" else [units.rovers]
-        if max(len(equations.of_rovers(rovers)) for rovers in of_one_size) < FEWEST_TO_CONFIRM:
+        equations, rest, term = self.equations, without(fit, index), fit.terms[index]
+        if max(len(equations.of_rovers(rovers)) for rovers, _ in term.parts) < FEWEST_TO_CONFIRM:
             return 0.0
+        weights = equations.weights * equations.reductions[:, term.group.columns[0], None]
         came_back, gained = 0.0, fit.delta_chi2 - equations.fit(rest).delta_chi2
         for fold in folds_of(equations):
             with_it, less = (equations.fit(terms, 1.0 - fold) for terms in (fit.terms, rest))
-            saved = (equations.squares(less) - equations.squares(with_it)) * equations.weights
+            saved = (equations.squares(less) - equations.squares(with_it)) * weights
             came_back += float(fold @ saved.sum(axis=1))
         loss = THRESHOLDS.coefficient_cost * (fit.spans[index].stop - fit.spans[index].start)
         return came_back + loss - THRESHOLDS.transferred_share * gained
@@ -162,9 +162,8 @@ def relative_size(equations: FleetEquations, fit: FleetFit, index: int) -> float
     squares = fourths = readings = mean = 0.0
     for size, factor in zip(fit.coefficients[span].reshape(-1, len(at)), fit.factors[span][:: len(at)], strict=True):
         for i, w in zip(*np.nonzero(factor), strict=True):
-            values, weight = factor[i, w] * size, max(equations.weights[i, w], 1e-300)
-            part = float(values @ equations.gram[i, w][np.ix_(at, at)] @ values) / weight
-            squares += part
+            values = factor[i, w] * size
+            squares += float(values @ equations.products(i, w, at) @ values)
             fourths += float(values @ values) ** 2 * _fourth(equations, int(i), int(w), at)
             readings += equations.counts[i, w]
             mean += equations.counts[i, w] * equations.sums[int(i)].mean_size

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
+from regolithd.calibration.mismatch.fleet.told.sizes import told_sizes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
     from regolithd.calibration.mismatch.fleet.work.found import Found
+    from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
 
 
 @dataclass(frozen=True)
@@ -33,24 +35,33 @@ class Estimate:
     std: float
 
 
-def estimates_of(equations: FleetEquations, fit: FleetFit, index: int) -> dict[int, Estimate]:
-    """Return the estimates in all recordings of the effect's rovers, before its onset too, by recording.
+def estimates_of(equations: FleetEquations, fit: FleetFit, index: int) -> list[tuple[int, Estimate]]:
+    """Return the estimates in all recordings of the effect's rovers, before its onset too, with their recordings.
 
-    All else is as the fleet's fit has it; of an effect of several coefficients, all have the same factor.
+    All else is as the fleet's fit has it; of an effect of several coefficients, all have the same factor. Where the
+    wheels have coefficients of their own, each has an estimate.
     """
     term, span, left = fit.terms[index], fit.spans[index], equations.left_moment(fit)
-    at, found = list(term.group.columns), {}
+    at, found = list(term.group.columns), list[tuple[int, Estimate]]()
     sizes, factors = fit.coefficients[span].reshape(-1, len(at)), fit.factors[span][:: len(at)]
     for i in equations.of_rovers(term.units.rovers):
-        wheels = tuple(w for w in term.units.wheels if equations.counts[i, w] > 0)
-        own = [k for k in range(len(sizes)) if factors[k, i].any()] or [0]
-        size, factor = sizes[own[0]], float(np.max(factors[own[0], i]))
-        energy = sum(float(size @ equations.gram[i, w][np.ix_(at, at)] @ size) for w in wheels)
-        if energy <= 0 or size[0] == 0:
-            continue
-        further = _further(left[i][:, at], size, wheels) / energy
-        found[i] = Estimate(wheels, factor != 0, float(size[0]) * (factor + further), abs(float(size[0])) / energy**0.5)
+        for (rovers, on), size, factor in zip(term.parts, sizes, factors, strict=True):
+            wheels = tuple(w for w in on if equations.counts[i, w] > 0)
+            energy = sum(float(size @ equations.gram[i, w][np.ix_(at, at)] @ size) for w in wheels)
+            told = _told_size(term.group, size)
+            if equations.rover[i] in rovers and energy > 0 and told:
+                by = float(np.max(factor[i]))
+                further = _further(left[i][:, at], size, wheels) / energy
+                found.append((i, Estimate(wheels, by != 0, told * (by + further), abs(told) / energy**0.5)))
     return found
+
+
+def _told_size(group: GridGroup, size: np.ndarray) -> float:
+    """Return the first parameter of an effect: its first coefficient, or what it makes of those of a wheel."""
+    if not group.of_wheels:
+        return float(size[0])
+    values, _ = told_sizes(group, size, np.zeros(len(size)))
+    return next(iter(group.candidate.parameters(group.shape, values.tolist()).values()))
 
 
 def parameter_alone(

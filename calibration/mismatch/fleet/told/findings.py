@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.answer import FitImprovement, Parameter, Sensitivity
-from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm
+from regolithd.calibration.mismatch.answer import FitImprovement, Parameter
 from regolithd.calibration.mismatch.fleet.choice.held_out import HeldOutSquares, held_out_squares
 from regolithd.calibration.mismatch.fleet.choice.intervals import onset_places, size_stds
 from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
-from regolithd.calibration.mismatch.fleet.choice.search import may_share, penalty
 from regolithd.calibration.mismatch.fleet.choice.selection import Chooser, relative_size
 from regolithd.calibration.mismatch.fleet.told.answer import (
     FleetAnswer,
@@ -24,23 +22,21 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
     RoverOfFleet,
 )
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
+from regolithd.calibration.mismatch.fleet.told.sensitivity import sensitivities
 from regolithd.calibration.mismatch.fleet.told.sizes import mean_sizes, parameters_of
 from regolithd.calibration.mismatch.inference.statements import capital, on_wheels, size_and_cost
 from regolithd.calibration.mismatch.problem.problem import LeftOut
 from regolithd.calibration.mismatch.problem.words import in_words
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
-from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from datetime import datetime
 
     from regolithd.calibration.mismatch.answer import Effect, Verdict
-    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit, FleetTerm
     from regolithd.calibration.mismatch.fleet.choice.recordings import Shown
-    from regolithd.calibration.mismatch.fleet.choice.search import Place
     from regolithd.calibration.mismatch.fleet.work.found import Found
-    from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 Array = NDArray[np.float64]
@@ -134,7 +130,7 @@ def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
         effects=(*effects, *single),
         unexplained=rest,
         indistinguishable=rivals(chosen.chooser, fit, simulation),
-        sensitivity=_sensitivities(chosen),
+        sensitivity=sensitivities(chosen.chooser, fit, simulation, in_each_alone(chosen)),
         fit=FitImprovement(simulation.channel, before, after if fit.terms else before, floor),
         parameters=parameters,
         left_out=_left_out(chosen),
@@ -193,9 +189,12 @@ def _sizes(chosen: Chosen, index: int, beside: Beside) -> dict[str, Parameter]:
     """Return coefficients, shape parameters and relative size with their intervals."""
     fit, stds, simulation = beside.fit, beside.stds, chosen.simulation
     found = parameters_of(beside.equations, fit, stds, index, simulation.unit, chosen.labels)
-    span, count = fit.spans[index], len(fit.terms[index].group.columns)
-    mean, std = mean_sizes(fit.coefficients[span], stds[span], count)
+    group, span = fit.terms[index].group, fit.spans[index]
     size = relative_size(chosen.equations, fit, index)
+    mean, std = mean_sizes(fit.coefficients[span], stds[span], len(group.columns))
+    if group.of_wheels:
+        first = next(iter(found.values()))
+        mean, std = np.array([first.value]), np.array([(first.high - first.low) / 2 / NINETY_PERCENT_STDS])
     share = NINETY_PERCENT_STDS * float(np.max(std / np.maximum(np.abs(mean), 1e-300)))
     course = fit.terms[index].course
     grown = {"growth_power": Parameter(course.power, np.nan, np.nan, "1")} if course.kind == "growing" else {}
@@ -297,53 +296,6 @@ def _noise_floor(chosen: Chosen) -> float:
     return float(np.sqrt(squares / max(float(chosen.equations.counts.sum()), 1.0)))
 
 
-def _sensitivities(chosen: Chosen) -> tuple[Sensitivity, ...]:
-    """Return, for each candidate, the smallest root mean square that would have shown, on the first place it may be."""
-    equations, channel, unit = chosen.equations, chosen.simulation.channel, chosen.simulation.unit
-    found: dict[str, float] = {}
-    for group in equations.groups:
-        place = _first_place(chosen, group)
-        if place is None:
-            found.setdefault(group.candidate.name, float("inf"))
-            continue
-        term = FleetTerm(group, place.units, place.courses(group)[0])
-        others = [each for each in chosen.fit.terms if each.name != term.name]
-        found.setdefault(term.name, _smallest(chosen, others, term))
-    return tuple(Sensitivity(name, channel, size, unit) for name, size in sorted(found.items()))
-
-
-def _first_place(chosen: Chosen, group: GridGroup) -> Place | None:
-    """Return the first place that a candidate may have: all rovers, where all wheels may have it, else of one rover."""
-    return next(
-        (
-            place
-            for place in chosen.chooser.places
-            if may_share(group, place.units, len(chosen.equations.wheels))
-            and place.courses(group)
-            and ("all" in group.candidate.sharing or len(place.units.rovers) == 1)
-        ),
-        None,
-    )
-
-
-def _smallest(chosen: Chosen, others: Sequence[FleetTerm], term: FleetTerm) -> float:
-    equations = chosen.equations
-    fit = equations.fit((*others, term))
-    at, factors = list(term.group.columns), equations.factors(term)[0]
-    outside = 1 / max(float(np.max(np.diag(fit.covariance)[fit.spans[-1]])), 1e-300)
-    weighted = np.einsum("iw,iwc->c", factors**2, np.diagonal(equations.gram, axis1=2, axis2=3)[:, :, at])
-    if outside <= 1e-9 * float(weighted.max()):
-        return float("inf")
-    weights = np.where(equations.weights > 0, equations.weights, np.inf)
-    squares = float(np.sum(np.diagonal(equations.gram, axis1=2, axis2=3)[:, :, at[0]] * factors**2 / weights))
-    readings = float(equations.counts[factors != 0].sum())
-    needed = np.sqrt(chosen.chooser.entry_threshold + penalty(equations, term)) + THRESHOLDS.detection_quantile
-    size = float(np.mean([sums.mean_size for sums in equations.sums]))
-    return max(
-        float(np.sqrt(squares / max(readings, 1.0)) * needed / np.sqrt(outside)), THRESHOLDS.smallest_effect * size
-    )
-
-
 def _left_out(chosen: Chosen) -> tuple[LeftOut, ...]:
     total: dict[tuple[str, str], int] = {}
     for found in chosen.found:
@@ -362,7 +314,18 @@ def _notes(chosen: Chosen) -> tuple[str, ...]:
         for note in found.findings.notes_on_recording:
             of.setdefault(note, []).append(name)
     count = len(chosen.names.recordings)
-    return tuple(f"{_which(names, count)}: {note}" for note, names in of.items())
+    told = tuple(f"{_which(names, count)}: {note}" for note, names in of.items())
+    return (*told, f"{IN_EACH_ALONE}: {', '.join(alone)}.") if (alone := in_each_alone(chosen)) else told
+
+
+IN_EACH_ALONE = "Looked for in each recording by itself, not in all together"
+"""How the note begins of what a weak effect of is not found: what acts on another channel, or repeats in none."""
+
+
+def in_each_alone(chosen: Chosen) -> list[str]:
+    """Return the candidates that recordings allow, and that have no shape in common over them."""
+    together = {group.candidate.name for group in chosen.equations.groups}
+    return sorted({name for found in chosen.found for name in found.shapes} - together)
 
 
 def _which(names: Sequence[str], count: int) -> str:

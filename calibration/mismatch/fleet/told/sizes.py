@@ -44,6 +44,17 @@ def mean_sizes(values: Array, stds: Array, count: int) -> tuple[Array, Array]:
     return mean, np.maximum(1 / np.sqrt(np.sum(weights, axis=0)), np.std(values, axis=0))
 
 
+def told_sizes(group: GridGroup, values: Array, stds: Array) -> tuple[Array, Array]:
+    """Return an effect's coefficients with standard deviations as its candidate has them: of wheels, or their mean."""
+    count = len(group.columns)
+    places = group.candidate.columns_of_wheels(group.shape, len(values) // count)
+    if places is None:
+        return mean_sizes(values, stds, count)
+    found = np.zeros((2, len(values)))
+    found[:, places.ravel()] = values, stds
+    return found[0], found[1]
+
+
 def parameters_of(
     equations: FleetEquations, fit: FleetFit, stds: Array, index: int, unit: str, labels: Mapping[str, str]
 ) -> dict[str, Parameter]:
@@ -54,8 +65,8 @@ def parameters_of(
     """
     group, span = fit.terms[index].group, fit.spans[index]
     candidate = group.candidate
-    own = Law(group.shape, *mean_sizes(fit.coefficients[span], stds[span], len(group.columns)))
-    moved = {name: moved_law(equations, fit, index, name) for name in _free(group)}
+    own = Law(group.shape, *told_sizes(group, fit.coefficients[span], stds[span]))
+    moved = {name: None if group.of_wheels else moved_law(equations, fit, index, name) for name in _free(group)}
     wide = {name: np.nan if found is None else found[1] for name, found in moved.items()}
     laws = [own, *(found[0] for found in moved.values() if found is not None)]
     ranges = [_ranges(candidate, law, wide) for law in laws]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.comparison import decided
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values
 from regolithd.calibration.mismatch.inference.findings import noise_floor
+from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.candidates.responses import Responses
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.inference.findings import Findings
     from regolithd.calibration.mismatch.problem.problem import Problem
@@ -41,6 +43,7 @@ class FoundTerm:
     wheels: indices
     penalty: what it had to gain, in Δχ²
     columns: shape (column, time, wheel), 0 on other wheels and where nothing is compared
+    coupling: of a smooth term, how it acts
     """
 
     name: str
@@ -49,6 +52,7 @@ class FoundTerm:
     wheels: tuple[int, ...]
     penalty: float
     columns: Single
+    coupling: str = ""
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,7 @@ class Found:
     entry_threshold: score above which an effect was named
     terms: named effects, then smooth terms
     shapes: the grid of each candidate that this recording allows, by name
+    responses: what is left beside all else that was found has of those that are found over all recordings, by name
     labels: what covariates are called, with their units
     """
 
@@ -87,6 +92,7 @@ class Found:
     labels: dict[str, str] = field(default_factory=dict)
     late_inputs: dict[str, float] = field(default_factory=dict)
     late: tuple[str, float] | None = None
+    responses: dict[str, Responses] = field(default_factory=dict)
 
 
 def one_channel(simulation: Simulation, channel: str) -> Simulation:
@@ -122,7 +128,22 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
         labels=dict(problem.labels),
         late_inputs=dict(problem.on_time),
         late=problem.late,
+        responses=_responses(decision, of_recording.applicable),
     )
+
+
+def _responses(decision: Decision, candidates: Sequence[Candidate]) -> dict[str, Responses]:
+    """Return the responses of each candidate that has some, beside all that was found but itself."""
+    equations, found = decision.equations, {}
+    left = residual_of(equations, decision.whole)
+    for candidate in candidates:
+        rest = [term for term in decision.whole.terms if term.name != candidate.name]
+        is_named = len(rest) < len(decision.whole.terms)
+        without = residual_of(equations, equations.fit(rest)) if is_named else left
+        each = candidate.responses(equations.problem, without)
+        if each is not None:
+            found[candidate.name] = each
+    return found
 
 
 def _found_term(decision: Decision, term: Term) -> FoundTerm:
@@ -137,6 +158,7 @@ def _found_term(decision: Decision, term: Term) -> FoundTerm:
         wheels=term.wheels,
         penalty=equations.penalty(term),
         columns=columns,
+        coupling=term.group.coupling,
     )
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regolithd.calibration.mismatch.candidates.responses import strongest
 from regolithd.calibration.mismatch.regression.candidate_groups import coefficient_signs
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ MOST_SHAPES = 6
 """Shapes of a candidate's grid (a choice: the shapes that single recordings were found to have come beside them)."""
 MOST_FOUND_SHAPES = 6
 """Shapes that were found in single recordings, of one candidate (a choice)."""
+MOST_RESPONSES = 4
+"""Responses of all recordings of which the shapes are tried (a choice: the factor of a sine has three kinds)."""
 AT_ONCE = "onset_s"
 """The shape parameter of what begins within a recording. Over a fleet it is there from its first instant."""
 
@@ -47,21 +50,45 @@ class GridGroup:
         """The columns' signs, 0 for either."""
         return coefficient_signs(self.candidate, len(self.columns))
 
+    @property
+    def of_wheels(self) -> bool:
+        """Whether each wheel has coefficients of its own."""
+        return self.candidate.columns_of_wheels(self.shape, 1) is not None
 
-def grid_of(candidates: Sequence[Candidate], found: Sequence[Found], first: int) -> tuple[GridGroup, ...]:
-    """Return the groups, whose columns begin at place `first`.
 
-    A candidate's grid is that of the recording in which its covariate reaches furthest. Faults that another channel
-    shows (a load cell's) stay with their recording.
+def grid_of(
+    candidates: Sequence[Candidate], found: Sequence[Found], first: int, rovers: Sequence[str] = ()
+) -> tuple[GridGroup, ...]:
+    """Return the groups, whose columns begin at place `first`; `rovers` tells whose each recording is.
+
+    A candidate's grid is that of the recording in which its covariate reaches furthest, or what all recordings respond
+    to most strongly. Faults that another channel shows (a load cell's) stay with their recording.
     """
     groups: list[GridGroup] = []
     for candidate in candidates:
         shapes = shapes_over_fleet(candidate, found) if candidate.channel is None else ()
+        tried = len(shapes)
+        if not shapes and candidate.channel is None:
+            shapes, tried = _shapes_by_response(candidate, found, rovers)
         for shape in shapes:
             columns = tuple(range(first, first + len(candidate.coefficients)))
-            groups.append(GridGroup(candidate, shape, columns, len(shapes), begins=candidate.change_point in shape))
+            groups.append(GridGroup(candidate, shape, columns, tried, begins=candidate.change_point in shape))
             first += len(columns)
     return tuple(groups)
+
+
+def _shapes_by_response(
+    candidate: Candidate, found: Sequence[Found], rovers: Sequence[str]
+) -> tuple[tuple[Shape, ...], int]:
+    """Return the shapes that recordings respond to most strongly together, and of how many they are."""
+    of = [(rover, each.responses[candidate.name]) for rover, each in zip(rovers, found, strict=False)
+          if candidate.name in each.responses]  # fmt: skip
+    if not of:
+        return (), 0
+    responses = [each for _, each in of]
+    best = strongest(responses, [rover for rover, _ in of], MOST_RESPONSES)
+    shapes = responses[0].shapes
+    return tuple(shape for place in best for shape in shapes[place]), sum(map(len, shapes))
 
 
 def placed(grid: Sequence[GridGroup], sums: Sequence[Sums], first: int) -> tuple[GridGroup, ...]:
@@ -81,17 +108,13 @@ def placed(grid: Sequence[GridGroup], sums: Sequence[Sums], first: int) -> tuple
 def shapes_over_fleet(candidate: Candidate, found: Sequence[Found]) -> tuple[Shape, ...]:
     """Return a candidate's shapes for all recordings; of what begins at some time, the shape after that alone."""
     grids = [each.shapes[candidate.name] for each in found if candidate.name in each.shapes]
-    if not grids:
+    widest = max(grids, key=lambda grid: (grid.reach, len(grid.shapes))).shapes if grids else ()
+    if not widest:
         return ()
-    widest = max(grids, key=lambda grid: (grid.reach, len(grid.shapes))).shapes
     change_point = candidate.change_point
-    if widest and change_point in widest[0]:
+    if change_point in widest[0]:
         return ({**widest[0], change_point: 0.0},)
-    kept = (
-        [widest[int(place)] for place in np.unique(np.linspace(0, len(widest) - 1, MOST_SHAPES).round())]
-        if widest
-        else []
-    )
+    kept = [widest[int(place)] for place in np.unique(np.linspace(0, len(widest) - 1, MOST_SHAPES).round())]
     named = [term.shape for each in found for term in each.terms if term.named and term.name == candidate.name]
     more = {repr(sorted(shape.items())): shape for shape in named if shape not in kept}
     return (*kept, *list(more.values())[:MOST_FOUND_SHAPES])

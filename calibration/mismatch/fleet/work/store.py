@@ -16,6 +16,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from regolithd.calibration.mismatch import answer as answers
+from regolithd.calibration.mismatch.candidates.responses import Responses
 from regolithd.calibration.mismatch.fleet.work.found import Found, FoundTerm, Shapes
 from regolithd.calibration.mismatch.fleet.work.sums import Sums
 from regolithd.calibration.mismatch.inference.findings import Findings
@@ -32,6 +33,7 @@ KINDS: Mapping[str, type] = {
         Found,
         FoundTerm,
         Shapes,
+        Responses,
         Sums,
         LeftOut,
         Findings,

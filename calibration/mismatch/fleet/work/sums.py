@@ -61,6 +61,7 @@ class Sums:
     blocks: weighted moments of each block of time with what the own terms leave, shape (block, wheel, column)
     mean_size: the channel's mean magnitude
     wheel_sets: sets of wheels, by indices, that may share an effect
+    reductions: long-run variance of the noise over that at the frequencies of each law's columns, shape (law,)
     """
 
     wheels: tuple[int | str, ...]
@@ -78,6 +79,7 @@ class Sums:
     blocks: Array
     mean_size: float
     wheel_sets: tuple[tuple[int, ...], ...]
+    reductions: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,17 +106,19 @@ def sums_of(
     of_channel = one_channel(simulation, channel)
     candidates = {each.name: each for each in forms_of(of_channel)}
     problem = _posed(recording, simulation, of_channel, found, thresholds)
-    columns = _columns(problem, [(candidates[name], shape) for name, shape in laws], found.terms)
+    shaped = [(candidates[name], shape) for name, shape in laws]
+    columns = _columns(problem, shaped, found.terms)
     # Measured from the stated values, not from where this recording's own comparison linearised the simulation.
     residual = problem.residual + np.einsum("c,ctw->tw", columns.shifts, columns.values[: len(columns.shifts)])
     noise = NoiseModel(found.deviation, found.autocorrelation_times)
     gram, moment, fourth = _products(columns.values, residual)
+    left = _left(columns, residual, gram, moment, noise)
     return Sums(
         wheels=problem.recording.wheels,
         tangents=columns.tangents,
         prior_stds=columns.prior_stds,
         places=columns.places,
-        penalties=_penalties(problem, [(candidates[name], shape) for name, shape in laws], columns.places),
+        penalties=_penalties(problem, shaped, columns.places),
         own=columns.own,
         gram=gram,
         moment=moment,
@@ -122,10 +126,26 @@ def sums_of(
         energy=np.sum(residual**2, axis=0),
         counts=problem.mask.sum(axis=0).astype(np.float64),
         weights=noise.weights,
-        blocks=_block_moments(problem, columns, residual, gram, moment, noise),
+        blocks=_block_moments(problem, columns, left, noise),
         mean_size=problem.mean_size,
         wheel_sets=problem.wheel_sets,
+        reductions=_reductions(problem, shaped, columns.places, left, noise),
     )
+
+
+def _reductions(
+    problem: Problem,
+    laws: Sequence[tuple[Candidate, Shape]],
+    places: Sequence[tuple[int, ...]],
+    left: Array,
+    noise: NoiseModel,
+) -> Array:
+    """Return the noise's autocorrelation time over that at the frequencies of each law, at least 1."""
+    here = [
+        candidate.autocorrelation_time_at(problem, left, shape) if own else np.inf
+        for (candidate, shape), own in zip(laws, places, strict=True)
+    ]
+    return np.maximum(noise.autocorrelation_time / np.array(here), 1.0)
 
 
 def _penalties(problem: Problem, laws: Sequence[tuple[Candidate, Shape]], places: Sequence[tuple[int, ...]]) -> Array:
@@ -157,7 +177,7 @@ def _columns(problem: Problem, laws: Sequence[tuple[Candidate, Shape]], terms: S
     shifts = [problem.values[name] - parameters[name].value if name in parameters else 0.0 for name in names]
     count, places = len(made), []
     for candidate, shape in laws:
-        fresh = columns_of(problem, candidate, shape) if candidate.applies(problem) else ()
+        fresh = _of_law(problem, candidate, shape) if candidate.applies(problem) else ()
         places.append(tuple(range(count, count + len(fresh))))
         made, count = [*made, *fresh], count + len(fresh)
     own = []
@@ -167,6 +187,13 @@ def _columns(problem: Problem, laws: Sequence[tuple[Candidate, Shape]], terms: S
     whole = problem.mask.shape
     values = np.where(problem.mask, np.stack([np.broadcast_to(each, whole) for each in made]), 0.0)
     return _Columns(values, tuple(names), np.array(stds), np.array(shifts), tuple(places), tuple(own))
+
+
+def _of_law(problem: Problem, candidate: Candidate, shape: Shape) -> Array:
+    """Return a law's columns, shape (time, wheel) each; those that each wheel has for itself are put side by side."""
+    columns = columns_of(problem, candidate, shape)
+    own = candidate.columns_of_wheels(shape, columns.shape[-1])
+    return columns if own is None else columns[own].sum(axis=0)
 
 
 def _products(values: Array, residual: Array) -> tuple[Array, Array, Array]:
@@ -184,17 +211,19 @@ def _products(values: Array, residual: Array) -> tuple[Array, Array, Array]:
     return gram, moment, fourth
 
 
-def _block_moments(
-    problem: Problem, columns: _Columns, residual: Array, gram: Array, moment: Array, noise: NoiseModel
-) -> Array:
-    """Return each block's weighted moments with what tangents and own terms leave of the residual."""
-    blocks = blocks_of_time(problem, noise)
+def _left(columns: _Columns, residual: Array, gram: Array, moment: Array, noise: NoiseModel) -> Array:
+    """Return what tangents and own terms leave of the residual, shape (time, wheel)."""
     taken = [*range(len(columns.tangents)), *(column for own in columns.own for column in own)]
     fitted = _fitted(gram, moment, noise.weights, taken, columns.prior_stds)
-    left = (residual - np.einsum("c,ctw->tw", fitted, columns.values[taken])) * noise.weights
+    return np.asarray(residual - np.einsum("c,ctw->tw", fitted, columns.values[taken]))
+
+
+def _block_moments(problem: Problem, columns: _Columns, left: Array, noise: NoiseModel) -> Array:
+    """Return each block's weighted moments with what tangents and own terms leave of the residual."""
+    blocks, weighted = blocks_of_time(problem, noise), left * noise.weights
     order = np.argsort(blocks, kind="stable")
     starts = np.flatnonzero(np.diff(blocks[order], prepend=-1))
-    sums = [np.add.reduceat((column * left)[order], starts, axis=0) for column in columns.values]
+    sums = [np.add.reduceat((column * weighted)[order], starts, axis=0) for column in columns.values]
     return np.stack(sums, axis=2)
 
 

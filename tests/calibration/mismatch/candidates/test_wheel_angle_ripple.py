@@ -12,6 +12,7 @@ import pytest
 from scipy.stats import chi2
 
 from regolithd.calibration.mismatch import Simulation
+from regolithd.calibration.mismatch.candidates.responses import strongest
 from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import WheelAngleRipple
 from regolithd.calibration.mismatch.data.recording import from_columns
@@ -152,3 +153,50 @@ def test_the_amplitude_is_that_of_the_wheels_that_have_it() -> None:
     assert found["amplitude"] == pytest.approx(5.0)
     assert WheelAngleRipple().parameters(shape, [3.0, 4.0, 0.0, 5.0])["amplitude"] == pytest.approx(5.0)
     assert WheelAngleRipple().parameters(shape, [0.0, 0.0])["amplitude"] == 0.0
+
+
+class Geared(Propeller):
+    """The same with an angle that was recorded."""
+
+    inputs: ClassVar = ("speed_rad_s", "angle_rad")
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return speed, time and angle."""
+        return {**super().covariates(inputs), "wheel_angle": inputs["angle_rad"]}
+
+
+def turned(begin_rad: float, order: float, amplitude: float) -> tuple[Problem, Array]:
+    """Return the problem of a propeller with an encoder, and a ripple of that order in noise."""
+    time_s = 0.02 * np.arange(4000)
+    speed = 5.0 + 2.0 * np.sin(0.7 * time_s)
+    angle = begin_rad + np.cumsum(speed) * 0.02
+    columns = {"t_s": time_s, "thrust_N": np.ones(len(time_s)), "speed_rad_s": speed, "angle_rad": angle}
+    residual = amplitude * np.cos(order * angle) + np.random.default_rng(int(10 * begin_rad)).normal(0, 0.5, len(angle))
+    return build_problem(from_columns(columns), Geared()), residual[:, None]
+
+
+def test_recordings_that_show_no_ripple_by_themselves_respond_to_one_together() -> None:
+    """Of a whole order the phase is the same in all, wherever the angle begins; where it is not recorded, none is."""
+    candidate = WheelAngleRipple()
+    found = [candidate.responses(*turned(begin, 3.0, 0.04)) for begin in (0.0, 0.4, 1.7, 2.9, 4.6, 5.1)]
+    assert None not in found
+    shapes = found[0].shapes[strongest(found, ["a"] * len(found), 1)[0]]
+    assert [(shape["order"], shape["sines"]) for shape in shapes] == [(3.0, 1.0), (3.0, 2.0)]
+    problem, ripple = spun(20.0, 0.01, 3.0)
+    assert candidate.responses(problem, ripple) is None
+
+
+def test_a_response_has_the_gain_that_noise_leaves() -> None:
+    """Δχ² of cosine and sine over the noise around the order: of white noise its variance."""
+    found = WheelAngleRipple().responses(*turned(0.3, 3.0, 0.1)) or pytest.fail("no response")
+    (place,) = [n for n, (first, _) in enumerate(found.shapes) if (first["order"], first["kind"]) == (3.0, "torque")]
+    gain = float(np.sum(found.moment[place, 0] ** 2) / found.energy[place, 0])
+    assert gain == pytest.approx(0.1**2 / 2 * 4000 / 0.25, rel=0.5)
+
+
+def test_each_wheel_has_its_own_columns() -> None:
+    """Their places are those of its cosine and sine, then of its overtone."""
+    problem, _ = turned(0.0, 3.0, 0.0)
+    shape = {"order": 3.0, "kind": "torque", "sines": 2.0}
+    assert WheelAngleRipple().columns_of_wheels(shape, 3).tolist() == [[0, 1, 6, 7], [2, 3, 8, 9], [4, 5, 10, 11]]
+    assert len(WheelAngleRipple().columns(problem, shape)) == WheelAngleRipple().columns_of_wheels(shape, 1).size

@@ -210,12 +210,40 @@ def test_an_effect_of_all_rovers_is_one_effect(tmp_path: Path) -> None:
     assert effect.parameters["coulomb_current"].low < 0.05 < effect.parameters["coulomb_current"].high
 
 
-def test_a_ripple_of_all_motors_is_one_effect() -> None:
-    """It has sines of each wheel, at one phase in all of its recordings."""
-    found = compare([fleet_arm.columns(n, ripple=0.1) for n in range(3)], fleet_arm.ArmWithAngle())
+def test_a_ripple_that_no_recording_shows_is_found_in_all_together() -> None:
+    """It has a sine of each wheel, at one phase in all of its recordings."""
+    recordings = [fleet_arm.columns(n, ripple=0.02) for n in range(6)]
+    assert compare(recordings[0], fleet_arm.ArmWithAngle()).answer.verdict == "consistent"
+    found = compare(recordings, fleet_arm.ArmWithAngle())
     (effect,) = found.answer.effects
     assert (effect.name, effect.wheels) == ("wheel-angle-ripple", fleet_arm.JOINTS)
-    assert effect.parameters["order"].value == pytest.approx(fleet_arm.RIPPLES, abs=0.01)
+    assert effect.parameters["order"].value == fleet_arm.RIPPLES
+    assert effect.parameters["amplitude"].low < 0.02 < effect.parameters["amplitude"].high
+    alone = [row.value for row in found.evidence.rows]
+    assert alone == pytest.approx([0.02] * 12, abs=0.03)
+
+
+def test_a_ripple_that_recordings_show_is_the_fleet_s() -> None:
+    """Although its order was found to be another in each, to within the width of a line."""
+    found = compare([fleet_arm.columns(n, ripple=0.1) for n in range(3)], fleet_arm.ArmWithAngle())
+    (effect,) = found.answer.effects
+    assert effect.parameters["order"].value == fleet_arm.RIPPLES
+
+
+def test_what_is_looked_for_in_each_recording_alone_is_told_so() -> None:
+    """Where no angle is recorded, a ripple's phase is another in each."""
+    found = compare([fleet_arm.columns(n) for n in range(2)], ArmOfUnknownAngle())
+    assert "Looked for in each recording by itself, not in all together: wheel-angle-ripple." in found.answer.notes
+    (least,) = [one.smallest_detectable for one in found.answer.sensitivity if one.name == "wheel-angle-ripple"]
+    assert least == float("inf")
+
+
+class ArmOfUnknownAngle(fleet_arm.ArmWithAngle):
+    """The same without the angle."""
+
+    def covariates(self, inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what friction follows but the angle."""
+        return {name: values for name, values in super().covariates(inputs).items() if name != "wheel_angle"}
 
 
 def test_a_fleet_without_a_finding_is_consistent(tmp_path: Path) -> None:

@@ -7,12 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from synthetic_fleet import DRAG, GROUPS, WAVE, WEAR, Drive, drive, equations_of, least_squares, on_both, term
+from synthetic_fleet import DRAG, GROUPS, WAVE, WEAR, Drive, Wave, drive, equations_of, least_squares, on_both, term
 
 from regolithd.calibration.mismatch.fleet.choice.courses import Course
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm, Units, fleet_equations
+from regolithd.calibration.mismatch.fleet.choice.search import further, penalty, places_of
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from regolithd.calibration.mismatch.candidates.candidate import Shape
     from regolithd.calibration.mismatch.fleet.choice.equations import Level
 
 ROVER = (0, 1, 0, 1, 0)
@@ -152,3 +156,42 @@ def test_a_simulation_without_free_parameters_is_fitted_too(drives: list[Drive])
     size = np.sum(column * residual) / np.sum(column**2)
     assert fit.coefficients == pytest.approx([size])
     assert fit.delta_chi2 == pytest.approx(size**2 * np.sum(column**2))
+
+
+class OfWheels(Wave):
+    """The same with coefficients of each wheel's own."""
+
+    def columns_of_wheels(self, shape: Shape, wheels: int) -> NDArray[np.int64]:  # noqa: ARG002
+        """Return two columns for each wheel."""
+        return np.arange(2 * wheels).reshape(wheels, 2)
+
+
+def test_a_law_whose_wheels_have_coefficients_of_their_own_has_them_on_each_wheel_of_each_rover() -> None:
+    """Each the same in all recordings of its rover; a fit with them is least squares of all readings."""
+    drives = [drive(n, {(3, 0): 0.2, (4, 1): 0.3 * (-1) ** n}) for n in range(5)]
+    own = replace(WAVE, candidate=OfWheels())
+    of = fleet_equations([each.sums() for each in drives], ROVER, range(5), (*GROUPS[:2], own), "rover")
+    one = term(own, Course("since", 1), rovers=(0, 1))
+    assert one.parts == (((0,), (0,)), ((0,), (1,)), ((1,), (0,)), ((1,), (1,)))
+    fit = of.fit((one,))
+    np.testing.assert_allclose(fit.coefficients, least_squares(drives, fit).coefficients, rtol=1e-8)
+    expected = [[0.2, 0], [0, 0.3], [0.2, 0], [0, -0.3]]
+    np.testing.assert_allclose(fit.coefficients[fit.spans[0]].reshape(4, 2), expected, atol=0.05)
+    gains = {
+        each.units.kind: value + penalty(of, each) for value, each in further(of, of.fit(()), places_of(of), [own])
+    }
+    assert gains["fleet"] == pytest.approx(of.fit((replace(one, course=Course("always")),)).delta_chi2, rel=0.05)
+
+
+def test_where_noise_is_less_a_law_counts_more(drives: list[Drive]) -> None:
+    """Its size, and what is left of the readings, are the same."""
+    sums = [each.sums() for each in drives]
+    quiet = [replace(each, reductions=np.array([1.0, 1.0, 4.0])) for each in sums]
+    one = term(WAVE, Course("always"), rovers=(0, 1))
+    plain, counted = (fleet_equations(each, ROVER, range(5), GROUPS, "rover") for each in (sums, quiet))
+    fit, again = plain.fit((one,)), counted.fit((one,))
+    np.testing.assert_allclose(again.coefficients[-2:], fit.coefficients[-2:], atol=0.005)
+    np.testing.assert_allclose(np.diag(again.covariance)[-2:], np.diag(fit.covariance)[-2:] / 4, rtol=0.1)
+    assert again.delta_chi2 == pytest.approx(4 * fit.delta_chi2, rel=0.1)
+    np.testing.assert_allclose(counted.squares(fit), plain.squares(fit), rtol=1e-9)
+    np.testing.assert_allclose(counted.products(1, 0, [1, 3]), sums[1].gram[0][np.ix_([1, 3], [1, 3])], rtol=1e-9)

@@ -112,3 +112,21 @@ def test_what_the_fleet_has_is_not_told_again_of_a_recording() -> None:
     for first, told in ((1, ()), (2, ((1, 0),))):
         fit = of.fit((term(DRAG, Course("since", first)),))
         assert shown_beside(of, fit, [found(), own, found()]).terms == told
+
+
+@pytest.mark.parametrize(
+    ("rover", "coupling", "told"),
+    [((0, 0, 0), "drag", ((0, 0), (1, 0))), ((0, 1, 0), "drag", ()), ((0, 0, 0), "offset", ())],
+)
+def test_the_same_curve_in_several_recordings_of_a_rover_is_judged_together(
+    rover: tuple[int, ...], coupling: str, told: tuple[tuple[int, int], ...]
+) -> None:
+    """Its cost is paid in each, the threshold once; a recording that does not pay its cost is not of it."""
+    sums = [replace(drive(n, on_both(OWN, 0.1)).sums(), own=((OWN,),)) for n in range(3)]
+    of = fleet_equations(sums, rover, (0.0, 1.0, 2.0), GROUPS, "rover")
+    fit, needed = of.fit(()), THRESHOLDS.smooth_term_entry + 2 * np.log(3)
+    gains = [gain_beside(of, fit, n, 0) for n in range(3)]
+    costs = [gains[0] - 0.6 * needed, gains[1] - 0.6 * needed, gains[2] + 1.0]
+    couplings = ("drag", coupling, "drag")
+    terms = [replace(shown("voltage", named=False, penalty=costs[n]), coupling=couplings[n]) for n in range(3)]
+    assert shown_beside(of, fit, [found(each) for each in terms]).curves == told

@@ -20,7 +20,7 @@ def test_the_size_is_that_of_least_squares_in_the_recording_alone() -> None:
     """With all else as the fleet's fit has it, and before the onset too."""
     of = equations_of(DRIVES, (0,) * 5)
     fit = of.fit((term(WAVE, Course("always")), term(DRAG, Course("since", 2))))
-    found = estimates_of(of, fit, 1)
+    found = dict(estimates_of(of, fit, 1))
     assert list(found) == [0, 1, 2, 3, 4]
     assert [estimate.acts for estimate in found.values()] == [False, False, True, True, True]
     for i, estimate in found.items():
@@ -39,7 +39,7 @@ def test_each_rover_s_recordings_are_beside_its_own_size() -> None:
     """Of an effect with a size for each rover."""
     of = equations_of([drive(n, on_both(1, 0.4 if n % 2 else 0.1)) for n in range(4)], (0, 1, 0, 1))
     fit = of.fit((FleetTerm(DRAG, Units((0, 1), (0, 1), "each rover"), Course("always")),))
-    found = estimates_of(of, fit, 0)
+    found = dict(estimates_of(of, fit, 0))
     assert [round(found[i].value, 1) for i in range(4)] == [0.1, 0.4, 0.1, 0.4]
 
 
@@ -52,7 +52,7 @@ def test_a_recording_without_the_effect_s_wheel_has_no_estimate() -> None:
     lacking = replace(lacking, wheels=("left",), **{name: getattr(lacking, name)[:1] for name in names})
     sums = [replace(silent, gram=gram), lacking, DRIVES[3].sums()]
     of = fleet_equations(sums, (0,) * 3, (0.0, 1.0, 2.0), GROUPS, "rover")
-    on_right = estimates_of(of, of.fit((term(DRAG, Course("always"), wheels=(1,)),)), 0)
+    on_right = dict(estimates_of(of, of.fit((term(DRAG, Course("always"), wheels=(1,)),)), 0))
     assert list(on_right) == [2]
-    on_all = estimates_of(of, of.fit((term(DRAG, Course("always")),)), 0)
+    on_all = dict(estimates_of(of, of.fit((term(DRAG, Course("always")),)), 0))
     assert {i: estimate.wheels for i, estimate in on_all.items()} == {1: (0,), 2: (0, 1)}
