@@ -69,10 +69,17 @@ def onset_interval(equations: NormalEquations, fit: Fit, index: int) -> tuple[fl
         density = likelihood(profile, grid, developments, _size(equations, fit, index))
         low, value, high = quantiles(grid, density, SHARES)
         return value, low, high
-    (value,) = quantiles(grid, _density(np.array([gains(float(onset_s)) for onset_s in grid])), (0.5,))
+
+    def median(onsets: Array) -> float:
+        (found,) = quantiles(onsets, _density(np.array([gains(float(onset_s)) for onset_s in onsets])), (0.5,))
+        return float(found)
+
+    value = median(grid)
     least = max(profile(shape), *gains(at)) - equations.thresholds.onset_fall
     low = max(at - _distance(lambda far: within(at - far), length_s), first)
     high = min(at + _distance(lambda far: within(at + far), length_s), last)
+    if not low <= value <= high:  # of what is possible, the middle
+        value = median(np.linspace(low, high, GRID))
     inside = low + MARGIN * (high - low), high - MARGIN * (high - low)
     return float(np.clip(value, *inside)), low, high
 

@@ -10,7 +10,7 @@ from linear_machine import AXES, INSTANTS, STEP_S, problem_of, table
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.load_cell_drift import DriftOfPredictedLoad
-from regolithd.calibration.mismatch.inference.onset_interval import onset_interval
+from regolithd.calibration.mismatch.inference.onset_interval import GRID, onset_interval
 from regolithd.calibration.mismatch.regression.candidate_groups import with_candidate
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape
@@ -73,3 +73,11 @@ def test_the_onset_of_a_random_walk_is_found() -> None:
     found = [interval_of(DriftOfPredictedLoad(), path_of(0.8, 0.0, seed), seed) for seed in range(SEEDS)]
     assert sum(abs(value - ONSET_S) < 0.1 * LENGTH_S for value, _, _ in found) >= 16
     assert sum(low <= ONSET_S <= high for _, low, high in found) >= 17
+
+
+def test_an_onset_that_is_known_closely_is_not_told_at_an_edge_of_its_interval() -> None:
+    """Where the interval is narrower than the step of the grid, the onset is found anew within it."""
+    for seed in (2, 5, 7):
+        value, low, high = interval_of(Steady(), path_of(0.0, 16.0, seed), seed)
+        assert high - low < LENGTH_S / GRID
+        assert low + 0.05 * (high - low) < value < high - 0.05 * (high - low)
