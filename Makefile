@@ -97,7 +97,7 @@ online: $(DEV) ## false reports of `regolithd monitor`, and delays of drag that 
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.online_study build/figures/online.json docs/online.svg
 
 fleet: $(DEV) ## 100 recordings of five virtual rovers on a local Dask cluster, a worker killed half way (half an hour)
-	$(BIN)/python -m regolithd.calibration.validation.fleet_study $(if $(SEED),--seed $(SEED)) $(if $(CHECK),--check $(CHECK)) $(if $(PICTURE),--picture docs/mismatch-season.png)
+	$(BIN)/python -m regolithd.calibration.validation.fleet_study $(if $(SEED),--seed $(SEED)) $(if $(DRIVES),--drives $(DRIVES)) $(if $(CHECK),--check $(CHECK)) $(if $(PICTURE),--picture docs/mismatch-season.png)
 
 mutations: $(DEV) ## `regolithd mismatch` on a thousand damaged files of each kind, and in other units (half an hour)
 	MUTATIONS=1000 INVARIANCES=1000 $(BIN)/python -m pytest --timeout 3600 tests/daemon/mismatch tests/calibration/mismatch/test_invariance.py

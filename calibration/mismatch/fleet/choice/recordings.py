@@ -41,15 +41,17 @@ class Shown:
 def shown_beside(equations: FleetEquations, fit: FleetFit, found: Sequence[Found]) -> Shown:
     """Return the effects and structures that recordings show beside the fit.
 
-    Recordings of one rover that show the same curve are judged together: what each gains beyond its cost adds up.
+    Recordings of one rover that show the same curve are judged together: what each gains beyond its cost adds up. A
+    fault that another channel shows (its penalty is below 0 for that) has to be significant in the predicted one, too.
     """
     chance = 2 * float(np.log(len(found)))
-    ahead = {
-        (i, k): gain_beside(equations, fit, i, k) - term.penalty
+    gains = {
+        (i, k): gain_beside(equations, fit, i, k)
         for i, of_recording in enumerate(found)
         for k, term in enumerate(of_recording.terms)
         if not _is_of_the_fleet(equations, fit, i, term)
     }
+    ahead = {(i, k): gain - found[i].terms[k].penalty for (i, k), gain in gains.items()}
     together = dict[object, float]()
     for (i, k), score in ahead.items():
         if not found[i].terms[k].named:
@@ -58,7 +60,8 @@ def shown_beside(equations: FleetEquations, fit: FleetFit, found: Sequence[Found
     effects, rest, own, curves = [], [], [], []
     for (i, k), score in ahead.items():
         term, findings = found[i].terms[k], found[i].findings
-        if term.named and score > found[i].entry_threshold + chance:
+        here = gains[i, k] > THRESHOLDS.smooth_term_entry
+        if term.named and here and score > found[i].entry_threshold + chance:
             own.append((i, k))
             effects += [(i, each) for each in findings.effects if each.name == term.name][:1]
         significant = together.get(_curve_of(equations, i, term), 0.0) > THRESHOLDS.smooth_term_entry + chance

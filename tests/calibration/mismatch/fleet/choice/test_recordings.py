@@ -94,6 +94,15 @@ def test_a_finding_must_gain_what_was_asked_there_and_for_the_choice_among_recor
         assert len(getattr(result, part)) == (margin > 0)
 
 
+def test_a_fault_of_another_channel_has_to_show_in_the_predicted_one() -> None:
+    """A load cell that seems to drift gains nothing beside the drag that the fleet has there."""
+    drift = shown("load-cell-drift", named=True, penalty=-250.0)
+    of = with_own(drive(1, on_both(OWN, 0.2)))
+    assert shown_beside(of, of.fit(()), [found(), found(drift), found()]).terms == ((1, 0),)
+    quiet = with_own(drive(1))
+    assert shown_beside(quiet, quiet.fit(()), [found(), found(drift), found()]).terms == ()
+
+
 def test_a_finding_is_told_as_its_recording_tells_it() -> None:
     """With the place of the recording; a name by its name, a structure by its place among the structures."""
     of = with_own(drive(1, {**on_both(OWN, 0.2), **on_both(OWN - 1, 0.2)}), count=2)

@@ -1,0 +1,54 @@
+"""Names that have more evidence than the answer, and pass every test that it passed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from winch import Winch
+
+from regolithd.calibration.mismatch.comparison import compare
+from regolithd.calibration.mismatch.data.recording import from_columns
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+ROWS, STEP_S, ONSET_S = 4000, 0.25, 500.0
+
+
+class InTheWind(Winch):
+    """A winch on which a wind acts."""
+
+    inputs = ("pull_N", "speed", "wind_m_s")
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return speed, time and wind."""
+        return {**super().covariates(inputs), "wind": inputs["wind_m_s"]}
+
+
+def smooth(rng: np.random.Generator, period_s: float) -> Array:
+    """Return a course of three sines about a period, with a standard deviation of 1."""
+    time_s = STEP_S * np.arange(ROWS)
+    course = sum(np.sin(2 * np.pi * time_s / (period_s * k) + rng.uniform(0, 6)) for k in (0.6, 1.0, 1.7))
+    return np.asarray(course / np.std(course))
+
+
+def test_a_drag_that_begins_is_named_beside_a_curve_that_was_found_before_it() -> None:
+    """The noise is estimated with the curve out of it at last, and beside that the drag has its evidence."""
+    rng = np.random.default_rng(4)
+    time_s, speed, wind = STEP_S * np.arange(ROWS), smooth(rng, 20.0), 8 + 2.5 * smooth(rng, 150.0)
+    noise = np.zeros(ROWS)
+    for row in range(1, ROWS):
+        noise[row] = 0.6 * noise[row - 1] + rng.normal(0, 0.08)
+    pull = 40 + 10 * smooth(rng, 45.0)
+    drag = 0.12 * np.sign(speed) * (time_s >= ONSET_S)
+    current = 0.02 * pull + 0.18 * np.sin(2 * np.pi * wind / 8.3) + drag + noise
+    columns = {"t_s": time_s, "current_A": current, "speed": speed, "pull_N": pull, "wind_m_s": wind}
+    answer = compare(from_columns(columns, unit="drum"), InTheWind()).answer
+    assert [effect.name for effect in answer.effects] == ["bearing-drag"]
+    assert abs((answer.effects[0].onset_s or 0.0) - ONSET_S) < 0.1 * time_s[-1]
+    assert [place.covariate for place in answer.unexplained] == ["wind"]
