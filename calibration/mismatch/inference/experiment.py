@@ -166,7 +166,8 @@ def range_in_words(problem: Problem, setting: Setting) -> str:
     rounded = (float(f"{each:.2g}") if abs(each) > least else 0.0 for each in (setting.low, setting.high))
     ends = " to ".join(f"{each:.6g}" for each in rounded)
     if setting.relative:
-        covariate = column_of(problem.recording.channels[setting.channel], problem.covariates)
+        read = problem.recording.channels.get(setting.channel)
+        covariate = None if read is None else column_of(read, problem.covariates)
         told = problem.labels.get(covariate or "", label_of_column(setting.channel))
         return f"{told.split(' (')[0]} {ends} times the usual"
     unit = unit_in_label(setting.covariate, problem.labels)
