@@ -95,11 +95,11 @@ def columns(
     return {name: np.concatenate(values) for name, values in made.items()}
 
 
-def write_simulation(folder: Path) -> Path:
-    """Write a SIM.toml that names `Arm`, for processes that know nothing of these tests."""
+def write_simulation(folder: Path, model: str = "Arm") -> Path:
+    """Write a SIM.toml that names a class of this file, for processes that know nothing of these tests."""
     path = folder / "SIM.toml"
     here = Path(__file__).resolve().parent
-    path.write_text(f'[simulation]\nmodel = "fleet_arm:Arm"\npath = "{here}"\n', encoding="utf-8")
+    path.write_text(f'[simulation]\nmodel = "fleet_arm:{model}"\npath = "{here}"\n', encoding="utf-8")
     return path
 
 

@@ -5,39 +5,54 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.corrected import corrected_tables, stated_tables, write_simulation
 from regolithd.calibration.mismatch.errors import MismatchError
-from regolithd.calibration.mismatch.fleet.choice.recordings import shown_beside
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm
     from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer, FleetEffect
     from regolithd.calibration.mismatch.fleet.told.findings import Chosen
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
+
+Array = NDArray[np.float64]
 
 Told = tuple["Contribution", "FleetEffect"]
 """An effect's term, and the same in the answer."""
 
 
 def acting_last(chosen: Chosen, answer: FleetAnswer, channel: str = "") -> list[Told]:
-    """Return the terms of the effects that act in the first rover's last recording, as large as they are there.
+    """Return the terms of the effects that act in the last recording of the only rover, as large as they are there.
 
-    `channel` is that of the terms; empty where the simulation predicts one alone.
+    Nothing of several rovers. `channel` is that of the terms; empty where the simulation predicts one alone.
     """
-    equations = chosen.equations.beside(shown_beside(chosen.equations, chosen.fit, chosen.found).terms)
-    fit, last = equations.fit(chosen.fit.terms), chosen.equations.recordings_of[0][-1]
-    found = []
+    if len(answer.rovers) > 1:
+        return []
+    equations, fit = chosen.equations, chosen.beside.fit
+    last, found = equations.recordings_of[0][-1], []
     for term, span, effect in zip(fit.terms, fit.spans, answer.effects, strict=False):
-        size = slice(span.start, span.start + len(term.group.columns))  # of several rovers' sizes the first
-        factors = fit.factors[size][0, last]
+        factors = fit.factors[span][:, last].max(axis=0)
         wheels = tuple(name for name, factor in zip(equations.wheels, factors, strict=True) if factor != 0)
         if wheels:
-            coefficients = tuple((float(np.max(factors)) * fit.coefficients[size]).tolist())
+            sizes = _of_candidate(term, fit.coefficients[span], len(equations.wheels))
+            coefficients = tuple((float(np.max(factors)) * sizes).tolist())
             found.append((Contribution(term.name, term.group.shape, coefficients, wheels, channel=channel), effect))
+    return found
+
+
+def _of_candidate(term: FleetTerm, sizes: Array, wheels: int) -> Array:
+    """Return a term's sizes as its candidate has coefficients of them; 0 of wheels that have others of their own."""
+    places = term.group.candidate.columns_of_wheels(term.group.shape, wheels)
+    if places is None:
+        return sizes
+    found = np.zeros(places.size)
+    for (_, (wheel,)), own in zip(term.parts, sizes.reshape(len(term.parts), -1), strict=True):
+        found[places[wheel]] = own
     return found
 
 

@@ -24,7 +24,7 @@ class FleetEvidence:
     labels: names of effects, covariates and axes
     units: of each predicted channel, by its name
     wheels: of all recordings
-    acting: the effects that act in the first rover's last recording, as terms and as the answer has them
+    acting: of one rover, the effects that act in its last recording, as terms and as the answer has them
     """
 
     rows: tuple[CatalogueRow, ...]

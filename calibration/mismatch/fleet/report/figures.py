@@ -66,7 +66,7 @@ def sizes_figure(rows: Sequence[CatalogueRow], rovers: Sequence[str], season: Se
     `factor` is from the rows' unit to that of the `label`.
     """
     ends = [factor * each for row in rows for each in (row.low, row.high) if each is not None]
-    low, high = min(0.0, *ends), max(0.0, *ends)
+    low, high = min([0.0, *ends]), max([0.0, *ends])
     margin = 0.08 * ((high - low) or 1.0)
     parts: list[str] = []
     panel = Panel(84, 0, WIDTH - 96, 0, season.ends, (0, 1))

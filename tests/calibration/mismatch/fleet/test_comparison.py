@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import os
 import signal
+import tomllib
 import weakref
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import fleet_arm
+import numpy as np
 import pyarrow.parquet
 import pytest
 from jsonschema import Draft202012Validator
 
-from regolithd.calibration.mismatch import MismatchError, compare
+from regolithd.calibration.mismatch import MismatchError, compare, load_simulation
 from regolithd.calibration.mismatch.fleet.comparison import FleetComparison, Member, compare_fleet
 from regolithd.calibration.mismatch.fleet.told.answer import fleet_answer_schema
 from regolithd.calibration.mismatch.fleet.work.found import Found
@@ -228,6 +230,15 @@ def test_a_ripple_that_recordings_show_is_the_fleet_s() -> None:
     found = compare([fleet_arm.columns(n, ripple=0.1) for n in range(3)], fleet_arm.ArmWithAngle())
     (effect,) = found.answer.effects
     assert effect.parameters["order"].value == fleet_arm.RIPPLES
+
+
+def test_a_ripple_is_carried_to_a_later_recording(tmp_path: Path) -> None:
+    """Each wheel's with the coefficients of its own."""
+    simulation, new = load_simulation(fleet_arm.write_simulation(tmp_path, "ArmWithAngle")), tmp_path / "NEW.toml"
+    compare([fleet_arm.columns(n, ripple=0.1) for n in range(4)], simulation).write_corrected(new)
+    (effect,) = tomllib.loads(new.read_text())["effects"]
+    assert np.hypot(*np.reshape(effect["coefficients"][:4], (2, 2)).T) == pytest.approx([0.1, 0.1], rel=0.2)
+    assert compare(fleet_arm.columns(9, ripple=0.1), load_simulation(new)).answer.verdict == "consistent"
 
 
 def test_what_is_looked_for_in_each_recording_alone_is_told_so() -> None:

@@ -212,6 +212,12 @@ def test_of_a_large_fleet_what_is_not_shown_is_told(monkeypatch: pytest.MonkeyPa
     assert "recorded <b>" not in text
 
 
+def test_sizes_that_no_recording_tells_alone_are_not_drawn() -> None:
+    """Their panel is empty."""
+    blank = tuple(replace(each, value=None, low=None, high=None) for each in ROWS)
+    assert marks(drawings(shown(rows=blank))["drag (N·m) in each recording"]) == {ACTS: 0, ABSENT: 0, UNEXPLAINED: 0}
+
+
 def test_a_consistent_fleet_has_a_season_and_what_it_is_worth() -> None:
     """And no section of effects; several channels have a table of their errors."""
     answer = replace(ANSWER, verdict="consistent", effects=(), unexplained=(), indistinguishable=(), parameters=())
