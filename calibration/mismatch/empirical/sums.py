@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.as_read import as_read, long_run_weights
+from regolithd.calibration.mismatch.regression.as_read import columns_on_wheels, long_run_weights
 from regolithd.calibration.mismatch.regression.smooth_groups import acting
 
 if TYPE_CHECKING:
@@ -101,28 +101,28 @@ def sums_of(equations: NormalEquations, beside: Fit, term: Term, whole: Fit) -> 
     What `whole`, the fit with the term, leaves is the noise: what `beside` alone leaves has the term's own course in
     it, whose long memory would be taken for the noise's.
     """
-    design, read = equations.design, as_read(equations, beside)
-    weights = long_run_weights(equations, whole)
+    design, weights = equations.design, long_run_weights(equations, whole)
+    columns, residual = columns_on_wheels(equations, beside), design.residual_as_read.astype(np.float64)
     values, factor = _course(equations, term)
     at, index = _bins(values, factor != 0)
-    folds, wheels, bins = len(design.cuts) - 1, len(read.weights), len(at)
+    folds, wheels, bins = len(design.cuts) - 1, len(weights), len(at)
     power, moment = np.zeros((folds, wheels, bins)), np.zeros((folds, wheels, bins))
-    cross = np.zeros((folds, wheels, bins, len(read.columns)))
-    gram = np.zeros((folds, wheels, len(read.columns), len(read.columns)))
-    column_moment = np.zeros((folds, wheels, len(read.columns)))
+    cross = np.zeros((folds, wheels, bins, len(columns)))
+    gram = np.zeros((folds, wheels, len(columns), len(columns)))
+    column_moment = np.zeros((folds, wheels, len(columns)))
     energy = np.zeros((folds, wheels))
     for fold, (a, b) in enumerate(zip(design.cuts[:-1], design.cuts[1:], strict=True)):
         for w in term.wheels:
             here, by = index[w, a:b], factor[w, a:b]
             power[fold, w] = np.bincount(here, by**2, bins)
-            moment[fold, w] = np.bincount(here, by * read.residual[w, a:b], bins)
-            for k, column in enumerate(read.columns):
+            moment[fold, w] = np.bincount(here, by * residual[w, a:b], bins)
+            for k, column in enumerate(columns):
                 cross[fold, w, :, k] = np.bincount(here, by * column[w, a:b], bins)
-        part, left = read.columns[:, :, a:b], read.residual[:, a:b]
+        part, left = columns[:, :, a:b], residual[:, a:b]
         gram[fold] = np.einsum("pwt,qwt->wpq", part, part, optimize=True)
         column_moment[fold] = np.einsum("pwt,wt->wp", part, left)
         energy[fold] = np.sum(left**2, axis=1)
-    beyond = np.zeros(len(read.columns) - len(equations.nuisance.columns))
+    beyond = np.zeros(len(columns) - len(equations.nuisance.columns))
     readings = np.bincount(index[factor != 0], minlength=bins).astype(np.float64)
     return CovariateSums(
         at=at,

@@ -40,7 +40,7 @@ def likelier_names(decision: Decision) -> Decision | None:
 
 
 def _with_curve(decision: Decision, other: Alternative) -> Decision:
-    """Return the decision with some of its names alone, and a curve."""
+    """Return the decision with the names and the curve of another answer."""
     named = [term for term in other.terms if term.group.named]
     curves = tuple(term for term in other.terms if not term.group.named)
     equations = decision.equations

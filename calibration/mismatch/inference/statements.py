@@ -6,8 +6,10 @@ import re
 from math import floor, isfinite, log10, sqrt
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from regolithd.calibration.mismatch.problem.words import in_words
-from regolithd.calibration.mismatch.regression.nuisance import LEAST_KNOWN
+from regolithd.calibration.mismatch.regression.nuisance import beyond_prior_predictive
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
@@ -182,9 +184,8 @@ def notes_on_priors(
 
 def _strains_its_prior(parameter: CalibratedParameter, thresholds: Thresholds) -> bool:
     """Return whether a parameter within its prior is further from it than the prior lets expect of readings."""
-    away, variance = parameter.prior_stds_away, parameter.variance_left
-    expected = sqrt(1 - min(variance, LEAST_KNOWN))
-    return not parameter.beyond_prior(thresholds) and away > thresholds.furthest_prior_stds * expected
+    away, left = np.array([parameter.prior_stds_away]), np.array([parameter.variance_left])
+    return not parameter.beyond_prior(thresholds) and bool(beyond_prior_predictive(away, left, thresholds)[0])
 
 
 def _strained_in_words(parameter: CalibratedParameter) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import direction_of
 from regolithd.calibration.mismatch.inference.statements import (
+    after_number,
     capital,
     had_to_leave_its_prior,
     listed,
@@ -18,7 +19,7 @@ from regolithd.calibration.mismatch.inference.statements import (
     plural,
     wheels_in_words,
 )
-from regolithd.calibration.mismatch.problem.words import COVARIATES
+from regolithd.calibration.mismatch.problem.words import COVARIATES, unit_in_label
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -122,9 +123,10 @@ class Labels:
         """Return what is told of the period of a sine: ", with a period of 12.3 s"; nothing where there is none."""
         if place.period is None:
             return ""
-        in_brackets = self.axis(place.covariate).partition(" (")[2].rstrip(")")
-        factor = self.time_factor if place.covariate == "time" else 1.0
-        return f", with a period of {place.period * factor:.3g} {in_brackets}".rstrip()
+        over_time = place.covariate == "time"
+        unit = self.time_unit if over_time else unit_in_label(place.covariate, self.covariates)
+        period = place.period * (self.time_factor if over_time else 1.0)
+        return f", with a period of {period:.3g}{after_number(unit)}"
 
     def parameter(self, effect: str, name: str) -> str:
         """Return the label of an effect's parameter."""

@@ -192,7 +192,7 @@ def effect(found: Effect, evidence: Evidence, labels: Labels, *, several: bool =
     )
     return EffectSection(
         capital(labels.effect(found.name)),
-        _unbroken(capital(found.statement)),
+        unbroken(capital(found.statement)),
         found.equation,
         tuple(fact for fact in facts if fact),
         parameter_rows(found, labels),
@@ -231,7 +231,7 @@ def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> Unexp
     )
     curve = empirical_section(place, evidence, labels) if place.curve else None
     name = labels.the(place.covariate) + labels.period(place)
-    return UnexplainedSection(name, tuple(_unbroken(fact) for fact in facts if fact), curve)
+    return UnexplainedSection(name, tuple(unbroken(fact) for fact in facts if fact), curve)
 
 
 def fit(answer: Answer, evidence: Evidence, labels: Labels) -> FitSection:
@@ -303,7 +303,7 @@ def other_curves(answer: Answer, evidence: Evidence, labels: Labels) -> tuple[Fi
     return tuple(Figure(_safe(drawing)) for drawing in drawings)
 
 
-def _unbroken(text: str) -> str:
+def unbroken(text: str) -> str:
     """Return a text whose numbers and percent signs stay on one line."""
     return text.replace(" %", NO_BREAK + "%")
 

@@ -59,7 +59,7 @@ class ParameterOfRover:
 
 @dataclass(frozen=True)
 class RecordingRow:
-    """A recording, and what it shows alone."""
+    """A recording, and what the answer says of it."""
 
     rover: str
     name: str
@@ -107,7 +107,7 @@ def _effect(
     ]
     section = sections.EffectSection(
         capital(labels.effect(found.name)),
-        capital(found.statement).replace(" %", sections.NO_BREAK + "%"),
+        sections.unbroken(capital(found.statement)),
         found.equation,
         tuple(_facts(found, answer, labels, wheels)),
         sections.parameter_rows(found, labels),
@@ -133,7 +133,7 @@ def _facts(found: FleetEffect, answer: FleetAnswer, labels: Labels, wheels: Sequ
         f"until {_day(found.until)}" if found.until else "",
         "constant" if found.covariate == "none" else f"depends on {labels.the(found.covariate)}",
     ]
-    return [each.replace(" %", sections.NO_BREAK + "%") for each in facts if each]
+    return [sections.unbroken(each) for each in facts if each]
 
 
 def _since(found: FleetEffect) -> str:

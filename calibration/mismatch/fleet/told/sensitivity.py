@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.fleet.work.grid import GridGroup
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
+DETERMINED = 1e-9
+"""Share of a term's energy outside of the span of all else, below which that is rounding."""
+
 
 def sensitivities(
     chooser: Chooser, fit: FleetFit, simulation: Simulation, not_together: Iterable[str]
@@ -76,7 +79,3 @@ def _smallest(chooser: Chooser, others: Sequence[FleetTerm], term: FleetTerm) ->
     return max(
         float(np.sqrt(squares / max(readings, 1.0)) * needed / np.sqrt(outside)), THRESHOLDS.smallest_effect * size
     )
-
-
-DETERMINED = 1e-9
-"""Share of a term's energy outside of the span of all else, below which that is rounding."""

@@ -81,8 +81,8 @@ def _shapes_by_response(
     candidate: Candidate, found: Sequence[Found], rovers: Sequence[str]
 ) -> tuple[tuple[Shape, ...], int]:
     """Return the shapes that recordings respond to most strongly together, and of how many they are."""
-    of = [(rover, each.responses[candidate.name]) for rover, each in zip(rovers, found, strict=False)
-          if candidate.name in each.responses]  # fmt: skip
+    name = candidate.name
+    of = [(rover, each.responses[name]) for rover, each in zip(rovers, found, strict=False) if name in each.responses]
     if not of:
         return (), 0
     responses = [each for _, each in of]
