@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from regolithd.calibration.mismatch.errors import MismatchError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
     from regolithd.calibration.mismatch.answer import Answer
@@ -53,7 +53,7 @@ def write_page(path: Path, found: Comparison, recordings: Sequence[Path], simula
     from regolithd.calibration.mismatch.report.page import write_report  # noqa: PLC0415
     from regolithd.calibration.mismatch.report.template import Provenance  # noqa: PLC0415
 
-    digests = [_digest_of(file) for file in (*recordings, simulation)]
+    digests = [digest_of(file) for file in (*recordings, simulation)]
     names = [recording.name for recording in recordings]
     command = f"regolithd mismatch {' '.join(names)} --simulation {simulation.name} --report {path.name}"
     source = Provenance(", ".join(names), simulation.name, ", ".join(digests[:-1]), digests[-1], command)
@@ -64,13 +64,21 @@ def write_fleet_page(path: Path, found: FleetComparison, recordings: Sequence[Pa
     """Write the report of many recordings, with names and SHA-256 of the files that it came from."""
     from regolithd.calibration.mismatch.fleet.report.page import FleetProvenance, fleet_report  # noqa: PLC0415
 
-    short = len({recording.name for recording in recordings}) == len(recordings)
-    digests = {recording.name if short else str(recording): _digest_of(recording) for recording in recordings}
+    names = short_names(recordings)
+    digests = {names[recording]: digest_of(recording) for recording in recordings}
     command = f"regolithd mismatch RECORDINGS --simulation {simulation.name} --report {path.name}"
-    source = FleetProvenance(digests, simulation.name, _digest_of(simulation), command)
+    source = FleetProvenance(digests, simulation.name, digest_of(simulation), command)
     path.write_text(fleet_report(found.answer, found.evidence, source), encoding="utf-8")
 
 
-def _digest_of(path: Path) -> str:
+def short_names(paths: Iterable[Path]) -> dict[Path, str]:
+    """Return what each file is called: its name, with its folders where two files have the same name."""
+    different = set(paths)
+    short = len({path.name for path in different}) == len(different)
+    return {path: path.name if short else str(path) for path in different}
+
+
+def digest_of(path: Path) -> str:
+    """Return the SHA-256 of a file's content, as hexadecimal digits."""
     with path.open("rb") as content:
         return file_digest(content, "sha256").hexdigest()

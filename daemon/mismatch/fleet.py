@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
-from hashlib import file_digest, sha256
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -24,7 +24,7 @@ from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER, date_in
 from regolithd.calibration.mismatch.fleet.work.store import Store
 from regolithd.calibration.mismatch.fleet.work.workers import AllCores, DaskCluster, Workers
 from regolithd.calibration.mismatch.simulation.load import load_simulation, model_folder, read_tables
-from regolithd.daemon.mismatch.files import write_fleet_page, write_json
+from regolithd.daemon.mismatch.files import digest_of, short_names, write_fleet_page, write_json
 from regolithd.daemon.mismatch.recordings import read_one
 from regolithd.daemon.mismatch.terminal import print_answer
 from regolithd.daemon.recording.export import recorded_snapshots
@@ -128,12 +128,11 @@ def begins_at(path: Path) -> datetime | None:
 def members_of(files: Sequence[RoverFile], unit: str) -> list[Member]:
     """Return the recordings of a fleet; their names are the files', with folders where two have the same."""
     paths = [file.path for file in files]
-    short = len({path.name for path in paths}) == len(set(paths))
+    names = short_names(paths)
     found: list[Member] = []
     for file in files:
-        path, name = file.path.resolve(), file.path.name if short else str(file.path)
-        with path.open("rb") as content:
-            digest = file_digest(content, "sha256").hexdigest() + file.rover
+        path, name = file.path.resolve(), names[file.path]
+        digest = digest_of(path) + file.rover
         whole = Member(
             name=f"{name} ({file.rover})" if paths.count(file.path) > 1 else name,
             rover=file.rover or ONLY_ROVER,

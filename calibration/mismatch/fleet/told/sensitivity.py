@@ -9,6 +9,7 @@ import numpy as np
 from regolithd.calibration.mismatch.answer import Sensitivity
 from regolithd.calibration.mismatch.fleet.choice.equations import FleetTerm
 from regolithd.calibration.mismatch.fleet.choice.search import may_share, penalty
+from regolithd.calibration.mismatch.inference.sensitivity import LARGEST_TOLD
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
@@ -58,7 +59,10 @@ def _first_place(chooser: Chooser, group: GridGroup) -> Place | None:
 
 
 def _smallest(chooser: Chooser, others: Sequence[FleetTerm], term: FleetTerm) -> float:
-    """Return the smallest root mean square where a term acts; of sizes of its own each part has the same."""
+    """Return the smallest root mean square where a term acts; of sizes of its own each part has the same.
+
+    Infinite: none shows, or only one of many times the mean reading.
+    """
     equations = chooser.equations
     fit = equations.fit((*others, term))
     at, span, factors = list(term.group.columns), fit.spans[-1], equations.factors(term)
@@ -76,6 +80,7 @@ def _smallest(chooser: Chooser, others: Sequence[FleetTerm], term: FleetTerm) ->
     needed = np.sqrt(chooser.entry_threshold + penalty(equations, term)) + THRESHOLDS.detection_quantile
     size = float(np.mean([sums.mean_size for sums in equations.sums]))
     outside = float(np.sum(1 / variances[told]))
-    return max(
+    found = max(
         float(np.sqrt(squares / max(readings, 1.0)) * needed / np.sqrt(outside)), THRESHOLDS.smallest_effect * size
     )
+    return found if found <= LARGEST_TOLD * size else float("inf")
