@@ -118,6 +118,8 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         *("NormalTruths", "NormalTruth", "MixingDensity", "Windows", "JumpChain", "Estimate", "Combination"),
         *("Batch", "Left"),
         "Whitening",
+        "NoiseSpectrum",
+        *("Confined", "ConfinedLaw"),
         *("Setting", "Drive", "Hypothesis", "Expected", "Choice", "Experimenter"),
         *("Piece", "Law", "Linearised", "Interval", "Segment", "Suffixes", "Search", "Scores", "_Beside"),
         *("CovariateSums", "Profile", "Points", "_Points", "Spline", "FittedForm", "FoundCurve", "EmpiricalFit"),

@@ -31,7 +31,7 @@ from regolithd.calibration.mismatch.empirical.stated import beyond_the_range
 from regolithd.calibration.mismatch.inference.evidence import empirical_fits, evidence_of
 from regolithd.calibration.mismatch.inference.feedback import fed_back, notes_of_feedback
 from regolithd.calibration.mismatch.inference.findings import Findings, answer_of, findings_of
-from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, earned
+from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, beside_regions, earned
 from regolithd.calibration.mismatch.inference.improbable import in_probable_regions
 from regolithd.calibration.mismatch.inference.joint_parameters import information_of
 from regolithd.calibration.mismatch.inference.parameter_information import drawn_for
@@ -41,6 +41,7 @@ from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.equations import smooth_equations, with_library
 from regolithd.calibration.mismatch.regression.reliability import noise_size_of
 from regolithd.calibration.mismatch.result import Comparison
+from regolithd.calibration.mismatch.selection.confined import without_confined_laws
 from regolithd.calibration.mismatch.selection.decision import as_if_late, decide
 from regolithd.calibration.mismatch.simulation.one_channel import OneChannel
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
@@ -216,7 +217,11 @@ def _decided(
     if decision.has_delay and not search.decision.has_delay:  # which was refused before held-out readings asked
         search = _searched_beside_delays(search, decision, pose, progress)
         decision, held_out = earned(search.decision, search.grid)
-    decision = without_refuted_curves(in_probable_regions(decision), start.problem)
+    confined = without_confined_laws(decision)
+    regional = in_probable_regions(confined)
+    if regional is not decision:
+        decision, held_out = beside_regions(regional, search.grid)
+    decision = without_refuted_curves(decision, start.problem)
     decision = with_changes_beside_same_parameters(decision)
     return Decided(decision, held_out, search.candidates, search.applicable)
 

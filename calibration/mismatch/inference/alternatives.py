@@ -19,9 +19,10 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
     passes_entry_test,
 )
 from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
-from regolithd.calibration.mismatch.selection.decision import answer_names
+from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED, answer_names
 from regolithd.calibration.mismatch.selection.law_misfit import law_misfit
 from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what_pulls_parameters_out
+from regolithd.calibration.mismatch.selection.region_search import schwarz_penalty
 from regolithd.calibration.mismatch.selection.smooth_terms import (
     covariate_of,
     drop_what_a_curve_explains,
@@ -58,16 +59,18 @@ class Alternative:
 def alternatives(decision: Decision, *, refused: bool = False) -> tuple[Alternative, ...]:
     """Return the other answers of one step's difference, the best of each set of names, best first.
 
-    With `refused` also those that held-out readings refused: no answers, but evidence that something is there.
+    With `refused` also those that held-out readings refused: no answers, but evidence that something is there. Where a
+    law in a range was more probable than a name that holds everywhere, no further name is another answer.
     """
     chosen = decision.whole
     best: dict[tuple[str, ...], tuple[float, tuple[Term, ...]]] = {}
-    ahead = _evidence(decision, chosen)
+    ahead, decided_names = _evidence(decision, chosen), answer_names(chosen.terms) - {UNEXPLAINED}
     for terms in _neighbours(decision):
         fit = decision.equations.fit(terms)
         names, evidence = _names(fit.terms), _evidence(decision, fit)
         plausible = ahead - evidence < LARGEST_MARGIN and evidence > best.get(names, NEVER)[0]
         told = names != _names(chosen.terms) and (refused or frozenset(names) not in decision.refused)
+        told = told and not (decision.confined and set(names) - {UNEXPLAINED} > decided_names)
         if told and plausible and _admissible(decision, fit):
             best[names] = evidence, fit.terms
     found = [Alternative(names, ahead - evidence, of) for names, (evidence, of) in best.items()]
@@ -128,9 +131,19 @@ def _is_a_laws_misfit(decision: Decision, fit: Fit, named: Fit, curve: Term) -> 
 
 
 def _evidence(decision: Decision, fit: Fit) -> float:
-    """Return the score of a fit less what each of its terms had to gain to enter."""
+    """Return the score of a fit less what each of its terms had to gain to enter.
+
+    Beside regions a curve pays for its coefficients as they did, by Schwarz's criterion.
+    """
     equations = decision.equations
-    return equations.score(fit) - entry_cost(equations, fit.terms, decision.entry_threshold)
+    evidence = equations.score(fit) - entry_cost(equations, fit.terms, decision.entry_threshold)
+    if any(term.group.region is not None for term in decision.unnamed):
+        curves = [term for term in fit.terms if not term.group.named and term.group.region is None]
+        paid = equations.thresholds.coefficient_penalty
+        evidence -= sum(
+            (schwarz_penalty(equations, fit, term.wheels) - paid) * len(term.group.columns) for term in curves
+        )
+    return evidence
 
 
 def _neighbours(decision: Decision) -> Iterator[tuple[Term, ...]]:

@@ -31,7 +31,7 @@ from regolithd.calibration.mismatch.inference.not_looked_for import not_looked_f
 from regolithd.calibration.mismatch.inference.other_covariates import notes_on_other_covariates
 from regolithd.calibration.mismatch.inference.parameter_information import parameter_covariance
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
-from regolithd.calibration.mismatch.inference.ranges import range_of
+from regolithd.calibration.mismatch.inference.ranges import notes_on_confined_laws, range_of
 from regolithd.calibration.mismatch.inference.same_parameters import with_changed_or_moved
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
 from regolithd.calibration.mismatch.inference.statements import notes_on_priors, parameters_found, statement, words_of
@@ -98,6 +98,7 @@ def findings_of(
         notes=(
             *notes_on_priors(parameters, unexplained=rest, thresholds=limits),
             *decision.notes,
+            *notes_on_confined_laws(decision),
             *notes_on_other_covariates(decision),
             *notes_on_dynamics(decision),
         ),

@@ -46,13 +46,15 @@ class HeldOutErrors:
     Attributes
     ----------
     before, after: of the calibrated simulation, and of it with those named effects that the other blocks chose too
-    without, with_it: for each named term, on its wheels
+    without, with_it: for each named term, on its wheels, beside the curves of what is unexplained
+    whole: of all that was found, with those curves
     """
 
     before: float
     after: float
     without: tuple[float, ...]
     with_it: tuple[float, ...]
+    whole: float
 
     def without_gain(self) -> int | None:
         """Return the index of the term that lowers the held-out error least, if it does not lower it at all."""
@@ -63,36 +65,43 @@ class HeldOutErrors:
 
 
 def held_out_errors(
-    equations: NormalEquations, named: Fit, groups: Sequence[Group], entry_threshold: float
+    equations: NormalEquations,
+    named: Fit,
+    groups: Sequence[Group],
+    entry_threshold: float,
+    curves: tuple[Term, ...] = (),
 ) -> tuple[NormalEquations, HeldOutErrors]:
     """Choose, optimise and fit on all folds but one, measure on that one, for each fold in turn.
 
-    `groups` are those to choose from: the grid as it was before any data optimised its shapes. The equations that come
-    back have the columns of what the folds optimised, so that none of them has to copy the others.
+    `groups` are those to choose from: the grid as it was before any data optimised their shapes. What is unexplained is
+    fitted by its `curves` beside them, so that it hides no name; `before` and `after` are without those. The equations
+    that come back have the columns of what the folds optimised, so that none of them has to copy the others.
     """
     wheels = len(equations.weights)
     before, after = np.zeros(wheels), np.zeros(wheels)
-    without = np.zeros((len(named.terms), wheels))
+    without, with_it = np.zeros((len(named.terms), wheels)), np.zeros(wheels)
     for fold in range(equations.design.folds):
         train = training_equations(equations, fold)
-        chosen = chosen_effects(train.with_groups(groups), entry_threshold)
-        train, chosen = with_optimised_shapes(train, chosen)
+        chosen = chosen_effects(train.with_groups(groups), entry_threshold, curves)
+        train, chosen = with_optimised_shapes(train, chosen, curves)
         if len(chosen) == len(named.terms) and {term.name for term in chosen} != {term.name for term in named.terms}:
-            train, chosen = _or_as_named(train, chosen, named, groups)
+            train, chosen = _or_as_named(train, chosen, named, groups, curves)
         chosen = of_names(chosen, named)
         equations = equations.over(train.design.with_groups(equations.design.groups))
         before += squares_left(train, train.fit(()), fold)
         after += squares_left(train, train.fit(chosen), fold)
+        with_it += squares_left(train, train.fit((*chosen, *curves)), fold)
         for index, term in enumerate(named.terms):
             rest = tuple(other for other in chosen if other.group.subject != term.group.subject)
-            without[index] += squares_left(train, without_term(train, term, rest), fold)
+            without[index] += squares_left(train, without_term(train, term, (*rest, *curves)), fold)
     counts = equations.design.counts.sum(axis=0)
     on = [list(term.wheels) for term in named.terms]
     return equations, HeldOutErrors(
         before=_rms(before, counts),
         after=_rms(after, counts),
         without=tuple(_rms(squares[w], counts[w]) for squares, w in zip(without, on, strict=True)),
-        with_it=tuple(_rms(after[w], counts[w]) for w in on),
+        with_it=tuple(_rms(with_it[w], counts[w]) for w in on),
+        whole=_rms(with_it, counts),
     )
 
 
@@ -102,16 +111,22 @@ def of_names(chosen: tuple[Term, ...], named: Fit) -> tuple[Term, ...]:
     return tuple(term for term in chosen if term.name in names)
 
 
-def with_optimised_shapes(train: NormalEquations, chosen: tuple[Term, ...]) -> tuple[NormalEquations, tuple[Term, ...]]:
+def with_optimised_shapes(
+    train: NormalEquations, chosen: tuple[Term, ...], curves: tuple[Term, ...] = ()
+) -> tuple[NormalEquations, tuple[Term, ...]]:
     """Return the chosen effects with their shapes optimised on the folds of `train` alone, and equations with them."""
     terms = list(chosen)
     for index, term in enumerate(chosen):
-        train, terms[index] = optimised_shape(train, terms[:index] + terms[index + 1 :], term)
+        train, terms[index] = optimised_shape(train, [*terms[:index], *terms[index + 1 :], *curves], term)
     return with_best_developments(train, terms)
 
 
 def _or_as_named(
-    train: NormalEquations, chosen: tuple[Term, ...], named: Fit, groups: Sequence[Group]
+    train: NormalEquations,
+    chosen: tuple[Term, ...],
+    named: Fit,
+    groups: Sequence[Group],
+    curves: tuple[Term, ...],
 ) -> tuple[NormalEquations, tuple[Term, ...]]:
     """Return the answer's effects, fitted to these folds, where they score more there than as many that were chosen.
 
@@ -120,13 +135,13 @@ def _or_as_named(
     terms: tuple[Term, ...] = ()
     for one in named.terms:
         family = family_of(one, [other for other in named.terms if other is not one], groups)
-        found = [(gain, term) for gain, term in train.further(terms, family) if term.wheels == one.wheels]
+        found = [(gain, term) for gain, term in train.further((*terms, *curves), family) if term.wheels == one.wheels]
         if not found:
             return train, chosen
         terms = (*terms, max(found, key=lambda pair: pair[0])[1])
-    train, terms = with_optimised_shapes(train, terms)
-    as_named = train.fit(terms)
-    better = acceptable(train, as_named) and train.score(as_named) > train.score(train.fit(chosen))
+    train, terms = with_optimised_shapes(train, terms, curves)
+    as_named = train.fit((*terms, *curves))
+    better = acceptable(train, as_named) and train.score(as_named) > train.score(train.fit((*chosen, *curves)))
     return train, terms if better else chosen
 
 
@@ -135,12 +150,12 @@ def _rms(squares: Array, counts: Array) -> float:
     return float(np.sqrt(max(float(squares.sum()), 0.0) / counts.sum()))
 
 
-def chosen_effects(train: NormalEquations, entry_threshold: float) -> tuple[Term, ...]:
-    """Choose by the same tests on these folds alone, on the grid: forwards, and once among pairs."""
+def chosen_effects(train: NormalEquations, entry_threshold: float, curves: tuple[Term, ...] = ()) -> tuple[Term, ...]:
+    """Choose by the same tests on these folds alone, on the grid, beside curves: forwards, and once among pairs."""
     terms: tuple[Term, ...] = ()
     first: list[tuple[float, Term]] = []
     for _ in range(LARGEST_SET):
-        found = best_of_each_candidate(train, terms)
+        found = best_of_each_candidate(train, (*terms, *curves))
         if not found:
             break
         first = first or found
@@ -149,43 +164,73 @@ def chosen_effects(train: NormalEquations, entry_threshold: float) -> tuple[Term
             trials += [
                 (one, other)
                 for _, one in first[:TRIED_FIRST]
-                for _, other in best_of_each_candidate(train, (one,))[:TRIED_SECOND]
+                for _, other in best_of_each_candidate(train, (one, *curves))[:TRIED_SECOND]
             ]
-        ranked = sorted((train.fit(trial) for trial in trials), key=train.score, reverse=True)
+        ranked = sorted((train.fit((*trial, *curves)) for trial in trials), key=train.score, reverse=True)
         best = next((fit for fit in ranked if acceptable(train, fit)), None)
-        if best is None or not passes_entry_test(train, best, train.fit(terms), entry_threshold):
+        if best is None or not passes_entry_test(train, best, train.fit((*terms, *curves)), entry_threshold):
             break
-        terms = best.terms
+        terms = best.terms[: len(best.terms) - len(curves)]
     return terms
 
 
 def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOutErrors]:
-    """Return the decision without names that lower no held-out error, the worst dropped first; and those errors.
+    """Return the decision without names that lower no held-out error by themselves, the worst first; and its errors.
 
     An answer that has more evidence takes its place where its names lower it further, or are fewer. What comes and goes
     is unexplained; so is, without any name left, what is more probably there than not. `grid` are the groups before
     any data optimised their shapes.
     """
     equations, threshold = decision.equations, decision.entry_threshold
-    problem, kept = equations.problem, set(map(id, grid))
-    choice = [group for group in equations.design.groups if id(group) in kept or _only_proposed(problem, group)]
+    choice = _choice(decision, grid)
     equations, held_out = held_out_errors(equations, decision.named, choice, threshold)
     while (idle := held_out.without_gain()) is not None:
         decision = without_name(replace(decision, equations=equations), idle)
         equations, held_out = held_out_errors(equations, decision.named, choice, threshold)
-    decision = replace(decision, equations=equations)
+    if decision.unnamed:
+        equations, held_out = held_out_errors(equations, decision.named, choice, threshold, decision.unnamed)
+    decision, held_out = with_likelier_names(replace(decision, equations=equations), held_out, grid)
+    told = unexplained_if_improbable(unexplained_if_intermittent(decision))
+    if told.named.terms != decision.named.terms:
+        equations, held_out = held_out_errors(told.equations, told.named, choice, threshold, told.unnamed)
+        told = replace(told, equations=equations)
+    return told, held_out
+
+
+def with_likelier_names(
+    decision: Decision, held_out: HeldOutErrors, grid: Sequence[Group]
+) -> tuple[Decision, HeldOutErrors]:
+    """Return the answer that has most evidence, of those whose names held-out readings confirm.
+
+    Their names alone lower the held-out error further, or do so with what stays unexplained, or are fewer.
+    """
+    choice = _choice(decision, grid)
     while (other := likelier_names(decision)) is not None:
-        equations, errors = held_out_errors(other.equations, other.named, choice, threshold)
-        lower = errors.after < held_out.after or names_of(other) < names_of(decision)
-        if errors.without_gain() is None and lower:
+        equations, errors = held_out_errors(
+            other.equations, other.named, choice, decision.entry_threshold, other.unnamed
+        )
+        lower = errors.after < held_out.after or errors.whole < held_out.whole
+        if errors.without_gain() is None and (lower or names_of(other) < names_of(decision)):
             decision, held_out = replace(other, equations=equations), errors
         else:
             decision = replace(decision, equations=equations, refused=decision.refused | {names_of(other)})
-    told = unexplained_if_improbable(unexplained_if_intermittent(decision))
-    if told.named.terms != decision.named.terms:
-        equations, held_out = held_out_errors(told.equations, told.named, choice, threshold)
-        told = replace(told, equations=equations)
-    return told, held_out
+    return decision, held_out
+
+
+def beside_regions(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOutErrors]:
+    """Return a decision whose curves have become regions, with the names that have more evidence beside these."""
+    choice = _choice(decision, grid)
+    equations, held_out = held_out_errors(
+        decision.equations, decision.named, choice, decision.entry_threshold, decision.unnamed
+    )
+    return with_likelier_names(replace(decision, equations=equations, refused=frozenset()), held_out, grid)
+
+
+def _choice(decision: Decision, grid: Sequence[Group]) -> list[Group]:
+    """Return the groups that each fold chooses from."""
+    problem, kept = decision.equations.problem, set(map(id, grid))
+    groups = decision.equations.design.groups
+    return [group for group in groups if id(group) in kept or _only_proposed(problem, group)]
 
 
 def _only_proposed(problem: Problem, group: Group) -> bool:

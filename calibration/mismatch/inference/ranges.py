@@ -35,6 +35,25 @@ def range_of(decision: Decision, term: Term) -> Range | None:
     return Range(region.covariate, lower, upper, in_words(region.covariate, lower, upper, problem))
 
 
+def notes_on_confined_laws(decision: Decision) -> tuple[str, ...]:
+    """Return a note on each law of the library that explains a range better than any does that acts everywhere."""
+    notes = []
+    for each in decision.confined:
+        candidate = each.law.group.candidate
+        where = range_of(decision, each.region) if each.region in decision.whole.terms else None
+        if candidate is not None and where is not None:
+            notes.append(
+                f"Of the library's laws, {candidate.label} explains best what acts {_only(where)}: "
+                f"{candidate.words_for(each.law.group.shape)}. Where it acts everywhere, no law explains as much."
+            )
+    return tuple(notes)
+
+
+def _only(where: Range) -> str:
+    """Return a range without how sure it is, which the finding tells."""
+    return f"only {where.statement.split(' (90 %')[0]}"
+
+
 def covariate_unit(problem: Problem, covariate: str) -> str:
     """Return a covariate's unit, as its label has it in brackets; 1 where it is not known."""
     if unit := unit_in_label(covariate, problem.labels):

@@ -164,9 +164,22 @@ def range_sums(
     equations: NormalEquations, read: AsRead, covariate: str, coupling: str, wheels: Sequence[int], edges: Array
 ) -> RangeSums:
     """Sum over the bins between edges, on some wheels, beside a fit to the readings as they were read."""
+    course = acting(equations.problem, covariate, coupling)
+    return sums_over_ranges(equations, read, (covariate, coupling), course, wheels, edges)
+
+
+def sums_over_ranges(
+    equations: NormalEquations,
+    read: AsRead,
+    named: tuple[str, str],
+    course: tuple[Array, Array],
+    wheels: Sequence[int],
+    edges: Array,
+) -> RangeSums:
+    """Sum the same of any course: a covariate's values, and a factor by which they act, shape (time, wheel) each."""
     fit = read.fit
     problem, design = equations.problem, equations.design
-    values, factor = (each[design.order] for each in acting(problem, covariate, coupling))
+    values, factor = (each[design.order] for each in course)
     mask = problem.mask[design.order] & np.isfinite(values)
     on = list(wheels)
     inside = values[:, on][mask[:, on]]
@@ -192,8 +205,8 @@ def range_sums(
                 fitted = read.columns[c, w, rows]
                 cross[:, :, c] += np.stack([np.bincount(at, each * fitted, bins) for each in column], axis=1)
     return RangeSums(
-        covariate=covariate,
-        coupling=coupling,
+        covariate=named[0],
+        coupling=named[1],
         edges=edges,
         low=low,
         high=high,

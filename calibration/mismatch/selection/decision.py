@@ -18,7 +18,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import best_subsets, 
 from regolithd.calibration.mismatch.selection.cross_validation import drop_what_does_not_transfer
 from regolithd.calibration.mismatch.selection.implausible_effects import drop_what_the_implausible_explains
 from regolithd.calibration.mismatch.selection.noise_estimation import (
-    fit_of_significant_terms,
+    noise_left,
     noise_of_whitened,
     whitened,
 )
@@ -60,6 +60,22 @@ class Intermittent:
 
 
 @dataclass(frozen=True, eq=False)
+class ConfinedLaw:
+    """A candidate's law that is more probable in a range of a covariate than a name that holds everywhere.
+
+    Attributes
+    ----------
+    law: the term everywhere, of which a region of the covariate has the law
+    instead_of: the name
+    region: the term that stands for it, unexplained
+    """
+
+    law: Term
+    instead_of: str
+    region: Term
+
+
+@dataclass(frozen=True, eq=False)
 class Decision:
     """What was decided, and what the inference needs.
 
@@ -73,6 +89,7 @@ class Decision:
     whole: fit of both together
     intermittent: of those of the smooth terms that stand for what comes and goes, when and how much
     refused: answers, by their names, of which one name lowered no held-out error
+    confined: laws that were more probable in a range than a name that holds everywhere
     notes: on what was decided
     changed_or_moved: for each corrected effect that has changed, or else parameters have (`inference.same_parameters`),
         by how much the first is ahead of the second, in Δχ²
@@ -86,6 +103,7 @@ class Decision:
     whole: Fit
     intermittent: tuple[Intermittent, ...] = ()
     refused: frozenset[frozenset[str]] = frozenset()
+    confined: tuple[ConfinedLaw, ...] = ()
     notes: tuple[str, ...] = ()
     changed_or_moved: Mapping[str, float] = field(default_factory=dict)
 
@@ -129,7 +147,7 @@ class Decision:
 def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decision:
     """Choose the named effects, and the smooth terms that nothing named explains."""
     problem = equations.problem
-    left = residual_of(equations, fit_of_significant_terms(equations))
+    left = noise_left(equations)
     equations = whitened(equations, left)
     threshold = entry_threshold(equations, left, blocks_of_time(problem, noise_of_whitened(equations.design, left)))
     equations = with_proposed_shapes(equations, candidates)

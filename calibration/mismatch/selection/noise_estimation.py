@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.regression.as_read import left_beside
 from regolithd.calibration.mismatch.regression.reliability import reliability_of
-from regolithd.calibration.mismatch.regression.residuals import residual_of
+from regolithd.calibration.mismatch.regression.residuals import residual_as_read_of, residual_of
 from regolithd.calibration.mismatch.selection.causality import acts_forwards
 from regolithd.calibration.mismatch.signal.noise import NoiseModel
+from regolithd.calibration.mismatch.signal.noise_spectrum import gain_of_columns
 from regolithd.calibration.mismatch.signal.whitening import estimate_whitening
 
 if TYPE_CHECKING:
@@ -39,7 +41,49 @@ def fit_of_significant_terms(equations: NormalEquations) -> Fit:
     weighted = equations.weighted(NoiseModel(second.deviation, second.autocorrelation_time).weights)
     least_score = limits.noise_term_share * limits.smooth_term_entry
     terms = _most_significant(weighted, 2 * limits.provisional_terms, least_score)
-    return weighted.fit(terms)
+    return weighted.fit(_beyond_slow_noise(weighted, terms))
+
+
+def noise_left(equations: NormalEquations) -> Array:
+    """Return the residual [time, wheel] of the significant terms, parameters being as far off as any is told to be.
+
+    What a wrong parameter leaves is no noise, whoever states how well it is known.
+    """
+    terms, nuisance = fit_of_significant_terms(equations).terms, equations.nuisance
+    wide = nuisance.widened(nuisance.told(equations.problem), equations.problem)
+    free = equations.with_nuisance(wide)
+    return residual_of(free, free.fit(terms))
+
+
+def _beyond_slow_noise(equations: NormalEquations, terms: Sequence[Term]) -> list[Term]:
+    """Return the terms without which the residual is less likely to be noise, whatever the spectrum of that is.
+
+    Under a short autocorrelation time slow noise is significant, and a curve that follows it would be taken out of it.
+    The worst term is left out first.
+    """
+    kept = list(terms)
+    while kept:
+        scores = [
+            _gain_over_noise(equations, [*kept[:index], *kept[index + 1 :]], term) - equations.penalty(term)
+            for index, term in enumerate(kept)
+        ]
+        worst = int(np.argmin(scores))
+        if scores[worst] > 0:
+            break
+        del kept[worst]
+    return kept
+
+
+def _gain_over_noise(equations: NormalEquations, rest: Sequence[Term], term: Term) -> float:
+    """Return what a term gains beside others in twice the log likelihood, where what is left is noise."""
+    design, fit = equations.design, equations.fit(rest)
+    columns = design.in_time(design.columns_as_read(term.group.columns).astype(np.float64))
+    on = np.isin(np.arange(columns.shape[-1]), term.wheels)
+    beside = design.in_folds(left_beside(equations, fit, columns * on))
+    left = residual_as_read_of(equations, fit)
+    read = [places for places, _ in design.readings]
+    courses = [of_wheel[places] for places, of_wheel in zip(read, left, strict=True)]
+    return gain_of_columns(courses, [beside[:, w, places] for w, places in enumerate(read)], equations.thresholds)
 
 
 def whitened(equations: NormalEquations, residual: Array) -> NormalEquations:

@@ -179,7 +179,7 @@ def _region_of(equations: NormalEquations, fit: Fit, read: AsRead, curve: Term, 
     if not len(edges):
         return None
     sums = range_sums(equations, read, covariate, coupling, wheels, edges)
-    ranges = _allowed(sums, Ranges(*np.triu_indices(len(edges) + 2, 1)), fit)
+    ranges = allowed(sums, Ranges(*np.triu_indices(len(edges) + 2, 1)), fit)
     of_each = schwarz_penalty(equations, fit, wheels)
     coarse = sorted(_best_of_each_form(equations, sums, ranges, forms, of_each), key=_rank)
     refined = (_refined(equations, read, wheels, choice, edges) for choice in coarse[:REFINED])
@@ -249,7 +249,7 @@ def _refined(
         ]
         fine = np.unique(np.concatenate(places))
         sums = range_sums(equations, read, region.covariate, region.coupling, wheels, fine)
-        ranges = _allowed(sums, between(fine, *places), read.fit)
+        ranges = allowed(sums, between(fine, *places), read.fit)
         if not len(ranges.first):
             return choice
         gains = sums.delta_chi2(ranges, [region.powers])[0]
@@ -279,7 +279,7 @@ def between(edges: Array, lower: Array, upper: Array) -> Ranges:
     return Ranges(pairs[0].ravel(), pairs[1].ravel())
 
 
-def _allowed(sums: RangeSums, ranges: Ranges, fit: Fit) -> Ranges:
+def allowed(sums: RangeSums, ranges: Ranges, fit: Fit) -> Ranges:
     """Return the ranges with readings in and outside of them, and apart from the regions of a fit."""
     forwards = ranges.first < ranges.last
     share = sums.share(ranges)

@@ -34,7 +34,9 @@ def in_regions(decision: Decision) -> Decision:
 
     What recurs, follows what was before, or comes and goes, is in no region.
     """
-    if not decision.unnamed or decision.intermittent or decision.unnamed[0].group.coupling in WITHOUT_CURVE:
+    if not decision.unnamed or decision.intermittent or decision.confined:
+        return decision
+    if decision.unnamed[0].group.coupling in WITHOUT_CURVE:
         return decision
     named, curve = decision.named, decision.unnamed[0]
     needed = _curve_score(decision.equations, named, curve)

@@ -37,6 +37,11 @@ class NoiseThresholds:
         "Share of `smooth_term_entry` that a term must score to be taken out before the noise is estimated again.",
         f"{TRIALS}: what is left in makes the noise seem larger, what is taken out by chance smaller",
     )
+    slowest_noise_share: float = threshold(
+        0.02,
+        "Correlation time of the noise, as a share of the recording, beyond which what wanders is structure.",
+        f"{CHOICE}: fifty of these times; slow noise and an effect that is as slow have the same likelihood",
+    )
     noise_term_columns: int = threshold(
         12,
         "Most columns of a term that is taken out before the noise is estimated: a freer curve follows noise.",

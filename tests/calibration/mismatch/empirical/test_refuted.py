@@ -60,7 +60,7 @@ def test_a_curve_that_held_out_readings_do_not_confirm_is_none(monkeypatch: pyte
     assert compare(pumped(1), Pump()).answer.unexplained == ()
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, 4])
 def test_what_errors_give_by_themselves_is_no_finding(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """A room that a noisy current heats wanders; a curve over time would follow that."""
     assert compare(recorded(seed), ReadRoom()).answer.verdict == "consistent"

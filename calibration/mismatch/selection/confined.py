@@ -1,0 +1,205 @@
+"""A law that holds in a range alone: no name that holds everywhere may stand for it.
+
+Friction below a temperature, or a drag beyond an angle, leaks into laws that hold everywhere and are then named, with a
+curve for the rest. Where a candidate's law confined to a range of a covariate is more probable than such a name with
+all that stands beside it, the name goes; what is left is told as unexplained over that covariate, with the range.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.regression.as_read import as_read
+from regolithd.calibration.mismatch.regression.group import Group, Term
+from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
+from regolithd.calibration.mismatch.regression.range_sums import Ranges, known_values, sums_over_ranges
+from regolithd.calibration.mismatch.regression.smooth_groups import acting, couplings_of
+from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_candidate, best_of_each_smooth_term
+from regolithd.calibration.mismatch.selection.decision import ConfinedLaw
+from regolithd.calibration.mismatch.selection.law_misfit import law_misfit
+from regolithd.calibration.mismatch.selection.region_search import (
+    Found,
+    allowed,
+    edges_of,
+    schwarz_penalty,
+    with_region,
+)
+from regolithd.calibration.mismatch.selection.smooth_terms import covariate_of, unexplained_beside
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+    from regolithd.calibration.mismatch.regression.region import Region
+    from regolithd.calibration.mismatch.selection.decision import Decision
+
+Array = NDArray[np.float64]
+
+LAWS_TRIED = 6
+"""Laws that are confined to ranges, beside the one that was named (a choice: computing time)."""
+COVARIATES_TRIED = 3
+"""Covariates over whose ranges they are (a choice: computing time)."""
+STEP = (0,)
+"""A law's own size, the same in the whole range."""
+
+
+@dataclass(frozen=True, eq=False)
+class Confined:
+    """A law in a range: the equations with its column, the fit with it beside the rest, and the score of that."""
+
+    equations: NormalEquations
+    fit: Fit
+    law: Term
+    region: Region
+    score: float
+
+
+def without_confined_laws(decision: Decision) -> Decision:
+    """Return the decision without names in whose place a law in a range is more probable, regions in their place.
+
+    A curve that stood beside the name stays where it is significant beside the region.
+    """
+    while (found := _better_in_a_range(decision)) is not None:
+        index, confined = found
+        rest = decision.equations.fit(decision.named.without(index))
+        equations, whole = _with_region(decision.equations, rest, confined)
+        region, told = whole.terms[-1], tuple(each.region for each in decision.confined)
+        whole = equations.fit((*rest.terms, *told, region))
+        left = unexplained_beside(equations, whole)
+        unnamed = (*told, region) if left is None or left.name == region.name else (*told, region, left)
+        decision = replace(
+            decision,
+            equations=equations,
+            named=equations.fit(rest.terms),
+            unnamed=unnamed,
+            whole=equations.fit((*rest.terms, *unnamed)),
+            confined=(*decision.confined, ConfinedLaw(confined.law, decision.named.terms[index].name, region)),
+        )
+    return decision
+
+
+def _better_in_a_range(decision: Decision) -> tuple[int, Confined] | None:
+    """Return the name that a law in a range is better than, by its index, and that law; None: there is none."""
+    equations, named, limits = decision.equations, decision.named, decision.equations.thresholds
+    told = _told_score(decision)
+    best: tuple[int, Confined] | None = None
+    for index, term in enumerate(named.terms):
+        if not _may_be_confined(term):
+            continue
+        rest = equations.fit(named.without(index))
+        for confined in _in_ranges(equations, rest, term, _covariates(decision, term)):
+            ahead = confined.score - told
+            instead = law_misfit(equations, named, confined.fit)
+            of_its_covariate = confined.region.covariate == covariate_of(term)
+            better = ahead > limits.smooth_term_entry and (not of_its_covariate or instead > limits.form_misfit)
+            if better and (best is None or confined.score > best[1].score):
+                best = index, confined
+    return best
+
+
+def _told_score(decision: Decision) -> float:
+    """Return the score of what was decided, its curves paid for by Schwarz's criterion as ranges are."""
+    equations, whole = decision.equations, decision.whole
+    paid = equations.thresholds.coefficient_penalty
+    curves = [term for term in decision.unnamed if term.group.region is None]
+    extra = sum((schwarz_penalty(equations, whole, each.wheels) - paid) * len(each.group.columns) for each in curves)
+    return equations.score(whole) - extra
+
+
+def _may_be_confined(term: Term) -> bool:
+    """Return whether a term is a law of the machine: no sensor's fault, no change at a time, no corrected effect."""
+    group = term.group
+    return not group.is_change and group.own_channel is None and covariate_of(term) not in {"time", "none"}
+
+
+def _covariates(decision: Decision, term: Term) -> list[tuple[str, str]]:
+    """Return covariates over whose ranges a term's law may be confined, each with a coupling of smooth terms there.
+
+    These are the covariates of what is left on its wheels, whether told or tolerated, and the law's own.
+    """
+    equations, least = decision.equations, decision.equations.thresholds.smooth_term_entry
+    scored = best_of_each_smooth_term(equations, decision.named.terms)
+    left = (*decision.unnamed, *(curve for score, curve in scored if score > least))
+    own = (curve for _, curve in scored if curve.name == covariate_of(term))
+    found: dict[str, str] = {}
+    for curve in (*left, *own):
+        if curve.group.coupling not in WITHOUT_CURVE and set(curve.wheels) & set(term.wheels):
+            found.setdefault(curve.name, curve.group.coupling)
+    kept = list(found.items())
+    return [*kept[:COVARIATES_TRIED], *(each for each in kept[COVARIATES_TRIED:] if each[0] == covariate_of(term))]
+
+
+def _in_ranges(
+    equations: NormalEquations, rest: Fit, named: Term, covariates: Sequence[tuple[str, str]]
+) -> Iterator[Confined]:
+    """Yield the best range of each covariate for each law in the place of a named one."""
+    if not covariates:
+        return
+    others = [
+        term
+        for _, term in best_of_each_candidate(equations, rest.terms)
+        if term.wheels == named.wheels and term.name != named.name and _may_be_confined(term)
+    ]
+    read = as_read(equations, rest)
+    for law in (named, *others[:LAWS_TRIED]):
+        if len(law.group.columns) != 1:
+            continue
+        column = equations.design.in_time(equations.design.columns_as_read(law.group.columns)[0].astype(np.float64))
+        for covariate, coupling in covariates:
+            values, _ = acting(equations.problem, covariate, coupling)
+            edges = edges_of(known_values(equations, covariate, coupling, law.wheels))
+            if not len(edges) or covariate == covariate_of(law):
+                continue
+            sums = sums_over_ranges(equations, read, (covariate, coupling), (values, column), law.wheels, edges)
+            ranges = allowed(sums, Ranges(*np.triu_indices(len(edges) + 2, 1)), rest)
+            gains = sums.delta_chi2(ranges, [STEP])[0]
+            share = sums.share(ranges)
+            gains = gains - 2 * np.log(np.maximum(share / (1 - share), 1.0))
+            if not len(gains):
+                continue
+            at = int(np.argmax(gains))
+            region = sums.region(int(ranges.first[at]), int(ranges.last[at]), STEP)
+            yield _confined(equations, rest, law, region, (values, column))
+
+
+def _confined(
+    equations: NormalEquations, rest: Fit, law: Term, region: Region, course: tuple[Array, Array]
+) -> Confined:
+    """Return a law in a range, fitted beside the rest; it pays for its bounds as a region does, and as a law does."""
+    design, places = equations.design.extended(region.columns(*course))
+    bounds = int(np.isfinite(region.lower)) + int(np.isfinite(region.upper))
+    of_each = schwarz_penalty(equations, rest, law.wheels)
+    penalty = (1 + bounds) * of_each + 2 * float(np.log(LAWS_TRIED * COVARIATES_TRIED))
+    group = Group(
+        name=region.covariate,
+        columns=places,
+        signs=law.group.signs,
+        sharing=law.group.sharing,
+        selection_penalty=penalty - equations.thresholds.coefficient_penalty,
+        coupling=region.coupling,
+        region=region,
+    )
+    grown = equations.over(design)
+    fit = grown.fit((*rest.terms, Term(group, law.wheels)))
+    value = float(fit.coefficients[fit.of_term(len(rest.terms))][0])
+    right_sign = value * law.group.signs[0] >= 0
+    return Confined(grown, fit, law, region, grown.score(fit) if right_sign else -np.inf)
+
+
+def _with_region(equations: NormalEquations, rest: Fit, confined: Confined) -> tuple[NormalEquations, Fit]:
+    """Return the fit with the range as a region of the coupling that explains most there, and equations with it."""
+    best: tuple[NormalEquations, Fit] | None = None
+    for coupling in couplings_of(equations.problem):
+        region = replace(confined.region, coupling=coupling)
+        penalty = confined.fit.terms[-1].group.selection_penalty
+        equations, term = with_region(equations, Found(0.0, region, confined.law.wheels, penalty))
+        fit = equations.fit((*rest.terms, term))
+        if best is None or fit.delta_chi2 > best[1].delta_chi2:
+            best = equations, fit
+    assert best is not None  # noqa: S101  # there are always offset and gain
+    return equations, best[1]

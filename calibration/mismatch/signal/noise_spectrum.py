@@ -1,0 +1,148 @@
+"""How likely a residual is as noise: white noise and first-order processes, fitted to its periodogram.
+
+A sensor's noise is white noise and what wanders about it, each part forgotten within a time of its own. Its spectrum is
+then a sum of those of first-order processes, whose powers maximise Whittle's likelihood (1953): each ordinate of the
+periodogram is exponentially distributed about the spectrum. What is slower than `slowest_noise_share` of the recording
+is no noise that a spectrum could be told by: it passes only some twenty times, and is looked for as structure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Array = NDArray[np.float64]
+
+BAND = 1.06
+"""Ratio of the frequencies at both ends of a band whose ordinates are averaged (a choice: the spectrum of a first-order
+process changes by less than 12 % within one)."""
+TIMES_PER_OCTAVE = 1.0
+"""Correlation times per factor of two (a choice: between two of them, a sum of both is within 2 % of any third)."""
+STEPS = 200
+"""Iterations of the powers (a choice: the likelihood then changes by less than 0.01)."""
+GENERALISED = 2
+"""Times that columns are fitted, each with the spectrum of what was left before (a choice: a third changes nothing)."""
+LEAST_EIGENVALUE = 1e-9
+"""Share of the largest eigenvalue below which a combination of columns is rounding."""
+OF_THE_MEAN = 0.5
+"""Ordinates that the frequency 0 counts for: it has one degree of freedom, any other has two."""
+FEWEST_READINGS = 64
+"""Readings below which a course has no spectrum (a choice)."""
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseSpectrum:
+    """Powers of first-order processes.
+
+    Attributes
+    ----------
+    times: correlation times [readings], 0 for white noise, shape (process,)
+    powers: variance of each, of readings over their standard deviation, shape (process,)
+    deviations: standard deviation of each course, shape (course,); 0 of those too short to tell
+    minus_two_log_likelihood: of the readings, up to a constant
+    """
+
+    times: Array
+    powers: Array
+    deviations: Array
+    minus_two_log_likelihood: float
+
+    def at(self, frequencies: Array) -> Array:
+        """Return the spectrum at frequencies [cycles per reading]; that of white noise of variance 1 is 1."""
+        return np.asarray(self.powers @ _spectra(self.times, frequencies))
+
+
+def fitted_spectrum(courses: Sequence[Array], thresholds: Thresholds = THRESHOLDS) -> NoiseSpectrum:
+    """Return the spectrum of courses of readings: of one shape, each with a variance of its own.
+
+    Parameters
+    ----------
+    courses: readings that followed each other, each of shape (reading,)
+    """
+    deviations = np.array([_deviation(values) for values in courses])
+    scaled = [values / size for values, size in zip(courses, deviations, strict=True) if size > 0]
+    if not scaled:
+        return NoiseSpectrum(np.zeros(1), np.ones(1), deviations, 0.0)
+    longest = max(len(values) for values in scaled)
+    times = _times(thresholds.slowest_noise_share * longest)
+    bands = [_bands(values) for values in scaled]
+    frequency, mean, count = (np.concatenate(parts) for parts in zip(*bands, strict=True))
+    shapes = _spectra(times, frequency)
+    powers = np.full(len(times), 1 / len(times))
+    for _ in range(STEPS):
+        # Each step raises the likelihood (Févotte and Idier, 2011, of the Itakura-Saito divergence).
+        spectrum = powers @ shapes
+        powers = powers * np.sqrt((shapes @ (count * mean / spectrum**2)) / (shapes @ (count / spectrum)))
+    spectrum = powers @ shapes
+    likelihood = 2 * float(count @ (np.log(spectrum) + mean / spectrum))
+    sizes = sum(2 * len(values) * float(np.log(size)) for values, size in zip(courses, deviations, strict=True) if size)
+    return NoiseSpectrum(times, powers, deviations, likelihood + sizes)
+
+
+def gain_of_columns(courses: Sequence[Array], columns: Sequence[Array], thresholds: Thresholds = THRESHOLDS) -> float:
+    """Return what columns gain in twice the log likelihood, where what is left has a spectrum of its own.
+
+    Parameters
+    ----------
+    courses: readings that followed each other, each of shape (reading,)
+    columns: what is fitted to each by generalised least squares, with the same coefficients, shape (column, reading)
+    """
+    spectrum = before = fitted_spectrum(courses, thresholds)
+    for _ in range(GENERALISED):
+        coefficients = _generalised_least_squares(courses, columns, spectrum)
+        left = [values - coefficients @ of_course for values, of_course in zip(courses, columns, strict=True)]
+        spectrum = fitted_spectrum(left, thresholds)
+    return before.minus_two_log_likelihood - spectrum.minus_two_log_likelihood
+
+
+def _generalised_least_squares(courses: Sequence[Array], columns: Sequence[Array], spectrum: NoiseSpectrum) -> Array:
+    """Return the coefficients, shape (column,), each frequency weighted by the noise there."""
+    matrix, moment = np.zeros((len(columns[0]), len(columns[0]))), np.zeros(len(columns[0]))
+    for values, of_course, size in zip(courses, columns, spectrum.deviations, strict=True):
+        if size > 0:
+            amplitudes, measured = np.fft.rfft(of_course), np.fft.rfft(values)
+            frequencies = np.asarray(np.fft.rfftfreq(len(values)), np.float64)
+            weighted = amplitudes.conj() / (size**2 * spectrum.at(frequencies))
+            weighted[:, 0] *= OF_THE_MEAN
+            matrix += (weighted @ amplitudes.T).real
+            moment += (weighted @ measured).real
+    return np.asarray(np.linalg.pinv(matrix, rcond=LEAST_EIGENVALUE, hermitian=True) @ moment)
+
+
+def _deviation(values: Array) -> float:
+    """Return the root mean square of a course; 0 where it is too short to have a spectrum."""
+    return float(np.sqrt(np.mean(values**2))) if len(values) >= FEWEST_READINGS else 0.0
+
+
+def _times(slowest: float) -> Array:
+    octaves = max(int(np.ceil(TIMES_PER_OCTAVE * np.log2(max(slowest, 2.0)))), 1)
+    return np.append(0.0, np.geomspace(1.0, max(slowest, 2.0), octaves + 1))
+
+
+def _spectra(times: Array, frequencies: Array) -> Array:
+    """Return the spectrum of a process of variance 1 with each time, shape (process, frequency)."""
+    kept = np.exp(-1 / np.maximum(times, 1e-9))[:, None]
+    return np.asarray((1 - kept**2) / np.abs(1 - kept * np.exp(-2j * np.pi * frequencies)) ** 2)
+
+
+def _bands(values: Array) -> tuple[Array, Array, Array]:
+    """Return frequency [cycles per reading], mean of the periodogram and number of ordinates of each band."""
+    power = np.abs(np.fft.rfft(values)) ** 2 / len(values)
+    last = (len(values) - 1) // 2
+    edges = [1]
+    while edges[-1] <= last:
+        edges.append(max(edges[-1] + 1, int(edges[-1] * BAND)))
+    edges[-1] = last + 1
+    starts, ends = np.array(edges[:-1]), np.array(edges[1:])
+    count = (ends - starts).astype(np.float64)
+    mean = np.add.reduceat(power[1 : last + 1], starts - 1) / count
+    frequency = (starts + ends - 1) / 2 / len(values)
+    return np.append(0.0, frequency), np.append(power[0], mean), np.append(OF_THE_MEAN, count)
