@@ -112,6 +112,7 @@ def test_a_machine_that_holds_its_command_is_consistent_as_one_that_does_not(tmp
     assert tau.low <= TAU_S <= tau.high
 
 
+@pytest.mark.timeout(300)  # the FMU is stepped through each of its calls: 85 s of computing time
 def test_a_command_that_is_late_by_steps_is_no_instant_within_one(tmp_path: Path) -> None:
     """Three steps of delay are out of the bounds of what a recording does not say, and are named."""
     simulation = _lag(tmp_path, "co-simulation")
