@@ -22,7 +22,7 @@ from regolithd.calibration.mismatch.selection.changed_parameters import drop_wha
 from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED, answer_names
 from regolithd.calibration.mismatch.selection.law_misfit import law_misfit
 from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what_pulls_parameters_out
-from regolithd.calibration.mismatch.selection.region_search import schwarz_penalty
+from regolithd.calibration.mismatch.selection.region_search import schwarz_surcharge
 from regolithd.calibration.mismatch.selection.smooth_terms import (
     covariate_of,
     drop_what_a_curve_explains,
@@ -64,18 +64,24 @@ def alternatives(decision: Decision, *, refused: bool = False) -> tuple[Alternat
     """
     chosen = decision.whole
     best: dict[tuple[str, ...], tuple[float, tuple[Term, ...]]] = {}
-    ahead, decided_names = _evidence(decision, chosen), answer_names(chosen.terms) - {UNEXPLAINED}
+    ahead = _evidence(decision, chosen)
     for terms in _neighbours(decision):
         fit = decision.equations.fit(terms)
         names, evidence = _names(fit.terms), _evidence(decision, fit)
         plausible = ahead - evidence < LARGEST_MARGIN and evidence > best.get(names, NEVER)[0]
-        told = names != _names(chosen.terms) and (refused or frozenset(names) not in decision.refused)
-        told = told and not (decision.confined and set(names) - {UNEXPLAINED} > decided_names)
-        if told and plausible and _admissible(decision, fit):
+        told = refused or frozenset(names) not in decision.refused
+        if told and plausible and _is_another(decision, names) and _admissible(decision, fit):
             best[names] = evidence, fit.terms
     found = [Alternative(names, ahead - evidence, of) for names, (evidence, of) in best.items()]
     found = [other for other in found if other.margin >= 0 or _stands_optimised(decision, other)]
     return tuple(sorted(found, key=lambda each: each.margin))
+
+
+def _is_another(decision: Decision, names: tuple[str, ...]) -> bool:
+    """Return whether a set of names is another answer: other names, and beside a law in a range no further one."""
+    told = answer_names(decision.whole.terms)
+    further = set(names) - {UNEXPLAINED} > told - {UNEXPLAINED}
+    return set(names) != told and not (decision.confined and further)
 
 
 def _stands_optimised(decision: Decision, other: Alternative) -> bool:
@@ -139,10 +145,7 @@ def _evidence(decision: Decision, fit: Fit) -> float:
     evidence = equations.score(fit) - entry_cost(equations, fit.terms, decision.entry_threshold)
     if any(term.group.region is not None for term in decision.unnamed):
         curves = [term for term in fit.terms if not term.group.named and term.group.region is None]
-        paid = equations.thresholds.coefficient_penalty
-        evidence -= sum(
-            (schwarz_penalty(equations, fit, term.wheels) - paid) * len(term.group.columns) for term in curves
-        )
+        evidence -= schwarz_surcharge(equations, fit, curves)
     return evidence
 
 

@@ -86,19 +86,20 @@ def findings_of(
     problem = decision.equations.problem
     effects, changes = named_effects(decision, held_out, drawn)
     parameters = calibrated_parameters(decision, drawn)
-    limits, rest = decision.equations.thresholds, bool(decision.unnamed)
+    limits, places = decision.equations.thresholds, unexplained(decision)
+    rest = bool(decision.unnamed)
     moved = parameters_found(parameters, unexplained=rest, thresholds=limits)
     return Findings(
         verdict=verdict_of(decision, moved),
         effects=effects,
         changes=changes,
-        unexplained=unexplained(decision),
+        unexplained=places,
         parameters=parameters,
         left_out=problem.left_out,
         notes=(
             *notes_on_priors(parameters, unexplained=rest, thresholds=limits),
             *decision.notes,
-            *notes_on_confined_laws(decision),
+            *notes_on_confined_laws(decision, places),
             *notes_on_other_covariates(decision),
             *notes_on_dynamics(decision),
         ),

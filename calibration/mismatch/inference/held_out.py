@@ -187,43 +187,43 @@ def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOut
     while (idle := held_out.without_gain()) is not None:
         decision = without_name(replace(decision, equations=equations), idle)
         equations, held_out = held_out_errors(equations, decision.named, choice, threshold)
+    decision = replace(decision, equations=equations)
     if decision.unnamed:
-        equations, held_out = held_out_errors(equations, decision.named, choice, threshold, decision.unnamed)
-    decision, held_out = with_likelier_names(replace(decision, equations=equations), held_out, grid)
+        decision, held_out = _errors_beside_curves(decision, choice)
+    decision, held_out = _with_likelier_names(decision, held_out, choice)
     told = unexplained_if_improbable(unexplained_if_intermittent(decision))
-    if told.named.terms != decision.named.terms:
-        equations, held_out = held_out_errors(told.equations, told.named, choice, threshold, told.unnamed)
-        told = replace(told, equations=equations)
-    return told, held_out
-
-
-def with_likelier_names(
-    decision: Decision, held_out: HeldOutErrors, grid: Sequence[Group]
-) -> tuple[Decision, HeldOutErrors]:
-    """Return the answer that has most evidence, of those whose names held-out readings confirm.
-
-    Their names alone lower the held-out error further, or do so with what stays unexplained, or are fewer.
-    """
-    choice = _choice(decision, grid)
-    while (other := likelier_names(decision)) is not None:
-        equations, errors = held_out_errors(
-            other.equations, other.named, choice, decision.entry_threshold, other.unnamed
-        )
-        lower = errors.after < held_out.after or errors.whole < held_out.whole
-        if errors.without_gain() is None and (lower or names_of(other) < names_of(decision)):
-            decision, held_out = replace(other, equations=equations), errors
-        else:
-            decision = replace(decision, equations=equations, refused=decision.refused | {names_of(other)})
-    return decision, held_out
+    return (told, held_out) if told.named.terms == decision.named.terms else _errors_beside_curves(told, choice)
 
 
 def beside_regions(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOutErrors]:
     """Return a decision whose curves have become regions, with the names that have more evidence beside these."""
     choice = _choice(decision, grid)
-    equations, held_out = held_out_errors(
+    return _with_likelier_names(*_errors_beside_curves(replace(decision, refused=frozenset()), choice), choice)
+
+
+def _with_likelier_names(
+    decision: Decision, held_out: HeldOutErrors, choice: Sequence[Group]
+) -> tuple[Decision, HeldOutErrors]:
+    """Return the answer that has most evidence, of those whose names held-out readings confirm.
+
+    Their names alone lower the held-out error further, or do so with what stays unexplained, or are fewer.
+    """
+    while (other := likelier_names(decision)) is not None:
+        other, errors = _errors_beside_curves(other, choice)
+        lower = errors.after < held_out.after or errors.whole < held_out.whole
+        if errors.without_gain() is None and (lower or names_of(other) < names_of(decision)):
+            decision, held_out = other, errors
+        else:
+            decision = replace(decision, equations=other.equations, refused=decision.refused | {names_of(other)})
+    return decision, held_out
+
+
+def _errors_beside_curves(decision: Decision, choice: Sequence[Group]) -> tuple[Decision, HeldOutErrors]:
+    """Return the errors of a decision's names beside its curves, and it with the columns that the folds made."""
+    equations, errors = held_out_errors(
         decision.equations, decision.named, choice, decision.entry_threshold, decision.unnamed
     )
-    return with_likelier_names(replace(decision, equations=equations, refused=frozenset()), held_out, grid)
+    return replace(decision, equations=equations), errors
 
 
 def _choice(decision: Decision, grid: Sequence[Group]) -> list[Group]:

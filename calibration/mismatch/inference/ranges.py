@@ -11,6 +11,9 @@ from regolithd.calibration.mismatch.problem.words import ANGULAR_SPEED, unit_in_
 from regolithd.calibration.mismatch.selection.region_bounds import bounds_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.answer import Unexplained
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
@@ -35,23 +38,24 @@ def range_of(decision: Decision, term: Term) -> Range | None:
     return Range(region.covariate, lower, upper, in_words(region.covariate, lower, upper, problem))
 
 
-def notes_on_confined_laws(decision: Decision) -> tuple[str, ...]:
-    """Return a note on each law of the library that explains a range better than any does that acts everywhere."""
-    notes = []
+def notes_on_confined_laws(decision: Decision, told: Sequence[Unexplained]) -> tuple[str, ...]:
+    """Return a note on each law of the library that explains a range better than any does that acts everywhere.
+
+    `told` is what is unexplained, in the decision's order.
+    """
+    places, notes = list(zip(decision.unnamed, told, strict=True)), []
     for each in decision.confined:
-        candidate = each.law.group.candidate
-        where = range_of(decision, each.region) if each.region in decision.whole.terms else None
+        candidate, where = (
+            each.law.group.candidate,
+            next((place.range for term, place in places if term is each.region), None),
+        )
         if candidate is not None and where is not None:
             notes.append(
-                f"Of the library's laws, {candidate.label} explains best what acts {_only(where)}: "
+                f"Of the library's laws, {candidate.label} explains best what acts only "
+                f"{_place_in_words(where.covariate, where.lower, where.upper, decision.equations.problem)}: "
                 f"{candidate.words_for(each.law.group.shape)}. Where it acts everywhere, no law explains as much."
             )
     return tuple(notes)
-
-
-def _only(where: Range) -> str:
-    """Return a range without how sure it is, which the finding tells."""
-    return f"only {where.statement.split(' (90 %')[0]}"
 
 
 def covariate_unit(problem: Problem, covariate: str) -> str:
@@ -68,19 +72,22 @@ def in_words(covariate: str, lower: Parameter | None, upper: Parameter | None, p
 
     Angles in rad are told in degrees.
     """
+    intervals = " and ".join(_told(bound)[1] for bound in (lower, upper) if bound is not None)
+    return f"{_place_in_words(covariate, lower, upper, problem)} (90 % sure: {intervals})"
+
+
+def _place_in_words(covariate: str, lower: Parameter | None, upper: Parameter | None, problem: Problem) -> str:
+    """Return the same without how sure it is."""
     bounds = [_told(bound) for bound in (lower, upper) if bound is not None]
-    values, intervals, unit = [each[0] for each in bounds], " and ".join(each[1] for each in bounds), bounds[0][2]
+    values, unit = [each[0] for each in bounds], bounds[0][2]
     of = "" if covariate == "time" else f" of {word_for(covariate, problem.labels)}"
     between = "" if unit in CLOSE_TO_NUMBER or not unit else " "
     where = f"{' and '.join(values)}{between}{unit}{of}"
     if lower is None:
-        words = "until" if covariate == "time" else "below"
-    elif upper is None:
-        words = "from" if covariate == "time" else "beyond"
-        where += " on" if covariate == "time" else ""
-    else:
-        words = "between"
-    return f"{words} {where} (90 % sure: {intervals})"
+        return f"{'until' if covariate == 'time' else 'below'} {where}"
+    if upper is None:
+        return f"from {where} on" if covariate == "time" else f"beyond {where}"
+    return f"between {where}"
 
 
 def _told(bound: Parameter) -> tuple[str, str, str]:

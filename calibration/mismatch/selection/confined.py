@@ -25,7 +25,9 @@ from regolithd.calibration.mismatch.selection.region_search import (
     Found,
     allowed,
     edges_of,
+    odds_of,
     schwarz_penalty,
+    schwarz_surcharge,
     with_region,
 )
 from regolithd.calibration.mismatch.selection.smooth_terms import covariate_of, unexplained_beside
@@ -78,7 +80,7 @@ def without_confined_laws(decision: Decision) -> Decision:
             named=equations.fit(rest.terms),
             unnamed=unnamed,
             whole=equations.fit((*rest.terms, *unnamed)),
-            confined=(*decision.confined, ConfinedLaw(confined.law, decision.named.terms[index].name, region)),
+            confined=(*decision.confined, ConfinedLaw(confined.law, region)),
         )
     return decision
 
@@ -104,11 +106,8 @@ def _better_in_a_range(decision: Decision) -> tuple[int, Confined] | None:
 
 def _told_score(decision: Decision) -> float:
     """Return the score of what was decided, its curves paid for by Schwarz's criterion as ranges are."""
-    equations, whole = decision.equations, decision.whole
-    paid = equations.thresholds.coefficient_penalty
     curves = [term for term in decision.unnamed if term.group.region is None]
-    extra = sum((schwarz_penalty(equations, whole, each.wheels) - paid) * len(each.group.columns) for each in curves)
-    return equations.score(whole) - extra
+    return decision.equations.score(decision.whole) - schwarz_surcharge(decision.equations, decision.whole, curves)
 
 
 def _may_be_confined(term: Term) -> bool:
@@ -145,26 +144,21 @@ def _in_ranges(
         for _, term in best_of_each_candidate(equations, rest.terms)
         if term.wheels == named.wheels and term.name != named.name and _may_be_confined(term)
     ]
-    read = as_read(equations, rest)
-    for law in (named, *others[:LAWS_TRIED]):
-        if len(law.group.columns) != 1:
-            continue
-        column = equations.design.in_time(equations.design.columns_as_read(law.group.columns)[0].astype(np.float64))
-        for covariate, coupling in covariates:
-            values, _ = acting(equations.problem, covariate, coupling)
-            edges = edges_of(known_values(equations, covariate, coupling, law.wheels))
+    laws = [law for law in (named, *others[:LAWS_TRIED]) if len(law.group.columns) == 1]
+    design, read = equations.design, as_read(equations, rest)
+    columns = [design.in_time(design.columns_as_read(law.group.columns)[0].astype(np.float64)) for law in laws]
+    for covariate, coupling in covariates:
+        values, _ = acting(equations.problem, covariate, coupling)
+        edges = edges_of(known_values(equations, covariate, coupling, named.wheels))
+        for law, column in zip(laws, columns, strict=True):
             if not len(edges) or covariate == covariate_of(law):
                 continue
             sums = sums_over_ranges(equations, read, (covariate, coupling), (values, column), law.wheels, edges)
             ranges = allowed(sums, Ranges(*np.triu_indices(len(edges) + 2, 1)), rest)
-            gains = sums.delta_chi2(ranges, [STEP])[0]
-            share = sums.share(ranges)
-            gains = gains - 2 * np.log(np.maximum(share / (1 - share), 1.0))
-            if not len(gains):
-                continue
-            at = int(np.argmax(gains))
-            region = sums.region(int(ranges.first[at]), int(ranges.last[at]), STEP)
-            yield _confined(equations, rest, law, region, (values, column))
+            if len(ranges.first):
+                at = int(np.argmax(sums.delta_chi2(ranges, [STEP])[0] - odds_of(sums, ranges)))
+                region = sums.region(int(ranges.first[at]), int(ranges.last[at]), STEP)
+                yield _confined(equations, rest, law, region, (values, column))
 
 
 def _confined(

@@ -65,13 +65,11 @@ class ConfinedLaw:
 
     Attributes
     ----------
-    law: the term everywhere, of which a region of the covariate has the law
-    instead_of: the name
+    law: the term that has the law, everywhere
     region: the term that stands for it, unexplained
     """
 
     law: Term
-    instead_of: str
     region: Term
 
 

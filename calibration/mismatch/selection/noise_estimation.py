@@ -2,7 +2,8 @@
 
 An effect that is left in makes the noise larger and its autocorrelation time longer, and is then insignificant itself.
 So the most significant terms are taken out first, under a short autocorrelation time, whether they are significant or
-not: their few coefficients hardly lower the estimate. Then, with that noise, only what is significant is taken out.
+not: their few coefficients hardly lower the estimate. Then, with that noise, only what is significant is taken out, and
+of that only what makes the rest likelier as noise of any spectrum.
 """
 
 from __future__ import annotations

@@ -213,8 +213,7 @@ def _best_of_each_form(
     holding more readings than it leaves: what acts in a range may be said of the rest as well, where a parameter of
     the simulation makes up for it.
     """
-    found, share = [], sums.share(ranges)
-    odds = 2 * np.log(np.maximum(share / (1 - share), 1.0))
+    found, odds = [], odds_of(sums, ranges)
     open_ended = (ranges.first == 0) | (ranges.last == len(sums.edges) + 1)
     for powers, gains in zip(forms, sums.delta_chi2(ranges, forms), strict=True):
         for kind, bounds in ((open_ended, 1), (~open_ended, 2)) if powers != GROWTH else ((open_ended, 1),):
@@ -234,6 +233,18 @@ def schwarz_penalty(equations: NormalEquations, fit: Fit, wheels: Sequence[int])
     on = list(wheels)
     readings = float(chi2_of(equations, fit)[on].sum())
     return float(np.log(max(readings, math.e)))
+
+
+def schwarz_surcharge(equations: NormalEquations, fit: Fit, curves: Sequence[Term]) -> float:
+    """Return what curves pay for their coefficients by Schwarz's criterion, as regions do, beyond their penalties."""
+    paid = equations.thresholds.coefficient_penalty
+    return sum((schwarz_penalty(equations, fit, each.wheels) - paid) * len(each.group.columns) for each in curves)
+
+
+def odds_of(sums: RangeSums, ranges: Ranges) -> Array:
+    """Return what ranges pay for holding more readings than they leave, in Δχ², shape (range,)."""
+    share = sums.share(ranges)
+    return np.asarray(2 * np.log(np.maximum(share / (1 - share), 1.0)))
 
 
 def _refined(

@@ -17,7 +17,7 @@ from regolithd.calibration.mismatch.selection.region_bounds import with_median_b
 from regolithd.calibration.mismatch.selection.region_search import (
     everywhere_score,
     regions_beside,
-    schwarz_penalty,
+    schwarz_surcharge,
 )
 from regolithd.calibration.mismatch.selection.smooth_terms import unexplained_beside
 
@@ -54,8 +54,7 @@ def in_regions(decision: Decision) -> Decision:
 def _curve_score(equations: NormalEquations, named: Fit, curve: Term) -> float:
     """Return the score with a smooth term, its coefficients paid for as those of regions: by Schwarz's criterion."""
     fit = equations.fit((*named.terms, curve))
-    of_each = schwarz_penalty(equations, fit, curve.wheels) - equations.thresholds.coefficient_penalty
-    return equations.score(fit) - of_each * len(curve.group.columns)
+    return equations.score(fit) - schwarz_surcharge(equations, fit, [curve])
 
 
 def _smooth_score(equations: NormalEquations, named: Fit, curve: Term, regions: Sequence[Term]) -> float:

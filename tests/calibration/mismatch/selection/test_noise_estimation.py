@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from lifting_axis import LiftingAxis, drive
 from linear_machine import NOISE, equations_of, problem_of, table
 
+from regolithd.calibration.mismatch import compare
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.selection.noise_estimation import fit_of_significant_terms
 from regolithd.calibration.mismatch.signal.noise import estimate_noise
@@ -33,3 +35,11 @@ def test_without_candidates_it_is_the_noise_of_the_residual() -> None:
     assert noise.autocorrelation_time == direct.autocorrelation_time
     np.testing.assert_allclose(noise.deviation, direct.deviation, rtol=1e-6)
     assert significant.terms == ()
+
+
+@pytest.mark.parametrize("noise_time_s", [2.0, 5.0])
+def test_noise_that_wanders_for_seconds_is_no_finding(noise_time_s: float) -> None:
+    """Of six recordings without any effect at most one is told as unexplained, and nothing is named."""
+    answers = [compare(drive(seed, noise_time_s=noise_time_s), LiftingAxis()).answer for seed in range(6)]
+    assert not any(answer.effects for answer in answers)
+    assert sum(answer.verdict == "consistent" for answer in answers) >= 5
