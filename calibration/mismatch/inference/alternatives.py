@@ -23,6 +23,7 @@ from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED, answe
 from regolithd.calibration.mismatch.selection.law_misfit import law_misfit
 from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what_pulls_parameters_out
 from regolithd.calibration.mismatch.selection.region_search import schwarz_surcharge
+from regolithd.calibration.mismatch.selection.slow_noise import score_beside_slow_noise
 from regolithd.calibration.mismatch.selection.smooth_terms import (
     covariate_of,
     drop_what_a_curve_explains,
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.selection.decision import Decision
 
-NEVER: tuple[float, tuple[Term, ...]] = (-float("inf"), ())
+NEVER: tuple[float, tuple[Term, ...]] = (float("inf"), ())
 LARGEST_MARGIN = 40.0
 """Margin beyond which an answer is no alternative: it is e^20 times less probable."""
 
@@ -62,17 +63,17 @@ def alternatives(decision: Decision, *, refused: bool = False) -> tuple[Alternat
     With `refused` also those that held-out readings refused: no answers, but evidence that something is there. Where a
     law in a range was more probable than a name that holds everywhere, no further name is another answer.
     """
-    chosen = decision.whole
     best: dict[tuple[str, ...], tuple[float, tuple[Term, ...]]] = {}
-    ahead = _evidence(decision, chosen)
+    margins = _Margins(decision)
     for terms in _neighbours(decision):
         fit = decision.equations.fit(terms)
-        names, evidence = _names(fit.terms), _evidence(decision, fit)
-        plausible = ahead - evidence < LARGEST_MARGIN and evidence > best.get(names, NEVER)[0]
+        names = _names(fit.terms)
+        most = min(LARGEST_MARGIN, best.get(names, NEVER)[0])
         told = refused or frozenset(names) not in decision.refused
-        if told and plausible and _is_another(decision, names) and _admissible(decision, fit):
-            best[names] = evidence, fit.terms
-    found = [Alternative(names, ahead - evidence, of) for names, (evidence, of) in best.items()]
+        possible = told and margins.least(fit) < most and _is_another(decision, names)
+        if possible and _admissible(decision, fit) and (margin := margins.to(fit)) < most:
+            best[names] = margin, fit.terms
+    found = [Alternative(names, margin, of) for names, (margin, of) in best.items()]
     found = [other for other in found if other.margin >= 0 or _stands_optimised(decision, other)]
     return tuple(sorted(found, key=lambda each: each.margin))
 
@@ -136,8 +137,66 @@ def _is_a_laws_misfit(decision: Decision, fit: Fit, named: Fit, curve: Term) -> 
     return law_misfit(decision.equations, instead_of, fit) < decision.equations.thresholds.form_misfit
 
 
+class _Margins:
+    """By how much the evidence for other answers is behind that for the answer that was given.
+
+    Of the terms that two answers do not share, the evidence is the less of that by the weights and of that where the
+    noise may have any spectrum: by the weights a curve that follows slow noise has much. Spells are told from noise
+    apart, and a range that stands for a law in it is not that law.
+    """
+
+    def __init__(self, decision: Decision) -> None:
+        self._decision = decision
+        self._by_weights_alone = {id(each.term) for each in decision.intermittent}
+        self._by_weights_alone |= {id(each.region) for each in decision.confined}
+        self._beside_slow_noise: dict[tuple[int, ...], float] = {}
+
+    def to(self, fit: Fit) -> float:
+        """Return the margin to the answer with these terms."""
+        shared = self._shared(fit)
+        own, others = (self._further(each, shared) for each in (self._decision.whole, fit))
+        return self._evidence(own, shared, others) - self._evidence(others, shared, own)
+
+    def least(self, fit: Fit) -> float:
+        """Return what the margin to the answer with these terms is at least: less of a computation."""
+        shared = self._shared(fit)
+        own, others = (self._further(each, shared) for each in (self._decision.whole, fit))
+        return self._evidence(own, shared, others) - self._by_weights(others, shared)
+
+    def _shared(self, fit: Fit) -> Fit:
+        """Return the fit of the terms that both answers have."""
+        return self._decision.equations.fit([term for term in self._decision.whole.terms if _is_among(term, fit)])
+
+    @staticmethod
+    def _further(fit: Fit, shared: Fit) -> tuple[Term, ...]:
+        return tuple(term for term in fit.terms if not _is_among(term, shared))
+
+    def _evidence(self, further: tuple[Term, ...], shared: Fit, instead_of: tuple[Term, ...]) -> float:
+        """Return the evidence for further terms, which stand in the place of others, or of nothing."""
+        by_weights = self._by_weights(further, shared)
+        if not further or any(id(term) in self._by_weights_alone for term in further):
+            return by_weights
+        equations, key = self._decision.equations, tuple(map(id, (*shared.terms, *further)))
+        if key not in self._beside_slow_noise:
+            self._beside_slow_noise[key] = score_beside_slow_noise(equations, shared.terms, further)
+        cost = entry_cost(equations, further, self._decision.entry_threshold)
+        if not instead_of:
+            # What raises a curve's score by chance, slow noise, is no chance here.
+            limits = equations.thresholds
+            cost -= (limits.smooth_term_entry - limits.largest_entry) * sum(not term.group.named for term in further)
+        return min(by_weights, self._beside_slow_noise[key] - cost)
+
+    def _by_weights(self, further: tuple[Term, ...], shared: Fit) -> float:
+        fit = self._decision.equations.fit((*shared.terms, *further))
+        return _evidence(self._decision, fit) - _evidence(self._decision, shared)
+
+
+def _is_among(term: Term, fit: Fit) -> bool:
+    return any(term is other for other in fit.terms)
+
+
 def _evidence(decision: Decision, fit: Fit) -> float:
-    """Return the score of a fit less what each of its terms had to gain to enter.
+    """Return the score of a fit by the weights, less what each of its terms had to gain to enter.
 
     Beside regions a curve pays for its coefficients as they did, by Schwarz's criterion.
     """

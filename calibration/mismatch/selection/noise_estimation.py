@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.as_read import left_beside
 from regolithd.calibration.mismatch.regression.reliability import reliability_of
-from regolithd.calibration.mismatch.regression.residuals import residual_as_read_of, residual_of
+from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.selection.causality import acts_forwards
+from regolithd.calibration.mismatch.selection.slow_noise import score_beside_slow_noise
 from regolithd.calibration.mismatch.signal.noise import NoiseModel
-from regolithd.calibration.mismatch.signal.noise_spectrum import gain_of_columns
 from regolithd.calibration.mismatch.signal.whitening import estimate_whitening
 
 if TYPE_CHECKING:
@@ -65,7 +64,7 @@ def _beyond_slow_noise(equations: NormalEquations, terms: Sequence[Term]) -> lis
     kept = list(terms)
     while kept:
         scores = [
-            _gain_over_noise(equations, [*kept[:index], *kept[index + 1 :]], term) - equations.penalty(term)
+            score_beside_slow_noise(equations, [*kept[:index], *kept[index + 1 :]], [term])
             for index, term in enumerate(kept)
         ]
         worst = int(np.argmin(scores))
@@ -73,18 +72,6 @@ def _beyond_slow_noise(equations: NormalEquations, terms: Sequence[Term]) -> lis
             break
         del kept[worst]
     return kept
-
-
-def _gain_over_noise(equations: NormalEquations, rest: Sequence[Term], term: Term) -> float:
-    """Return what a term gains beside others in twice the log likelihood, where what is left is noise."""
-    design, fit = equations.design, equations.fit(rest)
-    columns = design.in_time(design.columns_as_read(term.group.columns).astype(np.float64))
-    on = np.isin(np.arange(columns.shape[-1]), term.wheels)
-    beside = design.in_folds(left_beside(equations, fit, columns * on))
-    left = residual_as_read_of(equations, fit)
-    read = [places for places, _ in design.readings]
-    courses = [of_wheel[places] for places, of_wheel in zip(read, left, strict=True)]
-    return gain_of_columns(courses, [beside[:, w, places] for w, places in enumerate(read)], equations.thresholds)
 
 
 def whitened(equations: NormalEquations, residual: Array) -> NormalEquations:

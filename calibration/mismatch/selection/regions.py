@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.selection.region_search import (
     regions_beside,
     schwarz_surcharge,
 )
+from regolithd.calibration.mismatch.selection.slow_noise import score_beside_slow_noise
 from regolithd.calibration.mismatch.selection.smooth_terms import unexplained_beside
 
 if TYPE_CHECKING:
@@ -65,8 +66,11 @@ def _smooth_score(equations: NormalEquations, named: Fit, curve: Term, regions: 
 
 
 def _holds(equations: NormalEquations, fit: Fit, named: int, entry_threshold: float) -> bool:
-    """Return whether nothing significant is left outside, and every region is found on other parts of the recording."""
-    transfers = (
-        transfer_margin(equations, fit.terms, index, entry_threshold) >= 0 for index in range(named, len(fit.terms))
-    )
-    return unexplained_beside(equations, fit) is None and all(transfers)
+    """Return whether nothing significant is left outside, and each region is there: on other parts, and beyond noise.
+
+    Noise of any spectrum does not explain it, and it is found on other parts of the recording.
+    """
+    places = range(named, len(fit.terms))
+    transfers = (transfer_margin(equations, fit.terms, index, entry_threshold) >= 0 for index in places)
+    beyond = (score_beside_slow_noise(equations, fit.without(index), [fit.terms[index]]) > 0 for index in places)
+    return unexplained_beside(equations, fit) is None and all(transfers) and all(beyond)

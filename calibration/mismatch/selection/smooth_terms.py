@@ -20,6 +20,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
 )
 from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
 from regolithd.calibration.mismatch.selection.law_misfit import law_misfit
+from regolithd.calibration.mismatch.selection.slow_noise import best_curve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,25 +38,25 @@ def weigh_against_smooth_terms(
     Some of the effects alone (`simpler`, smallest first) that leave nothing significant are preferred to a smooth term.
     """
     alone = best_of_each_smooth_term(equations, ())
-    if not alone:
-        return named, ()
     passed = named
     named = drop_what_a_changed_parameter_explains(equations, drop_transients(equations, named))
     refuted = [term for term in passed.terms if term not in named.terms]
-    curve = alone[0][1]
-    behind = _is_behind_a_curve(equations, named, curve)
+    curve = best_curve(equations, (), alone)
+    behind = curve is not None and _is_behind_a_curve(equations, named, curve)
     names = {term.name for term in named.terms}
     for fit in simpler if behind else ():
         if names.issuperset(term.name for term in fit.terms) and unexplained_beside(equations, fit) is None:
             return fit, ()
     # Laws that are a little wrong are behind a curve as well, where the noise is small.
-    imitated = behind and law_misfit(equations, named, equations.fit((curve,))) > equations.thresholds.form_misfit
     left = unexplained_beside(equations, named) or _rest_of_refuted(equations, named, refuted, entry_threshold)
-    beside = _effects_beside_curve(equations, named, curve, entry_threshold)
-    with_rest = named if left is None else equations.fit((*named.terms, left))
-    if imitated or _explains_more(equations, beside, with_rest, entry_threshold):
-        kept = equations.fit([term for term in beside.terms if term.group.named])
-        return drop_what_a_curve_explains(equations, kept, curve), (curve,)
+    if curve is not None:
+        misfit = law_misfit(equations, named, equations.fit((curve,))) if behind else 0.0
+        beside = _effects_beside_curve(equations, named, curve, entry_threshold)
+        with_rest = named if left is None else equations.fit((*named.terms, left))
+        imitated = misfit > equations.thresholds.form_misfit
+        if imitated or _explains_more(equations, beside, with_rest, entry_threshold):
+            kept = equations.fit([term for term in beside.terms if term.group.named])
+            return drop_what_a_curve_explains(equations, kept, curve), (curve,)
     return (named, ()) if left is None else (drop_what_a_curve_explains(equations, named, left), (left,))
 
 
@@ -118,9 +119,9 @@ def unexplained_beside(equations: NormalEquations, named: Fit, *, tolerated: flo
     limits, faulty = equations.thresholds, wheels_of_faulty_sensors(named)
     curves = best_of_each_smooth_term(equations, named.terms)
     left = [(score, term) for score, term in curves if not set(term.wheels) <= faulty]
-    if not left or left[0][0] <= limits.smooth_term_entry:
+    curve = best_curve(equations, named.terms, left)
+    if curve is None:
         return None
-    curve = left[0][1]
     beside = equations.fit((*named.terms, curve))
     if power_share(equations, beside, named) < limits.smooth_term_power:
         return None

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 BAND = 1.06
 """Ratio of the frequencies at both ends of a band whose ordinates are averaged (a choice: the spectrum of a first-order
@@ -92,22 +93,37 @@ def gain_of_columns(courses: Sequence[Array], columns: Sequence[Array], threshol
     ----------
     courses: readings that followed each other, each of shape (reading,)
     columns: what is fitted to each by generalised least squares, with the same coefficients, shape (column, reading)
+
+    Courses that are too short to have a spectrum are left out.
     """
+    long_enough = [index for index, values in enumerate(courses) if len(values) >= FEWEST_READINGS]
+    courses, columns = [courses[index] for index in long_enough], [columns[index] for index in long_enough]
     spectrum = before = fitted_spectrum(courses, thresholds)
+    transformed = [
+        (np.fft.rfft(of_course), np.fft.rfft(values)) for values, of_course in zip(courses, columns, strict=True)
+    ]
     for _ in range(GENERALISED):
-        coefficients = _generalised_least_squares(courses, columns, spectrum)
+        coefficients = _generalised_least_squares(transformed, [len(values) for values in courses], spectrum)
         left = [values - coefficients @ of_course for values, of_course in zip(courses, columns, strict=True)]
         spectrum = fitted_spectrum(left, thresholds)
     return before.minus_two_log_likelihood - spectrum.minus_two_log_likelihood
 
 
-def _generalised_least_squares(courses: Sequence[Array], columns: Sequence[Array], spectrum: NoiseSpectrum) -> Array:
-    """Return the coefficients, shape (column,), each frequency weighted by the noise there."""
-    matrix, moment = np.zeros((len(columns[0]), len(columns[0]))), np.zeros(len(columns[0]))
-    for values, of_course, size in zip(courses, columns, spectrum.deviations, strict=True):
+def _generalised_least_squares(
+    transformed: Sequence[tuple[Complex, Complex]], readings: Sequence[int], spectrum: NoiseSpectrum
+) -> Array:
+    """Return the coefficients, shape (column,), each frequency weighted by the noise there.
+
+    Parameters
+    ----------
+    transformed: columns [column, frequency] and readings [frequency] of each course
+    readings: number of readings of each
+    """
+    columns = len(transformed[0][0])
+    matrix, moment = np.zeros((columns, columns)), np.zeros(columns)
+    for (amplitudes, measured), count, size in zip(transformed, readings, spectrum.deviations, strict=True):
         if size > 0:
-            amplitudes, measured = np.fft.rfft(of_course), np.fft.rfft(values)
-            frequencies = np.asarray(np.fft.rfftfreq(len(values)), np.float64)
+            frequencies = np.asarray(np.fft.rfftfreq(count), np.float64)
             weighted = amplitudes.conj() / (size**2 * spectrum.at(frequencies))
             weighted[:, 0] *= OF_THE_MEAN
             matrix += (weighted @ amplitudes.T).real

@@ -1,0 +1,63 @@
+"""What a term gains where the noise may have any spectrum, and be as slow as the term is.
+
+The weights of the equations are those of the noise beside what was found. Where the noise is slow, a curve that follows
+it gains by the weights what it does not gain in likelihood: a slow spectrum explains as much.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from regolithd.calibration.mismatch.regression.as_read import left_beside
+from regolithd.calibration.mismatch.regression.residuals import residual_as_read_of
+from regolithd.calibration.mismatch.signal.noise_spectrum import FEWEST_READINGS, gain_of_columns
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
+    from regolithd.calibration.mismatch.regression.group import Term
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+Array = NDArray[np.float64]
+
+
+def score_beside_slow_noise(equations: NormalEquations, rest: Sequence[Term], terms: Sequence[Term]) -> float:
+    """Return what terms gain beside others in twice the log likelihood of noise of any spectrum, less their penalties.
+
+    Where no wheel has readings enough for a spectrum, it is what they gain by the weights.
+    """
+    design, fit = equations.design, equations.fit(rest)
+    read = [places for places, _ in design.readings]
+    if max((len(places) for places in read), default=0) < FEWEST_READINGS:
+        return equations.score(equations.fit((*rest, *terms))) - equations.score(fit)
+    columns = np.concatenate([_columns_of(design, term) for term in terms])
+    beside = design.in_folds(left_beside(equations, fit, columns))
+    left = residual_as_read_of(equations, fit)
+    courses = [of_wheel[places] for places, of_wheel in zip(read, left, strict=True)]
+    gain = gain_of_columns(courses, [beside[:, w, places] for w, places in enumerate(read)], equations.thresholds)
+    return gain - sum(equations.penalty(term) for term in terms)
+
+
+def _columns_of(design: DesignMatrix, term: Term) -> Array:
+    """Return a term's columns as read, 0 on the wheels that it is not on, shape (column, time, wheel)."""
+    columns = design.in_time(design.columns_as_read(term.group.columns).astype(np.float64))
+    return np.asarray(columns * np.isin(np.arange(columns.shape[-1]), term.wheels))
+
+
+def best_curve(equations: NormalEquations, given: Sequence[Term], curves: Iterable[tuple[float, Term]]) -> Term | None:
+    """Return the significant curve that scores most of those that noise of any spectrum does not explain, if any.
+
+    Parameters
+    ----------
+    given: terms that the curve stands beside
+    curves: with their scores by the weights, best first
+    """
+    limits = equations.thresholds
+    significant = (curve for score, curve in curves if score > limits.smooth_term_entry)
+    return next(
+        (each for each in significant if score_beside_slow_noise(equations, given, [each]) > limits.largest_entry), None
+    )
