@@ -11,7 +11,7 @@ RECORDINGS ?= ../shared/recordings
 .PHONY: help demo test check docs clean install uninstall
 .PHONY: interop first-day week
 .PHONY: figures chaos fuzz holds bench audit wheelhouse lock
-.PHONY: sizing reproduce evaluate loop prove prove-machines reliability real scaling thresholds mutations mutants frames pictures picture screenshots
+.PHONY: sizing reproduce evaluate loop prove prove-machines slow-noise reliability real scaling thresholds mutations mutants frames pictures picture screenshots
 .PHONY: fleet online unnamed regions experiments
 
 help:
@@ -80,6 +80,9 @@ reliability: $(DEV) ## how often answers are right at their stated probability (
 
 regions: $(DEV) ## laws that fail in regions: localisation and bias of the parameters, beside LISDD; 4 minutes (SEEDS=8)
 	$(BIN)/python -m regolithd.calibration.validation.region_study build/figures/regions.json docs/regions.svg $(if $(SEEDS),--seeds $(SEEDS))
+
+slow-noise: $(DEV) ## noise that wanders, told as something or as noise, and weak effects beside it; 5 minutes (COUNT=20 SEED=…)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.slow_noise_study build/figures/slow-noise.json --seed $(or $(SEED),0) --count $(or $(COUNT),20)
 
 experiments: $(DEV) ## the proposed experiment beside a covariate-wise and a random one, in simulation; continues an interrupted run (SEED=… COUNT=20 MACHINE=rover)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m regolithd.calibration.validation.experiment_study build/figures docs --machine $(or $(MACHINE),rover) --seed $(or $(SEED),1) --count $(or $(COUNT),20)

@@ -15,13 +15,15 @@ from regolithd.calibration.mismatch.signal.chi_squared import quantile
 from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED, Whitening, estimate_whitening
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Shape
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 Array = NDArray[np.float64]
 
+KEYS = (TRANSITION, PRESLIDING)
+"""Numbers of a shape that a reversal has."""
 TRANSITIONS = (0.0025, 0.005, 0.01, 0.02, 0.04)
 """Speeds at which the friction has reversed by three quarters, as shares of the highest usual speed (a choice: from
 where it is a step for most readings to where it would be taken for viscous friction); the best is refined between its
@@ -57,15 +59,23 @@ SINGULAR = 1e-12
 
 def reversal_of(problem: Problem) -> Shape:
     """Return the shape that explains this recording's friction better than a step does, empty where none does."""
-    keys = (TRANSITION, PRESLIDING)
+    return _reversal(problem, lambda: _best_reversal(problem))
 
-    def found() -> Array:
-        best = _best_reversal(problem)
-        return np.array([float(best.get(key, 0.0)) for key in keys])
+
+def with_reversal(problem: Problem, known: Shape) -> Problem:
+    """Return the problem, of which `reversal_of` was computed before."""
+    _reversal(problem, lambda: known)
+    return problem
+
+
+def _reversal(problem: Problem, found: Callable[[], Shape]) -> Shape:
+    def values() -> Array:
+        best = found()
+        return np.array([float(best.get(key, 0.0)) for key in KEYS])
 
     # Copies of a problem share what was run once, and a copy may be late where the problem is not.
-    values = problem.run_once(f"reversal of the friction, late by {problem.late}", 0.0, found)
-    return {key: float(value) for key, value in zip(keys, values, strict=True) if value}
+    once = problem.run_once(f"reversal of the friction, late by {problem.late}", 0.0, values)
+    return {key: float(value) for key, value in zip(KEYS, once, strict=True) if value}
 
 
 def _best_reversal(problem: Problem) -> Shape:
@@ -167,7 +177,7 @@ class _Beside:
     residual: shape (1, reading)
     laws: how many friction may follow
     decay: drag that decays from standstill among them; None: none
-    made: columns of the other laws by the shape with which they reverse, of the last few shapes
+    made: columns of the other laws, and products of all, by the shape with which they reverse, of the last few shapes
     """
 
     problem: Problem
@@ -178,7 +188,7 @@ class _Beside:
     residual: Array
     laws: int
     decay: _Decay | None = None
-    made: dict[tuple[tuple[str, object], ...], Array] = field(default_factory=dict)
+    made: dict[tuple[tuple[str, object], ...], tuple[Array, Array]] = field(default_factory=dict)
 
     def gain(self, left: float, step: float) -> float:
         """Return the Δχ² of what leaves one sum of squares over what leaves another."""
@@ -187,29 +197,40 @@ class _Beside:
     @property
     def squares_without_friction(self) -> float:
         """Return the sum of squares that the free parameters alone leave."""
-        return float(np.sum(_left(self.free, self.residual)[0] ** 2))
+        return _squares_left(self._products(self.free, self.residual))[0]
 
     def squares_left(self, shape: Shape) -> float:
         """Return the sum of squares that the free parameters and friction of any usual law leave, with this shape.
 
         What decays from standstill is drag beyond the other laws: less drag there would be a gradual reversal.
         """
-        columns = np.concatenate((self.free, self._laws_of(shape)))
-        if self.decay is not None:
-            decaying = _decaying(self.problem, shape, self.decay)
-            columns = np.concatenate((columns, _in_order(self.problem, [decaying], self.whitening, self.deviation)))
-        left, last = _left(columns, self.residual)
-        if self.decay is not None and last < 0:
-            left, _ = _left(columns[:-1], self.residual)
-        return float(np.sum(left**2))
+        laws, products = self._laws_of(shape)
+        if self.decay is None:
+            return _squares_left(products)[0]
+        drag = _decaying(self.problem, shape, self.decay)
+        decaying = _in_order(self.problem, [drag], self.whitening, self.deviation)
+        beside = np.concatenate([each @ decaying[0] for each in (self.free, laws, decaying, self.residual)])
+        at = len(self.free) + len(laws)
+        with_decay = np.insert(np.insert(products, at, 0.0, axis=0), at, 0.0, axis=1)
+        with_decay[at], with_decay[:, at] = beside, beside
+        left, coefficient = _squares_left(with_decay)
+        return left if coefficient >= 0 else _squares_left(products)[0]
 
-    def _laws_of(self, shape: Shape) -> Array:
-        """Return the columns of all laws but one that decays, whitened, shape (column, reading)."""
+    def _products(self, *columns: Array) -> Array:
+        """Return the products of columns, shape (column, reading), with each other."""
+        return np.block([[one @ other.T for other in columns] for one in columns])
+
+    def _laws_of(self, shape: Shape) -> tuple[Array, Array]:
+        """Return the columns of all laws but one that decays, whitened, shape (column, reading), and products of all.
+
+        The products are those of the free columns, the laws and the residual, which is last.
+        """
         key = tuple(shape.items())
         if key not in self.made:
             while len(self.made) >= MOST_KEPT:
                 del self.made[next(iter(self.made))]
-            self.made[key] = _in_order(self.problem, _laws(self.problem, shape), self.whitening, self.deviation)
+            laws = _in_order(self.problem, _laws(self.problem, shape), self.whitening, self.deviation)
+            self.made[key] = laws, self._products(self.free, laws, self.residual)
         return self.made[key]
 
 
@@ -220,7 +241,7 @@ def _beside_a_step(problem: Problem) -> _Beside:
     ones = np.ones(residual.shape[1])
     laws = _laws(problem, {})
     as_read = _in_order(problem, [residual, *free, *laws], NOT_WHITENED, ones)
-    left = _left(as_read[1:], as_read[:1])[0][0]
+    left = _left(as_read[1:], as_read[0])
     ends = np.cumsum([len(rows) for rows, _ in problem.courses])[:-1]
     parts = np.split(left, ends)
     deviation = np.array([np.sqrt(np.mean(part**2)) if part.size else 0.0 for part in parts])
@@ -286,12 +307,27 @@ def _in_order(problem: Problem, columns: Sequence[Array], whitening: Whitening, 
     return np.concatenate(parts, axis=1)
 
 
-def _left(columns: Array, residual: Array) -> tuple[Array, float]:
-    """Return what the columns leave of a residual, shape (1, reading), by least squares, and the last one's sign."""
-    size = np.sqrt(np.sum(columns**2, axis=1))
-    columns = columns[size > 0] / size[size > 0, None]
-    fitted = np.linalg.lstsq(columns @ columns.T, columns @ residual[0], rcond=SINGULAR)[0]
-    return residual - fitted @ columns, float(np.sign(fitted[-1])) if len(fitted) else 0.0
+def _left(columns: Array, residual: Array) -> Array:
+    """Return what columns, shape (column, reading), leave of a residual (reading,) by least squares."""
+    return np.asarray(residual - _fitted(columns @ columns.T, columns @ residual) @ columns)
+
+
+def _squares_left(products: Array) -> tuple[float, float]:
+    """Return the sum of squares that columns leave of a residual, and the last column's coefficient.
+
+    `products` are those of the columns and, last, the residual with each other.
+    """
+    squares, moments = products[:-1, :-1], products[:-1, -1]
+    fitted = _fitted(squares, moments)
+    left = products[-1, -1] - 2 * fitted @ moments + fitted @ squares @ fitted
+    return max(float(left), 0.0), float(fitted[-1]) if len(fitted) else 0.0
+
+
+def _fitted(squares: Array, moments: Array) -> Array:
+    """Return the coefficients of least squares, from products of columns with each other and with a residual."""
+    size = np.sqrt(np.diag(squares))
+    scale = np.where(size > 0, size, 1.0)
+    return np.asarray(np.linalg.lstsq(squares / np.outer(scale, scale), moments / scale, rcond=SINGULAR)[0] / scale)
 
 
 def _refined(beside: _Beside, shape: Shape) -> _Turn:

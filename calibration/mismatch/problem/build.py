@@ -102,6 +102,7 @@ def build_problem(
         doubt=inputs.doubt,
         on_time=dict(late or {}),
         as_recorded=as_recorded,
+        smoothed=inputs.smoothed,
     )
 
 

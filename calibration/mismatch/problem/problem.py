@@ -101,6 +101,7 @@ class Problem:
     late: how the predicted channel is late, by `sensor_delay.OF_CHANNEL`, and by how much [s]: what acts on the machine
         shows so much later; None: it is not, or it is not known yet
     fed_back: covariates that follow the channel's noise: no curve over them explains anything
+    smoothed: inputs that were replaced by their expectation, shape (time, wheel); empty where any was bridged as well
     held: parameters that stay at their values, as the recording would move them out of their bounds; and, by the names
         that `tangents` gives them, sizes of corrected effects
     """
@@ -127,6 +128,7 @@ class Problem:
     late: tuple[str, float] | None = None
     fed_back: frozenset[str] = frozenset()
     held: frozenset[str] = frozenset()
+    smoothed: Mapping[str, Array] = field(default_factory=dict, repr=False)
     _derived: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
     """What was computed from covariates and readings, by name: a cache, which a copy begins anew."""
     _lately: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)

@@ -69,6 +69,14 @@ class Inputs:
     doubt: InputDoubt | None = None
     between: Mapping[str, Array] = field(default_factory=dict)
 
+    @property
+    def smoothed(self) -> dict[str, Array]:
+        """Inputs that were replaced by their expectation, shape (time, wheel); empty where any was bridged as well."""
+        if self.bridged_otherwise is not None:
+            return {}
+        read, expected = self.as_read.channels, self.expected.channels
+        return {name: column for name, column in expected.items() if column is not read.get(name)}
+
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
@@ -98,8 +106,16 @@ class Simulated:
         return np.asarray(np.isfinite(self.prediction) & ~unknown)
 
 
-def inputs_of(recording: Recording, simulation: Predictor, thresholds: Thresholds = THRESHOLDS) -> Inputs:
+def inputs_of(
+    recording: Recording,
+    simulation: Predictor,
+    thresholds: Thresholds = THRESHOLDS,
+    *,
+    smoothed: Mapping[str, Array] | None = None,
+) -> Inputs:
     """Return what the simulation is run on, without faults of a few readings.
+
+    `smoothed` are inputs whose expectation was computed before (`Inputs.smoothed`).
 
     Raises
     ------
@@ -119,7 +135,8 @@ def inputs_of(recording: Recording, simulation: Predictor, thresholds: Threshold
     normal = _inputs_of_speed(as_read, simulation)
     shown = shown_errors(as_read, simulation, predict, normal)
     errors = {**simulation.sensors, **shown}
-    expected, otherwise = expected_inputs(as_read, errors, normal), None
+    expected = as_read.with_channels(**smoothed) if smoothed else expected_inputs(as_read, errors, normal)
+    otherwise = None
     if blanks:
         otherwise, _ = _prepared(recording, simulation, other_way=True)
         otherwise = expected_inputs(otherwise, errors, normal)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 from regolithd.calibration.mismatch.comparison import decided
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values
 from regolithd.calibration.mismatch.inference.findings import noise_floor
@@ -79,6 +80,8 @@ class Found:
     shapes: the grid of each candidate that this recording allows, by name
     responses: what is left beside all else that was found has of those that are found over all recordings, by name
     labels: what covariates are called, with their units
+    reversal: how friction reverses, of a recording that shows it
+    smoothed: inputs that were replaced by their expectation, shape (time, wheel); empty where they have to be computed
     """
 
     findings: Findings
@@ -93,6 +96,8 @@ class Found:
     late_inputs: dict[str, float] = field(default_factory=dict)
     late: tuple[str, float] | None = None
     responses: dict[str, Responses] = field(default_factory=dict)
+    reversal: Shape = field(default_factory=dict)
+    smoothed: dict[str, Single] = field(default_factory=dict)
 
 
 def one_channel(simulation: Simulation, channel: str) -> Simulation:
@@ -129,6 +134,8 @@ def found_in(recording: Recording, simulation: Simulation, channel: str, thresho
         late_inputs=dict(problem.on_time),
         late=problem.late,
         responses=_responses(decision, of_recording.applicable),
+        reversal=dict(reversal_of(problem)),
+        smoothed={name: values.astype(np.float32) for name, values in problem.smoothed.items()},
     )
 
 

@@ -35,11 +35,11 @@ class KeptColumns:
             When the folder for temporary files is full.
         """
         places = self._places[name] = []
-        for term in found.terms:
-            self._file.write(term.columns, self._end)
-            places.append((self._end, term.columns.shape))
-            self._end += BYTES * term.columns.size
-        return _with(found, [np.zeros((len(term.columns), 0, 0), np.float32) for term in found.terms])
+        for values in (*(term.columns for term in found.terms), *found.smoothed.values()):
+            self._file.write(values, self._end)
+            places.append((self._end, values.shape))
+            self._end += BYTES * values.size
+        return _with(found, [np.zeros((*shape[:-2], 0, 0), np.float32) for _, shape in places])
 
     def restored(self, name: str, found: Found) -> Found:
         """Return the same with its columns."""
@@ -50,5 +50,6 @@ class KeptColumns:
 
 
 def _with(found: Found, columns: list[np.ndarray[tuple[int, ...], np.dtype[np.float32]]]) -> Found:
-    terms = tuple(replace(term, columns=values) for term, values in zip(found.terms, columns, strict=True))
-    return replace(found, terms=terms)
+    count = len(found.terms)
+    terms = tuple(replace(term, columns=values) for term, values in zip(found.terms, columns[:count], strict=True))
+    return replace(found, terms=terms, smoothed=dict(zip(found.smoothed, columns[count:], strict=True)))

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.candidates.reversal import with_reversal
 from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in
 from regolithd.calibration.mismatch.fleet.work.found import one_channel
 from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.problem.simulated import inputs_of
 from regolithd.calibration.mismatch.regression.blocks import blocks_of_time
 from regolithd.calibration.mismatch.regression.candidate_groups import implausibility
 from regolithd.calibration.mismatch.regression.nuisance import tangents
@@ -167,8 +169,11 @@ def _posed(
         each for each in simulation.corrected_effects if not simulation.channels or each.channel == of_channel.channel
     ]
     stated = stated_in(forms_of(of_channel), effects, of_channel.stated_effects(), of_channel.empirical_curves)
-    problem = build_problem(recording, of_channel, found.values, late=found.late_inputs, thresholds=thresholds)
-    return replace(corrected_problem(problem, stated), late=found.late)
+    smoothed = {name: values.astype(np.float64) for name, values in found.smoothed.items()}
+    inputs = inputs_of(recording, of_channel, thresholds, smoothed=smoothed)
+    late = found.late_inputs
+    problem = build_problem(recording, of_channel, found.values, inputs=inputs, late=late, thresholds=thresholds)
+    return with_reversal(replace(corrected_problem(problem, stated), late=found.late), found.reversal)
 
 
 def _columns(problem: Problem, laws: Sequence[tuple[Candidate, Shape]], terms: Sequence[FoundTerm]) -> _Columns:
