@@ -44,73 +44,64 @@ class NoiseSpectrum:
     Attributes
     ----------
     times: correlation times [readings], 0 for white noise, shape (process,)
-    powers: variance of each, of readings over their standard deviation, shape (process,)
-    deviations: standard deviation of each course, shape (course,); 0 of those too short to tell
+    powers: variance of each, in the square of the readings' unit, shape (process,)
     minus_two_log_likelihood: of the readings, up to a constant
     """
 
     times: Array
     powers: Array
-    deviations: Array
     minus_two_log_likelihood: float
 
     def at(self, frequencies: Array) -> Array:
-        """Return the spectrum at frequencies [cycles per reading]; that of white noise of variance 1 is 1."""
+        """Return the spectrum at frequencies [cycles per reading]; that of white noise is its variance."""
         return np.asarray(self.powers @ _spectra(self.times, frequencies))
 
 
-def fitted_spectrum(courses: Sequence[Array], thresholds: Thresholds = THRESHOLDS) -> NoiseSpectrum:
-    """Return the spectrum of courses of readings: of one shape, each with a variance of its own.
-
-    Parameters
-    ----------
-    courses: readings that followed each other, each of shape (reading,)
-    """
-    deviations = np.array([_deviation(values) for values in courses])
-    scaled = [values / size for values, size in zip(courses, deviations, strict=True) if size > 0]
-    if not scaled:
-        return NoiseSpectrum(np.zeros(1), np.ones(1), deviations, 0.0)
-    longest = max(len(values) for values in scaled)
-    times = _times(thresholds.slowest_noise_share * longest)
-    bands = [_bands(values) for values in scaled]
-    frequency, mean, count = (np.concatenate(parts) for parts in zip(*bands, strict=True))
-    shapes = _spectra(times, frequency)
-    powers = np.full(len(times), 1 / len(times))
+def fitted_spectrum(values: Array, thresholds: Thresholds = THRESHOLDS) -> NoiseSpectrum:
+    """Return the spectrum of readings that followed each other, shape (reading,)."""
+    times = _times(thresholds.slowest_noise_share * len(values))
+    frequency, mean, count = _bands(values)
+    shapes, variance = _spectra(times, frequency), float(np.mean(values**2))
+    if not variance > 0:
+        return NoiseSpectrum(times, np.zeros(len(times)), 0.0)
+    powers = np.full(len(times), variance / len(times))
     for _ in range(STEPS):
         # Each step raises the likelihood (Févotte and Idier, 2011, of the Itakura-Saito divergence).
         spectrum = powers @ shapes
         powers = powers * np.sqrt((shapes @ (count * mean / spectrum**2)) / (shapes @ (count / spectrum)))
     spectrum = powers @ shapes
-    likelihood = 2 * float(count @ (np.log(spectrum) + mean / spectrum))
-    sizes = sum(2 * len(values) * float(np.log(size)) for values, size in zip(courses, deviations, strict=True) if size)
-    return NoiseSpectrum(times, powers, deviations, likelihood + sizes)
+    return NoiseSpectrum(times, powers, 2 * float(count @ (np.log(spectrum) + mean / spectrum)))
 
 
 def gain_of_columns(courses: Sequence[Array], columns: Sequence[Array], thresholds: Thresholds = THRESHOLDS) -> float:
-    """Return what columns gain in twice the log likelihood, where what is left has a spectrum of its own.
+    """Return what columns gain in twice the log likelihood of noise with a spectrum of its own in each course.
+
+    Courses that are too short to have a spectrum, or that are 0, are left out.
 
     Parameters
     ----------
     courses: readings that followed each other, each of shape (reading,)
     columns: what is fitted to each by generalised least squares, with the same coefficients, shape (column, reading)
-
-    Courses that are too short to have a spectrum are left out.
     """
-    long_enough = [index for index, values in enumerate(courses) if len(values) >= FEWEST_READINGS]
-    courses, columns = [courses[index] for index in long_enough], [columns[index] for index in long_enough]
-    spectrum = before = fitted_spectrum(courses, thresholds)
+    known = [index for index, values in enumerate(courses) if len(values) >= FEWEST_READINGS and values.any()]
+    courses, columns = [courses[index] for index in known], [columns[index] for index in known]
+    if not courses:
+        return 0.0
+    spectra = before = [fitted_spectrum(values, thresholds) for values in courses]
     transformed = [
         (np.fft.rfft(of_course), np.fft.rfft(values)) for values, of_course in zip(courses, columns, strict=True)
     ]
     for _ in range(GENERALISED):
-        coefficients = _generalised_least_squares(transformed, [len(values) for values in courses], spectrum)
+        coefficients = _generalised_least_squares(transformed, [len(values) for values in courses], spectra)
         left = [values - coefficients @ of_course for values, of_course in zip(courses, columns, strict=True)]
-        spectrum = fitted_spectrum(left, thresholds)
-    return before.minus_two_log_likelihood - spectrum.minus_two_log_likelihood
+        spectra = [fitted_spectrum(values, thresholds) for values in left]
+    return sum(
+        each.minus_two_log_likelihood - now.minus_two_log_likelihood for each, now in zip(before, spectra, strict=True)
+    )
 
 
 def _generalised_least_squares(
-    transformed: Sequence[tuple[Complex, Complex]], readings: Sequence[int], spectrum: NoiseSpectrum
+    transformed: Sequence[tuple[Complex, Complex]], readings: Sequence[int], spectra: Sequence[NoiseSpectrum]
 ) -> Array:
     """Return the coefficients, shape (column,), each frequency weighted by the noise there.
 
@@ -121,19 +112,13 @@ def _generalised_least_squares(
     """
     columns = len(transformed[0][0])
     matrix, moment = np.zeros((columns, columns)), np.zeros(columns)
-    for (amplitudes, measured), count, size in zip(transformed, readings, spectrum.deviations, strict=True):
-        if size > 0:
-            frequencies = np.asarray(np.fft.rfftfreq(count), np.float64)
-            weighted = amplitudes.conj() / (size**2 * spectrum.at(frequencies))
-            weighted[:, 0] *= OF_THE_MEAN
-            matrix += (weighted @ amplitudes.T).real
-            moment += (weighted @ measured).real
+    for (amplitudes, measured), count, spectrum in zip(transformed, readings, spectra, strict=True):
+        frequencies = np.asarray(np.fft.rfftfreq(count), np.float64)
+        weighted = amplitudes.conj() / spectrum.at(frequencies)
+        weighted[:, 0] *= OF_THE_MEAN
+        matrix += (weighted @ amplitudes.T).real
+        moment += (weighted @ measured).real
     return np.asarray(np.linalg.pinv(matrix, rcond=LEAST_EIGENVALUE, hermitian=True) @ moment)
-
-
-def _deviation(values: Array) -> float:
-    """Return the root mean square of a course; 0 where it is too short to have a spectrum."""
-    return float(np.sqrt(np.mean(values**2))) if len(values) >= FEWEST_READINGS else 0.0
 
 
 def _times(slowest: float) -> Array:
