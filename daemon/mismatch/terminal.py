@@ -11,8 +11,10 @@ from rich.markup import escape
 from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer
 from regolithd.calibration.mismatch.inference.statements import (
     NO_HELP,
+    REFUSED,
     after_number,
     beyond_prior_in_words,
+    doubt_of,
     notes_beside_priors,
     on_wheels,
     parameters_found,
@@ -46,7 +48,8 @@ def print_answer(console: Console, answer: Answer, labels: Labels, wheels: Seque
     `wheels` are all that the recording has; empty: not known. On a terminal, lines that continue are indented; a file
     or a pipe gets each on one line.
     """
-    console.print(f"[bold]{answer.verdict}[/bold]")
+    doubt = doubt_of(answer.probability)
+    console.print(f"[bold]{answer.verdict}[/bold]{f', {doubt}' if doubt else ''}")
     for line in _lines(answer, labels, wheels):
         console.print(escape(_wrapped(line, console.width if console.is_terminal else 0)), soft_wrap=True)
 
@@ -60,7 +63,7 @@ def sure_of(answer: Answer) -> str:
     if (other := answer.next_best) is None:
         return text
     names = (*other.effects, *(("something unexplained",) if other.unexplained else ()))
-    order = "next" if other.probability <= answer.probability else "refused, though likelier by evidence alone"
+    order = "next" if other.probability <= answer.probability else REFUSED
     return f"{text}; {order}: {' + '.join(names) or 'nothing'} ({other.probability:.2f})"
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from regolithd.calibration.mismatch.inference.alternatives import alternatives
 from regolithd.calibration.mismatch.inference.intermittent import unexplained_if_intermittent
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, probability, probability_of_others
+from regolithd.calibration.mismatch.inference.statements import EVEN
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.decision import names_of
 from regolithd.calibration.mismatch.selection.regions import in_regions
@@ -21,9 +22,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.inference.alternatives import Alternative
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
-
-EVEN = 0.5
-"""Probability below which the answer is more probably wrong than right."""
 
 
 def unexplained_if_improbable(decision: Decision) -> Decision:

@@ -38,10 +38,22 @@ NO_HELP = (
 """What is said of an empirical curve that does not help on held-out readings."""
 
 
+REFUSED = "refused, though likelier by evidence alone"
+"""What another answer is that has more evidence, and failed a test of its own."""
+WRONG_RATHER_THAN_RIGHT = "more probably wrong than right"
+"""What an answer is that has less than half of the evidence of all."""
+
+EVEN = 0.5
+"""Probability below which the answer is more probably wrong than right."""
 LEAST_COST = 0.1
 """Share of the held-out error below which 0.0 % might be told [%]."""
 LEAST_SHARE = 0.005
 """Share of the residual below which 0 % would be told."""
+
+
+def doubt_of(probability: float | None) -> str:
+    """Return `WRONG_RATHER_THAN_RIGHT` for such an answer; nothing for others, and of an unknown probability."""
+    return WRONG_RATHER_THAN_RIGHT if probability is not None and probability < EVEN else ""
 
 
 def percent(share: float) -> str:

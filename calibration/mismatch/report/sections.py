@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from regolithd.calibration.mismatch.inference.statements import capital, listed, percent, plural
+from regolithd.calibration.mismatch.inference.statements import REFUSED, capital, doubt_of, listed, percent, plural
 from regolithd.calibration.mismatch.report.axes import number
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.empirical import EmpiricalSection, empirical_section
@@ -107,19 +107,22 @@ class SensitivityRow:
 
 @dataclass(frozen=True)
 class Certainty:
-    """The probability of the set of names, and the next best answer with its own; empty where there is none."""
+    """The probability of the set of names, the next best answer with its own, and a doubt; empty: there is none."""
 
     given: str
-    next: str
+    next: str = ""
+    doubt: str = ""
 
 
 def certainty(answer: Answer, labels: Labels) -> Certainty:
     """Return how sure the answer is of its names."""
     given = "unknown" if answer.probability is None else f"{answer.probability:.2f}"
     if (other := answer.next_best) is None:
-        return Certainty(given, "")
+        return Certainty(given, doubt=doubt_of(answer.probability))
     names = [*map(labels.effect, other.effects), *(["something unexplained"] if other.unexplained else [])]
-    return Certainty(given, f"{listed(names or ['nothing missing'])} ({other.probability:.2f})")
+    order = REFUSED if answer.probability is not None and other.probability > answer.probability else "next best"
+    told = f"{order}: {listed(names or ['nothing missing'])} ({other.probability:.2f})"
+    return Certainty(given, told, doubt_of(answer.probability))
 
 
 def summary(evidence: Evidence, labels: Labels) -> tuple[tuple[str, str], ...]:

@@ -226,13 +226,17 @@ def units_problems(answers: list[Answer]) -> Iterator[str]:
 
 
 def shape_of(effect: Answer) -> dict[str, float]:
-    """Return what a change of unit leaves: ratios of interval to value, without temperatures, whose zero moves."""
+    """Return what a change of unit leaves: ratios of interval to value, without temperatures, whose zero moves.
+
+    A number without an interval has no ratio.
+    """
     kept = {
         key: one
         for key, one in effect.get("parameters", {}).items()
         if one["value"] and not any(degree in one.get("unit", "") for degree in ("°", "deg", "K"))
     }
-    ratios = {f"{key} {end}": one[end] / one["value"] for key, one in kept.items() for end in ("low", "high")}
+    ends = [(key, end) for key, one in kept.items() for end in ("low", "high") if one[end] is not None]
+    ratios = {f"{key} {end}": kept[key][end] / kept[key]["value"] for key, end in ends}
     return {**ratios, "rmse": effect["rmse_after"] / effect["rmse_before"]}
 
 

@@ -189,8 +189,9 @@ def test_an_answer_that_evidence_alone_disfavours_says_so() -> None:
     print_answer(console, answer_with(verdict="unexplained", probability=0.07, next_best=other), Labels(), (1,))
     assert (
         "probability of this answer: 0.07; refused, though likelier by evidence alone: nothing (0.91)"
-        in console.export_text()
+        in console.export_text(clear=False)
     )
+    assert console.export_text().splitlines()[0] == "unexplained, more probably wrong than right"
 
 
 def test_what_a_fleet_leaves_unexplained_names_recording_and_rover() -> None:

@@ -309,7 +309,12 @@ def test_the_next_best_answer_is_told_where_it_is_not_negligible() -> None:
         return certainty(replace(sample_answer.ANSWER, probability=0.934, alternatives=(other,)), labels).next
 
     frictions = OtherAnswer(("coulomb-friction", "viscous-friction"), True, 0.043)
-    assert told(frictions) == "Coulomb friction, viscous friction and something unexplained (0.04)"
-    assert told(OtherAnswer((), False, 0.1)) == "nothing missing (0.10)"
+    assert told(frictions) == "next best: Coulomb friction, viscous friction and something unexplained (0.04)"
+    assert told(OtherAnswer((), False, 0.1)) == "next best: nothing missing (0.10)"
     assert told(replace(frictions, probability=0.004)) == ""
     assert certainty(sample_answer.ANSWER, labels).given == "unknown"
+    refused = replace(sample_answer.ANSWER, probability=0.07, alternatives=(OtherAnswer((), False, 0.91),))
+    doubtful = certainty(refused, labels)
+    assert doubtful.next == "refused, though likelier by evidence alone: nothing missing (0.91)"
+    assert doubtful.doubt == "more probably wrong than right"
+    assert certainty(replace(refused, probability=0.5), labels).doubt == ""

@@ -196,6 +196,13 @@ def test_the_same_answer_in_other_units_is_the_same() -> None:
     wider = deepcopy(same)
     wider["effects"][0]["parameters"]["coulomb_current"]["high"] = 300.0
     assert any("other size or interval" in one for one in verdict(sealed, RIGHT, wider).problems)
+    power = {"value": 0.25, "low": None, "high": None, "unit": "1"}
+    unknown, known = deepcopy(RIGHT), deepcopy(same)
+    for said in (unknown, known):
+        said["effects"][0]["parameters"]["power"] = dict(power)
+    assert verdict(sealed, unknown, known).right
+    known["effects"][0]["parameters"]["power"] |= {"low": 0.2, "high": 0.3}
+    assert any("other size or interval" in one for one in verdict(sealed, unknown, known).problems)
     other = answer("consistent", factor=1000.0)
     assert any("other units, other answer" in one for one in verdict(sealed, RIGHT, other).problems)
 
