@@ -53,6 +53,9 @@ LEAST_GAIN = 10.8
 """Δχ² from which a gradual reversal is preferred to a step: one chance in a thousand for one more coefficient."""
 TURNED = 0.75
 """Share of the friction that has reversed where a reading is no more within a reversal: tanh 1."""
+ROUNDING = 1e-12
+"""Share of the residual's sum of squares below which what is left of it is rounding (a choice: double precision, with a
+margin)."""
 SINGULAR = 1e-12
 """Relative singular value of the products below which laws are the same (a choice: double precision, with a margin)."""
 
@@ -320,7 +323,7 @@ def _squares_left(products: Array) -> tuple[float, float]:
     squares, moments = products[:-1, :-1], products[:-1, -1]
     fitted = _fitted(squares, moments)
     left = products[-1, -1] - 2 * fitted @ moments + fitted @ squares @ fitted
-    return max(float(left), 0.0), float(fitted[-1]) if len(fitted) else 0.0
+    return max(float(left), ROUNDING * float(products[-1, -1])), float(fitted[-1]) if len(fitted) else 0.0
 
 
 def _fitted(squares: Array, moments: Array) -> Array:

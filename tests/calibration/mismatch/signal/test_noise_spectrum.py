@@ -46,10 +46,7 @@ def test_a_curve_through_slow_noise_hardly_makes_it_likelier() -> None:
 
 
 def test_each_course_has_noise_of_its_own() -> None:
-    """A step that both have is as clear in one's quick small noise as without the other, whose noise is slow and large.
-
-    What is taken out of the quick one alone changes nothing that is said of the slow one.
-    """
+    """A step in small quick noise is as clear beside another course, whose noise is slow and large, as alone."""
     quick, slow = noise(2.0, 1), 100 * noise(60.0, 2)
     step = np.where(np.arange(READINGS) > READINGS / 2, 1.0, -1.0)[None]
     alone = gain_of_columns([quick + 0.3 * step[0]], [step])
