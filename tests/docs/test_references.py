@@ -84,9 +84,9 @@ def test_every_command_and_option_exists(page: Path) -> None:
 @pytest.mark.parametrize("page", PAGES, ids=page_name)
 def test_every_make_target_and_module_exists(page: Path) -> None:
     """Each `make NAME` and `python -m NAME` that a page names as code can be run."""
-    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE))
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), flags=re.MULTILINE))
     text = "\n".join(code_of(page.read_text(encoding="utf-8")))
-    told = {word for words in re.findall(r"\bmake ((?:[a-z]+ ?)+)", text) for word in words.split()}
+    told = {word for words in re.findall(r"\bmake ((?:[a-z-]+ ?)+)", text) for word in words.split()}
     assert told <= targets
     modules = re.findall(r"python -m ((?:regolithd|tests)[\w.]+)", text)
     assert [name for name in modules if not _found(name)] == []
