@@ -65,10 +65,9 @@ def reversal_of(problem: Problem) -> Shape:
     return _reversal(problem, lambda: _best_reversal(problem))
 
 
-def with_reversal(problem: Problem, known: Shape) -> Problem:
-    """Return the problem, of which `reversal_of` was computed before."""
+def keep_reversal(problem: Problem, known: Shape) -> None:
+    """Keep what `reversal_of` returned of the same recording before, so that it is not computed again."""
     _reversal(problem, lambda: known)
-    return problem
 
 
 def _reversal(problem: Problem, found: Callable[[], Shape]) -> Shape:

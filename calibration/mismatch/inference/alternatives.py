@@ -153,38 +153,32 @@ class _Margins:
 
     def to(self, fit: Fit) -> float:
         """Return the margin to the answer with these terms."""
-        shared = self._shared(fit)
-        own, others = (self._further(each, shared) for each in (self._decision.whole, fit))
-        return self._evidence(own, shared, others) - self._evidence(others, shared, own)
+        shared, own, others = self._apart(fit)
+        return self._evidence(own, shared, instead=bool(others)) - self._evidence(others, shared, instead=bool(own))
 
     def least(self, fit: Fit) -> float:
         """Return what the margin to the answer with these terms is at least: less of a computation."""
-        shared = self._shared(fit)
-        own, others = (self._further(each, shared) for each in (self._decision.whole, fit))
-        return self._evidence(own, shared, others) - self._by_weights(others, shared)
+        shared, own, others = self._apart(fit)
+        return self._evidence(own, shared, instead=bool(others)) - self._by_weights(others, shared)
 
-    def _shared(self, fit: Fit) -> Fit:
-        """Return the fit of the terms that both answers have."""
-        return self._decision.equations.fit([term for term in self._decision.whole.terms if _is_among(term, fit)])
+    def _apart(self, fit: Fit) -> tuple[Fit, tuple[Term, ...], tuple[Term, ...]]:
+        """Return the fit of the terms that both answers have, and the further terms of either."""
+        whole = self._decision.whole
+        shared = self._decision.equations.fit([term for term in whole.terms if _is_among(term, fit)])
+        own, others = (tuple(term for term in each.terms if not _is_among(term, shared)) for each in (whole, fit))
+        return shared, own, others
 
-    @staticmethod
-    def _further(fit: Fit, shared: Fit) -> tuple[Term, ...]:
-        return tuple(term for term in fit.terms if not _is_among(term, shared))
-
-    def _evidence(self, further: tuple[Term, ...], shared: Fit, instead_of: tuple[Term, ...]) -> float:
-        """Return the evidence for further terms, which stand in the place of others, or of nothing."""
+    def _evidence(self, further: tuple[Term, ...], shared: Fit, *, instead: bool) -> float:
+        """Return the evidence for further terms, which stand in the place of others (`instead`), or of nothing."""
         by_weights = self._by_weights(further, shared)
         if not further or any(id(term) in self._by_weights_alone for term in further):
             return by_weights
         equations, key = self._decision.equations, tuple(map(id, (*shared.terms, *further)))
         if key not in self._beside_slow_noise:
             self._beside_slow_noise[key] = score_beside_slow_noise(equations, shared.terms, further)
-        cost = entry_cost(equations, further, self._decision.entry_threshold)
-        if not instead_of:
-            # What raises a curve's score by chance, slow noise, is no chance here.
-            limits = equations.thresholds
-            cost -= (limits.smooth_term_entry - limits.largest_entry) * sum(not term.group.named for term in further)
-        return min(by_weights, self._beside_slow_noise[key] - cost)
+        of_curve = None if instead else equations.thresholds.slow_noise_entry
+        needed = entry_cost(equations, further, self._decision.entry_threshold, of_curve)
+        return min(by_weights, self._beside_slow_noise[key] - needed)
 
     def _by_weights(self, further: tuple[Term, ...], shared: Fit) -> float:
         fit = self._decision.equations.fit((*shared.terms, *further))

@@ -101,9 +101,9 @@ class Problem:
     late: how the predicted channel is late, by `sensor_delay.OF_CHANNEL`, and by how much [s]: what acts on the machine
         shows so much later; None: it is not, or it is not known yet
     fed_back: covariates that follow the channel's noise: no curve over them explains anything
-    smoothed: inputs that were replaced by their expectation, shape (time, wheel); empty where any was bridged as well
     held: parameters that stay at their values, as the recording would move them out of their bounds; and, by the names
         that `tangents` gives them, sizes of corrected effects
+    smoothed: inputs that were replaced by their expectation, shape (time, wheel); empty where any was bridged as well
     """
 
     recording: Recording

@@ -280,9 +280,14 @@ def passes_entry_test(equations: NormalEquations, more: Fit, less: Fit, entry_th
     return equations.score(more) - equations.score(less) > needed
 
 
-def entry_cost(equations: NormalEquations, terms: Sequence[Term], entry_threshold: float) -> float:
-    """Return what terms had to gain to enter: a threshold for each name, and one for each smooth term."""
-    smooth = equations.thresholds.smooth_term_entry
+def entry_cost(
+    equations: NormalEquations, terms: Sequence[Term], entry_threshold: float, of_smooth_term: float | None = None
+) -> float:
+    """Return what terms had to gain to enter: a threshold for each name, and one for each smooth term.
+
+    The latter is `smooth_term_entry` unless told.
+    """
+    smooth = equations.thresholds.smooth_term_entry if of_smooth_term is None else of_smooth_term
     return sum(entry_threshold if term.group.named else smooth for term in terms)
 
 

@@ -57,7 +57,9 @@ def best_curve(equations: NormalEquations, given: Sequence[Term], curves: Iterab
     curves: with their scores by the weights, best first
     """
     limits = equations.thresholds
-    significant = (curve for score, curve in curves if score > limits.smooth_term_entry)
-    return next(
-        (each for each in significant if score_beside_slow_noise(equations, given, [each]) > limits.largest_entry), None
-    )
+    for score, curve in curves:
+        if score <= limits.smooth_term_entry:
+            break
+        if score_beside_slow_noise(equations, given, [curve]) > limits.slow_noise_entry:
+            return curve
+    return None

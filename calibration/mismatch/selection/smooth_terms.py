@@ -47,12 +47,12 @@ def weigh_against_smooth_terms(
     for fit in simpler if behind else ():
         if names.issuperset(term.name for term in fit.terms) and unexplained_beside(equations, fit) is None:
             return fit, ()
-    # Laws that are a little wrong are behind a curve as well, where the noise is small.
     left = unexplained_beside(equations, named) or _rest_of_refuted(equations, named, refuted, entry_threshold)
     if curve is not None:
         misfit = law_misfit(equations, named, equations.fit((curve,))) if behind else 0.0
         beside = _effects_beside_curve(equations, named, curve, entry_threshold)
         with_rest = named if left is None else equations.fit((*named.terms, left))
+        # Laws that are a little wrong are behind a curve as well, where the noise is small.
         imitated = misfit > equations.thresholds.form_misfit
         if imitated or _explains_more(equations, beside, with_rest, entry_threshold):
             kept = equations.fit([term for term in beside.terms if term.group.named])

@@ -159,6 +159,12 @@ class SelectionThresholds:
         f"{TRIALS}: by chance at most 6.8 in 47 sound recordings and once 17.1 beside a named effect; the weakest "
         "concealed one of 25 scored 31 (seeds 98309134, 127741224)",
     )
+    slow_noise_entry: float = threshold(
+        12.0,
+        "Score above which a smooth term is told, where the noise may have any spectrum, in Δχ² less penalty.",
+        "standard: by chance one of eight smooth terms with eight coefficients each scores as much in one recording of "
+        "260 (χ²); of 60 recordings of nothing but slow noise 5 are told (`make slow-noise`)",
+    )
     smooth_term_power: float = threshold(
         0.01, "Share of the residual's power on its wheels below which a smooth term is ignored.", f"{CHOICE}"
     )

@@ -80,7 +80,7 @@ class Found:
     shapes: the grid of each candidate that this recording allows, by name
     responses: what is left beside all else that was found has of those that are found over all recordings, by name
     labels: what covariates are called, with their units
-    reversal: how friction reverses, of a recording that shows it
+    reversal: how friction reverses, empty: at once; None: it has to be computed
     smoothed: inputs that were replaced by their expectation, shape (time, wheel); empty where they have to be computed
     """
 
@@ -96,7 +96,7 @@ class Found:
     late_inputs: dict[str, float] = field(default_factory=dict)
     late: tuple[str, float] | None = None
     responses: dict[str, Responses] = field(default_factory=dict)
-    reversal: Shape = field(default_factory=dict)
+    reversal: Shape | None = None
     smoothed: dict[str, Single] = field(default_factory=dict)
 
 

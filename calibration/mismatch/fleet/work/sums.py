@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.library import library
-from regolithd.calibration.mismatch.candidates.reversal import with_reversal
+from regolithd.calibration.mismatch.candidates.reversal import keep_reversal
 from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in
 from regolithd.calibration.mismatch.fleet.work.found import one_channel
@@ -173,7 +173,10 @@ def _posed(
     inputs = inputs_of(recording, of_channel, thresholds, smoothed=smoothed)
     late = found.late_inputs
     problem = build_problem(recording, of_channel, found.values, inputs=inputs, late=late, thresholds=thresholds)
-    return with_reversal(replace(corrected_problem(problem, stated), late=found.late), found.reversal)
+    problem = replace(corrected_problem(problem, stated), late=found.late)
+    if found.reversal is not None:
+        keep_reversal(problem, found.reversal)
+    return problem
 
 
 def _columns(problem: Problem, laws: Sequence[tuple[Candidate, Shape]], terms: Sequence[FoundTerm]) -> _Columns:
