@@ -37,15 +37,19 @@ WIDTHS, PLACES = 12, 21
 
 @dataclass(frozen=True)
 class Span:
-    """The ends of the covariate in a recording, the least magnitude that it has, and its largest gap.
+    """The ends of the covariate in a recording, and the least magnitude that it has.
 
-    The gap is the largest step from one of its values to the next: of gears it is 1.
+    Attributes
+    ----------
+    gap: the largest step from one of its values to the next; of gears it is 1
+    usual_step: half of the range is crossed in steps of at most this; of gears it is 1, and one gap hardly changes it
     """
 
     low: float
     high: float
     least: float
     gap: float = 0.0
+    usual_step: float = 0.0
 
     @property
     def width(self) -> float:
@@ -60,7 +64,8 @@ class Span:
     @property
     def most_cycles(self) -> float:
         """The most cycles that show: at two values a cycle, a sine and its phase are one number."""
-        return min(MOST_CYCLES, self.width / (VALUES_A_CYCLE * self.gap) if self.gap > 0 else MOST_CYCLES)
+        step = VALUES_A_CYCLE * self.usual_step
+        return min(MOST_CYCLES, self.width / step if step > 0 else MOST_CYCLES)
 
     @property
     def both_signs(self) -> bool:

@@ -63,8 +63,11 @@ class FittedForm:
 
 
 def span_of(x: Array) -> Span:
-    """Return the ends of a covariate (ascending), its least magnitude, and its largest gap."""
-    return Span(float(x[0]), float(x[-1]), float(np.min(np.abs(x))), float(np.max(np.diff(x), initial=0.0)))
+    """Return the ends of a covariate (ascending), its least magnitude, its largest gap and its usual step."""
+    steps = np.sort(np.diff(x))
+    crossed = np.cumsum(steps)
+    gap, usual = (steps[-1], steps[np.searchsorted(crossed, crossed[-1] / 2)]) if len(steps) else (0.0, 0.0)
+    return Span(float(x[0]), float(x[-1]), float(np.min(np.abs(x))), float(gap), float(usual))
 
 
 def best_forms(sums: CovariateSums, autocorrelation_time: float) -> list[tuple[float, FittedForm]]:

@@ -50,3 +50,11 @@ def test_the_gaps_of_a_continuous_covariate_limit_nothing() -> None:
     span = span_of(np.linspace(0.0, 1.0, 240))
     assert sine.shapes(span).min() == pytest.approx(1 / 24)
     assert span.narrowest == pytest.approx(0.015)
+
+
+def test_one_gap_in_a_continuous_covariate_limits_no_sine() -> None:
+    """Where the values beyond a gap of an eighth are few, a sine of four cycles is looked for all the same."""
+    (sine,) = (form for form in grammar() if form.family == "sine")
+    span = span_of(np.concatenate((np.linspace(0.0, 0.8, 200), np.linspace(0.93, 1.0, 5))))
+    assert span.gap == pytest.approx(0.13)
+    assert sine.shapes(span).min() == pytest.approx(1 / 24)
