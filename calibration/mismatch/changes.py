@@ -20,6 +20,7 @@ from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of, l
 from regolithd.calibration.mismatch.contribution import Contribution
 from regolithd.calibration.mismatch.empirical.stated import EmpiricalCurveLaw
 from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
+from regolithd.calibration.mismatch.inference.rounding import with_interval
 from regolithd.calibration.mismatch.inference.statements import after_number, on_wheels
 from regolithd.calibration.mismatch.problem.onset_clock import is_later, on_the_clock_of
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
@@ -354,8 +355,9 @@ def direction_of(change: Change) -> Literal["gone", "larger", "smaller"]:
 def change_in_words(change: Change, where: str = "") -> str:
     """Return one sentence about a change; `where` is ', on ' and the wheels, empty where there is one alone."""
     direction, unit = direction_of(change), after_number(change.unit)
+    now, low, high = with_interval(change.now, change.low, change.high)
     told = "gone" if direction == "gone" else f"{direction} than the corrected simulation has it"
     return (
-        f"{change.name} is {told}{where}: {change.parameter} from {change.corrected:.4g} to {change.now:.4g}{unit} "
-        f"(90 % sure: {change.low:.4g} to {change.high:.4g})."
+        f"{change.name} is {told}{where}: {change.parameter} from {change.corrected:.4g} to {now}{unit} "
+        f"(90 % sure: {low} to {high})."
     )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from regolithd.calibration.mismatch.fleet.told.answer import FleetAnswer
+from regolithd.calibration.mismatch.inference.rounding import with_interval
 from regolithd.calibration.mismatch.inference.statements import (
     NO_HELP,
     REFUSED,
@@ -102,7 +103,8 @@ def _effect(effect: Effect, *, several: bool) -> list[str]:
 
 def _interval(parameter: Parameter) -> str:
     """Return a parameter's interval in brackets; nothing where it is not known."""
-    return f" (90 % sure: {parameter.low:.4g} to {parameter.high:.4g})" if isfinite(parameter.low) else ""
+    _, low, high = with_interval(parameter.value, parameter.low, parameter.high)
+    return f" (90 % sure: {low} to {high})" if isfinite(parameter.low) else ""
 
 
 def _not_distinguished(found: Indistinguishable, answer: Answer, labels: Labels) -> str:
@@ -164,7 +166,8 @@ def _compared(error: float, without: float) -> str:
 
 
 def _value(name: str, parameter: Parameter) -> str:
-    return f"{name} = {parameter.value:.4g}{after_number(parameter.unit)}"
+    value, _, _ = with_interval(parameter.value, parameter.low, parameter.high)
+    return f"{name} = {value}{after_number(parameter.unit)}"
 
 
 def _error(fit: FitImprovement) -> str:

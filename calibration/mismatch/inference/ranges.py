@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from regolithd.calibration.mismatch.answer import Parameter, Range
+from regolithd.calibration.mismatch.inference.rounding import with_interval
 from regolithd.calibration.mismatch.problem.words import ANGULAR_SPEED, unit_in_label, word_for
 from regolithd.calibration.mismatch.selection.region_bounds import bounds_of
 
@@ -18,8 +17,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
 
-DIGITS = 2
-"""Significant digits of an interval's width that a sentence shows."""
 CLOSE_TO_NUMBER = ("°", "%")
 """Units that stand at their number without a space."""
 
@@ -68,10 +65,7 @@ def covariate_unit(problem: Problem, covariate: str) -> str:
 
 
 def in_words(covariate: str, lower: Parameter | None, upper: Parameter | None, problem: Problem) -> str:
-    """Return the range as people say it: "beyond 12.3° of pitch (90 % sure: 11.9 to 12.8)".
-
-    Angles in rad are told in degrees.
-    """
+    """Return a range in words and the recording's unit: "below 8.2 °C of temperature (90 % sure: 8.0 to 8.4)"."""
     intervals = " and ".join(_told(bound)[1] for bound in (lower, upper) if bound is not None)
     return f"{_place_in_words(covariate, lower, upper, problem)} (90 % sure: {intervals})"
 
@@ -92,7 +86,6 @@ def _place_in_words(covariate: str, lower: Parameter | None, upper: Parameter | 
 
 def _told(bound: Parameter) -> tuple[str, str, str]:
     """Return a bound, its interval, and the unit in which they are told."""
-    unit, factor = ("°", 180 / np.pi) if bound.unit == "rad" else (bound.unit, 1.0)
-    low, value, high = (factor * each for each in (bound.low, bound.value, bound.high))
-    places = max(DIGITS - 1 - int(np.floor(np.log10(max(high - low, 1e-300)))), 0)
-    return f"{value:.{places}f}", f"{low:.{places}f} to {high:.{places}f}", {"1": "", "degC": "°C"}.get(unit, unit)
+    value, low, high = with_interval(bound.value, bound.low, bound.high)
+    unit = {"1": "", "degC": "°C", "deg": "°"}.get(bound.unit, bound.unit)
+    return value, f"{low} to {high}", unit

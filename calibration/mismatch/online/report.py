@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from regolithd.calibration.mismatch.inference.rounding import with_interval
 from regolithd.calibration.mismatch.inference.statements import on_wheels
 from regolithd.calibration.mismatch.problem.words import in_words
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
@@ -160,11 +161,12 @@ def _statement(change: Change, found: Linearised, words: str) -> str:
         if change.onset_s is not None
         else "from the start"
     )
+    size, low, high = with_interval(change.size, change.low, change.high)
     names = ", ".join(dict.fromkeys(rival.name for rival in change.rivals if rival.name != change.name))
     return (
-        f"{words[:1].upper()}{words[1:]}{where}, {since}: {change.size:.3g} {change.unit} "
+        f"{words[:1].upper()}{words[1:]}{where}, {since}: {size} {change.unit} "
         f"{'root mean square ' if change.name == UNNAMED else ''}"
-        f"(90 % sure: {change.low:.3g} to {change.high:.3g})"
+        f"(90 % sure: {low} to {high})"
         f"{f'; or {names}, which explains it nearly as well' if names else ''}. {WHOLE_DECIDES}."
     )
 

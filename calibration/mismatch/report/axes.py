@@ -9,10 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.inference.rounding import GREATEST_PLAIN, LEAST_PLAIN, with_interval
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 Array = NDArray[np.float64]
+
+MINUS = "−"
+"""U+2212, which is as wide as a plus sign."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +59,17 @@ def number(value: float, digits: int = 3) -> str:
     if not np.isfinite(value):
         return "–"
     text = f"{value:.{digits}g}"
-    if "e" in text and 1e-5 < abs(value) < 1e7:
+    if "e" in text and LEAST_PLAIN <= abs(value) < GREATEST_PLAIN:
         text = np.format_float_positional(float(text), trim="-")
-    return text.replace("-", "−")
+    return text.replace("-", MINUS)
+
+
+def interval(value: float, low: float, high: float) -> tuple[str, str, str]:
+    """Return a value and its interval with a minus sign (U+2212), and as many places as the interval supports."""
+    if not np.isfinite(high - low):
+        return number(value), number(low), number(high)
+    value_text, low_text, high_text = (each.replace("-", MINUS) for each in with_interval(value, low, high))
+    return value_text, low_text, high_text
 
 
 def text(x: float, y: float, words: str, *, anchor: str = "start", kind: str = "", turn: float = 0.0) -> str:

@@ -9,12 +9,12 @@ import numpy as np
 from markupsafe import Markup
 
 from regolithd.calibration.mismatch.inference.statements import NO_HELP, capital
-from regolithd.calibration.mismatch.report.axes import Panel, axes, box, line, number, svg, text
+from regolithd.calibration.mismatch.report.axes import Panel, axes, box, interval, line, number, svg, text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from regolithd.calibration.mismatch.answer import EmpiricalFit, Evidence, Suggestion, Unexplained
+    from regolithd.calibration.mismatch.answer import EmpiricalFit, Evidence, Parameter, Suggestion, Unexplained
     from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
     from regolithd.calibration.mismatch.report.axes import Array
     from regolithd.calibration.mismatch.report.labels import Labels
@@ -73,11 +73,14 @@ def empirical_section(place: Unexplained, evidence: Evidence, labels: Labels) ->
 
 
 def _row(form: Suggestion, factor: float) -> SuggestedRow:
-    told = [
-        f"{name} = {number(one.value)} ({number(one.low)} … {number(one.high)}) {'' if one.unit == '1' else one.unit}"
-        for name, one in form.parameters.items()
-    ]
-    return SuggestedRow(form.equation, "; ".join(each.strip() for each in told), number(factor * form.held_out_rmse))
+    told = "; ".join(_with_name(name, one) for name, one in form.parameters.items())
+    return SuggestedRow(form.equation, told, number(factor * form.held_out_rmse))
+
+
+def _with_name(name: str, parameter: Parameter) -> str:
+    """Return a parameter of a closed form with its interval: "a = 19.20 (18.97 … 19.41) mm"."""
+    value, low, high = interval(parameter.value, parameter.low, parameter.high)
+    return f"{name} = {value} ({low} … {high}) {'' if parameter.unit == '1' else parameter.unit}".strip()
 
 
 def band_figure(covariate: str, curve: EmpiricalCurve, fit: EmpiricalFit | None, labels: Labels) -> str:

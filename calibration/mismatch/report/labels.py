@@ -86,6 +86,12 @@ class Labels:
         """Factor from seconds to `time_unit`."""
         return 1 / 60 if self.in_minutes else 1.0
 
+    def from_to(self, from_s: float, to_s: float) -> str:
+        """Return a time range: "0.0 to 6.2 min", "12 to 98 s"."""
+        places = 1 if self.in_minutes else 0
+        first, last = (f"{each * self.time_factor:.{places}f}" for each in (from_s, to_s))
+        return f"{first} to {last} {self.time_unit}"
+
     def scaled(self, unit: str) -> tuple[float, str]:
         """Return factor and unit in which a value is shown: small currents in milliampere, others as they are."""
         if self.in_milli and unit.split(" ", maxsplit=1)[0] in WITH_MILLI:

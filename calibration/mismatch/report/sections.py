@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from regolithd.calibration.mismatch.inference.statements import REFUSED, capital, doubt_of, listed, percent, plural
-from regolithd.calibration.mismatch.report.axes import number
+from regolithd.calibration.mismatch.report.axes import interval, number
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.empirical import EmpiricalSection, empirical_section
 from regolithd.calibration.mismatch.report.figures import curve_figure, fit_figure, interval_figure, map_figure
@@ -212,7 +212,7 @@ def parameter_rows(found: Effect, labels: Labels) -> tuple[ParameterRow, ...]:
         if np.isfinite(value):
             drawing = _safe(interval_figure(value, low, high) if np.isfinite(low) else "")
             label = labels.parameter(found.name, name)
-            rows.append(ParameterRow(label, number(value), number(low), number(high), unit, drawing))
+            rows.append(ParameterRow(label, *interval(value, low, high), unit, drawing))
     return tuple(rows)
 
 
@@ -225,11 +225,10 @@ def _unit_of(found: Effect, evidence: Evidence) -> str:
 
 def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> UnexplainedSection:
     """Return one structure that no candidate explains: range, wheels, time, and share of the residual's power."""
-    first, last = (number(each * labels.time_factor) for each in (place.from_s, place.to_s))
     facts = (
         f"only {place.range.statement}" if place.range else "",
         labels.wheels(place.wheels, evidence.wheels),
-        f"{first} to {last} {labels.time_unit}",
+        labels.from_to(place.from_s, place.to_s),
         f"{percent(place.share_of_residual)} of the residual’s power",
     )
     curve = empirical_section(place, evidence, labels) if place.curve else None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.changes import direction_of
 from regolithd.calibration.mismatch.inference.statements import capital
-from regolithd.calibration.mismatch.report.axes import number
+from regolithd.calibration.mismatch.report.axes import interval, number
 from regolithd.calibration.mismatch.report.labels import UNITS
 
 if TYPE_CHECKING:
@@ -72,9 +72,8 @@ def calibrated(answer: Answer) -> tuple[CalibratedRow, ...]:
         stated = (
             f"{number(one.prior)} ± {number(one.prior_std, 2)}" if one.prior_std else f"{number(one.prior)} (exact)"
         )
-        ends = (number(one.low, 4), number(one.high, 4)) if one.prior_std else ("", "")
-        unit = UNITS.get(one.unit, one.unit)
-        rows.append(CalibratedRow(one.name, stated, number(one.value, 4), *ends, unit, one.beyond_prior()))
+        told = interval(one.value, one.low, one.high) if one.prior_std else (number(one.value, 4), "", "")
+        rows.append(CalibratedRow(one.name, stated, *told, UNITS.get(one.unit, one.unit), one.beyond_prior()))
     return tuple(rows)
 
 
@@ -86,13 +85,13 @@ def changes(answer: Answer, labels: Labels, wheels: Sequence[int | str] = ()) ->
 def _change(one: Change, labels: Labels, wheels: Sequence[int | str], *, several: bool) -> ChangeRow:
     """Return one change; of several channels it names its own."""
     factor, unit = labels.scaled(one.unit)
-    corrected, now, low, high = (number(factor * each) for each in (one.corrected, one.now, one.low, one.high))
+    now, low, high = interval(factor * one.now, factor * one.low, factor * one.high)
     return ChangeRow(
         label=capital(labels.effect(one.name)),
         where=", ".join(filter(None, [one.channel if several else "", labels.wheels(one.wheels, wheels)])),
         direction=direction_of(one),
         parameter=labels.parameter(one.name, one.parameter),
-        corrected=corrected,
+        corrected=number(factor * one.corrected),
         now=now,
         low=low,
         high=high,

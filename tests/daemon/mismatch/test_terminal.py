@@ -92,7 +92,7 @@ def test_mismatch_prints_the_answer() -> None:
     assert console.export_text().splitlines() == [
         "effects",
         "  coulomb-friction: 37 mA",
-        "    coulomb_current = 0.03712 A (90 % sure: 0.03 to 0.044)",
+        "    coulomb_current = 0.037 A (90 % sure: 0.030 to 0.044)",
         "    power = 0.75",
         "  changed: viscous-friction is larger than the corrected simulation has it.",
         f"  parameter loss had to leave its prior: {LEFT}",

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from linear_machine import problem_of, table
 
 from regolithd.calibration.mismatch.answer import Parameter
 from regolithd.calibration.mismatch.inference.ranges import covariate_unit, in_words
 
-SLOPE = Parameter(np.radians(12.3), np.radians(11.9), np.radians(12.8), "rad")
+SLOPE = Parameter(0.2147, 0.2077, 0.2234, "rad")
 
 
 @pytest.mark.parametrize(
     ("covariate", "lower", "upper", "expected"),
     [
-        ("pitch", SLOPE, None, "beyond 12.30° of pitch (90 % sure: 11.90 to 12.80)"),
+        ("pitch", SLOPE, None, "beyond 0.215 rad of pitch (90 % sure: 0.208 to 0.223)"),
         (
             "temperature",
             None,
@@ -28,6 +27,7 @@ SLOPE = Parameter(np.radians(12.3), np.radians(11.9), np.radians(12.8), "rad")
             Parameter(3.0, 2.9, 4.0, "rad/s"),
             "between 1.0 and 3.0 rad/s of speed (90 % sure: 0.8 to 2.0 and 2.9 to 4.0)",
         ),
+        ("pitch", Parameter(12.3, 11.9, 12.8, "deg"), None, "beyond 12.30° of pitch (90 % sure: 11.90 to 12.80)"),
         ("time", Parameter(812.0, 790.0, 830.0, "s"), None, "from 812 s on (90 % sure: 790 to 830)"),
         ("time", None, Parameter(812.0, 790.0, 830.0, "s"), "until 812 s (90 % sure: 790 to 830)"),
         ("fill", Parameter(0.5, 0.42, 0.6, "1"), None, "beyond 0.50 of fill (90 % sure: 0.42 to 0.60)"),
@@ -36,7 +36,7 @@ SLOPE = Parameter(np.radians(12.3), np.radians(11.9), np.radians(12.8), "rad")
 def test_a_range_reads_as_people_say_it(
     covariate: str, lower: Parameter | None, upper: Parameter | None, expected: str
 ) -> None:
-    """Angles in degrees, and as many places as the interval allows."""
+    """In the recording's unit, and with as many places as the interval allows."""
     assert in_words(covariate, lower, upper, problem_of(table())) == expected
 
 

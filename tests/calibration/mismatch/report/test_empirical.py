@@ -66,7 +66,7 @@ def test_the_texts_say_how_it_acts_and_what_it_brings() -> None:
     assert (told.before, told.after, told.unit) == ("0.4", "0.2", "A")
     assert re.match(r"It acts against the motion", told.acts)
     assert told.caution == ""
-    assert told.forms[0].parameters == "c = 0.25 (0.2 … 0.3) A/(m/s)"
+    assert told.forms[0].parameters == "c = 0.25 (0.20 … 0.30) A/(m/s)"
     assert 'class="after line suggested"' not in told.svg
 
 

@@ -32,7 +32,7 @@ def test_the_headline_tells_changes_and_parameters_that_left_their_priors() -> N
 def test_a_parameter_s_row_has_what_was_stated_and_what_came_out() -> None:
     """An exact parameter has no interval."""
     moved, exact = tables.calibrated(CHANGED)
-    assert (moved.stated, moved.value, moved.low, moved.high, moved.unit) == ("50 ± 2", "90.5", "89", "92", "kg")
+    assert (moved.stated, moved.value, moved.low, moved.high, moved.unit) == ("50 ± 2", "90.5", "89.0", "92.0", "kg")
     assert moved.beyond_prior
     assert (exact.stated, exact.low, exact.beyond_prior) == ("0.075 (exact)", "", False)
 
