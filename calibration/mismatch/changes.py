@@ -24,7 +24,7 @@ from regolithd.calibration.mismatch.inference.rounding import with_interval
 from regolithd.calibration.mismatch.inference.statements import after_number, on_wheels
 from regolithd.calibration.mismatch.problem.onset_clock import is_later, on_the_clock_of
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
-from regolithd.calibration.mismatch.problem.words import in_units
+from regolithd.calibration.mismatch.problem.words import in_units, in_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -336,7 +336,9 @@ def changes_of(
             wheels=changed,
         )
         where = on_wheels(changed, len(problem.recording.wheels), simulation.wheel_column)
-        found.append(replace(told, statement=change_in_words(told, where)))
+        of_curve = isinstance(candidate, EmpiricalCurveLaw)
+        subject = in_words(f"the {candidate.label}", problem.labels) if of_curve else of.name
+        found.append(replace(told, statement=change_in_words(told, where, subject)))
     return tuple(found)
 
 
@@ -352,12 +354,12 @@ def direction_of(change: Change) -> Literal["gone", "larger", "smaller"]:
     return "gone" if min(change.low, change.high) <= 0 <= max(change.low, change.high) else "smaller"
 
 
-def change_in_words(change: Change, where: str = "") -> str:
-    """Return one sentence about a change; `where` is ', on ' and the wheels, empty where there is one alone."""
+def change_in_words(change: Change, where: str, subject: str) -> str:
+    """Return one sentence about a change of a subject; `where` is ', on ' and the wheels, empty of one alone."""
     direction, unit = direction_of(change), after_number(change.unit)
     now, low, high = with_interval(change.now, change.low, change.high)
     told = "gone" if direction == "gone" else f"{direction} than the corrected simulation has it"
     return (
-        f"{change.name} is {told}{where}: {change.parameter} from {change.corrected:.4g} to {now}{unit} "
+        f"{subject} is {told}{where}: {change.parameter} from {change.corrected:.4g} to {now}{unit} "
         f"(90 % sure: {low} to {high})."
     )

@@ -25,8 +25,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-RELATIVE_SIZE = "relative_size"
-"""The curve's coefficient: 1 is as corrected."""
+FACTOR = "factor"
+"""The curve's coefficient, by which its values are multiplied: 1 is as corrected."""
+OVER = "-over-"
+"""In a curve's name, before its covariate."""
 LEAST_TOLD = 0.01
 """Share of the readings beyond a curve's range from which on that is told (a choice: its range leaves out 1 %)."""
 
@@ -34,7 +36,7 @@ LEAST_TOLD = 0.01
 class EmpiricalCurveLaw(Candidate):
     """An empirical curve as an effect with one coefficient, its relative size; no search names it."""
 
-    coefficients: ClassVar = (Coefficient(RELATIVE_SIZE, "1"),)
+    coefficients: ClassVar = (Coefficient(FACTOR, "1"),)
 
     def __init__(self, stated: StatedCurve) -> None:
         self.stated = stated
@@ -45,7 +47,7 @@ class EmpiricalCurveLaw(Candidate):
         self.signature = "the curve that was found"  # type: ignore[misc]
         self.experiment = f"vary {{{stated.covariate}}} over the curve's range"  # type: ignore[misc]
         self.source = "a comparison with a recording"  # type: ignore[misc]
-        self.label = self.name.replace("-", " ").replace("_", " ")  # type: ignore[misc]
+        self.label = curve_label(self.name)  # type: ignore[misc]
         self.along_motion = stated.curve.coupling.startswith("drag")  # type: ignore[misc]
         self.vary = (stated.covariate,)  # type: ignore[misc]
         self.requires = (stated.covariate,)  # type: ignore[misc]
@@ -79,7 +81,13 @@ class EmpiricalCurveLaw(Candidate):
 def name_of(stated: StatedCurve) -> str:
     """Return what a curve is called among the changes: how it acts, and over what."""
     how = stated.curve.coupling.replace(",", "").replace(" ", "-")
-    return f"empirical-{how}-over-{stated.covariate}"
+    return f"empirical-{how}{OVER}{stated.covariate}"
+
+
+def curve_label(name: str) -> str:
+    """Return the label of a curve of this name, with its covariate in braces; empty: it is the name of no curve."""
+    of_curve, _, covariate = name.partition(OVER)
+    return f"empirical curve over the {{{covariate}}}" if covariate and of_curve.startswith("empirical-") else ""
 
 
 def course_of(problem: Problem, stated: StatedCurve) -> Array:

@@ -9,6 +9,7 @@ import numpy as np
 
 from regolithd.calibration.mismatch.candidates.library import library
 from regolithd.calibration.mismatch.changes import direction_of
+from regolithd.calibration.mismatch.empirical.stated import curve_label
 from regolithd.calibration.mismatch.inference.statements import (
     after_number,
     capital,
@@ -19,7 +20,7 @@ from regolithd.calibration.mismatch.inference.statements import (
     plural,
     wheels_in_words,
 )
-from regolithd.calibration.mismatch.problem.words import COVARIATES, unit_in_label
+from regolithd.calibration.mismatch.problem.words import COVARIATES, in_words, unit_in_label
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
@@ -27,7 +28,12 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.answer import Answer, Change, Evidence, Unexplained
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
 
-PARAMETERS = {"lag_s": "lag", "onset_s": "onset", "relative_size": "share of the mean reading"}
+PARAMETERS = {
+    "lag_s": "lag",
+    "onset_s": "onset",
+    "factor": "factor on the curve",
+    "relative_size": "share of the mean reading",
+}
 """Parameters that the engine adds to those of a candidate."""
 UNITS = {"degC": "°C", "1": ""}
 """Units whose spelling in the answer is not the usual one."""
@@ -101,7 +107,8 @@ class Labels:
     def effect(self, name: str) -> str:
         """Return an effect's label; of a parameter's effect the name with spaces."""
         candidate = self.candidates.get(name)
-        return candidate.label if candidate else name.replace("-", " ").replace("_", " ")
+        label = candidate.label if candidate else curve_label(name)
+        return in_words(label, self.covariates) if label else name.replace("-", " ").replace("_", " ")
 
     def if_changed(self, name: str, found: Collection[str], told: str) -> str:
         """Return how an effect is told among those that could be there: as changed, where the simulation has it.

@@ -96,7 +96,8 @@ def test_a_curve_that_is_gone_is_told(found: Comparison, folder: Path) -> None:
     assert found.answer.unexplained
     again = compare(_recording(3, size=0.0, faster=1.2), load_simulation(folder / "NEW.toml"))
     (change,) = again.answer.changes
-    assert (change.name, change.corrected) == ("empirical-drag-over-wheel_speed", 1.0)
+    assert (change.name, change.parameter, change.corrected) == ("empirical-drag-over-wheel_speed", "factor", 1.0)
+    assert change.statement.startswith("the empirical curve over the speed is gone, on both drums: factor from 1 to ")
     assert change.low <= 0 < change.high
     assert any("outside the range of the empirical curve" in note for note in again.answer.notes)
     again.write_corrected(folder / "GONE.toml", empirical=True)

@@ -218,12 +218,12 @@ def test_an_effect_is_gone_where_it_is_smaller_and_may_be_zero(
 
 def test_a_change_is_told_with_both_sizes_and_the_interval() -> None:
     """In one sentence; an effect of size 0 can only have become larger."""
-    assert change_in_words(Change("drag", "drag_current", 0.62, 0.9137, 0.88, 0.94, "A"), ", on both axes") == (
+    assert change_in_words(Change("drag", "drag_current", 0.62, 0.9137, 0.88, 0.94, "A"), ", on both axes", "drag") == (
         "drag is larger than the corrected simulation has it, on both axes: drag_current from 0.62 to 0.914 A "
         "(90 % sure: 0.880 to 0.940)."
     )
-    gone = change_in_words(Change("drag", "d", 1.0, 0.01, -0.02, 0.04))
-    assert gone.startswith("drag is gone: d from 1 to 0.01 (90 % sure")
+    gone = change_in_words(Change("drag", "d", 1.0, 0.01, -0.02, 0.04), "", "drag")
+    assert gone.startswith("drag is gone: d from 1 to 0.010 (90 % sure")
     assert direction_of(Change("drag", "d", 0.0, 0.5, 0.4, 0.6)) == "larger"
 
 

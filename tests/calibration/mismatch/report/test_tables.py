@@ -93,3 +93,12 @@ def test_each_of_several_channels_has_its_own_drawings_and_findings() -> None:
     assert "Quadratic drag" not in first.split("<h2>Parameters")[0].split("<h2>Effects that this")[0]
     assert "held-out error: 3.2 → 2.1 N" in second
     assert "thrust_N</td>" in page
+
+
+def test_a_curve_that_changed_is_called_by_what_it_is_over() -> None:
+    """In the words of the machine; the key that names it in the answer stands nowhere."""
+    labels = Labels(covariates={"position": "leaf angle (rad)"})
+    doubled = Change("empirical-drag-over-position", "factor", 1.0, 2.04, 1.9, 2.2)
+    (row,) = tables.changes(replace(CHANGED, changes=(doubled,)), labels)
+    assert (row.label, row.parameter) == ("Empirical curve over the leaf angle", "factor on the curve")
+    assert (row.corrected, row.now, row.low, row.high) == ("1", "2.04", "1.90", "2.20")
