@@ -22,11 +22,13 @@ def notes_on_other_covariates(decision: Decision) -> tuple[str, ...]:
 
     As much but for the share that an inexact law may leave (`form_misfit`): knots lie otherwise over another covariate.
     A curve over time has knots enough to follow what changes seldom, and is no other cause. Where several things stay
-    unexplained, each has been told beside the others; what comes and goes has no covariate.
+    unexplained, each has been told beside the others. What comes and goes has no covariate; no curve follows a sine.
     """
     if len({term.name for term in decision.unnamed}) != 1 or decision.intermittent:
         return ()
     told, problem = decision.unnamed[0], decision.equations.problem
+    if told.group.coupling in WITHOUT_CURVE:
+        return ()
     scores = _scores_over(decision, told)
     least = (1 - decision.equations.thresholds.form_misfit) * scores.get(told.name, float("inf"))
     others = [

@@ -79,7 +79,12 @@ def input_doubt(
         for name, error in errors.items()
         if name in as_read.channels and name in inputs
     }
-    stated = {name: scale.error(inputs[name]) for name, scale in scales.items() if scale.deviation > 0}
+    # What is at rest is known to be (`errors_in_variables.py`): a simulation may have a step beside it.
+    stated = {
+        name: np.where(inputs[name] == 0, 0.0, scale.error(inputs[name]))
+        for name, scale in scales.items()
+        if scale.deviation > 0
+    }
     if not stated:
         return None
     before = simulation.predict(inputs, values)
@@ -128,7 +133,8 @@ def _left_by_smoothing(taken_out: Array, error: Array) -> float:
 
     What smoothing takes out is a function of the readings, and what is left of the error is orthogonal to these.
     """
-    return float(np.clip(1 - known_mean((taken_out / error).ravel() ** 2), LEAST_LEFT, 1.0))
+    uncertain = error > 0
+    return float(np.clip(1 - known_mean((taken_out[uncertain] / error[uncertain]) ** 2), LEAST_LEFT, 1.0))
 
 
 def wheels_in_common(values: Array) -> int:

@@ -187,9 +187,12 @@ def with_periodic_terms(design: DesignMatrix, residual: Array) -> DesignMatrix:
 
 
 def _with_sines_over_time(design: DesignMatrix, residual: Array) -> DesignMatrix:
-    """Add the strongest sine over time, acting as drag: of all wheels, and of each."""
+    """Add the strongest sines over time, which act against the motion or whatever it is: of all wheels, and of each."""
     problem, limits = design.problem, design.problem.thresholds
     along = motion_of(problem)
+    couplings = {PERIODIC: along}
+    if np.any(along[problem.mask] > 0) and np.any(along[problem.mask] < 0):
+        couplings[PERIODIC_OFFSET] = np.ones(problem.mask.shape)
     time_s, step_s = problem.time_s[:, 0], problem.recording.step_s
     lowest_Hz, highest_Hz = limits.fewest_periods / problem.length_s, 1 / (limits.shortest_period * step_s)
     if lowest_Hz >= highest_Hz:
@@ -198,14 +201,15 @@ def _with_sines_over_time(design: DesignMatrix, residual: Array) -> DesignMatrix
     length = padded_length(int(place[-1]))
     frequency_Hz = np.fft.rfftfreq(length, step_s)
     searched = (frequency_Hz >= lowest_Hz) & (frequency_Hz <= highest_Hz)
-    power = np.stack([power_of_sums(place, values, length) for values in (residual * along * problem.mask).T])
     # As many frequencies were open to choice as the recording resolves.
     selection_penalty = 2 * float(np.log(problem.length_s * highest_Hz))
-    for of_wheels in (power.sum(axis=0), *power):
-        period_s = 1 / float(frequency_Hz[np.argmax(np.where(searched, of_wheels, -1.0))])
-        phase = 2 * np.pi * problem.time_s / period_s
-        sines = [along * np.cos(phase), along * np.sin(phase)]
-        design = with_group(design, "time", sines, PERIODIC, selection_penalty=selection_penalty, period=period_s)
+    for coupling, factor in couplings.items():
+        power = np.stack([power_of_sums(place, values, length) for values in (residual * factor * problem.mask).T])
+        for of_wheels in (power.sum(axis=0), *power):
+            period_s = 1 / float(frequency_Hz[np.argmax(np.where(searched, of_wheels, -1.0))])
+            phase = 2 * np.pi * problem.time_s / period_s
+            sines = [factor * np.cos(phase), factor * np.sin(phase)]
+            design = with_group(design, "time", sines, coupling, selection_penalty=selection_penalty, period=period_s)
     return design
 
 

@@ -40,7 +40,7 @@ UNITS = {"degC": "°C", "1": ""}
 WITH_MILLI = frozenset({"A"})
 """Units of a channel that are shown in thousandths where the mean reading is below 1."""
 LONGEST_IN_SECONDS = 180.0
-"""Recordings up to this long have their times in seconds, longer ones in minutes [s] (a choice)."""
+"""Recordings and periods up to this long are told in seconds, longer ones in minutes [s] (a choice)."""
 
 
 @dataclass(frozen=True)
@@ -136,9 +136,10 @@ class Labels:
         """Return what is told of the period of a sine: ", with a period of 12.3 s"; nothing where there is none."""
         if place.period is None:
             return ""
-        over_time = place.covariate == "time"
-        unit = self.time_unit if over_time else unit_in_label(place.covariate, self.covariates)
-        period = place.period * (self.time_factor if over_time else 1.0)
+        period, unit = place.period, unit_in_label(place.covariate, self.covariates)
+        if place.covariate == "time":
+            in_minutes = period > LONGEST_IN_SECONDS
+            period, unit = (period / 60, "min") if in_minutes else (period, "s")
         return f", with a period of {period:.3g}{after_number(unit)}"
 
     def parameter(self, effect: str, name: str) -> str:

@@ -30,6 +30,7 @@ from regolithd.calibration.mismatch.selection.region_search import (
     schwarz_surcharge,
     with_region,
 )
+from regolithd.calibration.mismatch.selection.slow_noise import lead_beside_slow_noise
 from regolithd.calibration.mismatch.selection.smooth_terms import covariate_of, unexplained_beside
 
 if TYPE_CHECKING:
@@ -99,7 +100,8 @@ def _better_in_a_range(decision: Decision) -> tuple[int, Confined] | None:
             instead = law_misfit(equations, named, confined.fit)
             of_its_covariate = confined.region.covariate == covariate_of(term)
             better = ahead > limits.smooth_term_entry and (not of_its_covariate or instead > limits.form_misfit)
-            if better and (best is None or confined.score > best[1].score):
+            better = better and (best is None or confined.score > best[1].score)
+            if better and _lead_in_slow_noise(decision, confined) > limits.slow_noise_entry:
                 best = index, confined
     return best
 
@@ -108,6 +110,11 @@ def _told_score(decision: Decision) -> float:
     """Return the score of what was decided, its curves paid for by Schwarz's criterion as ranges are."""
     curves = [term for term in decision.unnamed if term.group.region is None]
     return decision.equations.score(decision.whole) - schwarz_surcharge(decision.equations, decision.whole, curves)
+
+
+def _lead_in_slow_noise(decision: Decision, confined: Confined) -> float:
+    """Return how far a law in a range is ahead of what was decided, in noise of any spectrum."""
+    return lead_beside_slow_noise(confined.equations, confined.fit.terms, decision.whole.terms)
 
 
 def _may_be_confined(term: Term) -> bool:

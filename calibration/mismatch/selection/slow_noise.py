@@ -42,6 +42,14 @@ def score_beside_slow_noise(equations: NormalEquations, rest: Sequence[Term], te
     return gain - sum(equations.penalty(term) for term in terms)
 
 
+def lead_beside_slow_noise(equations: NormalEquations, ahead: Sequence[Term], behind: Sequence[Term]) -> float:
+    """Return by how much some terms score more than others in noise of any spectrum, without those that both have."""
+    shared = [term for term in ahead if any(term is other for other in behind)]
+    own, others = ([term for term in terms if not any(term is other for other in shared)] for terms in (ahead, behind))
+    scores = [score_beside_slow_noise(equations, shared, terms) if terms else 0.0 for terms in (own, others)]
+    return scores[0] - scores[1]
+
+
 def _columns_of(design: DesignMatrix, term: Term) -> Array:
     """Return a term's columns as read, 0 on the wheels that it is not on, shape (column, time, wheel)."""
     columns = design.in_time(design.columns_as_read(term.group.columns).astype(np.float64))

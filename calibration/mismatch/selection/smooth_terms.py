@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
-from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, same_covariate
+from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, PERIODIC_OFFSET, same_covariate
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_smooth_term,
@@ -20,7 +20,11 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
 )
 from regolithd.calibration.mismatch.selection.changed_parameters import drop_what_a_changed_parameter_explains
 from regolithd.calibration.mismatch.selection.law_misfit import law_misfit
-from regolithd.calibration.mismatch.selection.slow_noise import best_curve
+from regolithd.calibration.mismatch.selection.slow_noise import (
+    best_curve,
+    lead_beside_slow_noise,
+    score_beside_slow_noise,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -80,7 +84,7 @@ def _is_behind_a_curve(equations: NormalEquations, named: Fit, curve: Term) -> b
     """
     if len(named.terms) < 2 or all(covariate_of(term) == curve.name for term in named.terms):
         return False
-    return equations.score(equations.fit((curve,))) > equations.score(named) + equations.thresholds.smooth_term_entry
+    return _is_ahead(equations, equations.fit((curve,)), named, equations.thresholds.smooth_term_entry)
 
 
 def _explains_more(equations: NormalEquations, curve: Fit, named: Fit, entry_threshold: float) -> bool:
@@ -90,13 +94,20 @@ def _explains_more(equations: NormalEquations, curve: Fit, named: Fit, entry_thr
     another covariate, and gain beyond them what is significant and more than a law's misfit.
     """
     limits = equations.thresholds
-    ahead = equations.score(curve) - equations.score(named)
     if all(term.group.named for term in named.terms):
         of_its_covariate = all(covariate_of(term) == curve.terms[-1].name for term in named.terms)
         misfit = law_misfit(equations, named, curve)
-        return not of_its_covariate and misfit > limits.form_misfit and ahead > limits.smooth_term_entry
+        another_law = not of_its_covariate and misfit > limits.form_misfit
+        return another_law and _is_ahead(equations, curve, named, limits.smooth_term_entry)
     further = sum(term.group.named for term in named.terms) - sum(term.group.named for term in curve.terms)
-    return ahead >= -entry_threshold * max(further, 0)
+    return _is_ahead(equations, curve, named, -entry_threshold * max(further, 0))
+
+
+def _is_ahead(equations: NormalEquations, curve: Fit, named: Fit, by: float) -> bool:
+    """Return whether a fit with a curve scores more by so much, by the weights and in noise of any spectrum."""
+    if equations.score(curve) - equations.score(named) <= by:
+        return False
+    return lead_beside_slow_noise(equations, curve.terms, named.terms) > by
 
 
 def _effects_beside_curve(equations: NormalEquations, named: Fit, curve: Term, entry_threshold: float) -> Fit:
@@ -181,7 +192,7 @@ def drop_transients(equations: NormalEquations, named: Fit) -> Fit:
     curves = [
         group
         for group in equations.design.groups
-        if not group.named and group.name == "time" and group.coupling != PERIODIC
+        if not group.named and group.name == "time" and group.coupling not in {PERIODIC, PERIODIC_OFFSET}
     ]
     kept = []
     for term in named.terms:
@@ -191,8 +202,16 @@ def drop_transients(equations: NormalEquations, named: Fit) -> Fit:
         shares = [
             gain / (gain + named.delta_chi2)
             for gain, curve in beside
-            if curve.wheels == term.wheels and gain > chi2_quantile(equations, len(curve.group.columns))
+            if curve.wheels == term.wheels and _is_significant(equations, named, curve, gain)
         ]
         if max(shares, default=0.0) < equations.thresholds.form_misfit:
             kept.append(term)
     return named if len(kept) == len(named.terms) else equations.fit(kept)
+
+
+def _is_significant(equations: NormalEquations, named: Fit, curve: Term, gain: float) -> bool:
+    """Return whether one curve gains more beside names than chance, by the weights and in noise of any spectrum."""
+    by_chance = chi2_quantile(equations, len(curve.group.columns))
+    if gain <= by_chance:
+        return False
+    return score_beside_slow_noise(equations, named.terms, [curve]) + equations.penalty(curve) > by_chance

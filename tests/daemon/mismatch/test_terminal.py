@@ -96,7 +96,7 @@ def test_mismatch_prints_the_answer() -> None:
         "    power = 0.75",
         "  changed: viscous-friction is larger than the corrected simulation has it.",
         f"  parameter loss had to leave its prior: {LEFT}",
-        "  unexplained: 12 % of the residual follows time, with a period of 2.5 min, on zones 1 and 4, 3 to 100 s",
+        "  unexplained: 12 % of the residual follows time, with a period of 150 s, on zones 1 and 4, 3 to 100 s",
         "  unexplained: 40 % of the residual follows the height of the bale, on zone 1, 0 to 9 s",
         "    empirical curve over the height of the bale, 0.1 to 0.7 m: held-out error 50.0 % smaller with it",
         "    suggestion 1: Δcurrent = c height; c = 2.5 A/m; 47.5 % smaller",

@@ -207,3 +207,26 @@ def test_intervals_have_the_errors_that_a_state_adds_up() -> None:
     assert [answer.verdict for answer in answers] == ["consistent"] * 10
     held = [each.low < heated_room.TRUE[each.name] < each.high for answer in answers for each in answer.parameters]
     assert 16 <= sum(held) <= 20
+
+
+class Braked(Slipping):
+    """A motor whose brake holds it at rest: there is no current where the speed reads 0."""
+
+    inputs = ("ground_m_s",)
+    parameters: ClassVar = {"idle_A": Prior(20.0, 1.0, "A")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the idle current where the motor turns."""
+        return np.where(inputs["ground_m_s"] == 0, 0.0, values["idle_A"])
+
+
+def test_a_column_that_is_at_rest_is_not_in_doubt() -> None:
+    """A step of the prediction beside 0 is no error of it where the reading is known to be 0."""
+    moving = driven(1)
+    rest = np.arange(COUNT) % 100 < 30
+    ground = np.where(rest[:, None], 0.0, moving.channels["ground_m_s"])
+    recording = moving.with_channels(ground_m_s=ground)
+    found = input_doubt(recording, recording, Braked(), {"idle_A": 20.0}, Braked.sensors)
+    assert found is not None
+    assert not found.alone.any()
+    assert not found.bias.any()

@@ -15,6 +15,7 @@ from regolithd.calibration.mismatch.regression.nuisance import with_nuisance
 from regolithd.calibration.mismatch.regression.residuals import active_rms, contribution
 from regolithd.calibration.mismatch.regression.smooth_groups import (
     PERIODIC,
+    PERIODIC_OFFSET,
     has_smooth_term,
     with_periodic_terms,
     with_smooth_terms,
@@ -79,13 +80,12 @@ def test_smooth_terms_cover_covariates_and_couplings() -> None:
 
 
 def test_the_strongest_sine_over_time_is_added() -> None:
-    """Of all wheels together and of each, along the motion, at the frequency of the residual's line."""
+    """Of all wheels together and of each, along the motion and whatever it is, at the frequency of the residual."""
     along = PROBLEM.covariates["direction"]
     residual = along * np.sin(2 * np.pi * 0.05 * PROBLEM.time_s) * np.array([1.0, 0.0])
     design = with_periodic_terms(design_of(PROBLEM), residual)
-    assert len(design.groups) == 3
+    assert [group.coupling for group in design.groups] == [*[PERIODIC] * 3, *[PERIODIC_OFFSET] * 3]
     group = design.groups[0]
-    assert group.coupling == PERIODIC
     assert group.selection_penalty == pytest.approx(2 * np.log(PROBLEM.length_s / (5 * 0.5)))
     columns = np.stack([design.in_time(design.columns([c])[0])[:, 0] for c in group.columns], axis=1)
     left = residual[:, 0] - columns @ np.linalg.lstsq(columns, residual[:, 0], rcond=None)[0]
