@@ -19,7 +19,7 @@ from regolithd.calibration.mismatch.selection.best_subsets import (
 )
 from regolithd.calibration.mismatch.selection.cross_validation import squares_left, training_equations
 from regolithd.calibration.mismatch.selection.decision import names_of, without_name
-from regolithd.calibration.mismatch.selection.law_misfit import without_term
+from regolithd.calibration.mismatch.selection.law_misfit import without_terms
 from regolithd.calibration.mismatch.selection.shape_optimisation import optimised_shape, with_best_developments
 
 if TYPE_CHECKING:
@@ -88,12 +88,12 @@ def held_out_errors(
             train, chosen = _or_as_named(train, chosen, named, groups, curves)
         chosen = of_names(chosen, named)
         equations = equations.over(train.design.with_groups(equations.design.groups))
-        before += squares_left(train, train.fit(()), fold)
+        before += squares_left(train, without_terms(train, named.terms, ()), fold)
         after += squares_left(train, train.fit(chosen), fold)
         with_it += squares_left(train, train.fit((*chosen, *curves)), fold)
         for index, term in enumerate(named.terms):
             rest = tuple(other for other in chosen if other.group.subject != term.group.subject)
-            without[index] += squares_left(train, without_term(train, term, (*rest, *curves)), fold)
+            without[index] += squares_left(train, without_terms(train, [term], (*rest, *curves)), fold)
     counts = equations.design.counts.sum(axis=0)
     on = [list(term.wheels) for term in named.terms]
     return equations, HeldOutErrors(

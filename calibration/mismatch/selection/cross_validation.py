@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations, normal_equations
 from regolithd.calibration.mismatch.regression.residuals import residual_as_read_of
-from regolithd.calibration.mismatch.selection.law_misfit import without_term
+from regolithd.calibration.mismatch.selection.law_misfit import without_terms
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,7 +61,7 @@ def gains_on_other_folds(equations: NormalEquations, terms: Sequence[Term], inde
     gains = np.zeros(equations.design.folds)
     for fold in range(len(gains)):
         train = training_equations(equations, fold)
-        less = squares_on_fold(train.design, without_term(train, terms[index], rest), fold)
+        less = squares_on_fold(train.design, without_terms(train, [terms[index]], rest), fold)
         saved = less - squares_on_fold(train.design, train.fit(terms), fold)
         gains[fold] = float(np.sum(saved * equations.weights))
     return gains
@@ -78,7 +78,7 @@ def transfer_margin(equations: NormalEquations, terms: Sequence[Term], index: in
     gains = gains_on_other_folds(equations, terms, index)
     # Of a gain that the priors alone pay (a parameter need not stray), no data can give anything back: only what the
     # data gained is asked for.
-    without, fit = without_term(equations, terms[index], rest), equations.fit(terms)
+    without, fit = without_terms(equations, [terms[index]], rest), equations.fit(terms)
     gained = sum(
         float((squares_on_fold(design, without, fold) - squares_on_fold(design, fit, fold)) @ equations.weights)
         for fold in range(len(gains))

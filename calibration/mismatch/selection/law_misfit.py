@@ -32,13 +32,14 @@ def as_stated(equations: NormalEquations) -> NormalEquations:
     return equations.with_nuisance(held)
 
 
-def without_term(equations: NormalEquations, term: Term, rest: Sequence[Term]) -> Fit:
-    """Return the fit of the others that a term's gain on held-out readings is measured against.
+def without_terms(equations: NormalEquations, terms: Sequence[Term], rest: Sequence[Term]) -> Fit:
+    """Return the fit of the others that the gain of terms on held-out readings is measured against.
 
     That of a change is measured against the corrected effect as it was: what is uncertain of that would take the change
     up, and be as good on any reading.
     """
-    return (as_stated(equations) if term.group.is_change else equations).fit(rest)
+    changed = any(term.group.is_change for term in terms)
+    return (as_stated(equations) if changed else equations).fit(rest)
 
 
 def settled(equations: NormalEquations, fit: Fit) -> Fit:

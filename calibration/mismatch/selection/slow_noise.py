@@ -28,18 +28,21 @@ Array = NDArray[np.float64]
 def score_beside_slow_noise(equations: NormalEquations, rest: Sequence[Term], terms: Sequence[Term]) -> float:
     """Return what terms gain beside others in twice the log likelihood of noise of any spectrum, less their penalties.
 
-    Where no wheel has readings enough for a spectrum, it is what they gain by the weights.
+    Added is by how much parameters come nearer to their priors: the size of a corrected effect, which stands for a
+    change of it as long as there is none. Where no wheel has readings enough for a spectrum, it is what the terms gain
+    by the weights.
     """
-    design, fit = equations.design, equations.fit(rest)
+    design, fit, more = equations.design, equations.fit(rest), equations.fit((*rest, *terms))
     read = [places for places, _ in design.readings]
     if max((len(places) for places in read), default=0) < FEWEST_READINGS:
-        return equations.score(equations.fit((*rest, *terms))) - equations.score(fit)
+        return equations.score(more) - equations.score(fit)
     columns = np.concatenate([_columns_of(design, term) for term in terms])
     beside = design.in_folds(left_beside(equations, fit, columns))
     left = residual_as_read_of(equations, fit)
     courses = [of_wheel[places] for places, of_wheel in zip(read, left, strict=True)]
     gain = gain_of_columns(courses, [beside[:, w, places] for w, places in enumerate(read)], equations.thresholds)
-    return gain - sum(equations.penalty(term) for term in terms)
+    away, nearer = (equations.nuisance.prior_stds_away(each) for each in (fit, more))
+    return gain + float(away @ away - nearer @ nearer) - sum(equations.penalty(term) for term in terms)
 
 
 def lead_beside_slow_noise(equations: NormalEquations, ahead: Sequence[Term], behind: Sequence[Term]) -> float:

@@ -29,7 +29,8 @@ from regolithd.calibration.mismatch.regression.equations import smooth_equations
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.selection.cross_validation import transfer_margin
-from regolithd.calibration.mismatch.selection.law_misfit import explained, without_term
+from regolithd.calibration.mismatch.selection.law_misfit import explained, without_terms
+from regolithd.calibration.mismatch.selection.slow_noise import score_beside_slow_noise
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -303,8 +304,20 @@ def test_a_change_gains_beyond_the_corrected_effect_as_it_was() -> None:
     terms = [Term(group, (0,))]
     fit = equations.fit(terms)
     assert residual_power(equations, equations.fit(())) < 1.01 * residual_power(equations, fit)
-    assert residual_power(equations, without_term(equations, terms[0], ())) > 2 * residual_power(equations, fit)
+    assert residual_power(equations, without_terms(equations, [terms[0]], ())) > 2 * residual_power(equations, fit)
     assert transfer_margin(equations, terms, 0, 8.0) > 0
+
+
+def test_a_change_has_evidence_beside_slow_noise_as_the_corrected_size_is_as_it_was() -> None:
+    """The size that was corrected stands for the change where there is none, and is then far from what was found."""
+    stated = stated_in(library(), [replace(COULOMB, relative_std=0.3)], [])
+    problem = corrected_problem(build_problem(moving(1, 1.5), Axis()), stated)
+    equations, _ = with_library(smooth_equations(problem), with_changes(problem, (), stated))
+    (group,) = [each for each in equations.design.groups if each.named]
+    terms = [Term(group, (0,))]
+    by_weights = equations.score(equations.fit(terms)) - equations.score(equations.fit(()))
+    assert by_weights > 10
+    assert score_beside_slow_noise(equations, (), terms) == pytest.approx(by_weights, rel=0.1)
 
 
 @pytest.mark.parametrize("one_way", [True, False])
