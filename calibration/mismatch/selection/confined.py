@@ -108,13 +108,19 @@ def _better_in_a_range(decision: Decision) -> tuple[int, Confined] | None:
 
 def _told_score(decision: Decision) -> float:
     """Return the score of what was decided, its curves paid for by Schwarz's criterion as ranges are."""
+    return decision.equations.score(decision.whole) - _surcharge(decision)
+
+
+def _surcharge(decision: Decision) -> float:
+    """Return what the curves of what was decided pay beyond their penalties, by Schwarz's criterion."""
     curves = [term for term in decision.unnamed if term.group.region is None]
-    return decision.equations.score(decision.whole) - schwarz_surcharge(decision.equations, decision.whole, curves)
+    return schwarz_surcharge(decision.equations, decision.whole, curves)
 
 
 def _lead_in_slow_noise(decision: Decision, confined: Confined) -> float:
     """Return how far a law in a range is ahead of what was decided, in noise of any spectrum."""
-    return lead_beside_slow_noise(confined.equations, confined.fit.terms, decision.whole.terms)
+    lead = lead_beside_slow_noise(confined.equations, confined.fit.terms, decision.whole.terms)
+    return lead + _surcharge(decision)
 
 
 def _may_be_confined(term: Term) -> bool:
