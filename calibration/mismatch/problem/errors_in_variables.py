@@ -96,11 +96,12 @@ def expected_inputs(
             continue
         moving, deviation = np.where(rest[:, k], np.nan, stabilised[:, k]), scales[k].deviation
         before = truths.column(k)
-        truth = smooth_where_better(moving, deviation, recording.time_s, recording.run, before)
+        truth = smooth_where_better(stabilised[:, k], deviation, recording.time_s, recording.run, before, rest[:, k])
         if name not in normal:
             smooth[:, k] = refined_by_density(moving, deviation, starts, truth)
         elif truth is not before:
-            smooth[:, k] = still_at_rest(moving, deviation, truth).mean
+            # A sensor that reads exactly 0 at rest reads anything else in motion.
+            smooth[:, k] = truth.mean if rest[:, k].any() else still_at_rest(moving, deviation, truth).mean
     expected = np.stack([scale.readings(column) for scale, column in zip(scales, smooth.T, strict=True)], axis=1)
     parts = np.split(np.where(rest, 0.0, expected), len(names), axis=1)
     return recording.with_channels(**dict(zip(names, parts, strict=True)))

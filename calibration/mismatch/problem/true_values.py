@@ -60,13 +60,19 @@ class NormalTruth:
 
 
 def smooth_where_better(
-    readings: Array, deviation: float, time: Array, run: NDArray[np.int64], normal: NormalTruth
+    readings: Array,
+    deviation: float,
+    time: Array,
+    run: NDArray[np.int64],
+    normal: NormalTruth,
+    rest: NDArray[np.bool_],
 ) -> NormalTruth:
     """Return what a smoothing spline says of the truth where that is clearly nearer to it; else `normal`.
 
-    `readings` (time,), NaN where there are none, have normal errors of this deviation.
+    `readings` (time,), NaN where there are none, have normal errors of this deviation; those at `rest` have none, and
+    say where a motion begins and ends.
     """
-    known = np.isfinite(readings)
+    known = np.isfinite(readings) & ~rest
     if not _matters(deviation, known, normal):
         return normal
     centred = readings - normal.prior_mean
@@ -76,7 +82,7 @@ def smooth_where_better(
         return normal
     part_of = np.concatenate([np.full(part.stop - part.start, number) for number, part in enumerate(parts)])
     runs = run[rows] * len(parts) + part_of
-    spline = best_spline(centred[rows], deviation, time[rows], runs)
+    spline = best_spline(centred[rows], deviation, time[rows], runs, rest[rows])
     there = spline.estimate(centred[rows], deviation, differences(time[rows], runs, spline.order))
     new = _at(there, known[rows])
     old = _at(Estimate((normal.mean - normal.prior_mean)[rows], normal.variance[rows]), known[rows])

@@ -128,9 +128,11 @@ class SmoothingSpline:
         return found, band
 
 
-def best_spline(readings: Array, deviation: float, time: Array, run: NDArray[np.int64]) -> SmoothingSpline:
-    """Return the spline whose mean square error is least by Stein's estimate."""
-    known = np.isfinite(readings)
+def best_spline(
+    readings: Array, deviation: float, time: Array, run: NDArray[np.int64], exact: NDArray[np.bool_]
+) -> SmoothingSpline:
+    """Return the spline whose mean square error is least by Stein's estimate, over the readings that are not exact."""
+    known = np.isfinite(readings) & ~exact
     rows = {order: differences(time, run, order) for order in ORDERS}
 
     def error(estimate: Estimate) -> float:

@@ -141,7 +141,8 @@ def test_what_the_speed_is_computed_from_has_no_density() -> None:
     found = simulated(inputs_of(recording, Winch()), Winch(), {"gain_V_W": 0.05}, THRESHOLDS).recording
     normal = normal_truths(np.column_stack((power, rpm)), np.full(2, 4.0), np.array([0]))
     splines = [
-        smooth_where_better(each, 2.0, TIME_S, found.run, normal.column(k)) for k, each in enumerate((power, rpm))
+        smooth_where_better(each, 2.0, TIME_S, found.run, normal.column(k), np.zeros(ROWS, np.bool_))
+        for k, each in enumerate((power, rpm))
     ]
     rpm_alone = still_at_rest(rpm, 2.0, splines[1]).mean
     np.testing.assert_allclose(found.channels["motor_rpm"][:, 0], rpm_alone)

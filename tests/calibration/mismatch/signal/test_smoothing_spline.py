@@ -111,7 +111,7 @@ def test_the_best_spline_is_nearly_that_of_who_knows_the_truth(truth: Array, hea
     def error(spline: SmoothingSpline) -> float:
         return float(np.mean((spline.mean(readings, 0.03, rows[spline.order]) - truth) ** 2))
 
-    chosen = best_spline(readings, 0.03, time, run)
+    chosen = best_spline(readings, 0.03, time, run, np.zeros(4000, np.bool_))
     assert chosen.heavy == heavy
     tried = [SmoothingSpline(order, each) for order in ORDERS for each in WIDTHS[:-4]]
     tried += [SmoothingSpline(order, each, heavy=True) for order in HEAVY_ORDERS for each in HEAVY_WIDTHS]
