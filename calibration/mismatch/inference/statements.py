@@ -22,11 +22,12 @@ if TYPE_CHECKING:
 
 
 NOUNS = """
-actuator antenna arm axis axle bay bearing belt bench blade boat body boom box brake branch bus cabin car
-carriage cell chain channel compressor conveyor crane cylinder device door drive drone drum engine fan finger
-flap gate gearbox gimbal gripper heater hoist hopper jaw jet joint key leg lift line link machine mast motor
-node nozzle oven pack pile pipe pitch press propeller pulley pump rack rail robot roll roller rotor rover screw
-sensor servo shaft side slide spindle spring stage stand station tank thruster tool tower track train trolley
+actuator antenna arm axis axle bay bearing belt bench blade block blower boat body boom box brake branch
+burner bus cabin capstan car carriage cell chain channel column compressor conveyor crane cylinder device disc
+door drive drone drum engine fan finger flap gate gearbox gimbal gripper head heater hoist hopper jaw jet
+joint key lane leg lift line link loop machine mast module motor node nozzle oven pack panel pile pipe pitch
+press propeller pulley pump rack rail ring robot roll roller rotor rover row screw section segment sensor
+servo shaft side slide spindle spring stage stand station table tank thruster tool tower track train trolley
 truck tube turbine unit valve vehicle wagon wheel winch wing zone
 """
 """What machines have several of, in English; a plural of any other word (`achse`) would be a guess."""

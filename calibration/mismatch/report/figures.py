@@ -19,6 +19,8 @@ WIDTH = 800.0
 """Of a drawing over the page's whole width [px]."""
 FULL_COLOUR = 6.0
 """Standard errors at which a cell has its full colour (a choice: twice what noise seldom passes)."""
+LONGEST_BAR = 3.0
+"""Error bars up to so many times the median one set the scale (a choice: of a bin with few readings it is cut off)."""
 OPACITY_POWER = 1.2
 """Opacity goes with this power of the standard errors, so that noise stays pale (a choice)."""
 FAINTEST = 0.02
@@ -117,8 +119,9 @@ def curve_figure(
     known = np.isfinite(before)
     if not known.any():
         return ""
-    low = float(np.nanmin(np.concatenate([before - spread, after, [0.0]])))
-    high = float(np.nanmax(np.concatenate([before + spread, after, [0.0]])))
+    reach = np.minimum(spread, LONGEST_BAR * np.nanmedian(spread[known]))
+    low = float(np.nanmin(np.concatenate([before - reach, after, [0.0]])))
+    high = float(np.nanmax(np.concatenate([before + reach, after, [0.0]])))
     margin = 0.08 * ((high - low) or 1.0)
     ends = (float(np.min(centre)), float(np.max(centre)))
     air = 0.03 * ((ends[1] - ends[0]) or 1.0)
@@ -130,7 +133,8 @@ def curve_figure(
     parts = [box(panel), line([(panel.left, panel.at_y(0)), (panel.left + panel.width, panel.at_y(0))], "zero")]
     for x, y, e in zip(centre[known], before[known], spread[known], strict=True):
         at = panel.at_x(x)
-        parts.append(line([(at, panel.at_y(y - e)), (at, panel.at_y(y + e))], "before bar"))
+        ends_of_bar = np.clip((y - e, y + e), *panel.y).tolist()
+        parts.append(line([(at, panel.at_y(end)) for end in ends_of_bar], "before bar"))
     radius = 2.2 if small else 3.4
     for kind, values in (("before", before), ("after", after))[: 2 if corrected else 1]:
         xy = [(panel.at_x(x), panel.at_y(y)) for x, y in zip(centre, values, strict=True)]
