@@ -7,6 +7,10 @@ known.
 
 So the simulation is run along each axis itself, to both sides, over its standard deviation: where nothing changes along
 an axis, nothing is seen along it. The axes are those of the tangents, so both are found anew until they agree.
+
+A change-over within an axis that is short makes it seem shorter still, from round to round, and no axes agree. A
+parameter by which the simulation switches then has the mean change over its prior's standard deviation to both sides,
+in which a change-over is averaged, if these tangents lead to values that fit better.
 """
 
 from __future__ import annotations
@@ -17,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.problem.prior import OFTEN_WITHIN
 
 if TYPE_CHECKING:
@@ -63,6 +68,10 @@ class Linearised(Protocol):
         """Where readings are compared."""
 
     @property
+    def filled(self) -> Array:
+        """The prediction, 0 where there is none."""
+
+    @property
     def thresholds(self) -> Thresholds:
         """The numbers that decide."""
 
@@ -91,7 +100,7 @@ def tangents_where_it_switches(problem: Linearised) -> Array:
     for _ in range(ROUNDS):
         stds, axes = _posterior(problem, columns, precision)
         if np.all(np.abs(stds - before) <= AGREE * before):
-            break
+            return np.asarray(columns / units[:, None, None])
         along = [
             _along(problem, dict(zip(names, (std * axis * units).tolist(), strict=True)), std)
             for std, axis in zip(stds.tolist(), axes.T, strict=True)
@@ -100,7 +109,38 @@ def tangents_where_it_switches(problem: Linearised) -> Array:
             np.tensordot(axis, columns, 1) if each is None else each for axis, each in zip(axes.T, along, strict=True)
         ]
         columns, before = np.tensordot(axes, np.stack(known), 1), stds
-    return np.asarray(columns / units[:, None, None])
+    averaged = np.stack([_averaged(problem, name, unit) for name, unit in zip(names, units.tolist(), strict=True)])
+    tried = (np.asarray(columns / units[:, None, None]), averaged)
+    return min(tried, key=lambda tangents: _left_after_a_step(problem, tangents, units))
+
+
+def _left_after_a_step(problem: Linearised, tangents: Array, units: Array) -> float:
+    """Return χ² of readings and priors where the simulation is run at the values that tangents lead to.
+
+    The noise is as large as what the present values leave, with the provisional autocorrelation time.
+    """
+    priors, names = problem.simulation.parameters, problem.free
+    values = np.array([problem.values[name] for name in names])
+    away = values - np.array([priors[name].value for name in names])
+    precision = np.array([priors[name].std for name in names]) ** -2.0
+    known = problem.mask & np.isfinite(tangents).all(axis=0)
+    columns, left = tangents[:, known], problem.residual[known]
+    weight = 1 / (np.mean(left**2) * problem.thresholds.provisional_autocorrelation_time)
+    scaled = units[:, None] * units * (weight * columns @ columns.T + np.diag(precision))
+    step = units * np.linalg.solve(scaled, units * (weight * columns @ left - precision * away))
+    try:
+        moved = problem.changed(**dict(zip(names, (values + step).tolist(), strict=True)))
+    except SimulationError:
+        return np.inf
+    left = (problem.residual - (moved - problem.filled))[known]
+    return float(weight * np.sum(np.nan_to_num(left) ** 2) + precision @ (away + step) ** 2)
+
+
+def _averaged(problem: Linearised, name: str, unit: float) -> Array:
+    """Return the mean change per unit to both sides over a prior's standard deviation, if the simulation switches."""
+    if not switches(problem, name):
+        return problem.difference_quotient(name)
+    return known_mean(np.stack((problem.secant(name, unit), problem.secant(name, -unit))))
 
 
 def switches(problem: Linearised, name: str) -> bool:

@@ -128,3 +128,35 @@ def test_the_fit_does_not_end_where_the_fan_runs_at_the_wrong_times(
     found = {each.name: each for each in answer.parameters}
     assert found["fan"].value == pytest.approx(truth["fan"], rel=0.02)
     assert answer.fit.held_out_rmse_after < 1.1
+
+
+class Freezing(Simulation):
+    """A torque in proportion to a load, with a step of 3 N·m in one reading as soon as the load has a greater share."""
+
+    channel, unit = "torque_Nm", "N·m"
+    inputs = ("load_kg", "speed_rad_s")
+    parameters: ClassVar = {"share": Prior(1.0, 0.1, "N·m/kg"), "drag": Prior(0.5, 0.05, "N·m s/rad")}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the torque."""
+        torque = values["share"] * inputs["load_kg"] + values["drag"] * inputs["speed_rad_s"]
+        torque[1000] += 3.0 * (values["share"] > 1.0)
+        return torque
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the load."""
+        return {"load": inputs["load_kg"]}
+
+
+def test_a_change_over_that_no_axis_agrees_on_does_not_grow() -> None:
+    """Over the standard deviation of what is known well, a step is a steep slope, and makes that seem known better."""
+    random = np.random.default_rng(3)
+    load, speed = random.uniform(1, 2, 2000), random.uniform(0, 3, 2000)
+    columns = {"t_s": 0.1 * np.arange(2000), "load_kg": load, "speed_rad_s": speed}
+    columns["torque_Nm"] = 1.02 * load + 0.49 * speed + random.normal(0, 0.1, 2000)
+    problem = build_problem(from_columns(columns), Freezing())
+    assert switches(problem, "share")
+    share, drag = tangents_where_it_switches(problem)[:, :, 0]
+    np.testing.assert_allclose(np.delete(share, 1000), np.delete(load, 1000))
+    assert share[1000] == pytest.approx(load[1000] + 3.0 / 0.2)
+    np.testing.assert_allclose(drag, speed)

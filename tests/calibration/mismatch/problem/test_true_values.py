@@ -261,7 +261,9 @@ def test_a_column_that_was_read_for_a_part_of_the_time_is_no_error() -> None:
     some = slice(10 * COUNT, 11 * COUNT)
     readings[some] = to_and_fro() + np.random.default_rng(21).normal(0, 0.05, COUNT)
     normal = normal_truths(readings[:, None], np.array([0.0025]), START).column(0)
-    found = smooth_where_better(readings, 0.05, time, np.zeros(len(time), np.int64), normal, np.zeros(len(time), np.bool_))
+    found = smooth_where_better(
+        readings, 0.05, time, np.zeros(len(time), np.int64), normal, np.zeros(len(time), np.bool_)
+    )
     np.testing.assert_array_equal(np.isfinite(found.mean), np.isfinite(readings))
     assert np.std(found.mean[some] - to_and_fro()) < 0.05
 
