@@ -145,7 +145,7 @@ class Decision:
 def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decision:
     """Choose the named effects, and the smooth terms that nothing named explains."""
     problem = equations.problem
-    left = noise_left(equations)
+    left = noise_left(with_sines(equations))
     equations = whitened(equations, left)
     threshold = entry_threshold(equations, left, blocks_of_time(problem, noise_of_whitened(equations.design, left)))
     equations = with_proposed_shapes(equations, candidates)
@@ -223,6 +223,11 @@ def _largest_that_passes(equations: NormalEquations, subsets: Sequence[Fit], thr
         if passes_entry_test(equations, fit, named, threshold):
             named = fit
     return named
+
+
+def with_sines(equations: NormalEquations) -> NormalEquations:
+    """Return equations with the strongest sines in what the free parameters leave: one that stays in is slow noise."""
+    return equations.over(with_periodic_terms(equations.design, residual_of(equations, equations.fit(()))))
 
 
 def with_proposed_shapes(equations: NormalEquations, candidates: Sequence[Candidate]) -> NormalEquations:

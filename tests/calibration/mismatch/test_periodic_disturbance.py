@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare, from_columns
 
@@ -67,6 +68,16 @@ def test_a_disturbance_that_acts_along_the_motion_is_too() -> None:
     (place,) = answer(1.5 * WAVE * np.sign(speed)).unexplained
     assert place.covariate == "time"
     assert place.period == pytest.approx(PERIOD_S, rel=0.01)
+
+
+def test_a_slow_wave_is_not_taken_for_the_noise() -> None:
+    """With a period of 31 s, in noise of which a third lasts for 2 s: it is as large as the noise."""
+    rng = np.random.default_rng(5)
+    lasting = lfilter([1.0], [1.0, -np.exp(-STEP_S / 2)], rng.normal(0, 1, INSTANTS))
+    wave = 1.7 * np.sin(2 * np.pi * TIME_S / 31.0)
+    (place,) = answer(wave + 0.7 * lasting / np.std(lasting)).unexplained
+    assert place.covariate == "time"
+    assert place.period == pytest.approx(31.0, rel=0.02)
 
 
 def test_a_still_day_is_consistent() -> None:
