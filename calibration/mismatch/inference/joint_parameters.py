@@ -124,9 +124,9 @@ def joint_posterior(
 ) -> JointPosterior:
     """Return the posterior of the parameters from all channels and their stated priors.
 
-    Where the channels together contradict a prior, it is released as in one channel: if the evidence is larger even
-    after what a wrong statement is charged, and no parameter goes further than a wrong statement explains. Of
-    parameters that could stand for each other the one with most evidence is released, or all together.
+    Where the channels together contradict a prior, it is released as in one channel: if the evidence is larger by
+    `lead_margin` even after what a wrong statement is charged, and no parameter goes further than a wrong statement
+    explains. Of parameters that could stand for each other the one with most evidence is released, or all together.
     """
     likelihood = _Likelihood.of(priors, informations)
     within = likelihood.posterior(())
@@ -136,8 +136,9 @@ def joint_posterior(
     contradicted = np.flatnonzero(beyond & np.array([priors[name].told for name in within.names], bool)).tolist()
     sets = dict.fromkeys([*((place,) for place in contradicted), tuple(contradicted)])
     found = [likelihood.posterior(places) for places in sets if places]
-    plausible = [each for each in found if not each.too_far(priors)]
-    return max((within, *plausible), key=lambda each: each.evidence)
+    needed = within.evidence + THRESHOLDS.lead_margin
+    plausible = [each for each in found if not each.too_far(priors) and each.evidence > needed]
+    return max(plausible, key=lambda each: each.evidence, default=within)
 
 
 def known_better_by_others(

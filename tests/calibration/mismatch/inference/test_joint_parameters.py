@@ -53,8 +53,9 @@ def test_a_contradicted_prior_is_released_and_another_is_not() -> None:
 
 
 def test_a_prior_is_not_released_within_its_reach_or_further_than_a_wrong_statement() -> None:
-    """Within three of its deviations, and further than eight."""
+    """Within three of its deviations, where that is hardly more probable than chance, and further than eight."""
     assert not joint_posterior(PRIORS, [alone("b", 1.29, 0.01)]).released
+    assert not joint_posterior(PRIORS, [alone("b", 1.33, 0.01)]).released
     assert not joint_posterior(PRIORS, [alone("b", 2.0, 0.01)]).released
     assert joint_posterior(PRIORS, [alone("b", 1.6, 0.01)]).released
     assert not joint_posterior(PRIORS, [alone("b", 1.6, 0.01)], may_release=False).released
