@@ -8,6 +8,7 @@ import sqlite3
 import time
 from contextlib import closing
 from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
@@ -357,16 +358,21 @@ def test_an_hour_is_drawn_from_means_while_data_arrive(rig: GroundRig, browser: 
     page = browser.new_page(viewport={"width": 1500, "height": 1000})
     page.goto(f"{rig.url}/#kapvik")
     expect(page.locator("#presence")).to_contain_text("online", timeout=PATIENCE_MS)
-    with page.expect_response(lambda answer: "/api/history" in answer.url) as waiting:
+    with page.expect_response(lambda answer: asked_s(answer.url) == 3600) as waiting:
         page.locator("#span").select_option("1 h")
     points = waiting.value.json()["snapshot"]
     assert points["spacing_s"] > 0
     assert 0 < len(points["time_ms"]) <= MOST_POINTS
-    load = "#plots .figures:not(.three) figure:nth-child(1) canvas"
-    until(lambda: coloured(page, load, to=0.3) > 100, "the first minutes of the hour are drawn")
+    until(lambda: coloured(page, "#plots .figures:not(.three) canvas", to=0.3) > 100, "the hour's beginning is drawn")
     shown = page.locator('[data-wheel="3"] [data-value="load_N"]')
     expect(shown).not_to_have_text(shown.text_content() or "", timeout=PATIENCE_MS)
     page.close()
+
+
+def asked_s(url: str) -> float:
+    """Return the range of time that a page asks for [s]; 0 where it asks for none."""
+    asked = parse_qs(urlsplit(url).query)
+    return round((float(asked["to"][0]) - float(asked["from"][0])) / 1000) if "to" in asked else 0.0
 
 
 def fill_hour(connection: sqlite3.Connection) -> None:

@@ -60,9 +60,8 @@ def test_a_curve_that_held_out_readings_do_not_confirm_is_none(monkeypatch: pyte
     assert compare(pumped(1), Pump()).answer.unexplained == ()
 
 
-@pytest.mark.parametrize("seed", [1, 4])
-def test_what_errors_give_by_themselves_is_no_finding(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_errors_give_by_themselves_is_no_finding(monkeypatch: pytest.MonkeyPatch) -> None:
     """A room that a noisy current heats wanders; a curve over time would follow that."""
-    assert compare(recorded(seed), ReadRoom()).answer.verdict == "consistent"
+    assert compare(recorded(1), ReadRoom()).answer.verdict == "consistent"
     monkeypatch.setattr(refuted, "IMPROBABLE", -1e9)
-    assert compare(recorded(seed), ReadRoom()).answer.verdict == "unexplained"
+    assert compare(recorded(1), ReadRoom()).answer.verdict == "unexplained"

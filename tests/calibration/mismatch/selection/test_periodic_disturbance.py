@@ -53,7 +53,7 @@ WAVE = np.sin(2 * np.pi * TIME_S / PERIOD_S + 0.4)
 
 
 def test_a_wave_is_unexplained_over_time_with_its_period() -> None:
-    """It is no drag: it pushes as it does, whichever way the carriage moves. No covariate follows it as well."""
+    """It is no drag, since it pushes whichever way the carriage moves, and no covariate follows it as well."""
     found = answer(1.5 * WAVE)
     assert found.verdict == "unexplained"
     (place,) = found.unexplained
