@@ -361,8 +361,7 @@ def test_an_hour_is_drawn_from_means_while_data_arrive(rig: GroundRig, browser: 
     with page.expect_response(lambda answer: asked_s(answer.url) == 3600) as waiting:
         page.locator("#span").select_option("1 h")
     points = waiting.value.json()["snapshot"]
-    assert points["spacing_s"] > 0
-    assert 0 < len(points["time_ms"]) <= MOST_POINTS
+    assert points["spacing_s"] > 0 < len(points["time_ms"]) <= MOST_POINTS
     until(lambda: coloured(page, "#plots .figures:not(.three) canvas", to=0.3) > 100, "the hour's beginning is drawn")
     shown = page.locator('[data-wheel="3"] [data-value="load_N"]')
     expect(shown).not_to_have_text(shown.text_content() or "", timeout=PATIENCE_MS)

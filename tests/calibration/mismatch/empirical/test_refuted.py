@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-import pytest
 from heated_room import ReadRoom, recorded
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
@@ -14,6 +13,8 @@ from regolithd.calibration.mismatch.empirical import refuted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    import pytest
 
     from numpy.typing import NDArray
 
