@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import pytest
-
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
