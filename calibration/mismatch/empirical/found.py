@@ -22,7 +22,7 @@ from regolithd.calibration.mismatch.empirical.sums import points_beside, profile
 from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.problem.words import divided, product, unit_in_label, word_for
 from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
-from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, PERIODIC_OFFSET
+from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, SINES
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def curves_of(decision: Decision) -> tuple[FoundCurve, ...]:
 def _coupling_of_curve(problem: Problem, term: Term) -> str | None:
     """Return how a term acts; of a sine over a covariate how its curve does. None: it is no curve."""
     coupling = term.group.coupling
-    if term.name != "time" and coupling in {PERIODIC, PERIODIC_OFFSET}:
+    if term.name != "time" and coupling in SINES:
         return "drag" if coupling == PERIODIC and "direction" in problem.covariates else "offset"
     return None if coupling in WITHOUT_CURVE else coupling
 

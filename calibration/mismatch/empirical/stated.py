@@ -27,14 +27,14 @@ Array = NDArray[np.float64]
 
 FACTOR = "factor"
 """The curve's coefficient, by which its values are multiplied: 1 is as corrected."""
-OVER = "-over-"
-"""In a curve's name, before its covariate."""
+EMPIRICAL, OVER = "empirical-", "-over-"
+"""How a curve's name begins, and what stands in it before its covariate."""
 LEAST_TOLD = 0.01
 """Share of the readings beyond a curve's range from which on that is told (a choice: its range leaves out 1 %)."""
 
 
 class EmpiricalCurveLaw(Candidate):
-    """An empirical curve as an effect with one coefficient, its relative size; no search names it."""
+    """An empirical curve as an effect with one coefficient, its factor; no search names it."""
 
     coefficients: ClassVar = (Coefficient(FACTOR, "1"),)
 
@@ -81,13 +81,13 @@ class EmpiricalCurveLaw(Candidate):
 def name_of(stated: StatedCurve) -> str:
     """Return what a curve is called among the changes: how it acts, and over what."""
     how = stated.curve.coupling.replace(",", "").replace(" ", "-")
-    return f"empirical-{how}{OVER}{stated.covariate}"
+    return f"{EMPIRICAL}{how}{OVER}{stated.covariate}"
 
 
 def curve_label(name: str) -> str:
     """Return the label of a curve of this name, with its covariate in braces; empty: it is the name of no curve."""
     of_curve, _, covariate = name.partition(OVER)
-    return f"empirical curve over the {{{covariate}}}" if covariate and of_curve.startswith("empirical-") else ""
+    return f"empirical curve over the {{{covariate}}}" if covariate and of_curve.startswith(EMPIRICAL) else ""
 
 
 def course_of(problem: Problem, stated: StatedCurve) -> Array:

@@ -23,7 +23,7 @@ from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED, answe
 from regolithd.calibration.mismatch.selection.law_misfit import law_misfit
 from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what_pulls_parameters_out
 from regolithd.calibration.mismatch.selection.region_search import schwarz_surcharge
-from regolithd.calibration.mismatch.selection.slow_noise import score_beside_slow_noise
+from regolithd.calibration.mismatch.selection.slow_noise import apart, score_beside_slow_noise
 from regolithd.calibration.mismatch.selection.smooth_terms import (
     covariate_of,
     drop_what_a_curve_explains,
@@ -163,10 +163,8 @@ class _Margins:
 
     def _apart(self, fit: Fit) -> tuple[Fit, tuple[Term, ...], tuple[Term, ...]]:
         """Return the fit of the terms that both answers have, and the further terms of either."""
-        whole = self._decision.whole
-        shared = self._decision.equations.fit([term for term in whole.terms if _is_among(term, fit)])
-        own, others = (tuple(term for term in each.terms if not _is_among(term, shared)) for each in (whole, fit))
-        return shared, own, others
+        shared, own, others = apart(self._decision.whole.terms, fit.terms)
+        return self._decision.equations.fit(shared), own, others
 
     def _evidence(self, further: tuple[Term, ...], shared: Fit, *, instead: bool) -> float:
         """Return the evidence for further terms, which stand in the place of others (`instead`), or of nothing."""
@@ -183,10 +181,6 @@ class _Margins:
     def _by_weights(self, further: tuple[Term, ...], shared: Fit) -> float:
         fit = self._decision.equations.fit((*shared.terms, *further))
         return _evidence(self._decision, fit) - _evidence(self._decision, shared)
-
-
-def _is_among(term: Term, fit: Fit) -> bool:
-    return any(term is other for other in fit.terms)
 
 
 def _evidence(decision: Decision, fit: Fit) -> float:

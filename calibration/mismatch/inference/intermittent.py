@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.problem.state_memory import before_state, memory_s
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
-from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, PERIODIC_OFFSET
+from regolithd.calibration.mismatch.regression.smooth_groups import curves_over_time
 from regolithd.calibration.mismatch.selection.decision import Intermittent
 from regolithd.calibration.mismatch.selection.smooth_terms import drop_what_gains_little
 from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
@@ -132,12 +132,7 @@ class _Courses:
 def _with_curves(decision: Decision, in_spells: dict[tuple[int, ...], TimedSpells]) -> tuple[Intermittent, ...]:
     """Return the best curve over time on each of these sets of wheels, where it has one; a sine is no spells."""
     equations = decision.equations
-    over_time = [
-        group
-        for group in equations.design.groups
-        if group.name == "time" and not group.named and group.coupling not in {PERIODIC, PERIODIC_OFFSET}
-    ]
-    found = equations.further(decision.named.terms, over_time)
+    found = equations.further(decision.named.terms, curves_over_time(equations.design))
     found.sort(key=lambda gain_and_term: gain_and_term[0] - equations.penalty(gain_and_term[1]))
     curves = {term.wheels: term for _, term in found}
     return tuple(Intermittent(curves[wheels], *spells) for wheels, spells in in_spells.items() if wheels in curves)

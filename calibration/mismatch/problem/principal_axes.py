@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.problem.prior import OFTEN_WITHIN
 
 if TYPE_CHECKING:
@@ -81,8 +80,8 @@ class Linearised(Protocol):
     def secant(self, name: str, step: float) -> Array:
         """Return the prediction's change per unit over a step."""
 
-    def difference_quotient(self, name: str) -> Array:
-        """Return the mean of the changes to both sides."""
+    def difference_quotient(self, name: str, step: float | None = None) -> Array:
+        """Return the mean of the changes to both sides, over a small step unless told."""
 
     def changed(self, **changes: float) -> Array:
         """Return the prediction at other values."""
@@ -138,9 +137,7 @@ def _left_after_a_step(problem: Linearised, tangents: Array, units: Array) -> fl
 
 def _averaged(problem: Linearised, name: str, unit: float) -> Array:
     """Return the mean change per unit to both sides over a prior's standard deviation, if the simulation switches."""
-    if not switches(problem, name):
-        return problem.difference_quotient(name)
-    return known_mean(np.stack((problem.secant(name, unit), problem.secant(name, -unit))))
+    return problem.difference_quotient(name, unit if switches(problem, name) else None)
 
 
 def switches(problem: Linearised, name: str) -> bool:

@@ -289,13 +289,13 @@ class Problem:
         along = self.run_once("tangents where it switches", 0.0, lambda: tangents_where_it_switches(self))
         return along[self.free.index(name)] if len(along) and name in self.free else self.difference_quotient(name)
 
-    def difference_quotient(self, name: str) -> Array:
-        """Return the prediction's change per unit of a parameter, over small steps to both sides of its value.
+    def difference_quotient(self, name: str, step: float | None = None) -> Array:
+        """Return the prediction's change per unit of a parameter, over steps, small unless told, to both sides.
 
         By one alone, parameters whose products or quotients act would seem to be known each. Where one side has no
         prediction by the other alone; 0 where none has.
         """
-        step = self.tangent_step(name)
+        step = self.tangent_step(name) if step is None else step
 
         def mean_of_secants() -> Array:
             return known_mean(np.stack((self.secant(name, step), self.secant(name, -step))))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown, bridged
 from regolithd.calibration.mismatch.problem.covariates import LONGEST_STEP
 from regolithd.calibration.mismatch.regression.group import Group
-from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, PERIODIC_OFFSET
+from regolithd.calibration.mismatch.regression.smooth_groups import SINES
 from regolithd.calibration.mismatch.regression.state_groups import ON_STATE
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ LAGGED = frozenset({LAGGED_PREDICTION, LAGGED_ACCELERATION})
 """Covariates of lagged terms."""
 FILTERED = "filtered"
 """Coupling of lagged terms."""
-WITHOUT_CURVE = frozenset({PERIODIC, PERIODIC_OFFSET, FILTERED, ON_STATE})
+WITHOUT_CURVE = SINES | {FILTERED, ON_STATE}
 """Couplings of smooth terms that are no curve over their covariate."""
 LAGS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32)
 """Lags between which the impulse response is linear, in readings (a choice: as many as the columns of a term that is

@@ -33,6 +33,8 @@ SAME_COURSE = 0.999
 """Correlation of two covariates above which they are one quantity (a choice: a thousandth of the power differs)."""
 PERIODIC, PERIODIC_OFFSET = "drag, periodic", "offset, periodic"
 """Couplings of a sine over time, or over a covariate: along the motion, and whatever the motion."""
+SINES = frozenset({PERIODIC, PERIODIC_OFFSET})
+"""Both."""
 FEWEST_CYCLES, MOST_CYCLES = 2.5, 24.0
 """Cycles of a sine over a covariate's range: fewer are followed by the knots of its smooth term (a choice: three knots
 a cycle), and more are seldom passed slowly enough (a choice)."""
@@ -184,6 +186,12 @@ def varies_with_time(problem: Problem, values: Array) -> bool:
 def with_periodic_terms(design: DesignMatrix, residual: Array) -> DesignMatrix:
     """Add the strongest sines in a residual [time, wheel], over time and over covariates."""
     return _with_sines_over_covariates(_with_sines_over_time(design, residual), residual)
+
+
+def curves_over_time(design: DesignMatrix) -> list[Group]:
+    """Return the groups of smooth terms over time, without sines."""
+    over_time = (group for group in design.groups if group.name == "time" and not group.named)
+    return [group for group in over_time if group.coupling not in SINES]
 
 
 def _with_sines_over_time(design: DesignMatrix, residual: Array) -> DesignMatrix:

@@ -47,10 +47,18 @@ def score_beside_slow_noise(equations: NormalEquations, rest: Sequence[Term], te
 
 def lead_beside_slow_noise(equations: NormalEquations, ahead: Sequence[Term], behind: Sequence[Term]) -> float:
     """Return by how much some terms score more than others in noise of any spectrum, without those that both have."""
-    shared = [term for term in ahead if any(term is other for other in behind)]
-    own, others = ([term for term in terms if not any(term is other for other in shared)] for terms in (ahead, behind))
-    scores = [score_beside_slow_noise(equations, shared, terms) if terms else 0.0 for terms in (own, others)]
-    return scores[0] - scores[1]
+    shared, *further = apart(ahead, behind)
+    of_ahead, of_behind = (score_beside_slow_noise(equations, shared, terms) if terms else 0.0 for terms in further)
+    return of_ahead - of_behind
+
+
+def apart(one: Sequence[Term], other: Sequence[Term]) -> tuple[tuple[Term, ...], tuple[Term, ...], tuple[Term, ...]]:
+    """Return the terms that both have, and the further terms of either."""
+    shared = tuple(term for term in one if any(term is each for each in other))
+    of_one, of_other = (
+        tuple(term for term in terms if not any(term is each for each in shared)) for terms in (one, other)
+    )
+    return shared, of_one, of_other
 
 
 def _columns_of(design: DesignMatrix, term: Term) -> Array:

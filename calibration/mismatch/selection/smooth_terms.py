@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
-from regolithd.calibration.mismatch.regression.smooth_groups import PERIODIC, PERIODIC_OFFSET, same_covariate
+from regolithd.calibration.mismatch.regression.smooth_groups import curves_over_time, same_covariate
 from regolithd.calibration.mismatch.selection.best_subsets import (
     acceptable,
     best_of_each_smooth_term,
@@ -189,11 +189,7 @@ def drop_transients(equations: NormalEquations, named: Fit) -> Fit:
     They show in a curve over time on the same wheels that is significant beside them. One covariate on given wheels
     was not selected from many, so a plain test of its Δχ² suffices.
     """
-    curves = [
-        group
-        for group in equations.design.groups
-        if not group.named and group.name == "time" and group.coupling not in {PERIODIC, PERIODIC_OFFSET}
-    ]
+    curves = curves_over_time(equations.design)
     kept = []
     for term in named.terms:
         # A sensor's fault, which its own channel shows, may come and go.

@@ -295,13 +295,18 @@ def test_a_law_s_misfit_is_of_the_whole_effect() -> None:
     assert beyond == pytest.approx(gained * ((1 + size) ** 2 - size**2) / size**2, rel=0.1)
 
 
-def test_a_change_gains_beyond_the_corrected_effect_as_it_was() -> None:
-    """A size that is known badly could take the change up itself, on other readings too: nothing would be gained."""
-    stated = stated_in(library(), [replace(COULOMB, relative_std=5.0)], [])
+def grown(relative_std: float) -> tuple[NormalEquations, list[Term]]:
+    """Return equations of friction that is half as large again as it was corrected, and the change's term."""
+    stated = stated_in(library(), [replace(COULOMB, relative_std=relative_std)], [])
     problem = corrected_problem(build_problem(moving(1, 1.5), Axis()), stated)
     equations, _ = with_library(smooth_equations(problem), with_changes(problem, (), stated))
     (group,) = [each for each in equations.design.groups if each.named]
-    terms = [Term(group, (0,))]
+    return equations, [Term(group, (0,))]
+
+
+def test_a_change_gains_beyond_the_corrected_effect_as_it_was() -> None:
+    """A size that is known badly could take the change up itself, on other readings too: nothing would be gained."""
+    equations, terms = grown(5.0)
     fit = equations.fit(terms)
     assert residual_power(equations, equations.fit(())) < 1.01 * residual_power(equations, fit)
     assert residual_power(equations, without_terms(equations, [terms[0]], ())) > 2 * residual_power(equations, fit)
@@ -310,11 +315,7 @@ def test_a_change_gains_beyond_the_corrected_effect_as_it_was() -> None:
 
 def test_a_change_has_evidence_beside_slow_noise_as_the_corrected_size_is_as_it_was() -> None:
     """The size that was corrected stands for the change where there is none, and is then far from what was found."""
-    stated = stated_in(library(), [replace(COULOMB, relative_std=0.3)], [])
-    problem = corrected_problem(build_problem(moving(1, 1.5), Axis()), stated)
-    equations, _ = with_library(smooth_equations(problem), with_changes(problem, (), stated))
-    (group,) = [each for each in equations.design.groups if each.named]
-    terms = [Term(group, (0,))]
+    equations, terms = grown(0.3)
     by_weights = equations.score(equations.fit(terms)) - equations.score(equations.fit(()))
     assert by_weights > 10
     assert score_beside_slow_noise(equations, (), terms) == pytest.approx(by_weights, rel=0.1)
