@@ -9,40 +9,37 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.regression.as_read import left_beside
-from regolithd.calibration.mismatch.regression.residuals import residual_as_read_of
-from regolithd.calibration.mismatch.signal.noise_spectrum import FEWEST_READINGS, gain_of_columns
+from regolithd.calibration.mismatch.regression.as_read import columns_on_wheels
+from regolithd.calibration.mismatch.signal.restricted_likelihood import FEWEST_READINGS, Priors, gain_of_columns
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
-
-Array = NDArray[np.float64]
 
 
 def score_beside_slow_noise(equations: NormalEquations, rest: Sequence[Term], terms: Sequence[Term]) -> float:
     """Return what terms gain beside others in twice the log likelihood of noise of any spectrum, less their penalties.
 
-    Added is by how much parameters come nearer to their priors: the size of a corrected effect, which stands for a
-    change of it as long as there is none. Where no wheel has readings enough for a spectrum, it is what the terms gain
-    by the weights.
+    The free parameters are fitted with them, held by their priors: where the weights know slow noise badly, it bends
+    these. Where no wheel has readings enough for a spectrum, it is what the terms gain by the weights.
     """
-    design, fit, more = equations.design, equations.fit(rest), equations.fit((*rest, *terms))
+    design, nuisance, fit = equations.design, equations.nuisance, equations.fit((*rest, *terms))
+    given = len(fit.columns) - sum(len(term.group.columns) for term in terms)
     read = [places for places, _ in design.readings]
     if max((len(places) for places in read), default=0) < FEWEST_READINGS:
-        return equations.score(more) - equations.score(fit)
-    columns = np.concatenate([_columns_of(design, term) for term in terms])
-    beside = design.in_folds(left_beside(equations, fit, columns))
-    left = residual_as_read_of(equations, fit)
-    courses = [of_wheel[places] for places, of_wheel in zip(read, left, strict=True)]
-    gain = gain_of_columns(courses, [beside[:, w, places] for w, places in enumerate(read)], equations.thresholds)
-    away, nearer = (equations.nuisance.prior_stds_away(each) for each in (fit, more))
-    return gain + float(away @ away - nearer @ nearer) - sum(equations.penalty(term) for term in terms)
+        return equations.score(fit) - equations.score(equations.fit(rest))
+    columns, residual = columns_on_wheels(equations, fit), design.residual_as_read.astype(np.float64)
+    gain = gain_of_columns(
+        [residual[w, places] for w, places in enumerate(read)],
+        [columns[:, w, places] for w, places in enumerate(read)],
+        given,
+        Priors(nuisance.precision, nuisance.centre),
+        equations.thresholds,
+    )
+    return gain - sum(equations.penalty(term) for term in terms)
 
 
 def lead_beside_slow_noise(equations: NormalEquations, ahead: Sequence[Term], behind: Sequence[Term]) -> float:
@@ -59,12 +56,6 @@ def apart(one: Sequence[Term], other: Sequence[Term]) -> tuple[tuple[Term, ...],
         tuple(term for term in terms if not any(term is each for each in shared)) for terms in (one, other)
     )
     return shared, of_one, of_other
-
-
-def _columns_of(design: DesignMatrix, term: Term) -> Array:
-    """Return a term's columns as read, 0 on the wheels that it is not on, shape (column, time, wheel)."""
-    columns = design.in_time(design.columns_as_read(term.group.columns).astype(np.float64))
-    return np.asarray(columns * np.isin(np.arange(columns.shape[-1]), term.wheels))
 
 
 def best_curve(equations: NormalEquations, given: Sequence[Term], curves: Iterable[tuple[float, Term]]) -> Term | None:

@@ -38,9 +38,10 @@ class NoiseThresholds:
         f"{TRIALS}: what is left in makes the noise seem larger, what is taken out by chance smaller",
     )
     slowest_noise_share: float = threshold(
-        0.02,
+        0.05,
         "Correlation time of the noise, as a share of the recording, beyond which what wanders is structure.",
-        f"{CHOICE}: fifty of these times; slow noise and an effect that is as slow have the same likelihood",
+        f"{CHOICE}: twenty of these times; beside noise that is so slow eight coefficients gain 9 by chance, and beside "
+        "noise of twice the time 15",
     )
     noise_term_columns: int = threshold(
         12,

@@ -1,0 +1,88 @@
+"""What columns gain in noise of any spectrum."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from regolithd.calibration.mismatch.signal.restricted_likelihood import Priors, gain_of_columns
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+READINGS = 6000
+ALONG = np.pi * np.arange(READINGS) / READINGS
+
+
+def noise(time: float, seed: int, white: float = 0.5) -> NDArray[np.float64]:
+    """Return noise of variance 1 of which a part has this correlation time [readings]."""
+    rng = np.random.default_rng(seed)
+    kept = np.exp(-1 / time)
+    slow = lfilter([np.sqrt(1 - kept**2)], [1, -kept], rng.standard_normal(READINGS + 2000))[2000:]
+    return np.asarray(np.sqrt(white) * rng.standard_normal(READINGS) + np.sqrt(1 - white) * slow)
+
+
+@pytest.mark.parametrize(("count", "time"), [(1, 20.0), (8, 20.0), (8, 100.0), (48, 20.0), (48, 100.0)])
+def test_by_chance_columns_gain_as_much_as_there_are_of_them(count: int, time: float) -> None:
+    """Also a curve of 48 coefficients that follows the noise wherever it is slow: χ² with 48 degrees of freedom."""
+    waves = np.cos(np.outer(np.arange(1, count + 1), ALONG))
+    gains = [gain_of_columns([noise(time, seed)], [waves]) for seed in range(24)]
+    assert np.mean(gains) == pytest.approx(count, abs=3.5 * np.sqrt(2 * count / 24) + 0.1 * count)
+
+
+def test_a_curve_that_is_there_gains_far_more() -> None:
+    """One wave of eight, as large as the noise."""
+    waves = np.cos(np.outer(np.arange(8), ALONG))
+    assert gain_of_columns([noise(20.0, 0) + np.cos(4 * ALONG)], [waves]) > 30
+
+
+def test_a_parameter_that_slow_noise_bends_takes_it_up_anyway() -> None:
+    """What is fitted anyway gains nothing, and a column that acts as it does gains no more."""
+    wave = np.cos(4 * ALONG)[None]
+    reading = noise(20.0, 0) + wave[0]
+    assert gain_of_columns([reading], [wave]) > 30
+    assert gain_of_columns([reading], [np.vstack([wave, wave])], given=1) == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_prior_leaves_to_a_column_what_it_holds_back() -> None:
+    """A parameter that is known firmly explains nothing; one whose mean is the wave leaves nothing to explain."""
+    wave = np.cos(4 * ALONG)[None]
+    reading, twice = noise(20.0, 0) + wave[0], np.vstack([wave, wave])
+    firm, there = (Priors(np.array([1e8]), np.array([mean])) for mean in (0.0, 1.0))
+    alone = gain_of_columns([reading], [wave])
+    assert gain_of_columns([reading], [twice], 1, firm) == pytest.approx(alone, rel=0.05)
+    assert gain_of_columns([reading], [twice], 1, there) < 6
+
+
+def test_each_course_has_noise_of_its_own() -> None:
+    """A step in small quick noise is as clear beside another course, whose noise is slow and large, as alone."""
+    quick, slow = noise(2.0, 1), 100 * noise(60.0, 2)
+    step = np.where(np.arange(READINGS) > READINGS / 2, 1.0, -1.0)[None]
+    alone = gain_of_columns([quick + 0.3 * step[0]], [step])
+    assert alone > 40
+    assert gain_of_columns([quick + 0.3 * step[0], slow], [step, step]) == pytest.approx(alone, rel=0.1)
+    assert gain_of_columns([quick + 0.3 * step[0], slow], [step, 0 * step]) == pytest.approx(alone, rel=1e-6)
+
+
+def test_the_unit_does_not_matter() -> None:
+    """Neither of the readings nor of a column."""
+    reading, wave = noise(20.0, 3) + 0.5 * np.cos(4 * ALONG), np.cos(4 * ALONG)[None]
+    gain = gain_of_columns([reading], [wave])
+    assert gain_of_columns([1000 * reading], [wave]) == pytest.approx(gain, rel=1e-6)
+    assert gain_of_columns([reading], [1000 * wave]) == pytest.approx(gain, rel=1e-6)
+
+
+def test_too_few_readings_say_nothing() -> None:
+    """Nor do zeros: columns gain nothing."""
+    for courses in ([], [np.zeros(READINGS)], [np.arange(10.0)]):
+        assert gain_of_columns(courses, [np.ones((1, len(values))) for values in courses]) == 0.0
+
+
+def test_an_offset_is_no_noise() -> None:
+    """The mean is power at frequency 0: an offset that a sum of readings shows is told from slow noise."""
+    values, ones = noise(20.0, 3), np.ones((1, READINGS))
+    assert gain_of_columns([values], [ones]) < 8
+    assert gain_of_columns([values + 0.6], [ones]) > 20
