@@ -28,6 +28,7 @@ from regolithd.calibration.mismatch.data.recording import as_recording
 from regolithd.calibration.mismatch.empirical.found import curves_of
 from regolithd.calibration.mismatch.empirical.refuted import without_refuted_curves
 from regolithd.calibration.mismatch.empirical.stated import beyond_the_range
+from regolithd.calibration.mismatch.inference.beside_spells import named_beside_spells
 from regolithd.calibration.mismatch.inference.evidence import empirical_fits, evidence_of
 from regolithd.calibration.mismatch.inference.feedback import fed_back, notes_of_feedback
 from regolithd.calibration.mismatch.inference.findings import Findings, answer_of, findings_of
@@ -221,7 +222,7 @@ def _decided(
     regional = in_probable_regions(confined)
     if regional is not decision:
         decision, held_out = beside_regions(regional, search.grid)
-    decision = without_refuted_curves(decision, start.problem)
+    decision, held_out = named_beside_spells(without_refuted_curves(decision, start.problem), held_out, search.grid)
     decision = with_changes_beside_same_parameters(decision)
     return Decided(decision, held_out, search.candidates, search.applicable)
 

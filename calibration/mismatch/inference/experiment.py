@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.experiments.margins import Hypothesis
     from regolithd.calibration.mismatch.experiments.settings import Setting
     from regolithd.calibration.mismatch.inference.alternatives import Alternative
+    from regolithd.calibration.mismatch.problem.predictor import Predictor
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
@@ -150,12 +151,13 @@ def _instruction(candidate: Candidate, problem: Problem) -> str:
 
 
 def varied_by(candidate: Candidate, problem: Problem) -> tuple[str, ...]:
-    """Return the covariates that a candidate's experiment varies on this machine.
+    """Return the covariates that a candidate's experiment varies on this machine."""
+    return as_it_runs(candidate.varied(problem), problem.simulation)
 
-    What a reversal shows, several speeds show on a machine that runs one way only.
-    """
-    varied = candidate.varied(problem)
-    if problem.simulation.one_way and DIRECTION in varied:
+
+def as_it_runs(varied: tuple[str, ...], simulation: Predictor) -> tuple[str, ...]:
+    """Return the covariates that are varied; what a reversal shows, several speeds show on one that runs one way."""
+    if simulation.one_way and DIRECTION in varied:
         return tuple(name for name in varied if name != DIRECTION) or (SPEED,)
     return varied
 

@@ -182,7 +182,7 @@ def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOut
     any data optimised their shapes.
     """
     equations, threshold = decision.equations, decision.entry_threshold
-    choice = _choice(decision, grid)
+    choice = groups_to_choose_from(decision, grid)
     equations, held_out = held_out_errors(equations, decision.named, choice, threshold)
     while (idle := held_out.without_gain()) is not None:
         decision = without_name(replace(decision, equations=equations), idle)
@@ -197,8 +197,13 @@ def earned(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOut
 
 def beside_regions(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOutErrors]:
     """Return a decision whose curves have become regions, with the names that have more evidence beside these."""
-    choice = _choice(decision, grid)
-    return _with_likelier_names(*_errors_beside_curves(replace(decision, refused=frozenset()), choice), choice)
+    return confirmed_beside_curves(replace(decision, refused=frozenset()), grid)
+
+
+def confirmed_beside_curves(decision: Decision, grid: Sequence[Group]) -> tuple[Decision, HeldOutErrors]:
+    """Return the decision, or one with names of more evidence that lower the held-out error, beside its curves."""
+    choice = groups_to_choose_from(decision, grid)
+    return _with_likelier_names(*_errors_beside_curves(decision, choice), choice)
 
 
 def _with_likelier_names(
@@ -226,7 +231,7 @@ def _errors_beside_curves(decision: Decision, choice: Sequence[Group]) -> tuple[
     return replace(decision, equations=equations), errors
 
 
-def _choice(decision: Decision, grid: Sequence[Group]) -> list[Group]:
+def groups_to_choose_from(decision: Decision, grid: Sequence[Group]) -> list[Group]:
     """Return the groups that each fold chooses from."""
     problem, kept = decision.equations.problem, set(map(id, grid))
     groups = decision.equations.design.groups

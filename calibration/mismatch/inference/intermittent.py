@@ -9,7 +9,7 @@ cools a greenhouse), and the readings follow it slowly: it is looked for in what
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,8 +34,25 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-TimedSpells = tuple[float, float, float]
-"""When the first spell begins and the last ends [s], and their share of the power."""
+
+@dataclass(frozen=True, eq=False)
+class TimedSpells:
+    """Spells on some wheels.
+
+    Attributes
+    ----------
+    from_s, to_s: begin of the first and end of the last
+    share: of the power of what is left without them
+    acting: how probably a reading is in a spell, times the factor by which it acts, shape (time, wheel); None: their
+        course is not known
+    """
+
+    from_s: float
+    to_s: float
+    share: float
+    acting: Array | None
+
+
 CONSTANT = frozenset({"direction", "none"})
 """Covariates of effects of constant size."""
 
@@ -54,7 +71,7 @@ def unexplained_if_intermittent(decision: Decision) -> Decision:
         return decision
     curves = tuple(each.term for each in found)
     told = {wheel for term in curves for wheel in term.wheels}
-    named = equations.fit([term for term in decision.named.terms if not _constant_on(term, told)])
+    named = equations.fit([term for term in decision.named.terms if not constant_on(term, told)])
     for curve in curves:
         named = drop_what_gains_little(equations, named, curve)
     unnamed = (*decision.unnamed, *curves)
@@ -80,7 +97,7 @@ def wheels_with_spells(decision: Decision) -> dict[tuple[int, ...], TimedSpells]
     as_it_acts = [_Courses(problem, left, explained, along) for along in ways]
     if (memory := memory_s(problem)) > 0:
         (acted, known), (beside, _) = (before_state(problem, course, memory) for course in (left, explained))
-        as_it_acts.append(_Courses(problem, acted, beside, known.astype(np.float64)))
+        as_it_acts.append(_Courses(problem, acted, beside, known.astype(np.float64), as_read=False))
     alone = ((wheel, _likeliest(courses.spells_on((wheel,)) for courses in as_it_acts)) for wheel in every)
     found: dict[tuple[int, ...], TimedSpells] = {(wheel,): spells for wheel, spells in alone if spells}
     if len(every) > 1 and not found and (spells := _likeliest(courses.spells_on(every) for courses in as_it_acts)):
@@ -90,7 +107,7 @@ def wheels_with_spells(decision: Decision) -> dict[tuple[int, ...], TimedSpells]
 
 def _likeliest(found: Iterable[tuple[float, TimedSpells] | None]) -> TimedSpells | None:
     """Return the spells with the highest gain."""
-    return max((each for each in found if each), default=(0.0, None))[1]
+    return max((each for each in found if each), key=lambda each: each[0], default=(0.0, None))[1]
 
 
 class _Courses:
@@ -100,11 +117,12 @@ class _Courses:
     ----------
     left, explained: shape (time, wheel)
     along: factor of each reading, of the same shape: the direction, or 1; what it makes 0 is not looked at
+    as_read: whether it acts on the readings, not on a state before them
     """
 
-    def __init__(self, problem: Problem, left: Array, explained: Array, along: Array) -> None:
+    def __init__(self, problem: Problem, left: Array, explained: Array, along: Array, *, as_read: bool = True) -> None:
         self._problem, self._left, self._explained, self._along = problem, left, explained, along
-        self._read = problem.mask & (along != 0)
+        self._read, self._as_read = problem.mask & (along != 0), as_read
         self._of_wheel = [self._of((wheel,)) for wheel in range(left.shape[1])]
 
     def spells_on(self, wheels: tuple[int, ...]) -> tuple[float, TimedSpells] | None:
@@ -113,15 +131,26 @@ class _Courses:
         course, beside = self._of(wheels) if len(wheels) > 1 else self._of_wheel[wheels[0]]
         others = [wheel for wheel in range(len(self._of_wheel)) if wheel not in wheels]
         switching = switching_mean(course, [self._of_wheel[wheel][0] for wheel in others], limits)
+        acting = None
         if switching and switching.power > limits.form_misfit * np.mean(beside**2):
             gain, spells = switching.gain, switching_spells(course, switching)
+            acting = self._acting(wheels, np.repeat(switching.acting(course), switching.block))
         elif lengths := skewed_lengths(course, beside, limits):
             spells = skewed_spells(course, lengths)
             gain = spells.share  # less than any two levels gain
         else:
             return None
         time_s = problem.time_s[self._read[:, list(wheels)].any(axis=1), 0]
-        return gain, (float(time_s[spells.first]), float(time_s[spells.last]), spells.share)
+        return gain, TimedSpells(float(time_s[spells.first]), float(time_s[spells.last]), spells.share, acting)
+
+    def _acting(self, wheels: tuple[int, ...], probability: Array) -> Array | None:
+        """Return how probably a reading is in a spell (instant,), as it acts on these wheels, shape (time, wheel)."""
+        if not self._as_read:
+            return None
+        acts = self._read & np.isin(np.arange(self._read.shape[1]), wheels)
+        instants, course = np.flatnonzero(acts.any(axis=1)), np.zeros(len(acts))
+        course[instants[: len(probability)]] = probability
+        return np.where(acts, course[:, None] * self._along, 0.0)
 
     def _of(self, wheels: tuple[int, ...]) -> tuple[Array, Array]:
         on = list(wheels)
@@ -135,10 +164,14 @@ def _with_curves(decision: Decision, in_spells: dict[tuple[int, ...], TimedSpell
     found = equations.further(decision.named.terms, curves_over_time(equations.design))
     found.sort(key=lambda gain_and_term: gain_and_term[0] - equations.penalty(gain_and_term[1]))
     curves = {term.wheels: term for _, term in found}
-    return tuple(Intermittent(curves[wheels], *spells) for wheels, spells in in_spells.items() if wheels in curves)
+    return tuple(
+        Intermittent(curves[wheels], spells.from_s, spells.to_s, spells.share, spells.acting)
+        for wheels, spells in in_spells.items()
+        if wheels in curves
+    )
 
 
-def _constant_on(term: Term, wheels: set[int]) -> bool:
+def constant_on(term: Term, wheels: set[int]) -> bool:
     """Return whether a named effect is of constant size on one of these wheels."""
     candidate = term.group.candidate
     return candidate is not None and candidate.covariate in CONSTANT and bool(wheels.intersection(term.wheels))

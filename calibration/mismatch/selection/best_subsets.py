@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.regression.residuals import chi2_of, relative_size
 from regolithd.calibration.mismatch.selection.causality import acts_forwards
 from regolithd.calibration.mismatch.selection.law_misfit import explained
@@ -89,11 +90,21 @@ def _acceptable_term(equations: NormalEquations, fit: Fit, index: int) -> bool:
         return False
     if not physically_plausible(equations, fit, index):
         return False
-    if term.group.named and relative_size(equations, fit, index) < equations.thresholds.smallest_effect:
+    if term.group.named and not large_enough(equations, fit, index):
         return False
     if not _gains_by_its_covariate(equations, fit, index) or _is_a_parameter(equations, fit, index):
         return False
     return term.group.own_channel is None or _agrees_with_own_channel(equations, fit, index)
+
+
+def large_enough(equations: NormalEquations, fit: Fit, index: int) -> bool:
+    """Return whether an effect is a finding by its size; a smaller delay is one if it is as clear as a curve is."""
+    limits, term = equations.thresholds, fit.terms[index]
+    size = relative_size(equations, fit, index)
+    if size >= limits.smallest_effect or term.name != SensorDelay.name:
+        return size >= limits.smallest_effect
+    gained = equations.score(fit) - equations.score(equations.fit(fit.without(index)))
+    return size >= limits.smallest_delay_effect and gained > limits.smooth_term_entry
 
 
 def _gains_by_its_covariate(equations: NormalEquations, fit: Fit, index: int) -> bool:
@@ -199,8 +210,7 @@ def _best_of_kinds(
 
 
 def _is_large(equations: NormalEquations, others: Sequence[Term], term: Term) -> bool:
-    fit = equations.fit((*others, term))
-    return relative_size(equations, fit, len(others)) >= equations.thresholds.smallest_effect
+    return large_enough(equations, equations.fit((*others, term)), len(others))
 
 
 def best_subsets(equations: NormalEquations) -> tuple[NormalEquations, list[Fit]]:

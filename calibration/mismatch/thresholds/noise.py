@@ -38,10 +38,11 @@ class NoiseThresholds:
         f"{TRIALS}: what is left in makes the noise seem larger, what is taken out by chance smaller",
     )
     slowest_noise_share: float = threshold(
-        0.05,
+        0.03,
         "Correlation time of the noise, as a share of the recording, beyond which what wanders is structure.",
-        f"{CHOICE}: twenty of these times; beside noise that is so slow eight coefficients gain 9 by chance, and beside "
-        "noise of twice the time 15",
+        f"{CHOICE}: slow noise and an effect that is as slow have the same likelihood. Beside noise with a sixtieth of "
+        "the recording eight coefficients gain 6 by chance, as they should, and beside a twentieth 15 (0.02: 26; 0.05: "
+        "9); a wave over half of the recording, as large as the noise, gains 30 (0.02: 38; 0.05: 22)",
     )
     noise_term_columns: int = threshold(
         12,

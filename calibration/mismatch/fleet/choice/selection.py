@@ -155,8 +155,13 @@ def without(fit: FleetFit, index: int) -> tuple[FleetTerm, ...]:
     return (*fit.terms[:index], *fit.terms[index + 1 :])
 
 
-def relative_size(equations: FleetEquations, fit: FleetFit, index: int) -> float:
-    """Return a term's active root mean square where it acts, over the mean magnitude of the channel there."""
+def relative_size(
+    equations: FleetEquations, fit: FleetFit, index: int, active_share: float = THRESHOLDS.active_share
+) -> float:
+    """Return a term's root mean square where it acts, over the mean magnitude of the channel there.
+
+    It counts as at least `active_share` of the root mean square while it acts; 0: it is told, and nothing is decided.
+    """
     term, span = fit.terms[index], fit.spans[index]
     at = list(term.group.columns)
     squares = fourths = readings = mean = 0.0
@@ -167,7 +172,7 @@ def relative_size(equations: FleetEquations, fit: FleetFit, index: int) -> float
             fourths += float(values @ values) ** 2 * _fourth(equations, int(i), int(w), at)
             readings += equations.counts[i, w]
             mean += equations.counts[i, w] * equations.sums[int(i)].mean_size
-    return active_size(squares, fourths, readings, THRESHOLDS.active_share) / max(mean / max(readings, 1.0), 1e-300)
+    return active_size(squares, fourths, readings, active_share) / max(mean / max(readings, 1.0), 1e-300)
 
 
 def _fourth(equations: FleetEquations, recording: int, wheel: int, at: Sequence[int]) -> float:

@@ -129,7 +129,7 @@ def answer_of_fleet(chosen: Chosen) -> FleetAnswer:
         verdict=verdict,
         effects=(*effects, *single),
         unexplained=rest,
-        indistinguishable=rivals(chosen.chooser, fit, simulation),
+        indistinguishable=rivals(chosen.chooser, fit, simulation, chosen.labels),
         sensitivity=sensitivities(chosen.chooser, fit, simulation, in_each_alone(chosen)),
         fit=FitImprovement(simulation.channel, before, after if fit.terms else before, floor),
         parameters=parameters,
@@ -190,7 +190,7 @@ def _sizes(chosen: Chosen, index: int, beside: Beside) -> dict[str, Parameter]:
     fit, stds, simulation = beside.fit, beside.stds, chosen.simulation
     found = parameters_of(beside.equations, fit, stds, index, simulation.unit, chosen.labels)
     group, span = fit.terms[index].group, fit.spans[index]
-    size = relative_size(chosen.equations, fit, index)
+    size = relative_size(chosen.equations, fit, index, active_share=0.0)
     mean, std = mean_sizes(fit.coefficients[span], stds[span], len(group.columns))
     if group.of_wheels:
         first = next(iter(found.values()))

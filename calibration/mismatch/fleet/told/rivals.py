@@ -9,24 +9,33 @@ import numpy as np
 from regolithd.calibration.mismatch.answer import Indistinguishable
 from regolithd.calibration.mismatch.fleet.choice.search import further, score
 from regolithd.calibration.mismatch.fleet.choice.selection import without
+from regolithd.calibration.mismatch.inference.experiment import as_it_runs
 from regolithd.calibration.mismatch.inference.identifiability import wrong_choice_rate
 from regolithd.calibration.mismatch.inference.statements import capital
+from regolithd.calibration.mismatch.problem.words import in_words
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from regolithd.calibration.mismatch.fleet.choice.equations import FleetEquations, FleetFit, FleetTerm
     from regolithd.calibration.mismatch.fleet.choice.selection import Chooser
     from regolithd.calibration.mismatch.simulation.simulation import Simulation
 
 
-def rivals(chooser: Chooser, fit: FleetFit, simulation: Simulation) -> tuple[Indistinguishable, ...]:
-    """Return, for each effect that has some, those that could be true in its place on the same wheels."""
+def rivals(
+    chooser: Chooser, fit: FleetFit, simulation: Simulation, labels: Mapping[str, str]
+) -> tuple[Indistinguishable, ...]:
+    """Return, for each effect that has some, those that could be true in its place on the same wheels.
+
+    `labels` are what the machine calls its covariates.
+    """
     found = []
     for index, term in enumerate(fit.terms):
         members = [term, *_in_its_place(chooser, fit, index)]
         names = tuple(dict.fromkeys(member.name for member in members))
         if len(names) > 1:
-            found.append(_with_experiment(names, members, simulation))
+            found.append(_with_experiment(names, members, simulation, labels))
     return tuple(dict.fromkeys(found))
 
 
@@ -59,19 +68,18 @@ def _outside(both: FleetFit, rival: FleetFit) -> float:
     return float(values @ np.linalg.pinv(covariance, rcond=1e-10) @ values)
 
 
-def _with_experiment(names: tuple[str, ...], members: list[FleetTerm], simulation: Simulation) -> Indistinguishable:
+def _with_experiment(
+    names: tuple[str, ...], members: list[FleetTerm], simulation: Simulation, labels: Mapping[str, str]
+) -> Indistinguishable:
     """Return the set with the drive that varies the covariate of each member."""
     candidates = [member.group.candidate for member in members]
-    drives = list(dict.fromkeys(candidate.experiment for candidate in candidates))
+    drives = list(dict.fromkeys(candidate.instruction(simulation) for candidate in candidates))
     lift = bool(simulation.unloaded_experiment) and any(candidate.run_unloaded for candidate in candidates)
     sentence = "; then ".join([*drives, simulation.unloaded_experiment] if lift else drives)
-    for name, label in simulation.covariate_labels.items():
-        sentence = sentence.replace(f"{{{name}}}", label.split(" (")[0])
-    sentence = sentence.replace("{", "").replace("}", "").replace("_", " ")
     return Indistinguishable(
         effects=names,
-        experiment=f"{capital(sentence)}.",
-        vary=tuple(dict.fromkeys(name for candidate in candidates for name in candidate.vary)),
+        experiment=f"{capital(in_words(sentence, labels))}.",
+        vary=tuple(dict.fromkeys(name for each in candidates for name in as_it_runs(each.vary, simulation))),
         duration_s=0.0,
         lift=lift,
     )

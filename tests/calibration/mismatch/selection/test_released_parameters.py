@@ -83,7 +83,7 @@ def test_half_of_its_value_is_no_limit_however_firmly_it_was_stated() -> None:
 
 def test_what_no_parameter_explains_stays_unexplained() -> None:
     """A loss that begins half way is located in time, though parameters would absorb a part of it."""
-    found = answer(4.0, leak_W=60.0)
+    found = answer(4.0, leak_W=100.0)
     assert found.verdict == "unexplained"
     assert [term.covariate for term in found.unexplained] == ["time"]
 

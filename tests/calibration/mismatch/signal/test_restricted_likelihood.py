@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from scipy.stats import chi2
 
 from regolithd.calibration.mismatch.signal.restricted_likelihood import Priors, gain_of_columns
 
@@ -34,9 +35,9 @@ def test_by_chance_columns_gain_as_much_as_there_are_of_them(count: int, time: f
 
 
 def test_a_curve_that_is_there_gains_far_more() -> None:
-    """One wave of eight, as large as the noise."""
+    """One wave of eight, half as large again as the noise: what those gain by chance in one of 10 000."""
     waves = np.cos(np.outer(np.arange(8), ALONG))
-    assert gain_of_columns([noise(20.0, 0) + np.cos(4 * ALONG)], [waves]) > 30
+    assert gain_of_columns([noise(20.0, 0) + 1.5 * np.cos(4 * ALONG)], [waves]) > chi2.isf(1e-4, 8)
 
 
 def test_a_parameter_that_slow_noise_bends_takes_it_up_anyway() -> None:

@@ -101,7 +101,7 @@ def test_the_size_is_the_root_mean_square_while_the_effect_acts() -> None:
 
 
 def test_an_intermittent_effect_counts_as_large_as_it_is_while_it_acts() -> None:
-    """At least two fifths of its root mean square there."""
+    """At least two fifths of its root mean square there; as large as it is over all readings, where it is told."""
     quiet = drive(3)
     columns = quiet.columns.copy()
     columns[1, 6:] = 0.0
@@ -111,6 +111,7 @@ def test_an_intermittent_effect_counts_as_large_as_it_is_while_it_acts() -> None
     acting = fit.coefficients[fit.spans[0]][0] * columns[1]
     assert relative_size(of, fit, 0) == pytest.approx(active_rms(acting.ravel() ** 2, 0.4))
     assert relative_size(of, fit, 0) > 1.5 * np.sqrt(np.mean(acting**2))
+    assert relative_size(of, fit, 0, active_share=0.0) == pytest.approx(np.sqrt(np.mean(acting**2)))
 
 
 def test_an_effect_of_one_recording_is_not_confirmed_by_the_others() -> None:

@@ -50,7 +50,7 @@ def alike(share: float, size: float) -> FleetEquations:
 def rivals_of_drag(of: FleetEquations) -> list[tuple[str, ...]]:
     """Return the sets of names that cannot be told apart where the drag was named."""
     chooser, fit = Chooser(of, places_of(of), 8.0), of.fit((term(DRAG, Course("always")),))
-    return [one.effects for one in rivals(chooser, fit, Machine())]
+    return [one.effects for one in rivals(chooser, fit, Machine(), Machine.covariate_labels)]
 
 
 def test_a_law_whose_column_is_alike_is_a_rival() -> None:
@@ -80,9 +80,35 @@ def test_the_experiment_varies_the_covariate_of_each() -> None:
     """In the machine's own words; unloaded where one of them asks for it and the machine can."""
     of = alike(0.9999, 0.1)
     chooser, fit = Chooser(of, places_of(of), 8.0), of.fit((term(DRAG, Course("always")),))
-    (one,) = rivals(chooser, fit, Machine())
+    (one,) = rivals(chooser, fit, Machine(), Machine.covariate_labels)
     assert one.experiment == "Drive at several carriage speeds; then vary the slip."
     assert (one.vary, one.lift, one.duration_s) == (("wheel_speed", "slip"), False, 0.0)
+
+
+class OneWay(Machine):
+    """The same machine, which cannot reverse."""
+
+    one_way = True
+
+
+class Reversed(Lookalike):
+    """A law that a reversal shows, or several speeds do."""
+
+    experiment, experiment_one_way = "run to and fro", "hold several values of the {wheel_speed}"
+    vary = ("direction",)
+
+
+def test_a_machine_that_runs_one_way_is_asked_for_no_reversal() -> None:
+    """The experiment is that of a machine that runs one way, in the words of the recording where none are stated."""
+    of = alike(0.9999, 0.1)
+    of = replace(of, groups=(DRAG, WEAR, GridGroup(Reversed(), {}, (3,), 1)))
+    chooser, fit = Chooser(of, places_of(of), 8.0), of.fit((term(DRAG, Course("always")),))
+    (one,) = rivals(chooser, fit, OneWay(), {"wheel_speed": "rake_rad_s"})
+    assert "hold several values of the rake" in one.experiment
+    assert one.vary == ("wheel_speed",)
+    (one,) = rivals(chooser, fit, Machine(), {})
+    assert "run to and fro" in one.experiment
+    assert one.vary == ("wheel_speed", "direction")
 
 
 @pytest.mark.parametrize(("can_lift", "told"), [(True, "; then run with the wheels lifted"), (False, "")])
@@ -92,6 +118,8 @@ def test_an_experiment_without_load_is_told_where_the_machine_can(can_lift: bool
     of = alike(0.9999, 0.1)
     of = replace(of, groups=(unloaded, *of.groups[1:]))
     machine = Machine() if can_lift else type("Fixed", (Machine,), {"unloaded_experiment": ""})()
-    (one,) = rivals(Chooser(of, places_of(of), 8.0), of.fit((term(unloaded, Course("always")),)), machine)
+    (one,) = rivals(
+        Chooser(of, places_of(of), 8.0), of.fit((term(unloaded, Course("always")),)), machine, machine.covariate_labels
+    )
     assert one.experiment == f"Drive at several carriage speeds; then vary the slip{told}."
     assert one.lift == can_lift
