@@ -31,5 +31,5 @@ def plain(value: float, digits: int = WITHOUT_INTERVAL) -> str:
 
 
 def _fixed(value: float, decimals: int) -> str:
-    """Return a number with so many decimals; 0 has no sign."""
-    return f"{round(value, decimals) + 0.0:.{decimals}f}"
+    """Return a number with so many decimals; 0 itself has neither decimals nor a sign."""
+    return f"{round(value, decimals) + 0.0:.{decimals}f}" if value else "0"
