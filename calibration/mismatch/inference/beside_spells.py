@@ -16,7 +16,7 @@ from regolithd.calibration.mismatch.inference.held_out import (
     groups_to_choose_from,
     with_optimised_shapes,
 )
-from regolithd.calibration.mismatch.inference.intermittent import constant_on
+from regolithd.calibration.mismatch.inference.intermittent import constant_on, wheels_with_spells
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.selection.noise_estimation import noise_of_whitened
@@ -27,7 +27,11 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors
     from regolithd.calibration.mismatch.regression.group import Group
-    from regolithd.calibration.mismatch.selection.decision import Decision, Intermittent
+    from regolithd.calibration.mismatch.selection.decision import Decision
+
+TURNS = 2
+"""Times that names are chosen beside the spells, each with the course that these have beside the last names (a choice).
+"""
 
 
 def named_beside_spells(
@@ -35,42 +39,56 @@ def named_beside_spells(
 ) -> tuple[Decision, HeldOutErrors]:
     """Return the decision with the names that are found beside the course of its spells, and their held-out errors.
 
-    Where that course is not known, or where no further name is found, the decision stays as it is. `grid` are the
-    groups before any data optimised their shapes.
+    Where that course is not known, or where fewer names are found beside it, or none, the decision stays as it is.
+    `grid` are the groups before any data optimised their shapes.
     """
-    spells = [each for each in decision.intermittent if each.acting is not None]
-    if not spells or len(decision.unnamed) > len(spells):
+    found = decision
+    for _ in range(TURNS):
+        if (beside := _beside_their_course(found)) is None:
+            return decision, held_out
+        found = _chosen_beside(beside, groups_to_choose_from(beside, grid))
+    if len(found.named.terms) < max(len(decision.named.terms), 1):
         return decision, held_out
-    beside = _beside_their_course(decision, spells)
-    choice = groups_to_choose_from(beside, grid)
+    return confirmed_beside_curves(found, grid)
+
+
+def _chosen_beside(beside: Decision, choice: Sequence[Group]) -> Decision:
+    """Return the decision with the names that are chosen from these groups beside its curves."""
     chosen = chosen_effects(beside.equations.with_groups(choice), beside.entry_threshold, beside.unnamed)
     equations, terms = with_optimised_shapes(beside.equations, chosen, beside.unnamed)
     told = {wheel for term in beside.unnamed for wheel in term.wheels}
     named = equations.fit([term for term in terms if not constant_on(term, told)])
     for curve in beside.unnamed:
         named = drop_what_gains_little(equations, named, curve)
-    if len(named.terms) <= len(decision.named.terms):
-        return decision, held_out
     whole = equations.fit((*named.terms, *beside.unnamed))
-    return confirmed_beside_curves(replace(beside, equations=equations, named=named, whole=whole), grid)
+    return replace(beside, equations=equations, named=named, whole=whole)
 
 
-def _beside_their_course(decision: Decision, spells: Sequence[Intermittent]) -> Decision:
-    """Return the decision with the course of the spells in the place of curves, and the noise estimated beside it."""
-    design, places = decision.equations.design.extended([each.acting for each in spells if each.acting is not None])
+def _beside_their_course(decision: Decision) -> Decision | None:
+    """Return the decision with the course of its spells in the place of curves, and the noise estimated beside it.
+
+    The course is that of what the names leave. None, where it is not known, or is not all that stays unexplained.
+    """
+    wheels = [each.term.wheels for each in decision.intermittent]
+    left = wheels_with_spells(replace(decision, whole=decision.named))
+    acting = [left[on].acting for on in wheels if on in left]
+    known = [each for each in acting if each is not None]
+    if not known or len(known) < len(decision.unnamed):
+        return None
+    design, places = decision.equations.design.extended(known)
     equations = decision.equations.over(design)
     courses = [
         Term(replace(each.term.group, columns=(place,), signs=(0,), acting=None), each.term.wheels)
-        for each, place in zip(spells, places, strict=True)
+        for each, place in zip(decision.intermittent, places, strict=True)
     ]
-    left = residual_of(equations, equations.fit((*decision.named.terms, *courses)))
-    equations = equations.weighted(noise_of_whitened(design, left).weights)
+    rest = residual_of(equations, equations.fit((*decision.named.terms, *courses)))
+    equations = equations.weighted(noise_of_whitened(design, rest).weights)
     return replace(
         decision,
         equations=equations,
-        noise=equations.problem.noise_of(left),
+        noise=equations.problem.noise_of(rest),
         named=equations.fit(decision.named.terms),
         unnamed=tuple(courses),
         whole=equations.fit((*decision.named.terms, *courses)),
-        intermittent=tuple(replace(each, term=course) for each, course in zip(spells, courses, strict=True)),
+        intermittent=tuple(replace(each, term=term) for each, term in zip(decision.intermittent, courses, strict=True)),
     )

@@ -165,7 +165,7 @@ def _with_curves(decision: Decision, in_spells: dict[tuple[int, ...], TimedSpell
     found.sort(key=lambda gain_and_term: gain_and_term[0] - equations.penalty(gain_and_term[1]))
     curves = {term.wheels: term for _, term in found}
     return tuple(
-        Intermittent(curves[wheels], spells.from_s, spells.to_s, spells.share, spells.acting)
+        Intermittent(curves[wheels], spells.from_s, spells.to_s, spells.share)
         for wheels, spells in in_spells.items()
         if wheels in curves
     )

@@ -51,15 +51,12 @@ class Intermittent:
     term: the curve
     from_s, to_s: begin of the first and end of the last spell
     share_of_residual: the spells' share of the power of what is left without them
-    acting: how probably a reading is in a spell, times the factor by which it acts, shape (time, wheel); None: their
-        course is not known
     """
 
     term: Term
     from_s: float
     to_s: float
     share_of_residual: float
-    acting: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,15 +9,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.as_read import columns_on_wheels
-from regolithd.calibration.mismatch.signal.restricted_likelihood import FEWEST_READINGS, Priors, gain_of_columns
+from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
+from regolithd.calibration.mismatch.signal.restricted_likelihood import FEWEST_READINGS, FurtherColumns, Priors
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+
+Array = NDArray[np.float64]
+
+FEWEST_KNOTS = 4
+"""Knots from which a curve has a course that may be smooth (a choice)."""
 
 
 def score_beside_slow_noise(equations: NormalEquations, rest: Sequence[Term], terms: Sequence[Term]) -> float:
@@ -32,14 +39,37 @@ def score_beside_slow_noise(equations: NormalEquations, rest: Sequence[Term], te
     if max((len(places) for places in read), default=0) < FEWEST_READINGS:
         return equations.score(fit) - equations.score(equations.fit(rest))
     columns, residual = columns_on_wheels(equations, fit), design.residual_as_read.astype(np.float64)
-    gain = gain_of_columns(
+    further = FurtherColumns(
         [residual[w, places] for w, places in enumerate(read)],
         [columns[:, w, places] for w, places in enumerate(read)],
         given,
         Priors(nuisance.precision, nuisance.centre),
         equations.thresholds,
     )
-    return gain - sum(equations.penalty(term) for term in terms)
+    score = further.gain() - sum(equations.penalty(term) for term in terms)
+    if (roughness := _roughness(equations, terms)) is None:
+        return score
+    gain, free = further.gain_if_smooth(roughness)
+    fewer = equations.thresholds.coefficient_penalty * (len(roughness) - free)
+    return max(score, gain - sum(equations.penalty(term) for term in terms) + fewer)
+
+
+def _roughness(equations: NormalEquations, terms: Sequence[Term]) -> Array | None:
+    """Return the sum of squares of the second differences along curves, as a matrix of the terms' scaled coefficients.
+
+    0 for those of what is no curve. None, where there is no curve.
+    """
+    second = np.zeros((0, 0))
+    for term in terms:
+        count = len(term.group.columns)
+        is_curve = not term.group.named and term.group.region is None and term.group.coupling not in WITHOUT_CURVE
+        own = np.diff(np.eye(count), 2, axis=0) if is_curve and count >= FEWEST_KNOTS else np.zeros((0, count))
+        own = own / equations.design.scale[list(term.group.columns)]
+        rows, before = second.shape
+        grown = np.zeros((rows + len(own), before + count))
+        grown[:rows, :before], grown[rows:, before:] = second, own
+        second = grown
+    return second.T @ second if len(second) else None
 
 
 def lead_beside_slow_noise(equations: NormalEquations, ahead: Sequence[Term], behind: Sequence[Term]) -> float:

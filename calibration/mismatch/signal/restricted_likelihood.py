@@ -10,7 +10,8 @@ them, however slow the noise.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import log
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,6 +32,9 @@ MOST_FITS = 20
 """Times that columns are fitted at most (a choice: three to six are usual)."""
 LEAST_EIGENVALUE = 1e-9
 """Share of the largest eigenvalue below which a combination of columns is rounding."""
+SMOOTHNESS = tuple(4.0**power for power in range(-6, 13))
+"""Multiples of the roughness that are tried, in those that weigh as much as the readings (a choice: between two of
+them the likelihood changes by a tenth)."""
 FEWEST_READINGS = 64
 """Readings below which a course has no spectrum (a choice)."""
 
@@ -52,14 +56,8 @@ class Priors:
 NO_PRIORS = Priors(np.zeros(0), np.zeros(0))
 
 
-def gain_of_columns(
-    courses: Sequence[Array],
-    columns: Sequence[Array],
-    given: int = 0,
-    priors: Priors = NO_PRIORS,
-    thresholds: Thresholds = THRESHOLDS,
-) -> float:
-    """Return what columns gain in twice the restricted log likelihood, with a spectrum of its own in each course.
+class FurtherColumns:
+    """What columns gain beside others in noise that has a spectrum of its own in each course.
 
     Courses that are too short to have a spectrum, or that are 0, are left out.
 
@@ -70,19 +68,69 @@ def gain_of_columns(
     given: how many of the first columns are fitted anyway, and gain nothing
     priors: of the coefficients of the first columns
     """
-    series = [np.vstack([of_course, values]) for values, of_course in zip(courses, columns, strict=True)]
-    of_courses = [
-        _Course.of(each, thresholds) for each in series if each.shape[1] >= FEWEST_READINGS and each[-1].any()
-    ]
-    if not of_courses:
-        return 0.0
-    held, mean = np.zeros((2, len(series[0]) - 1))
-    held[: len(priors.mean)], mean[: len(priors.mean)] = priors.precision, priors.mean
-    likelihood = _Likelihood(of_courses, held, mean)
-    spectra = [course.spectrum(np.zeros(0), np.zeros((0, 0))) for course in of_courses]
-    before = likelihood.fitted(given, spectra)
-    after = likelihood.fitted(len(held), before.spectra)
-    return (before.restricted - before.at_the_end) - (after.restricted - after.at_the_start)
+
+    def __init__(
+        self,
+        courses: Sequence[Array],
+        columns: Sequence[Array],
+        given: int = 0,
+        priors: Priors = NO_PRIORS,
+        thresholds: Thresholds = THRESHOLDS,
+    ) -> None:
+        series = [np.vstack([of_course, values]) for values, of_course in zip(courses, columns, strict=True)]
+        known = [each for each in series if each.shape[1] >= FEWEST_READINGS and each[-1].any()]
+        self._given, count = given, len(series[0]) - 1 if series else 0
+        held, mean = np.zeros((2, count))
+        held[: len(priors.mean)], mean[: len(priors.mean)] = priors.precision, priors.mean
+        self._likelihood = _Likelihood([_Course.of(each, thresholds) for each in known], np.diag(held), mean)
+        spectra = [course.spectrum(np.zeros(0), np.zeros((0, 0))) for course in self._likelihood.courses]
+        self._before = self._likelihood.fitted(given, spectra)
+
+    def gain(self) -> float:
+        """Return by how much twice the restricted log likelihood rises, whatever the coefficients."""
+        return self._gain(self._likelihood)
+
+    def gain_if_smooth(self, roughness: Array) -> tuple[float, int]:
+        """Return the same where the coefficients are as smooth as is likeliest, and how many numbers that leaves free.
+
+        Their prior is normal, with a multiple of `roughness` (column, column) as its precision (Wahba, 1978): what has
+        none is free, and the multiple is.
+        """
+        if not self._likelihood.courses:
+            return 0.0, 0
+        given, count = self._given, len(roughness)
+        matrix, moment, _ = self._likelihood.sums(given + count, self._before.spectra)
+        scale = _scale(matrix)
+        matrix, moment = matrix * np.outer(scale, scale), moment * scale
+        seen = scale[given:] > 0
+        values, vectors = np.linalg.eigh(_of_seen(roughness, seen) * np.outer(scale[given:], scale[given:]))
+        rough = values > LEAST_EIGENVALUE * values[-1]
+        if not rough.any():
+            return self.gain(), int(seen.sum())
+        prior = np.zeros(matrix.shape)
+        prior[given:, given:] = (vectors[:, rough] * values[rough]) @ vectors[:, rough].T
+        free = np.zeros((given + count, given + count - int(rough.sum())))
+        free[:given, :given], free[given:, given:] = np.eye(given), vectors[:, ~rough]
+        of_free, of_prior = _log_determinant(free.T @ matrix @ free), float(np.sum(np.log(values[rough])))
+
+        def price(times: float) -> float:
+            """Return what the prior's width costs with the spectra of what the given columns leave."""
+            of_all = _log_determinant(matrix + times * prior)
+            return of_all - of_free - of_prior - float(rough.sum()) * log(times)
+
+        usual = float(seen.sum() / np.sum(values[rough]))
+        tried = [factor * usual for factor in SMOOTHNESS]
+        explained = [float(moment @ _pseudo_inverse(matrix + times * prior) @ moment) - price(times) for times in tried]
+        times = tried[int(np.argmax(explained))]
+        back = np.divide(1.0, scale, out=np.zeros(len(scale)), where=scale > 0)
+        smooth = self._likelihood.precision + times * prior * np.outer(back, back)
+        gain = self._gain(replace(self._likelihood, precision=smooth)) - price(times)
+        return gain, int(seen.sum() - rough.sum()) + 1
+
+    def _gain(self, likelihood: _Likelihood) -> float:
+        before = self._before
+        after = likelihood.fitted(len(likelihood.mean), before.spectra)
+        return (before.restricted - before.at_the_end) - (after.restricted - after.at_the_start)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +191,8 @@ class _Likelihood:
     Attributes
     ----------
     courses: readings and columns
-    precision, mean: of the prior of each column's coefficient, 0 where it has none
+    precision: of the prior of the columns' coefficients, shape (column, column), 0 where it has none
+    mean: of each
     """
 
     courses: Sequence[_Course]
@@ -152,10 +201,10 @@ class _Likelihood:
 
     def fitted(self, count: int, spectra: Sequence[NoiseSpectrum]) -> _Fitted:
         """Return the fit of the first columns at its likeliest spectra, found from these on."""
-        kept = _independent(self._sums(count, spectra)[0])
+        kept = _independent(self.sums(count, spectra)[0])
         start, best = None, None
         for _ in range(MOST_FITS):
-            matrix, moment, minus_two_log = self._sums(count, spectra)
+            matrix, moment, minus_two_log = self.sums(count, spectra)
             inside = kept.T @ matrix @ kept
             covariance = kept @ np.linalg.inv(inside) @ kept.T
             coefficients, determinant = covariance @ moment, float(np.linalg.slogdet(inside)[1])
@@ -168,10 +217,11 @@ class _Likelihood:
         assert best is not None  # noqa: S101  # the first fit is always one
         return best
 
-    def _sums(self, count: int, spectra: Sequence[NoiseSpectrum]) -> tuple[Array, Array, float]:
+    def sums(self, count: int, spectra: Sequence[NoiseSpectrum]) -> tuple[Array, Array, float]:
         """Return matrix and moment of the first columns' normal equations, and −2 ln of the likelihood without them."""
-        held, mean = self.precision[:count], self.mean[:count]
-        matrix, moment, rest = np.diag(held), held * mean, float(held @ mean**2)
+        matrix, mean = self.precision[:count, :count], self.mean[:count]
+        moment = matrix @ mean
+        rest = float(mean @ moment)
         for course, spectrum in zip(self.courses, spectra, strict=True):
             of_course = course.weighted(spectrum, count)
             matrix, moment = matrix + of_course[0], moment + of_course[1]
@@ -181,6 +231,32 @@ class _Likelihood:
 
 def _independent(matrix: Array) -> Array:
     """Return the combinations of columns that differ by more than rounding, shape (column, combination)."""
-    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), np.finfo(np.float64).tiny))
+    scale = _scale(matrix)
     values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
     return np.asarray(scale[:, None] * vectors[:, values > LEAST_EIGENVALUE * max(values.max(initial=0.0), 0.0)])
+
+
+def _scale(matrix: Array) -> Array:
+    """Return by what columns are multiplied to be of size 1, shape (column,); 0 for those that are 0 themselves."""
+    size = np.diag(matrix)
+    seen = size > LEAST_EIGENVALUE**2 * size.max(initial=0.0)
+    return np.divide(1.0, np.sqrt(np.where(seen, size, 1.0)), out=np.zeros(len(size)), where=seen)
+
+
+def _of_seen(precision: Array, seen: NDArray[np.bool_]) -> Array:
+    """Return the precision of the coefficients of columns that are seen, whatever the others are; 0 for these."""
+    found = np.zeros(precision.shape)
+    cross = precision[np.ix_(~seen, seen)]
+    known = cross.T @ _pseudo_inverse(precision[np.ix_(~seen, ~seen)]) @ cross if cross.size else 0.0
+    found[np.ix_(seen, seen)] = precision[np.ix_(seen, seen)] - known
+    return found
+
+
+def _log_determinant(matrix: Array) -> float:
+    """Return the logarithm of the determinant, of the combinations that differ by more than rounding."""
+    values = np.linalg.eigvalsh(matrix)
+    return float(np.sum(np.log(values[values > LEAST_EIGENVALUE * values.max(initial=0.0)])))
+
+
+def _pseudo_inverse(matrix: Array) -> Array:
+    return np.asarray(np.linalg.pinv(matrix, rcond=LEAST_EIGENVALUE, hermitian=True))

@@ -101,7 +101,8 @@ def _of_model(model: str, tables: Mapping[str, Any], folder: Path, announce: Cal
         from regolithd.calibration.mismatch.simulation.rover_wheel import RoverWheel  # noqa: PLC0415  # soil physics
 
         return RoverWheel.from_tables(tables)
-    announce(f"running the code of {model} from {folder.resolve()}, which SIM.toml names: use only files that you trust")
+    place = folder.resolve()
+    announce(f"running the code of {model} from {place}, which SIM.toml names: use only files that you trust")
     if model.endswith(".fmu"):
         from regolithd.calibration.mismatch.simulation.fmu import FmuSimulation  # noqa: PLC0415  # needs FMPy
 

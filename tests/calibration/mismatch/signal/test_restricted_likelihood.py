@@ -9,10 +9,14 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from regolithd.calibration.mismatch.signal.restricted_likelihood import Priors, gain_of_columns
+from regolithd.calibration.mismatch.signal.restricted_likelihood import NO_PRIORS, FurtherColumns, Priors
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
 
 READINGS = 6000
 ALONG = np.pi * np.arange(READINGS) / READINGS
@@ -24,6 +28,13 @@ def noise(time: float, seed: int, white: float = 0.5) -> NDArray[np.float64]:
     kept = np.exp(-1 / time)
     slow = lfilter([np.sqrt(1 - kept**2)], [1, -kept], rng.standard_normal(READINGS + 2000))[2000:]
     return np.asarray(np.sqrt(white) * rng.standard_normal(READINGS) + np.sqrt(1 - white) * slow)
+
+
+def gain_of_columns(
+    courses: Sequence[Array], columns: Sequence[Array], given: int = 0, priors: Priors = NO_PRIORS
+) -> float:
+    """Return what the further columns gain whatever their coefficients."""
+    return FurtherColumns(courses, columns, given, priors).gain()
 
 
 @pytest.mark.parametrize(("count", "time"), [(1, 20.0), (8, 20.0), (8, 100.0), (48, 20.0), (48, 100.0)])
@@ -87,3 +98,45 @@ def test_an_offset_is_no_noise() -> None:
     values, ones = noise(20.0, 3), np.ones((1, READINGS))
     assert gain_of_columns([values], [ones]) < 8
     assert gain_of_columns([values + 0.6], [ones]) > 20
+
+
+def hats(knots: int) -> Array:
+    """Return a curve's columns over the readings, shape (knot, reading)."""
+    at = np.linspace(0, knots - 1, READINGS)
+    return np.maximum(1 - np.abs(at - np.arange(knots)[:, None]), 0.0)
+
+
+def if_smooth(reading: Array, knots: int) -> float:
+    """Return what a curve gains if it is smooth, less what its free numbers gain by chance."""
+    second = np.diff(np.eye(knots), 2, axis=0)
+    gain, free = FurtherColumns([reading], [hats(knots)]).gain_if_smooth(second.T @ second)
+    assert free == 3  # a line's two, and how smooth it is
+    return gain - free
+
+
+@pytest.mark.parametrize("knots", [8, 48])
+@pytest.mark.parametrize("time", [2.0, 20.0, 100.0])
+def test_by_chance_a_smooth_curve_gains_what_a_line_does(knots: int, time: float) -> None:
+    """However many knots it has."""
+    gains = [if_smooth(noise(time, seed), knots) for seed in range(24)]
+    assert abs(np.mean(gains)) < 3
+    assert max(gains) < chi2.isf(1e-4, 3)
+
+
+@pytest.mark.parametrize("knots", [8, 48])
+def test_a_smooth_curve_gains_more_than_one_of_any_course(knots: int) -> None:
+    """A drift of one arc: less what coefficients gain by chance."""
+    reading = noise(20.0, 4) + 0.8 * np.sin(ALONG)
+    whatever = gain_of_columns([reading], [hats(knots)]) - knots
+    assert if_smooth(reading, knots) > whatever + 3
+    assert if_smooth(1000 * reading, knots) == pytest.approx(if_smooth(reading, knots), abs=0.2)
+
+
+def test_knots_that_no_reading_sees_do_not_matter() -> None:
+    """A covariate that leaves out a part of its range."""
+    second = np.diff(np.eye(8), 2, axis=0)
+    reading, columns = noise(20.0, 4) + 0.8 * np.sin(ALONG), hats(8)
+    with_more = np.vstack([columns, np.zeros((3, READINGS))])
+    more = np.diff(np.eye(11), 2, axis=0)
+    gain, free = FurtherColumns([reading], [columns]).gain_if_smooth(second.T @ second)
+    assert FurtherColumns([reading], [with_more]).gain_if_smooth(more.T @ more) == (pytest.approx(gain, abs=0.01), free)
