@@ -16,7 +16,7 @@ from regolithd.calibration.mismatch.problem.words import column_of, in_words, la
 from regolithd.calibration.mismatch.regression.as_read import long_run_weights
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Collection, Iterable, Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
     from regolithd.calibration.mismatch.experiments.choice import Choice, Experimenter
@@ -92,7 +92,7 @@ def with_experiment(
     return Indistinguishable(
         effects=names,
         beside=tuple(addition.more.name for addition in beside),
-        experiment=f"{capital(sentence)}; {in_all} in all{ranges and f' ({ranges})'}. {_expectation(choice)}",
+        experiment=f"{capital(sentence)}; {in_all} in all{ranges and f' ({ranges})'}. {_expectation(choice, names)}",
         vary=tuple(dict.fromkeys((*choice.varied, *(name for each in apart for name in varied_by(each, problem))))),
         duration_s=duration_s,
         lift=lift,
@@ -176,11 +176,13 @@ def range_in_words(problem: Problem, setting: Setting) -> str:
     return f"{word_for(setting.covariate, problem.labels)} {ends} {unit}".strip()
 
 
-def _expectation(choice: Choice) -> str:
-    """Return how well the closest pair is told apart."""
+def _expectation(choice: Choice, names: Collection[str]) -> str:
+    """Return how well the closest pair is told apart, of which one may be a likely answer that is not in the set."""
     times = int(np.ceil(choice.needed / max(choice.margin, 1e-9) - AS_GOOD_AS_REACHED))
     told = f"{choice.needed:.0f} tells them apart nine times in ten" + (f": {times} times as long" if times > 1 else "")
-    return f"Expected Δχ² between {listed(choice.pair)}, the closest two: {choice.margin:.0f} ({told})."
+    further = [name for name in choice.pair if name not in names]
+    of_others = f" ({listed(further)} in another likely answer)" if further else ""
+    return f"Expected Δχ² between {listed(choice.pair)}, the closest two{of_others}: {choice.margin:.0f} ({told})."
 
 
 def _with_additions(
