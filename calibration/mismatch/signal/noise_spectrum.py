@@ -3,8 +3,8 @@
 A sensor's noise is white noise and what wanders about it, each part forgotten within a time of its own. Its spectrum is
 then a sum of those of first-order processes, whose powers maximise Whittle's likelihood (1953): the coefficients of a
 discrete cosine transform are independent, and each has the spectrum as its variance. (Those of a Fourier transform are
-not where the noise is slow: readings that end elsewhere than they began are a step to it.) What is slower than
-`slowest_noise_share` of the recording passes too seldom for a spectrum to be told, and is looked for as structure.
+not where the noise is slow: readings that end elsewhere than they began are a step to it.) What is slower than a share
+of the recording passes too seldom for a spectrum to be told, and is looked for as structure.
 """
 
 from __future__ import annotations
@@ -51,6 +51,10 @@ class Bands:
         while edges[-1] < readings:
             edges.append(min(max(edges[-1] + 1, int(edges[-1] * BAND)), readings))
         return cls(tuple(edges), _times(thresholds.slowest_noise_share * readings))
+
+    def with_slowest(self, share: float) -> Bands:
+        """Return the same bands of noise whose correlation time is up to this share of the readings."""
+        return Bands(self.edges, _times(share * self.edges[-1]))
 
     @cached_property
     def count(self) -> Array:

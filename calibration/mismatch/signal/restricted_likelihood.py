@@ -21,7 +21,7 @@ from regolithd.calibration.mismatch.signal.noise_spectrum import Bands, NoiseSpe
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
 Array = NDArray[np.float64]
 
@@ -30,6 +30,9 @@ CONVERGED = 0.05
 choice: what is told has to gain more than a hundred times as much)."""
 MOST_FITS = 20
 """Times that columns are fitted at most (a choice: three to six are usual)."""
+SELDOM = 4.6
+"""What noise costs in −2 ln of the likelihood that is slower than it usually is: odds of one in ten, 2 ln 10 (a
+choice)."""
 LEAST_EIGENVALUE = 1e-9
 """Share of the largest eigenvalue below which a combination of columns is rounding."""
 SMOOTHNESS = tuple(4.0**power for power in range(-6, 13))
@@ -79,16 +82,18 @@ class FurtherColumns:
     ) -> None:
         series = [np.vstack([of_course, values]) for values, of_course in zip(courses, columns, strict=True)]
         known = [each for each in series if each.shape[1] >= FEWEST_READINGS and each[-1].any()]
-        self._given, count = given, len(series[0]) - 1 if series else 0
+        count = len(series[0]) - 1 if series else 0
         held, mean = np.zeros((2, count))
         held[: len(priors.mean)], mean[: len(priors.mean)] = priors.precision, priors.mean
-        self._likelihood = _Likelihood([_Course.of(each, thresholds) for each in known], np.diag(held), mean)
-        spectra = [course.spectrum(np.zeros(0), np.zeros((0, 0))) for course in self._likelihood.courses]
-        self._before = self._likelihood.fitted(given, spectra)
+        courses_of = [_Course.of(each, thresholds) for each in known]
+        self._usual = _InNoise(_Likelihood(courses_of, np.diag(held), mean), given)
+        share = thresholds.slowest_possible_noise_share
+        slower = [replace(each, bands=each.bands.with_slowest(share)) for each in courses_of]
+        self._slow = _InNoise(_Likelihood(slower, np.diag(held), mean), given)
 
     def gain(self) -> float:
         """Return by how much twice the restricted log likelihood rises, whatever the coefficients."""
-        return self._gain(self._likelihood)
+        return self._in_either(_InNoise.gain)
 
     def gain_if_smooth(self, roughness: Array) -> tuple[float, int]:
         """Return the same where the coefficients are as smooth as is likeliest, and how many numbers that leaves free.
@@ -96,10 +101,40 @@ class FurtherColumns:
         Their prior is normal, with a multiple of `roughness` (column, column) as its precision (Wahba, 1978): what has
         none is free, and the multiple is.
         """
+        free = self._usual.smooth(roughness)[1]
+        return self._in_either(lambda noise: noise.smooth(roughness)[0]), free
+
+    def _in_either(self, gain: Callable[[_InNoise], float]) -> float:
+        """Return the gain where the noise is as slow as it usually is, or slower, whichever is likelier with each."""
+        usual, slow = self._usual.before.restricted, self._slow.before.restricted + SELDOM
+        if slow >= usual:  # then it is likelier with the columns, too: slower noise explains a part of what they do
+            return gain(self._usual)
+        return slow - min(usual - gain(self._usual), slow - gain(self._slow))
+
+
+class _InNoise:
+    """The fits to courses in noise up to some correlation time.
+
+    Attributes
+    ----------
+    before: the fit of the columns that are given
+    """
+
+    def __init__(self, likelihood: _Likelihood, given: int) -> None:
+        self._likelihood, self._given = likelihood, given
+        spectra = [course.spectrum(np.zeros(0), np.zeros((0, 0))) for course in likelihood.courses]
+        self.before = likelihood.fitted(given, spectra)
+
+    def gain(self) -> float:
+        """Return what the further columns gain."""
+        return self._gain(self._likelihood)
+
+    def smooth(self, roughness: Array) -> tuple[float, int]:
+        """Return what they gain if they are smooth, and how many numbers are free."""
         if not self._likelihood.courses:
             return 0.0, 0
         given, count = self._given, len(roughness)
-        matrix, moment, _ = self._likelihood.sums(given + count, self._before.spectra)
+        matrix, moment, _ = self._likelihood.sums(given + count, self.before.spectra)
         scale = _scale(matrix)
         matrix, moment = matrix * np.outer(scale, scale), moment * scale
         seen = scale[given:] > 0
@@ -128,7 +163,7 @@ class FurtherColumns:
         return gain, int(seen.sum() - rough.sum()) + 1
 
     def _gain(self, likelihood: _Likelihood) -> float:
-        before = self._before
+        before = self.before
         after = likelihood.fitted(len(likelihood.mean), before.spectra)
         return (before.restricted - before.at_the_end) - (after.restricted - after.at_the_start)
 

@@ -38,11 +38,15 @@ class NoiseThresholds:
         f"{TRIALS}: what is left in makes the noise seem larger, what is taken out by chance smaller",
     )
     slowest_noise_share: float = threshold(
-        0.03,
-        "Correlation time of the noise, as a share of the recording, beyond which what wanders is structure.",
-        f"{CHOICE}: slow noise and an effect that is as slow have the same likelihood. Beside noise with a sixtieth of "
-        "the recording eight coefficients gain 6 by chance, as they should, and beside a twentieth 15 (0.02: 26; 0.05: "
-        "9); a wave over half of the recording, as large as the noise, gains 30 (0.02: 38; 0.05: 22)",
+        0.02,
+        "Correlation time of the noise, as a share of the recording, up to which it is usual.",
+        f"{CHOICE}: fifty of these times; slow noise and an effect that is as slow have the same likelihood",
+    )
+    slowest_possible_noise_share: float = threshold(
+        0.05,
+        "The same, beyond which what wanders is structure; noise in between is one in ten.",
+        f"{CHOICE}: twenty of these times; a wave over half of the recording, as large as the noise, gains 22 beside "
+        "it, and 38 beside noise that is usual",
     )
     noise_term_columns: int = threshold(
         12,

@@ -165,10 +165,10 @@ class SelectionThresholds:
         "concealed one of 25 scored 31 (seeds 98309134, 127741224)",
     )
     slow_noise_entry: float = threshold(
-        12.0,
+        8.0,
         "Score above which a smooth term is told, where the noise may have any spectrum, in Δχ² less penalty.",
-        "standard: by chance one of eight smooth terms with eight coefficients each scores as much in one recording of "
-        "260 (χ²); of 60 recordings of nothing but slow noise 5 are told (`make slow-noise`)",
+        "standard: by chance one of eight smooth terms, with a line's two coefficients and a likeliest smoothness "
+        "each, scores as much in one recording of 50 (χ²); most are told from noise by its weights, too",
     )
     smooth_term_power: float = threshold(
         0.01, "Share of the residual's power on its wheels below which a smooth term is ignored.", f"{CHOICE}"
