@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 def likelier_names(decision: Decision) -> Decision | None:
     """Return the best answer that has more evidence than this one, None if there is none.
 
-    It has names alone or none, or a curve of an answer without some of its names, or a further name or another one
-    beside its curves, by more than chance. Held-out readings have not been asked yet.
+    It has other names or none; or by more than chance fewer names, or a further one or another beside its curves; or a
+    curve of an answer without some of its names. Held-out readings have not been asked yet.
     """
     told, chance = names_of(decision), decision.equations.thresholds.lead_margin
     for other in alternatives(decision):
@@ -33,7 +33,8 @@ def likelier_names(decision: Decision) -> Decision | None:
             beside_curves = UNEXPLAINED in told and other.margin < -chance
             found = _with_curve(decision, other) if told > set(other.effects) or beside_curves else None
         else:
-            found = _named(decision, other)
+            fewer = bool(other.effects) and told > set(other.effects)
+            found = None if fewer and other.margin > -chance else _named(decision, other)
         if found is not None:
             return found
     return None
