@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pytest
 from winch import Winch
 
 from regolithd.calibration.mismatch.comparison import compare
 from regolithd.calibration.mismatch.data.recording import from_columns
+from regolithd.calibration.mismatch.inference import likelier_names
+from regolithd.calibration.mismatch.inference.alternatives import Alternative
+from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -52,3 +57,27 @@ def test_a_drag_that_begins_is_named_beside_a_curve_that_was_found_before_it() -
     assert [effect.name for effect in answer.effects] == ["bearing-drag"]
     assert abs((answer.effects[0].onset_s or 0.0) - ONSET_S) < 0.1 * time_s[-1]
     assert [place.covariate for place in answer.unexplained] == ["wind"]
+
+
+@pytest.mark.parametrize(
+    ("names", "other", "margin", "is_taken"),
+    [
+        (("drag",), (), -0.1, True),
+        (("drag",), (), 0.1, False),
+        (("drag",), ("ripple",), -0.1, True),
+        (("drag", "ripple"), ("drag",), -0.9 * THRESHOLDS.lead_margin, False),
+        (("drag", "ripple"), ("drag",), -1.1 * THRESHOLDS.lead_margin, True),
+    ],
+)
+def test_an_answer_takes_the_place_of_names_where_it_is_likelier(
+    monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...], other: tuple[str, ...], margin: float, is_taken: bool
+) -> None:
+    """Nothing, or other names, where they are ahead at all; fewer names by more than chance."""
+    terms = [SimpleNamespace(name=name, group=SimpleNamespace(named=True)) for name in names]
+    decision: Any = SimpleNamespace(
+        equations=SimpleNamespace(thresholds=THRESHOLDS), whole=SimpleNamespace(terms=terms)
+    )
+    taken = object()
+    monkeypatch.setattr(likelier_names, "alternatives", lambda _: (Alternative(other, margin),))
+    monkeypatch.setattr(likelier_names, "_named", lambda *_: taken)
+    assert (likelier_names.likelier_names(decision) is taken) == is_taken
