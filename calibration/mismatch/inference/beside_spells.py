@@ -16,11 +16,10 @@ from regolithd.calibration.mismatch.inference.held_out import (
     groups_to_choose_from,
     with_optimised_shapes,
 )
-from regolithd.calibration.mismatch.inference.intermittent import constant_on, wheels_with_spells
+from regolithd.calibration.mismatch.inference.intermittent import names_beside_spells, wheels_with_spells
 from regolithd.calibration.mismatch.regression.group import Term
 from regolithd.calibration.mismatch.regression.residuals import residual_of
 from regolithd.calibration.mismatch.selection.noise_estimation import noise_of_whitened
-from regolithd.calibration.mismatch.selection.smooth_terms import drop_what_gains_little
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,10 +55,7 @@ def _chosen_beside(beside: Decision, choice: Sequence[Group]) -> Decision:
     """Return the decision with the names that are chosen from these groups beside its curves."""
     chosen = chosen_effects(beside.equations.with_groups(choice), beside.entry_threshold, beside.unnamed)
     equations, terms = with_optimised_shapes(beside.equations, chosen, beside.unnamed)
-    told = {wheel for term in beside.unnamed for wheel in term.wheels}
-    named = equations.fit([term for term in terms if not constant_on(term, told)])
-    for curve in beside.unnamed:
-        named = drop_what_gains_little(equations, named, curve)
+    named = names_beside_spells(equations, terms, beside.unnamed)
     whole = equations.fit((*named.terms, *beside.unnamed))
     return replace(beside, equations=equations, named=named, whole=whole)
 
@@ -69,10 +65,9 @@ def _beside_their_course(decision: Decision) -> Decision | None:
 
     The course is that of what the names leave. None, where it is not known, or is not all that stays unexplained.
     """
-    wheels = [each.term.wheels for each in decision.intermittent]
     left = wheels_with_spells(replace(decision, whole=decision.named))
-    acting = [left[on].acting for on in wheels if on in left]
-    known = [each for each in acting if each is not None]
+    spells = [left.get(each.term.wheels) for each in decision.intermittent]
+    known = [each.acting for each in spells if each is not None and each.acting is not None]
     if not known or len(known) < len(decision.unnamed):
         return None
     design, places = decision.equations.design.extended(known)

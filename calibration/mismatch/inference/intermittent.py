@@ -26,10 +26,11 @@ from regolithd.calibration.mismatch.signal.spells import skewed_spells, switchin
 from regolithd.calibration.mismatch.signal.switching_mean import switching_mean
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from regolithd.calibration.mismatch.problem.problem import Problem
-    from regolithd.calibration.mismatch.regression.group import Term
+    from regolithd.calibration.mismatch.regression.group import Fit, Term
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 Array = NDArray[np.float64]
@@ -70,10 +71,7 @@ def unexplained_if_intermittent(decision: Decision) -> Decision:
     if not found:
         return decision
     curves = tuple(each.term for each in found)
-    told = {wheel for term in curves for wheel in term.wheels}
-    named = equations.fit([term for term in decision.named.terms if not constant_on(term, told)])
-    for curve in curves:
-        named = drop_what_gains_little(equations, named, curve)
+    named = names_beside_spells(equations, decision.named.terms, curves)
     unnamed = (*decision.unnamed, *curves)
     whole = equations.fit((*named.terms, *unnamed))
     return replace(decision, named=named, unnamed=unnamed, whole=whole, intermittent=found)
@@ -171,7 +169,16 @@ def _with_curves(decision: Decision, in_spells: dict[tuple[int, ...], TimedSpell
     )
 
 
-def constant_on(term: Term, wheels: set[int]) -> bool:
+def names_beside_spells(equations: NormalEquations, terms: Sequence[Term], curves: Sequence[Term]) -> Fit:
+    """Return the fit of those effects that are not the mean of what comes and goes, and gain enough beside it."""
+    told = {wheel for curve in curves for wheel in curve.wheels}
+    named = equations.fit([term for term in terms if not _constant_on(term, told)])
+    for curve in curves:
+        named = drop_what_gains_little(equations, named, curve)
+    return named
+
+
+def _constant_on(term: Term, wheels: set[int]) -> bool:
     """Return whether a named effect is of constant size on one of these wheels."""
     candidate = term.group.candidate
     return candidate is not None and candidate.covariate in CONSTANT and bool(wheels.intersection(term.wheels))

@@ -24,7 +24,7 @@ def pseudo_inverse(matrix: Array, singular: float) -> Array:
     The matrix is scaled to a diagonal of 1 first, since precisions of priors differ by the squares of their units;
     `singular` is the relative eigenvalue below which a direction then counts as undetermined; one below 0 is rounding.
     """
-    size = np.sqrt(np.diag(matrix))
+    size = np.sqrt(np.maximum(np.diag(matrix), 0.0))
     size = np.where(size > 0, size, 1.0)
     values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
     determined = values > singular * values.max(initial=0.0)

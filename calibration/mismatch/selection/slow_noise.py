@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.as_read import columns_on_wheels
 from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
-from regolithd.calibration.mismatch.signal.restricted_likelihood import FEWEST_READINGS, FurtherColumns, Priors
+from regolithd.calibration.mismatch.regression.restricted_likelihood import FEWEST_READINGS, FurtherColumns, Priors
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -46,12 +46,11 @@ def score_beside_slow_noise(equations: NormalEquations, rest: Sequence[Term], te
         Priors(nuisance.precision, nuisance.centre),
         equations.thresholds,
     )
-    score = further.gain() - sum(equations.penalty(term) for term in terms)
-    if (roughness := _roughness(equations, terms)) is None:
-        return score
-    gain, free = further.gain_if_smooth(roughness)
-    fewer = equations.thresholds.coefficient_penalty * (len(roughness) - free)
-    return max(score, gain - sum(equations.penalty(term) for term in terms) + fewer)
+    gain, penalty = further.gain(), sum(equations.penalty(term) for term in terms)
+    if (roughness := _roughness(equations, terms)) is not None:
+        smooth, free = further.gain_if_smooth(roughness)
+        gain = max(gain, smooth + equations.thresholds.coefficient_penalty * (len(roughness) - free))
+    return gain - penalty
 
 
 def _roughness(equations: NormalEquations, terms: Sequence[Term]) -> Array | None:
@@ -59,17 +58,16 @@ def _roughness(equations: NormalEquations, terms: Sequence[Term]) -> Array | Non
 
     0 for those of what is no curve. None, where there is no curve.
     """
-    second = np.zeros((0, 0))
+    total, end = sum(len(term.group.columns) for term in terms), 0
+    found = np.zeros((total, total))
     for term in terms:
-        count = len(term.group.columns)
-        is_curve = not term.group.named and term.group.region is None and term.group.coupling not in WITHOUT_CURVE
-        own = np.diff(np.eye(count), 2, axis=0) if is_curve and count >= FEWEST_KNOTS else np.zeros((0, count))
-        own = own / equations.design.scale[list(term.group.columns)]
-        rows, before = second.shape
-        grown = np.zeros((rows + len(own), before + count))
-        grown[:rows, :before], grown[rows:, before:] = second, own
-        second = grown
-    return second.T @ second if len(second) else None
+        group, begin = term.group, end
+        end += len(group.columns)
+        is_curve = not group.named and group.region is None and group.coupling not in WITHOUT_CURVE
+        if is_curve and len(group.columns) >= FEWEST_KNOTS:
+            second = np.diff(np.eye(end - begin), 2, axis=0) / equations.design.scale[list(group.columns)]
+            found[begin:end, begin:end] = second.T @ second
+    return found if found.any() else None
 
 
 def lead_beside_slow_noise(equations: NormalEquations, ahead: Sequence[Term], behind: Sequence[Term]) -> float:

@@ -11,15 +11,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 Array = NDArray[np.float64]
 
@@ -103,20 +99,10 @@ class NoiseSpectrum:
         """The spectrum in each band, shape (band,); that of white noise is its variance."""
         return np.asarray(self.powers @ self.bands.shapes)
 
-    def at(self, frequencies: Sequence[float]) -> Array:
-        """Return the spectrum at frequencies [cycles per reading]."""
-        return np.asarray(self.powers @ _spectra(self.bands.times, np.asarray(frequencies, np.float64)))
-
     @property
     def log_determinant(self) -> float:
         """The logarithm of the determinant of the readings' covariance."""
         return float(self.bands.count @ np.log(self.level))
-
-
-def fitted_spectrum(values: Array, thresholds: Thresholds = THRESHOLDS) -> NoiseSpectrum:
-    """Return the spectrum of readings that followed each other, shape (reading,)."""
-    bands = Bands.of(len(values), thresholds)
-    return bands.fitted(bands.products(values[None])[:, 0, 0])
 
 
 def cosine_transform(series: Array) -> Array:

@@ -7,32 +7,28 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from scipy.fft import dct
-from scipy.signal import lfilter
+from wandering_noise import READINGS, noise
 
-from regolithd.calibration.mismatch.signal.noise_spectrum import cosine_transform, fitted_spectrum
+from regolithd.calibration.mismatch.signal.noise_spectrum import Bands, NoiseSpectrum, cosine_transform
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-READINGS = 6000
 
-
-def noise(time: float, seed: int, white: float = 0.5) -> NDArray[np.float64]:
-    """Return noise of variance 1 of which a part has this correlation time [readings]."""
-    rng = np.random.default_rng(seed)
-    kept = np.exp(-1 / time)
-    slow = lfilter([np.sqrt(1 - kept**2)], [1, -kept], rng.standard_normal(READINGS + 2000))[2000:]
-    return np.asarray(np.sqrt(white) * rng.standard_normal(READINGS) + np.sqrt(1 - white) * slow)
+def fitted_spectrum(values: NDArray[np.float64]) -> NoiseSpectrum:
+    """Return the spectrum of readings that followed each other, shape (reading,)."""
+    bands = Bands.of(len(values))
+    return bands.fitted(bands.products(values[None])[:, 0, 0])
 
 
 @pytest.mark.parametrize("time", [2.0, 20.0, 60.0])
 def test_slow_noise_has_its_long_run_variance(time: float) -> None:
     """The spectrum at a few cycles in the recording is that of the process, in the median within a third."""
-    frequency = np.array([5 / READINGS])
-    kept = np.exp(-1 / time)
-    true = 0.5 + 0.5 * (1 - kept**2) / np.abs(1 - kept * np.exp(-2j * np.pi * frequency)) ** 2
-    found = [fitted_spectrum(noise(time, seed)).at(frequency) for seed in range(12)]
-    assert np.median(found) / float(true[0]) == pytest.approx(1.0, abs=0.35)
+    cycles, kept = 5, np.exp(-1 / time)
+    true = 0.5 + 0.5 * (1 - kept**2) / np.abs(1 - kept * np.exp(-2j * np.pi * cycles / READINGS)) ** 2
+    found = [fitted_spectrum(noise(time, seed)) for seed in range(12)]
+    band = found[0].bands.edges.index(2 * cycles)  # two coefficients for each cycle, and there one in a band
+    assert np.median([each.level[band] for each in found]) / true == pytest.approx(1.0, abs=0.35)
 
 
 def test_readings_in_another_unit_have_the_same_spectrum() -> None:

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 from scipy.stats import chi2
+from wandering_noise import READINGS, noise
 
-from regolithd.calibration.mismatch.signal.restricted_likelihood import NO_PRIORS, FurtherColumns, Priors
+from regolithd.calibration.mismatch.regression.restricted_likelihood import NO_PRIORS, FurtherColumns, Priors
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,16 +18,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-READINGS = 6000
 ALONG = np.pi * np.arange(READINGS) / READINGS
-
-
-def noise(time: float, seed: int, white: float = 0.5) -> NDArray[np.float64]:
-    """Return noise of variance 1 of which a part has this correlation time [readings]."""
-    rng = np.random.default_rng(seed)
-    kept = np.exp(-1 / time)
-    slow = lfilter([np.sqrt(1 - kept**2)], [1, -kept], rng.standard_normal(READINGS + 2000))[2000:]
-    return np.asarray(np.sqrt(white) * rng.standard_normal(READINGS) + np.sqrt(1 - white) * slow)
 
 
 def gain_of_columns(

@@ -2,7 +2,7 @@
 
 A curve of many coefficients that follows slow noise leaves nothing of it. With a spectrum that is fitted to what the
 curve leaves, the readings then are far likelier, whether the curve is there or not: each coefficient that is fitted
-takes a degree of freedom from the noise. The restricted likelihood (Patterson and Thompson, 1971; Harville, 1977)
+takes a degree of freedom from the noise. The restricted likelihood (REML: Patterson and Thompson, 1971; Harville, 1977)
 counts them: to the power that is left in a band of frequencies the uncertainty of what was fitted is added, and a
 spectrum that is lower by the coefficients alone gains nothing. By chance columns then gain as much as there are of
 them, however slow the noise.
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
 from regolithd.calibration.mismatch.signal.noise_spectrum import Bands, NoiseSpectrum
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
@@ -30,7 +31,7 @@ CONVERGED = 0.05
 choice: what is told has to gain more than a hundred times as much)."""
 MOST_FITS = 20
 """Times that columns are fitted at most (a choice: three to six are usual)."""
-SELDOM = 4.6
+SLOW_NOISE_PENALTY = 4.6
 """What noise costs in −2 ln of the likelihood that is slower than it usually is: odds of one in ten, 2 ln 10 (a
 choice)."""
 LEAST_EIGENVALUE = 1e-9
@@ -93,7 +94,7 @@ class FurtherColumns:
 
     def gain(self) -> float:
         """Return by how much twice the restricted log likelihood rises, whatever the coefficients."""
-        return self._in_either(_InNoise.gain)
+        return self._in_either(self._usual.gain(), self._slow.gain)
 
     def gain_if_smooth(self, roughness: Array) -> tuple[float, int]:
         """Return the same where the coefficients are as smooth as is likeliest, and how many numbers that leaves free.
@@ -101,15 +102,15 @@ class FurtherColumns:
         Their prior is normal, with a multiple of `roughness` (column, column) as its precision (Wahba, 1978): what has
         none is free, and the multiple is.
         """
-        free = self._usual.smooth(roughness)[1]
-        return self._in_either(lambda noise: noise.smooth(roughness)[0]), free
+        gain, free = self._usual.smooth(roughness)
+        return self._in_either(gain, lambda: self._slow.smooth(roughness)[0]), free
 
-    def _in_either(self, gain: Callable[[_InNoise], float]) -> float:
+    def _in_either(self, gain: float, gain_in_slow: Callable[[], float]) -> float:
         """Return the gain where the noise is as slow as it usually is, or slower, whichever is likelier with each."""
-        usual, slow = self._usual.before.restricted, self._slow.before.restricted + SELDOM
+        usual, slow = self._usual.before.restricted, self._slow.before.restricted + SLOW_NOISE_PENALTY
         if slow >= usual:  # then it is likelier with the columns, too: slower noise explains a part of what they do
-            return gain(self._usual)
-        return slow - min(usual - gain(self._usual), slow - gain(self._slow))
+            return gain
+        return slow - min(usual - gain, slow - gain_in_slow())
 
 
 class _InNoise:
@@ -146,20 +147,18 @@ class _InNoise:
         prior[given:, given:] = (vectors[:, rough] * values[rough]) @ vectors[:, rough].T
         free = np.zeros((given + count, given + count - int(rough.sum())))
         free[:given, :given], free[given:, given:] = np.eye(given), vectors[:, ~rough]
-        of_free, of_prior = _log_determinant(free.T @ matrix @ free), float(np.sum(np.log(values[rough])))
-
-        def price(times: float) -> float:
-            """Return what the prior's width costs with the spectra of what the given columns leave."""
-            of_all = _log_determinant(matrix + times * prior)
-            return of_all - of_free - of_prior - float(rough.sum()) * log(times)
-
-        usual = float(seen.sum() / np.sum(values[rough]))
-        tried = [factor * usual for factor in SMOOTHNESS]
-        explained = [float(moment @ _pseudo_inverse(matrix + times * prior) @ moment) - price(times) for times in tried]
-        times = tried[int(np.argmax(explained))]
+        # What the prior's width costs, with the spectra of what the given columns leave, but for the multiple of it.
+        width = _explained(free.T @ matrix @ free, free.T @ moment)[1] + float(np.sum(np.log(values[rough])))
+        tried = []
+        for factor in SMOOTHNESS:
+            times = float(factor * seen.sum() / np.sum(values[rough]))
+            explained, determinant = _explained(matrix + times * prior, moment)
+            price = determinant - width - float(rough.sum()) * log(times)
+            tried.append((explained - price, times, price))
+        _, times, price = max(tried)
         back = np.divide(1.0, scale, out=np.zeros(len(scale)), where=scale > 0)
         smooth = self._likelihood.precision + times * prior * np.outer(back, back)
-        gain = self._gain(replace(self._likelihood, precision=smooth)) - price(times)
+        gain = self._gain(replace(self._likelihood, precision=smooth)) - price
         return gain, int(seen.sum() - rough.sum()) + 1
 
     def _gain(self, likelihood: _Likelihood) -> float:
@@ -280,18 +279,15 @@ def _scale(matrix: Array) -> Array:
 
 def _of_seen(precision: Array, seen: NDArray[np.bool_]) -> Array:
     """Return the precision of the coefficients of columns that are seen, whatever the others are; 0 for these."""
-    found = np.zeros(precision.shape)
-    cross = precision[np.ix_(~seen, seen)]
-    known = cross.T @ _pseudo_inverse(precision[np.ix_(~seen, ~seen)]) @ cross if cross.size else 0.0
-    found[np.ix_(seen, seen)] = precision[np.ix_(seen, seen)] - known
+    found, own, others = np.zeros(precision.shape), np.ix_(seen, seen), np.ix_(~seen, ~seen)
+    inverse = pseudo_inverse(precision[others], LEAST_EIGENVALUE)
+    found[own] = schur_complement(precision[own], precision[np.ix_(~seen, seen)], inverse)
     return found
 
 
-def _log_determinant(matrix: Array) -> float:
-    """Return the logarithm of the determinant, of the combinations that differ by more than rounding."""
-    values = np.linalg.eigvalsh(matrix)
-    return float(np.sum(np.log(values[values > LEAST_EIGENVALUE * values.max(initial=0.0)])))
-
-
-def _pseudo_inverse(matrix: Array) -> Array:
-    return np.asarray(np.linalg.pinv(matrix, rcond=LEAST_EIGENVALUE, hermitian=True))
+def _explained(matrix: Array, moment: Array) -> tuple[float, float]:
+    """Return what normal equations explain, and the logarithm of their determinant, rounding left out of both."""
+    values, vectors = np.linalg.eigh(matrix)
+    kept = values > LEAST_EIGENVALUE * values.max(initial=0.0)
+    along = vectors[:, kept].T @ moment
+    return float(np.sum(along**2 / values[kept])), float(np.sum(np.log(values[kept])))
