@@ -3,9 +3,9 @@
 A curve of many coefficients that follows slow noise leaves nothing of it. With a spectrum that is fitted to what the
 curve leaves, the readings then are far likelier, whether the curve is there or not: each coefficient that is fitted
 takes a degree of freedom from the noise. The restricted likelihood (REML: Patterson and Thompson, 1971; Harville, 1977)
-counts them: to the power that is left in a band of frequencies the uncertainty of what was fitted is added, and a
-spectrum that is lower by the coefficients alone gains nothing. By chance columns then gain as much as there are of
-them, however slow the noise.
+counts them: the power that is left in a band of frequencies has fewer degrees of freedom by those that the fit takes
+there, and a spectrum that is lower by the coefficients alone gains nothing. By chance columns then gain as much as
+there are of them, however slow the noise.
 """
 
 from __future__ import annotations
@@ -185,13 +185,17 @@ class _Course:
         bands = Bands.of(series.shape[1], thresholds)
         return cls(bands, bands.products(series))
 
-    def spectrum(self, coefficients: Array, covariance: Array) -> NoiseSpectrum:
-        """Return the spectrum of what a fit of the first columns leaves, to which its uncertainty is added."""
+    def spectrum(self, coefficients: Array, covariance: Array, start: NoiseSpectrum | None = None) -> NoiseSpectrum:
+        """Return the spectrum of what a fit of the first columns leaves, found from `start` on.
+
+        The fit takes degrees of freedom of each band: its uncertainty there over the spectrum that it was made with.
+        """
         count = len(coefficients)
         solved, moment = self.products[:, :count, :count], self.products[:, :count, -1]
         left = self.products[:, -1, -1] - 2 * moment @ coefficients
-        left += np.einsum("bij,ij->b", solved, np.outer(coefficients, coefficients) + covariance)
-        return self.bands.fitted(np.maximum(left, 0.0))
+        left += np.einsum("bij,ij->b", solved, np.outer(coefficients, coefficients))
+        taken = 0.0 if start is None else np.einsum("bij,ij->b", solved, covariance) / start.level
+        return self.bands.fitted(np.maximum(left, 0.0), np.maximum(self.bands.count - taken, 0.0), start)
 
     def weighted(self, spectrum: NoiseSpectrum, count: int) -> tuple[Array, Array, float]:
         """Return matrix and moment of the first columns' normal equations, and the readings' sum of squares."""
@@ -247,7 +251,8 @@ class _Likelihood:
             if best is not None and value > best.restricted - CONVERGED:
                 break
             best = _Fitted(value, start, determinant, spectra)
-            spectra = [course.spectrum(coefficients, covariance) for course in self.courses]
+            of_courses = zip(self.courses, spectra, strict=True)
+            spectra = [course.spectrum(coefficients, covariance, spectrum) for course, spectrum in of_courses]
         assert best is not None  # noqa: S101  # the first fit is always one
         return best
 

@@ -11,6 +11,7 @@ middle (0.5: a straight line) to its end (1: held until the reading). It is a pa
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -55,19 +56,21 @@ def follow_inputs(fmu: Any, variables: Mapping[str, Any], signal: NDArray[Any], 
 
 def _setter(fmu: Any, variables: Sequence[Any], signal: NDArray[Any]) -> Callable[[float], None]:  # noqa: ANN401
     """Return what sets inputs to their values at an instant, on a straight line between readings."""
-    times = np.ascontiguousarray(signal["time"])
+    # Lists, since a number of an array takes Python ten times as long.
+    times, last = signal["time"].tolist(), len(signal) - 1
     groups = []
     for kind, setter in REAL.items():
         if chosen := [each for each in variables if each.type == kind]:
-            table = np.stack([signal[each.name] for each in chosen])
-            groups.append((getattr(fmu, setter), [each.valueReference for each in chosen], table))
+            rows = np.stack([signal[each.name] for each in chosen], axis=1).tolist()
+            groups.append((getattr(fmu, setter), [each.valueReference for each in chosen], rows))
 
     def put(time: float) -> None:
-        after = min(max(int(np.searchsorted(times, time)), 1), len(times) - 1)
+        after = min(max(bisect_left(times, time), 1), last)
         before = after - 1
         share = min(max((time - times[before]) / (times[after] - times[before]), 0.0), 1.0)
-        for set_values, references, table in groups:
-            set_values(references, ((1 - share) * table[:, before] + share * table[:, after]).tolist())
+        for set_values, references, rows in groups:
+            pairs = zip(rows[before], rows[after], strict=True)
+            set_values(references, [(1 - share) * one + share * other for one, other in pairs])
 
     return put
 

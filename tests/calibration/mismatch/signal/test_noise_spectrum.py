@@ -38,6 +38,38 @@ def test_readings_in_another_unit_have_the_same_spectrum() -> None:
     assert other.log_determinant - one.log_determinant == pytest.approx(2 * READINGS * np.log(1000), rel=1e-6)
 
 
+@pytest.mark.parametrize("time", [2.0, 60.0])
+def test_no_other_powers_are_likelier(time: float) -> None:
+    """Where a power is above 0 the likelihood has no slope along it, and where it is 0, it falls."""
+    wave = 2 * np.cos(4 * np.pi * np.arange(READINGS) / READINGS)
+    bands = Bands.of(READINGS)
+    power = bands.products((noise(time, 0) + wave)[None])[:, 0, 0]
+    found = bands.fitted(power)
+    slope = bands.shapes @ ((power / found.level - bands.count) / found.level)
+    along = slope * power.sum() / READINGS
+    assert np.all(along < 1.0)
+    assert np.all(np.abs(along[found.powers > 1e-3]) < 1.0)
+
+
+def test_the_search_may_begin_anywhere() -> None:
+    """The likeliest spectrum of other readings, and one without slow noise, lead to the same one."""
+    bands = Bands.of(READINGS)
+    power = bands.products(noise(60.0, 0)[None])[:, 0, 0]
+    found = bands.fitted(power)
+    quick = NoiseSpectrum(bands, np.where(bands.times > 0, 0.0, 1.0))
+    for start in (quick, fitted_spectrum(noise(2.0, 1))):
+        np.testing.assert_allclose(bands.fitted(power, start=start).level, found.level, rtol=0.01)
+
+
+def test_what_a_fit_takes_is_no_power() -> None:
+    """Where a fit left nothing of the first bands' coefficients, the spectrum there is that of noise alone."""
+    bands = Bands.of(READINGS)
+    power = bands.products(noise(20.0, 0)[None])[:, 0, 0]
+    free = np.where(np.arange(len(power)) < 8, 0.0, bands.count)
+    kept = bands.fitted(np.where(free > 0, power, 0.0), free, NoiseSpectrum(bands, np.ones(len(bands.times))))
+    np.testing.assert_allclose(kept.level, bands.fitted(power).level, rtol=0.35)
+
+
 def test_zeros_have_no_power() -> None:
     """A course that is 0 has a spectrum of 0."""
     assert not fitted_spectrum(np.zeros(READINGS)).powers.any()
