@@ -23,8 +23,7 @@ def best_lag(problem: Problem, values: Array, slope: Array, residual: Array, mos
     Values of the column, slope and residual have shape (time, wheel); readings that are not compared count nothing.
     """
     moment, energy = np.zeros(most + 1), np.zeros(most + 1)
-    for run in np.unique(problem.recording.run):
-        here = problem.recording.run == run
+    for here in problem.recording.runs:
         for k in range(values.shape[1]):
             mask = problem.mask[here, k] & np.isfinite(values[here, k])
             column = np.where(mask, values[here, k], 0.0)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -82,6 +83,12 @@ class Recording:
         steps = np.diff(self.time_s)[np.diff(self.run) == 0]
         return float(np.median(steps)) if steps.size else 1.0
 
+    @cached_property
+    def runs(self) -> tuple[slice, ...]:
+        """The rows of each run."""
+        edges = [0, *(1 + np.flatnonzero(np.diff(self.run))).tolist(), len(self.run)]
+        return tuple(slice(first, end) for first, end in pairwise(edges) if end > first)
+
     def channel(self, name: str) -> Array:
         """Return a channel, or NaN everywhere where it was not recorded."""
         found = self.channels.get(name)
@@ -90,9 +97,8 @@ class Recording:
     def rate_of_change(self, values: Array) -> Array:
         """Return the change per second of values (time, wheel): central differences within each run."""
         found = np.full(self.shape, np.nan)
-        for run in np.unique(self.run):
-            rows = self.run == run
-            if rows.sum() > 1:
+        for rows in self.runs:
+            if rows.stop - rows.start > 1:
                 found[rows] = np.gradient(values[rows], self.time_s[rows], axis=0)
         return found
 

@@ -105,8 +105,8 @@ def bridged(
 def _bridged(recording: Recording, column: Array, *, held: bool) -> Array:
     """Return one wheel's readings with every blank between and beside readings of its run filled in."""
     found = column.copy()
-    for run in np.unique(recording.run):
-        here = np.flatnonzero(recording.run == run)
+    for rows in recording.runs:
+        here = np.arange(rows.start, rows.stop)
         known = here[np.isfinite(column[here])]
         if known.size and held:
             last = np.searchsorted(known, here, side="right") - 1

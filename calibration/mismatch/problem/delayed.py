@@ -35,28 +35,15 @@ def filtered(recording: Recording, values: Array, time_constant_s: float) -> Arr
 def shifted(recording: Recording, values: Array, by_s: float) -> Array:
     """Return values (time, wheel) as they are `by_s` later in the same run, on straight lines; ends are held."""
     moved = np.array(values, np.float64)
-    for run in np.unique(recording.run):
-        here = np.flatnonzero(recording.run == run)
-        if len(here) < 2:
-            continue
-        at, of_run = recording.time_s[here], values[here]
-        known = np.isfinite(of_run)
-        whole = known.all(axis=0)
-        moved[here[:, None], np.flatnonzero(whole)] = _on_straight_lines(at + by_s, at, of_run[:, whole])
-        for k in np.flatnonzero(~whole):
-            read = known[:, k]
-            if read.sum() > 1:
-                moved[here, k] = np.where(read, np.interp(at + by_s, at[read], of_run[read, k]), np.nan)
+    for rows in recording.runs:
+        at, of_run = recording.time_s[rows], values[rows]
+        wanted, known = at + by_s, np.isfinite(of_run)
+        for k, read in enumerate(known.T):
+            if len(at) > 1 and read.all():
+                moved[rows, k] = np.interp(wanted, at, of_run[:, k])
+            elif read.sum() > 1:
+                moved[rows, k] = np.where(read, np.interp(wanted, at[read], of_run[read, k]), np.nan)
     return moved
-
-
-def _on_straight_lines(wanted: Array, at: Array, columns: Array) -> Array:
-    """Return columns (time, column) at other times, as `np.interp` would; each time's place is found once for all."""
-    left = np.clip(np.searchsorted(at, wanted, side="right") - 1, 0, len(at) - 2)
-    slope = np.diff(columns, axis=0) / np.diff(at)[:, None]
-    found = slope[left] * (wanted - at[left])[:, None] + columns[left]
-    found[wanted <= at[0]], found[wanted >= at[-1]] = columns[0], columns[-1]
-    return np.asarray(found)
 
 
 def beyond_the_end(recording: Recording, by_s: float) -> NDArray[np.bool_]:

@@ -14,12 +14,13 @@ from regolithd.calibration.mismatch.problem.errors_in_variables import known_mea
 from regolithd.calibration.mismatch.problem.input_doubt import bias_of
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.principal_axes import tangents_where_it_switches
+from regolithd.calibration.mismatch.problem.recent_arrays import RecentArrays
 from regolithd.calibration.mismatch.problem.zero import zero_is_arbitrary
 from regolithd.calibration.mismatch.signal.noise import NoiseModel, estimate_noise
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Hashable, Mapping
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.input_doubt import InputDoubt
@@ -32,9 +33,6 @@ Readings = tuple[NDArray[np.int64], tuple[slice, ...]]
 
 LONGEST_BRIDGE = 4
 """Usual steps between readings that may be left out before a new run begins (a choice: blanks are short)."""
-
-MOST_LATELY = 4
-"""Arrays of shapes that are kept (a choice: the factors of a law, of which a search changes one at a time)."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +129,7 @@ class Problem:
     smoothed: Mapping[str, Array] = field(default_factory=dict, repr=False)
     _derived: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
     """What was computed from covariates and readings, by name: a cache, which a copy begins anew."""
-    _lately: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _lately: RecentArrays = field(default_factory=RecentArrays, init=False, repr=False, compare=False)
     """The same of shapes that were tried last, the latest one last."""
 
     @property
@@ -240,16 +238,12 @@ class Problem:
             values.setflags(write=False)  # whoever asks for it gets the same array
         return self._derived[name]
 
-    def lately(self, name: str, derive: Callable[[], Array]) -> Array:
-        """Return the same of what depends on a shape: only the last few are kept, as a search changes one number."""
-        found = self._lately.pop(name, None)
-        if found is None:
-            found = derive()
-            found.setflags(write=False)
-            if len(self._lately) == MOST_LATELY:
-                del self._lately[next(iter(self._lately))]
-        self._lately[name] = found
-        return found
+    def lately(self, name: Hashable, derive: Callable[[], Array], of: object = None) -> Array:
+        """Return the same of what depends on a shape: only the latest are kept, since a search changes one number.
+
+        `of` is what it belongs to, where the name does not tell.
+        """
+        return self._lately.get(of, name, derive)
 
     def run_once(self, name: str, step: float, run: Callable[[], Array]) -> Array:
         """Return what takes a run of the simulation, or long, the first time that this name and step are asked for."""

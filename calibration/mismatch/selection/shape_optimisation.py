@@ -127,7 +127,10 @@ class ShapeProfile:
         return (rows @ self.left).astype(np.float64), schur_complement(own, cross.T, self.inverse), own
 
     def _sums(self, shape: Shape) -> tuple[Array, Array, Array]:
-        return self.sums(self.rows(columns_of(self.equations.problem, self.candidate, shape)))
+        problem, candidate = self.equations.problem, self.candidate
+        # The same shapes are tried again beside other terms.
+        columns = problem.lately(tuple(shape.items()), lambda: columns_of(problem, candidate, shape), candidate)
+        return self.sums(self.rows(columns))
 
 
 def shape_profile(
