@@ -33,6 +33,7 @@ from regolithd.calibration.mismatch.problem.true_values import (
     refined_by_density,
     smooth_where_better,
     still_at_rest,
+    with_direction_of_motion,
 )
 from regolithd.calibration.mismatch.signal.recursion import recursion
 
@@ -102,6 +103,8 @@ def expected_inputs(
         elif truth is not before:
             # A sensor that reads exactly 0 at rest reads anything else in motion.
             smooth[:, k] = truth.mean if rest[:, k].any() else still_at_rest(moving, deviation, truth).mean
+        if rest[:, k].any():
+            smooth[:, k] = with_direction_of_motion(smooth[:, k], deviation, rest[:, k])
     expected = np.stack([scale.readings(column) for scale, column in zip(scales, smooth.T, strict=True)], axis=1)
     parts = np.split(np.where(rest, 0.0, expected), len(names), axis=1)
     return recording.with_channels(**dict(zip(names, parts, strict=True)))

@@ -17,6 +17,7 @@ from regolithd.calibration.mismatch.signal.stein import (
     best_combination,
     clearly_better,
     consistent,
+    consistent_throughout,
 )
 
 Array = NDArray[np.float64]
@@ -36,6 +37,9 @@ REST_DEVIATIONS = 3.0
 SLOWEST_CREEP = 0.25
 """Mean in standard deviations of the readings' error below which nothing moves (a choice): a sensor's zero is no
 better than a part of its error."""
+LEAST_IN_MOTION = 0.1
+"""Standard deviations of the readings' error that a column has at least in the direction of its motion, between a rest
+and the first clear reading (a choice: of a sign, not of a size)."""
 FEWEST_AT_REST = 9
 """Readings one after the other that must be so (a choice): fewer are passed on the way from one sign to the other."""
 LEAST_POSTERIOR = 1e-6
@@ -76,7 +80,7 @@ def smooth_where_better(
     if not _matters(deviation, known, normal):
         return normal
     centred = readings - normal.prior_mean
-    parts = fitted_rows(len(readings))
+    parts = fitted_rows(readings)
     rows = np.concatenate([np.arange(len(readings))[part] for part in parts])
     if not _matters(deviation, known[rows], normal):  # it was read elsewhere
         return normal
@@ -89,7 +93,10 @@ def smooth_where_better(
     read = centred[rows][known[rows]]
     if not (clearly_better(read, deviation**2, new, old, 2) and consistent(read, deviation**2, new)):
         return normal
-    smooth = spline.mean(centred, deviation, differences(time, run, spline.order)) + normal.prior_mean
+    smooth = spline.mean(centred, deviation, differences(time, run, spline.order))
+    if not consistent_throughout(centred[known], deviation**2, smooth[known]):
+        return normal
+    smooth += normal.prior_mean
     variance = max(float(new.variance.mean()), LEAST_LEFT * deviation**2)
     return replace(
         normal, mean=np.where(np.isfinite(normal.mean), smooth, np.nan), variance=np.full(smooth.shape, variance)
@@ -113,6 +120,25 @@ def still_at_rest(readings: Array, deviation: float, smooth: NormalTruth) -> Nor
         if abs(read.mean()) <= deviation * max(REST_DEVIATIONS / np.sqrt(len(read)), SLOWEST_CREEP):
             mean[first:last] = 0.0
     return replace(smooth, mean=mean)
+
+
+def with_direction_of_motion(mean: Array, deviation: float, rest: NDArray[np.bool_]) -> Array:
+    """Return estimates of the truth (time,) that have the motion's sign from a rest to the first clear one, and back.
+
+    A motion that begins or ends where readings are exactly 0 has one direction there, whatever the noise of its first
+    and last readings: friction of the other one would be as large as that of the whole motion.
+    """
+    found = mean.copy()
+    edges = np.flatnonzero(np.diff(rest, prepend=True, append=True))
+    for first, last in edges.reshape(-1, 2).tolist():
+        clear = first + np.flatnonzero(np.abs(mean[first:last]) > REST_DEVIATIONS * deviation)
+        if clear.size:
+            begin, end = (slice(first, clear[0]) if first else slice(0)), slice(clear[-1] + 1, last)
+            for part, at in ((begin, clear[0]), (end if last < len(mean) else slice(0), clear[-1])):
+                sign = np.sign(mean[at])
+                wrong = sign * mean[part] < LEAST_IN_MOTION * deviation
+                found[part][wrong] = sign * LEAST_IN_MOTION * deviation
+    return found
 
 
 def _matters(deviation: float, known: NDArray[np.bool_], normal: NormalTruth) -> bool:
@@ -149,7 +175,9 @@ def _refined(readings: Array, deviation: float, starts: NDArray[np.int64], norma
     if not (better and consistent(read, variance, new)):
         return None
     everywhere = windows_of(readings, starts, len(readings))
-    return combination.of(_estimates(everywhere, normal, density, chain)).mean
+    found = combination.of(_estimates(everywhere, normal, density, chain)).mean
+    known = np.isfinite(readings)
+    return found if consistent_throughout(readings[known], variance, found[known]) else None
 
 
 def _estimates(windows: Windows, normal: NormalTruth, density: MixingDensity, chain: JumpChain) -> list[Estimate]:

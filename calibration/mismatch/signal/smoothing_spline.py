@@ -185,11 +185,17 @@ def differences(time: Array, run: NDArray[np.int64], order: int) -> Array:
     return np.asarray(np.where(whole[:, None], factorial(order) * usual**order / np.prod(apart, axis=2), 0.0))
 
 
-def fitted_rows(length: int) -> list[slice]:
-    """Return the parts of a recording of so many instants in which a spline is found, evenly spread."""
-    count = max(length // CORE, 1)
-    chosen = np.arange(count) if count <= MOST_FITTED else np.linspace(0, count - 1, MOST_FITTED).astype(np.int64)
-    return [slice(int(each) * CORE, min(int(each) * CORE + CORE, length)) for each in chosen]
+def fitted_rows(readings: Array) -> list[slice]:
+    """Return the parts of a recording in which a spline is found: of each stretch, the one whose readings change most.
+
+    A spline that was found in dwells alone would smooth away the steps between others.
+    """
+    count = max(len(readings) // CORE, 1)
+    parts = [slice(first, min(first + CORE, len(readings))) for first in range(0, count * CORE, CORE)]
+    changes = [np.diff(readings[part]) for part in parts]
+    moved = np.array([np.sum(each[np.isfinite(each)] ** 2) for each in changes])
+    stretches = np.array_split(np.arange(count), min(count, MOST_FITTED))
+    return [parts[each[np.argmax(moved[each])]] for each in stretches]
 
 
 @cache

@@ -34,6 +34,9 @@ LEAST_GAIN = 0.25
 """Share of the mean square error that has to be gained (a choice: jumps and levels gain half of it and more, smooth
 motions a tenth; there other inputs follow the same motion, and would take up what an estimate that is not linear in the
 readings leaves of it)."""
+MOST_LEFT = 3.0
+"""Mean square of what a model leaves in a batch of readings, in error variances, beyond which it is refuted there (a
+choice: noise that is half as large again as stated leaves 2.25, a step of two errors that is smoothed away 4)."""
 FEWEST_BATCHES = 4
 """Batches below which nothing is judged."""
 
@@ -74,6 +77,13 @@ def consistent(readings: Array, error_variance: float, estimate: Estimate) -> bo
     """
     left = float(np.mean((readings - estimate.mean) ** 2 + estimate.variance)) / error_variance
     return abs(left - 1) < GREATEST_SURPLUS
+
+
+def consistent_throughout(readings: Array, error_variance: float, mean: Array) -> bool:
+    """Return whether readings differ by no more in any batch: models are fitted to parts of a recording alone."""
+    left = (readings - mean) ** 2
+    batches = left[: len(left) // BATCH * BATCH].reshape(-1, BATCH).mean(axis=1)
+    return bool(np.all(batches <= MOST_LEFT * error_variance))
 
 
 def best_combination(readings: Array, estimates: Sequence[Estimate]) -> Combination:

@@ -12,7 +12,7 @@ from linear_machine import AXES, INSTANTS, STEP_S, Level, problem_of, table
 from regolithd.calibration.mismatch import RecordingError, compare, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.prior import SensorError, own_name
-from regolithd.calibration.mismatch.problem.problem import MOST_LATELY, StatedEffect
+from regolithd.calibration.mismatch.problem.problem import StatedEffect
 from regolithd.calibration.mismatch.thresholds import Thresholds
 
 if TYPE_CHECKING:
@@ -117,26 +117,6 @@ def test_a_covariate_without_blanks_is_made_once_for_each_set_of_covariates() ->
     np.testing.assert_array_equal(other.known("wheel_speed"), np.nan_to_num(speed))
     with pytest.raises(ValueError, match="read-only"):
         other.known("wheel_speed")[0] = 1.0
-
-
-def test_what_depends_on_a_shape_is_kept_for_a_while() -> None:
-    """As long as few others came in between; whoever asks for it gets the same array."""
-    problem = problem_of(table())
-    made = []
-
-    def at(number: int) -> float:
-        def derive() -> np.ndarray:
-            made.append(number)
-            return np.full(2, float(number))
-
-        return float(problem.lately(f"law {number}", derive)[0])
-
-    assert [at(0), at(1), at(0)] == [0.0, 1.0, 0.0]
-    assert made == [0, 1]
-    assert [at(number) for number in range(2, 2 + MOST_LATELY - 1)] == [float(n) for n in range(2, 1 + MOST_LATELY)]
-    assert (at(0), at(1)) == (0.0, 1.0)
-    assert made[-1] == 1
-    assert made.count(0) == 1
 
 
 def test_variance_within_wheels_leaves_out_what_differs_between_them() -> None:

@@ -134,7 +134,16 @@ def test_the_change_with_the_readings_tells_the_error_of_heavy_tails(truth: Arra
 
 def test_a_long_recording_is_fitted_in_few_parts() -> None:
     """From its start to its end, none longer than another; a short one as a whole."""
-    parts = fitted_rows(100 * CORE + 7)
+    parts = fitted_rows(np.zeros(100 * CORE + 7))
     assert len(parts) == MOST_FITTED
-    assert (parts[0].start, parts[-1].stop) == (0, 100 * CORE)
-    assert fitted_rows(CORE - 1) == [slice(0, CORE - 1)]
+    assert all(part.stop - part.start == CORE for part in parts)
+    assert (parts[0].stop <= 25 * CORE, parts[-1].start >= 75 * CORE) == (True, True)
+    assert fitted_rows(np.zeros(CORE - 1)) == [slice(0, CORE - 1)]
+
+
+def test_it_is_fitted_where_the_readings_change_most() -> None:
+    """The one step of a quarter is in the part that is fitted there, whatever blanks are beside it."""
+    readings = np.random.default_rng(0).normal(0, 0.1, 100 * CORE)
+    readings[60 * CORE + 100 :] += 5.0
+    readings[10 * CORE : 11 * CORE] = np.nan
+    assert fitted_rows(readings)[2] == slice(60 * CORE, 61 * CORE)
