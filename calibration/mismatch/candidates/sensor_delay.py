@@ -252,6 +252,9 @@ def _delays(problem: Problem, ratio: float, known: float | None) -> list[float]:
 def _without_blanks(problem: Problem, delay_s: float) -> Array:
     """Return the prediction; where the simulation says nothing for long, the median of what was recorded there.
 
+    Between a rest of which the simulation says something, and a motion, the axis moves, too slowly for a direction: it
+    says there what it says of the motion beside.
+
     What a late channel reports just after a standstill is what it would have reported at standstill: as it does once
     the delay has passed. A straight line bridges what is shorter than two delays, or was not recorded either. A
     simulation that says nothing near standstill would say there what it says beside, as long as the motion goes on.
@@ -263,6 +266,10 @@ def _without_blanks(problem: Problem, delay_s: float) -> Array:
         blank = np.isnan(found[:, k])
         edges = np.flatnonzero(np.diff(blank, prepend=False, append=False))
         for first, end in zip(edges[::2], edges[1::2], strict=True):
+            before, after = max(first - 1, 0), min(end, len(found) - 1)
+            if (direction[before, k] == 0) != (direction[after, k] == 0):
+                found[first:end, k] = found[after if direction[before, k] == 0 else before, k]
+                continue
             standing = _standing(direction[:, k], first, end)
             found[first : standing.start, k] = found[max(first - 1, 0), k]
             found[standing.stop : end, k] = found[min(end, len(found) - 1), k]

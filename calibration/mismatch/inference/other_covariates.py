@@ -21,8 +21,9 @@ def notes_on_other_covariates(decision: Decision) -> tuple[str, ...]:
     """Return a note where curves over other covariates, on the same wheels, explain nearly as much.
 
     As much but for the share that an inexact law may leave (`form_misfit`): knots lie otherwise over another covariate.
-    A curve over time has knots enough to follow what changes seldom, and is no other cause. Where several things stay
-    unexplained, each has been told beside the others. What comes and goes has no covariate; no curve follows a sine.
+    A curve over time has knots enough to follow what changes seldom, and is another cause only where it explains more.
+    Where several things stay unexplained, each has been told beside the others. What comes and goes has no covariate;
+    no curve follows a sine.
     """
     if len({term.name for term in decision.unnamed}) != 1 or decision.intermittent:
         return ()
@@ -30,11 +31,12 @@ def notes_on_other_covariates(decision: Decision) -> tuple[str, ...]:
     if told.group.coupling in WITHOUT_CURVE:
         return ()
     scores = _scores_over(decision, told)
-    least = (1 - decision.equations.thresholds.form_misfit) * scores.get(told.name, float("inf"))
+    most = scores.get(told.name, float("inf"))
+    least = (1 - decision.equations.thresholds.form_misfit) * most
     others = [
         name
         for name, score in scores.items()
-        if score >= least and name != "time" and not same_covariate(problem, name, told.name, told.wheels)
+        if score >= (most if name == "time" else least) and not same_covariate(problem, name, told.name, told.wheels)
     ]
     if not others:
         return ()

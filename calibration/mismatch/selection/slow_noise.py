@@ -6,6 +6,7 @@ it gains by the weights what it does not gain in likelihood: a slow spectrum exp
 
 from __future__ import annotations
 
+from math import inf, log
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURV
 from regolithd.calibration.mismatch.regression.restricted_likelihood import FEWEST_READINGS, FurtherColumns, Priors
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
@@ -86,8 +87,10 @@ def apart(one: Sequence[Term], other: Sequence[Term]) -> tuple[tuple[Term, ...],
     return shared, of_one, of_other
 
 
-def best_curve(equations: NormalEquations, given: Sequence[Term], curves: Iterable[tuple[float, Term]]) -> Term | None:
+def best_curve(equations: NormalEquations, given: Sequence[Term], curves: Sequence[tuple[float, Term]]) -> Term | None:
     """Return the significant curve that scores most of those that noise of any spectrum does not explain, if any.
+
+    In place of one over time, it is one over another covariate that is more probable (`_over_another_covariate`).
 
     Parameters
     ----------
@@ -99,5 +102,34 @@ def best_curve(equations: NormalEquations, given: Sequence[Term], curves: Iterab
         if score <= limits.smooth_term_entry:
             break
         if score_beside_slow_noise(equations, given, [curve]) > limits.slow_noise_entry:
-            return curve
+            return _over_another_covariate(equations, score, curve, curves)
     return None
+
+
+def _over_another_covariate(
+    equations: NormalEquations, score: float, curve: Term, curves: Sequence[tuple[float, Term]]
+) -> Term:
+    """Return a curve, or, in place of one over time, one that explains nearly as much and is more probable.
+
+    A curve over time has knots enough to follow whatever changes slowly. By Schwarz's criterion each of them costs the
+    logarithm of the number of readings. Of what the other curve explains, the share that an inexact law may lack
+    (`form_misfit`) is no objection: its knots are few.
+    """
+    limits = equations.thresholds
+    if curve.name != "time":
+        return curve
+    readings = sum(len(equations.design.readings[wheel][0]) for wheel in curve.wheels)
+    further = log(readings) - limits.coefficient_penalty
+
+    def evidence(score: float, term: Term) -> float:
+        return score - further * len(term.group.columns)
+
+    rivals = [
+        (evidence(each, term), term)
+        for each, term in curves
+        if term.wheels == curve.wheels
+        and term.group.coupling not in WITHOUT_CURVE
+        and each >= (1 - limits.form_misfit) * score
+    ]
+    best, other = max(rivals, key=lambda pair: pair[0], default=(-inf, curve))
+    return other if best > evidence(score, curve) else curve

@@ -178,6 +178,28 @@ def test_near_standstill_the_prediction_goes_on_as_long_as_the_motion() -> None:
     np.testing.assert_allclose(behind[5:], problem.measured[5:], atol=1e-9)
 
 
+class Winch(Cart):
+    """The same with a sensor that is exactly 0 at rest: there the motor has no current."""
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the friction."""
+        return np.where(inputs["speed_rad_s"] == 0, 0.0, super().predict(inputs, values))
+
+
+@pytest.mark.parametrize("kind", ["secant_s", "filter_s"])
+def test_between_rest_and_motion_the_axis_moves(kind: str) -> None:
+    """Readings after 0 that are too slow for a direction are of the motion: late friction is a step, and no ramp."""
+    speed = np.where(np.arange(COUNT) // 100 % 2, np.clip(np.arange(COUNT) % 100 / 15, 0.1, 1.0), 0.0)
+    friction = np.where(speed == 0, 0.0, 2.0)
+    problem = build_problem(
+        from_columns({"t_s": TIME_S, "speed_rad_s": speed, "current_A": late(friction, kind, 0.5)}), Winch()
+    )
+    assert not problem.mask[:, 0].all()
+    (column,) = DELAY.columns(problem, {"late": "current_A", kind: 0.5})
+    behind = problem.prediction + 0.5 * column
+    np.testing.assert_allclose(behind[problem.mask][5:], problem.measured[problem.mask][5:], atol=1e-3)
+
+
 def test_a_blank_without_a_change_of_direction_is_no_standstill() -> None:
     """What the simulation does not predict there is what was recorded there."""
     speed = np.where(np.arange(COUNT) // 100 % 2, 0.3, 0.9)

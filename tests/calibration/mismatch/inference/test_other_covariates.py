@@ -52,3 +52,17 @@ def test_covariates_that_go_together_are_both_told(throttled: float, told: int) 
     found = notes(throttled)
     assert len(found) == told
     assert all("flow" in note and "pressure" in note for note in found)
+
+
+@pytest.mark.parametrize(("period_s", "seed"), [(900.0, 0), (1500.0, 1)])
+def test_what_follows_a_covariate_that_changes_slowly_is_told_over_that(period_s: float, seed: int) -> None:
+    """A curve over time has knots enough to explain more of a bump over the pressure, and no law: a note tells it."""
+    rng = np.random.default_rng(seed)
+    t_s = np.arange(2 * INSTANTS) * 0.5
+    pressure = 40.0 + 25.0 * np.sin(2 * np.pi * t_s / period_s + seed)
+    flow = 3.0 + 2.0 * np.sin(t_s / 7) * np.cos(t_s / 11)
+    bump = 12.0 * np.exp(-0.5 * ((pressure - 45.0) / 6.0) ** 2)
+    power = 20.0 * flow + bump + rng.normal(0, 3.0, len(t_s))
+    found = compare(from_columns({"t_s": t_s, "flow_l_s": flow, "pressure_kPa": pressure, "power_W": power}), Pump())
+    assert [each.covariate for each in found.answer.unexplained] == ["pressure"]
+    assert any("over the pressure follows the time nearly as well" in note for note in found.answer.notes)
