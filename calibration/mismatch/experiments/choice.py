@@ -172,7 +172,7 @@ def _drives_of(equations: NormalEquations) -> tuple[Drives | None, str]:
     covariates = [name for each in candidates if each is not None for name in each.varied(problem)]
     try:
         if not predicts_row_by_row(problem):
-            return None, "a prediction depends on other rows too, by a state or a rate of change in `predict`"
+            return None, "a prediction depends on other rows too: the simulation has a state or a rate of change"
         drives = Drives(problem, covariates)
     except MismatchError:
         return None, "the simulation accepts no other inputs than those recorded"

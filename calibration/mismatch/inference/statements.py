@@ -88,6 +88,14 @@ def noun_of(column: str) -> str:
     return re.sub(r"_(id|no|nr|name|number|index)$", "", column).replace("_", " ")
 
 
+def noun_before(wheels: Sequence[int | str], kind: str) -> str:
+    """Return 'wheel ' or 'wheels ', to stand before names; nothing where they begin with it, as row1 and row2 do."""
+    noun = noun_of(kind)
+    if all(str(wheel).casefold().startswith(noun.casefold()) for wheel in wheels):
+        return ""
+    return f"{plural(noun) if len(wheels) > 1 else noun} "
+
+
 def wheels_in_words(wheels: Sequence[int | str], of: int, kind: str = "wheel") -> str:
     """Return 'all 6 wheels', 'both axes', 'wheel 4', 'wheels 1, 3 and 5'; empty where there is one alone.
 
@@ -98,7 +106,7 @@ def wheels_in_words(wheels: Sequence[int | str], of: int, kind: str = "wheel") -
     noun = noun_of(kind)
     if len(wheels) == of:
         return f"each {noun}" if plural(noun) == noun else f"{'both' if of == 2 else f'all {of}'} {plural(noun)}"
-    return f"{plural(noun) if len(wheels) > 1 else noun} {listed([str(wheel) for wheel in wheels])}"
+    return noun_before(wheels, kind) + listed([str(wheel) for wheel in wheels])
 
 
 def on_wheels(wheels: Sequence[int | str], of: int, kind: str = "wheel") -> str:

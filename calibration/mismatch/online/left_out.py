@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.inference.statements import noun_before
 from regolithd.calibration.mismatch.problem.words import word_for
 from regolithd.calibration.mismatch.signal.robust import robust_std
 
@@ -65,7 +66,8 @@ class LeftOutReadings:
 
     def statement(self, kind: str) -> str:
         """Return it in words; `kind` is the column that tells wheels apart."""
-        return f"{kind} {self.wheel} is not compared since {self.since_s:.0f} s: {self.reason}"
+        wheel = f"{noun_before([self.wheel], kind)}{self.wheel}"
+        return f"{wheel} is not compared since {self.since_s:.0f} s: {self.reason}"
 
 
 @dataclass(frozen=True, eq=False)

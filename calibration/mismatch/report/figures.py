@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from regolithd.calibration.mismatch.inference.statements import noun_before
 from regolithd.calibration.mismatch.report.axes import Panel, axes, box, line, number, svg, text
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def map_figure(answer: Answer, evidence: Evidence, labels: Labels) -> str:
         parts += [text(left, panel.top - 9, heading, kind="strong"), box(panel)]
         parts += _cells(panel, edges, values)
         for row, wheel in enumerate(evidence.wheels):
-            label = f"{labels.wheel} {wheel}" if rows > 1 else "residual"
+            label = f"{noun_before([wheel], labels.wheel)}{wheel}" if rows > 1 else "residual"
             parts.append(text(left - 9, panel.top + high * (row + 0.5) + 4, label, anchor="end"))
     parts += _onsets(answer, panels, labels)
     last = panels[-1]

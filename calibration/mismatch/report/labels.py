@@ -15,9 +15,9 @@ from regolithd.calibration.mismatch.inference.statements import (
     capital,
     had_to_leave_its_prior,
     listed,
+    noun_before,
     noun_of,
     parameters_found,
-    plural,
     wheels_in_words,
 )
 from regolithd.calibration.mismatch.problem.words import COVARIATES, in_words, unit_in_label
@@ -152,7 +152,7 @@ class Labels:
         """Return 'all 6 wheels', 'both axes', 'wheel 4' or 'wheels 1, 3'; nothing where the machine has one alone."""
         if len(wheels) == len(everything):
             return wheels_in_words(wheels, len(everything), self.wheel)
-        return f"{plural(self.wheel) if len(wheels) > 1 else self.wheel} {', '.join(map(str, wheels))}"
+        return noun_before(wheels, self.wheel) + ", ".join(map(str, wheels))
 
 
 def verdict_sentence(answer: Answer, labels: Labels | None = None) -> str:

@@ -125,7 +125,7 @@ def test_a_simulation_with_a_state_is_not_predicted() -> None:
     experimenter = experimenter_of(equations_of(problem, (Drag(),)), THRESHOLD)
     assert experimenter.drives is None
     assert experimenter.unpredictable == (
-        "a prediction depends on other rows too, by a state or a rate of change in `predict`"
+        "a prediction depends on other rows too: the simulation has a state or a rate of change"
     )
 
 

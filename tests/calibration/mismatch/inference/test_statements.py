@@ -68,6 +68,7 @@ def test_the_axes_are_named_only_where_there_are_several() -> None:
     assert on_wheels((1, 3), 4, "zone") == ", on zones 1 and 3"
     assert on_wheels((1, 2), 2, "achse") == ", on each achse"
     assert on_wheels((1, 3), 4, "achse") == ", on achse 1 and 3"
+    assert on_wheels(("row1", "row2"), 4, "row") == ", on row1 and row2"
 
 
 @pytest.mark.parametrize(
