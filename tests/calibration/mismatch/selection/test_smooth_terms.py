@@ -12,6 +12,7 @@ from regolithd.calibration.mismatch.regression.nuisance import Nuisance
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection import smooth_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
+from regolithd.calibration.mismatch.selection.slow_noise import best_curve
 from regolithd.calibration.mismatch.selection.smooth_terms import (
     drop_transients,
     drop_what_a_curve_explains,
@@ -80,7 +81,7 @@ def test_a_curve_that_effects_imitate_goes_before_what_they_leave(monkeypatch: p
     monkeypatch.setattr(smooth_terms, "_effects_beside_curve", lambda equations, *_: equations.fit(()))
     kept, curves = weigh_against_smooth_terms(equations, named, (), 8.0)
     assert kept.terms == ()
-    assert curves == (best_of_each_smooth_term(equations, ())[0][1],)
+    assert curves == (best_curve(equations, (), best_of_each_smooth_term(equations, ())),)
 
 
 def test_a_change_that_comes_and_goes_loses_its_name() -> None:
