@@ -24,8 +24,8 @@ BAND = 1.06
 first-order process changes by less than 12 % within one)."""
 MOST_STEPS = 50
 """Steps of the powers at most (a choice: four to ten are usual)."""
-CONVERGED = 1e-4
-"""Fall of −2 ln of the likelihood in a step below which the powers are the likeliest (a choice: what is told gains ten
+CONVERGED = 1e-3
+"""Fall of −2 ln of the likelihood in a step below which the powers are the likeliest (a choice: what is told gains a
 thousand times as much)."""
 SHARES_OF_A_STEP = tuple(0.5**power for power in range(20))
 """Shares of a step that are tried in turn until the likelihood rises, which the whole step nearly always does."""
@@ -98,11 +98,15 @@ class Bands:
             return NoiseSpectrum(self, np.zeros(len(self.times)))
         equal = np.full(len(self.times), variance / len(self.times))
         powers = equal if start is None else np.maximum(start.powers, RIDGE * equal)
+        value = self._minus_two_log(powers, power, free)
         for _ in range(MOST_STEPS):
-            value, step = self._minus_two_log(powers, power, free), self._step(powers, power, free)
-            tried = (powers + share * step for share in SHARES_OF_A_STEP)
-            powers = next((each for each in tried if self._minus_two_log(each, power, free) <= value), powers)
-            if value - self._minus_two_log(powers, power, free) < CONVERGED:
+            step, before = self._step(powers, power, free), value
+            for share in SHARES_OF_A_STEP:
+                value = self._minus_two_log(tried := powers + share * step, power, free)
+                if value <= before:
+                    powers = tried
+                    break
+            if not before - value >= CONVERGED:
                 break
         return NoiseSpectrum(self, powers)
 
@@ -161,12 +165,12 @@ def _least_not_below_zero(matrix: Array, right: Array, above: NDArray[np.bool_])
     Those that are 0 are found by exchange, from a guess of those that are `above` (Portugal, Júdice and Vicente, 1994).
     """
     for _ in range(MOST_EXCHANGES):
-        found = np.zeros(len(right))
-        found[above] = np.linalg.solve(matrix[np.ix_(above, above)], right[above])
-        below, rising = above & (found < 0), ~above & (right - matrix @ found > 0)
-        if not (below.any() or rising.any()):
+        found, at = np.zeros(len(right)), np.flatnonzero(above)
+        found[at] = np.linalg.solve(matrix[at[:, None], at], right[at])
+        kept = np.where(above, found >= 0, right - matrix @ found > 0)
+        if np.array_equal(kept, above):
             break
-        above = above & ~below | rising
+        above = kept
     return np.maximum(found, 0.0)
 
 
