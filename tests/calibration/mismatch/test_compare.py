@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from rover_drives import TABLES, columns, recording, simulation
 
 from regolithd.calibration.mismatch.candidates.library import library
@@ -78,28 +76,10 @@ def test_the_same_input_has_the_same_answer(coulomb: Comparison) -> None:
     assert one == other
 
 
-@pytest.fixture(scope="module")
-def worn() -> Comparison:
-    """Return what is said of a drive with drag on wheel 3 alone."""
-    return compare(from_columns(with_drag(0.6, (3,))), simulation())
-
-
-def test_a_mirrored_rover_has_the_mirrored_answer(worn: Comparison) -> None:
-    """Left for right, with roll and yaw rate turned round: the same fault on the opposite wheel."""
-    table = with_drag(0.6, (3,))
-    table["wheel"] = np.where(table["wheel"] % 2 == 1, table["wheel"] + 1, table["wheel"] - 1)
-    for name in ("roll_rad", "yaw_rate_rad_s"):
-        table[name] = -table[name]
-    mirrored = compare(from_columns(table), simulation()).answer
-    assert [e.wheels for e in worn.answer.effects] == [(3,)]
-    assert [e.wheels for e in mirrored.effects] == [(4,)]
-    assert [e.name for e in worn.answer.effects] == [e.name for e in mirrored.effects]
-
-
-def test_effects_of_other_kinds_are_read_again_too(worn: Comparison) -> None:
+def test_effects_of_other_kinds_are_read_again_too(coulomb: Comparison) -> None:
     """One wheel's drag from some time on has no table in the daemon: it stands in `[[effects]]`."""
     drag = Contribution("bearing-drag", {"onset_s": 100.0, "rise_s": 30.0}, (0.004,), (3,))
-    tables = tomllib.loads(to_toml(corrected_tables(TABLES, simulation(), worn.evidence.values, (drag,))))
+    tables = tomllib.loads(to_toml(corrected_tables(TABLES, simulation(), coulomb.evidence.values, (drag,))))
     assert stated_effects(tables) == (drag,)
     problem = build_problem(recording(3), simulation())
     added = corrected_problem(problem, stated_in(library(), stated_effects(tables), ())).added
@@ -225,18 +205,15 @@ def as_it_was() -> Answer:
     return compare(from_columns(worn_drive()), simulation()).answer
 
 
-@settings(max_examples=3, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(shuffle=st.integers(0, 2**32 - 1), origin_s=st.floats(-1e6, 1e9), mirrored=st.booleans())
-def test_the_answer_does_not_hang_on_how_the_recording_is_written(
-    shuffle: int, origin_s: float, *, mirrored: bool
-) -> None:
+@pytest.mark.parametrize(("origin_s", "mirrored"), [(1.7e9, False), (-3600.0, True)])
+def test_the_answer_does_not_hang_on_how_the_recording_is_written(origin_s: float, *, mirrored: bool) -> None:
     """Names, wheels, onsets and sizes stay; a mirrored rover has its fault on the other side."""
     table = dict(worn_drive())
     if mirrored:
         table["wheel"] = np.vectorize(ONE_SIDE_IS_THE_OTHER.__getitem__)(table["wheel"].astype(int)).astype(float)
         table |= {name: -table[name] for name in ("roll_rad", "yaw_rate_rad_s")}
     table["t_s"] = table["t_s"] + origin_s
-    order = np.random.default_rng(shuffle).permutation(len(table["t_s"]))
+    order = np.random.default_rng(1).permutation(len(table["t_s"]))
     answer = compare(from_columns({name: values[order] for name, values in table.items()}), simulation()).answer
     expected = as_it_was()
     assert [e.name for e in expected.effects] == ["bearing-drag"]

@@ -65,7 +65,7 @@ def heated(seed: int, acts_on_noise: float, offset_K: float = 0.0, memory: float
     return from_columns({"t_s": t_s, "duty_pct": duty, "outside_degC": outside, "temperature_degC": measured})
 
 
-@pytest.mark.parametrize(("seed", "memory"), [(0, 0.0), (1, 0.0), (2, 0.0), (3, 0.0), (1, 0.6), (2, 0.6)])
+@pytest.mark.parametrize(("seed", "memory"), [(0, 0.0), (3, 0.0), (1, 0.6)])
 def test_a_controller_that_acts_on_the_noise_is_no_physics(seed: int, memory: float) -> None:
     """The residual follows the duty in what its past does not predict, though noise may remember some readings."""
     found = compare(heated(seed, acts_on_noise=1.0, memory=memory), Chamber()).answer
