@@ -88,7 +88,7 @@ def expected_inputs(
     scales = [ReadingScale.of(column, sensors[name]) for name, column in zip(owners, values.T, strict=True)]
     starts = np.flatnonzero(np.diff(recording.run, prepend=recording.run[0] - 1))
     stabilised = np.stack([scale.stabilised(column) for scale, column in zip(scales, values.T, strict=True)], axis=1)
-    rest = _at_rest(values)
+    rest = at_rest(values)
     truths = normal_truths(stabilised, np.array([scale.deviation for scale in scales]) ** 2, starts)
     smooth = truths.mean.copy()
     for k, name in enumerate(owners):
@@ -110,7 +110,7 @@ def expected_inputs(
     return recording.with_channels(**dict(zip(names, parts, strict=True)))
 
 
-def _at_rest(values: Array) -> NDArray[np.bool_]:
+def at_rest(values: Array) -> NDArray[np.bool_]:
     """Return where a reading, shape (time, column), and one beside it are exactly 0."""
     zero = np.pad(values == 0, ((1, 1), (0, 0)))
     return zero[1:-1] & (zero[:-2] | zero[2:])

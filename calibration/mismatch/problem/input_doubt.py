@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
+from regolithd.calibration.mismatch.problem.errors_in_variables import at_rest, known_mean
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
+from regolithd.calibration.mismatch.problem.true_values import direction_beside_rest
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -32,6 +33,8 @@ DRAWS = 8
 LASTING = 0.5
 """Correlation of the prediction's error with that of the next reading, from which it lasts (a choice: errors of
 readings are independent, and what a prediction makes of each alone has none)."""
+KEPT_IN_MOTION = 0.5
+"""Share of a value by which it is uncertain at most where its direction is known (a choice: any below 1)."""
 LEAST_LEFT = 0.02
 """Share of an error's variance that smoothing leaves at least (a choice: a mean of fifty readings)."""
 
@@ -80,11 +83,7 @@ def input_doubt(
         if name in as_read.channels and name in inputs
     }
     # What is at rest is known to be (`errors_in_variables.py`): a simulation may have a step beside it.
-    stated = {
-        name: np.where(inputs[name] == 0, 0.0, scale.error(inputs[name]))
-        for name, scale in scales.items()
-        if scale.deviation > 0
-    }
+    stated = {name: _in_motion(inputs[name], scale) for name, scale in scales.items() if scale.deviation > 0}
     if not stated:
         return None
     before = simulation.predict(inputs, values)
@@ -106,6 +105,18 @@ def input_doubt(
         drawn = {**inputs, **{name: inputs[name] + lot for name, lot in lots.items()}}
         draws[place] = np.nan_to_num(simulation.predict(drawn, values) - before)
     return InputDoubt(alone, together, bias, draws)
+
+
+def _in_motion(values: Array, scale: ReadingScale) -> Array:
+    """Return the standard deviation of an input's error (time, wheel): 0 at rest, and without a change of sign beside.
+
+    Where a motion begins at a rest or ends there, its direction is known (`true_values.direction_beside_rest`).
+    """
+    error, rest = np.where(values == 0, 0.0, scale.error(values)), at_rest(values)
+    for k in np.flatnonzero(rest.any(axis=0)):
+        beside = direction_beside_rest(values[:, k], scale.absolute, rest[:, k]) != 0
+        error[beside, k] = np.minimum(error[beside, k], KEPT_IN_MOTION * np.abs(values[beside, k]))
+    return error
 
 
 def _lasts(error: Array) -> bool:

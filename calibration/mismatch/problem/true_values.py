@@ -122,23 +122,27 @@ def still_at_rest(readings: Array, deviation: float, smooth: NormalTruth) -> Nor
     return replace(smooth, mean=mean)
 
 
-def with_direction_of_motion(mean: Array, deviation: float, rest: NDArray[np.bool_]) -> Array:
-    """Return estimates of the truth (time,) that have the motion's sign from a rest to the first clear one, and back.
+def direction_beside_rest(mean: Array, deviation: float, rest: NDArray[np.bool_]) -> Array:
+    """Return the sign of a motion from a rest to its first clear estimate, and from the last to a rest; 0 elsewhere.
 
     A motion that begins or ends where readings are exactly 0 has one direction there, whatever the noise of its first
     and last readings: friction of the other one would be as large as that of the whole motion.
     """
-    found = mean.copy()
+    found = np.zeros(len(mean))
     edges = np.flatnonzero(np.diff(rest, prepend=True, append=True))
     for first, last in edges.reshape(-1, 2).tolist():
         clear = first + np.flatnonzero(np.abs(mean[first:last]) > REST_DEVIATIONS * deviation)
-        if clear.size:
-            begin, end = (slice(first, clear[0]) if first else slice(0)), slice(clear[-1] + 1, last)
-            for part, at in ((begin, clear[0]), (end if last < len(mean) else slice(0), clear[-1])):
-                sign = np.sign(mean[at])
-                wrong = sign * mean[part] < LEAST_IN_MOTION * deviation
-                found[part][wrong] = sign * LEAST_IN_MOTION * deviation
+        if clear.size and first:
+            found[first : clear[0]] = np.sign(mean[clear[0]])
+        if clear.size and last < len(mean):
+            found[clear[-1] + 1 : last] = np.sign(mean[clear[-1]])
     return found
+
+
+def with_direction_of_motion(mean: Array, deviation: float, rest: NDArray[np.bool_]) -> Array:
+    """Return estimates of the truth (time,) that have this sign where there is one."""
+    direction, least = direction_beside_rest(mean, deviation, rest), LEAST_IN_MOTION * deviation
+    return np.where((direction != 0) & ~(direction * mean >= least), direction * least, mean)
 
 
 def _matters(deviation: float, known: NDArray[np.bool_], normal: NormalTruth) -> bool:

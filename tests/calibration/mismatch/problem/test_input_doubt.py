@@ -230,3 +230,25 @@ def test_a_column_that_is_at_rest_is_not_in_doubt() -> None:
     assert found is not None
     assert not found.alone.any()
     assert not found.bias.any()
+
+
+class Rubbing(Braked):
+    """A motor whose friction reverses with the speed."""
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the friction."""
+        return np.sign(inputs["ground_m_s"]) * values["idle_A"]
+
+
+def test_a_motion_from_a_rest_is_in_no_doubt_of_its_direction() -> None:
+    """Its first and last readings may be within their error of 0: friction does not reverse there by it."""
+    still = driven(1)
+    phase = np.arange(COUNT) % 100
+    ground = np.where(phase < 30, 0.0, np.minimum(phase - 29, 100 - phase) * 0.0003)[:, None] * np.ones(still.shape)
+    recording = still.with_channels(ground_m_s=ground)
+    error = Rubbing.sensors["ground_m_s"].absolute
+    assert np.any((ground > 0) & (ground < error))
+    found = input_doubt(recording, recording, Rubbing(), {"idle_A": 20.0}, Rubbing.sensors)
+    assert found is not None
+    assert not found.alone.any()
+    assert not found.bias.any()
