@@ -243,7 +243,7 @@ class Rubbing(Braked):
 def test_a_motion_from_a_rest_is_in_no_doubt_of_its_direction() -> None:
     """Its first and last readings may be within their error of 0: friction does not reverse there by it."""
     still = driven(1)
-    phase = np.arange(COUNT) % 100
+    phase = (np.arange(COUNT) + 15) % 100  # from rest to rest
     ground = np.where(phase < 30, 0.0, np.minimum(phase - 29, 100 - phase) * 0.0003)[:, None] * np.ones(still.shape)
     recording = still.with_channels(ground_m_s=ground)
     error = Rubbing.sensors["ground_m_s"].absolute
