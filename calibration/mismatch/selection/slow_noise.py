@@ -102,20 +102,20 @@ def best_curve(equations: NormalEquations, given: Sequence[Term], curves: Sequen
         if score <= limits.smooth_term_entry:
             break
         if score_beside_slow_noise(equations, given, [curve]) > limits.slow_noise_entry:
-            return _over_another_covariate(equations, score, curve, curves)
+            return _over_another_covariate(equations, given, (score, curve), curves)
     return None
 
 
 def _over_another_covariate(
-    equations: NormalEquations, score: float, curve: Term, curves: Sequence[tuple[float, Term]]
+    equations: NormalEquations, given: Sequence[Term], best: tuple[float, Term], curves: Sequence[tuple[float, Term]]
 ) -> Term:
     """Return a curve, or, in place of one over time, one that explains nearly as much and is more probable.
 
     A curve over time has knots enough to follow whatever changes slowly. By Schwarz's criterion each of them costs the
     logarithm of the number of readings. Of what the other curve explains, the share that an inexact law may lack
-    (`form_misfit`) is no objection: its knots are few.
+    (`form_misfit`) is no objection: its knots are few. Noise of any spectrum does not explain it either.
     """
-    limits = equations.thresholds
+    limits, (score, curve) = equations.thresholds, best
     if curve.name != "time":
         return curve
     readings = sum(len(equations.design.readings[wheel][0]) for wheel in curve.wheels)
@@ -131,5 +131,6 @@ def _over_another_covariate(
         and term.group.coupling not in WITHOUT_CURVE
         and each >= (1 - limits.form_misfit) * score
     ]
-    best, other = max(rivals, key=lambda pair: pair[0], default=(-inf, curve))
-    return other if best > evidence(score, curve) else curve
+    most, other = max(rivals, key=lambda pair: pair[0], default=(-inf, curve))
+    ahead = most > evidence(score, curve)
+    return other if ahead and score_beside_slow_noise(equations, given, [other]) > limits.slow_noise_entry else curve
