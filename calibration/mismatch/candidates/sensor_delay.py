@@ -252,9 +252,6 @@ def _delays(problem: Problem, ratio: float, known: float | None) -> list[float]:
 def _without_blanks(problem: Problem, delay_s: float) -> Array:
     """Return the prediction; where the simulation says nothing for long, the median of what was recorded there.
 
-    Between a rest of which the simulation says something, and a motion, the axis moves, too slowly for a direction: it
-    says there what it says of the motion beside.
-
     What a late channel reports just after a standstill is what it would have reported at standstill: as it does once
     the delay has passed. A straight line bridges what is shorter than two delays, or was not recorded either. A
     simulation that says nothing near standstill would say there what it says beside, as long as the motion goes on.
@@ -266,10 +263,6 @@ def _without_blanks(problem: Problem, delay_s: float) -> Array:
         blank = np.isnan(found[:, k])
         edges = np.flatnonzero(np.diff(blank, prepend=False, append=False))
         for first, end in zip(edges[::2], edges[1::2], strict=True):
-            before, after = max(first - 1, 0), min(end, len(found) - 1)
-            if (direction[before, k] == 0) != (direction[after, k] == 0):
-                found[first:end, k] = found[after if direction[before, k] == 0 else before, k]
-                continue
             standing = _standing(direction[:, k], first, end)
             found[first : standing.start, k] = found[max(first - 1, 0), k]
             found[standing.stop : end, k] = found[min(end, len(found) - 1), k]
@@ -282,11 +275,14 @@ def _without_blanks(problem: Problem, delay_s: float) -> Array:
 def _standing(direction: Array, first: int, end: int) -> slice:
     """Return the part of a blank without the rows in which the axis still moves as before it, or already as after it.
 
-    The whole blank where the direction does not change in it: then it is no standstill.
+    The whole blank where the direction does not change in it: then it is no standstill. Between a motion and a rest of
+    which the simulation says something, the axis moves, too slowly for a direction.
     """
     before, after = direction[max(first - 1, 0)], direction[min(end, len(direction) - 1)]
+    if (before == 0) != (after == 0):
+        return slice(first, first) if before == 0 else slice(end, end)
     changed = np.flatnonzero(direction[first:end] != before)
-    if before == 0 or after == 0 or (changed.size == 0 and before == after):
+    if before == 0 or (changed.size == 0 and before == after):
         return slice(first, end)
     still = first + (int(changed[0]) if changed.size else end - first)
     other = np.flatnonzero(direction[still:end] != after)

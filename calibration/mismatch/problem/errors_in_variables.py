@@ -86,7 +86,7 @@ def expected_inputs(
     values = np.concatenate([recording.channels[name] for name in names], axis=1)
     owners = [name for name in names for _ in recording.wheels]
     scales = [ReadingScale.of(column, sensors[name]) for name, column in zip(owners, values.T, strict=True)]
-    starts = np.flatnonzero(np.diff(recording.run, prepend=recording.run[0] - 1))
+    starts = np.array([rows.start for rows in recording.runs], np.int64)
     stabilised = np.stack([scale.stabilised(column) for scale, column in zip(scales, values.T, strict=True)], axis=1)
     rest = at_rest(values)
     truths = normal_truths(stabilised, np.array([scale.deviation for scale in scales]) ** 2, starts)

@@ -140,7 +140,7 @@ def direction_beside_rest(mean: Array, deviation: float, rest: NDArray[np.bool_]
 
 
 def with_direction_of_motion(mean: Array, deviation: float, rest: NDArray[np.bool_]) -> Array:
-    """Return estimates of the truth (time,) that have this sign where there is one."""
+    """Return estimates of the truth (time,), those beside a rest with the direction of its motion."""
     direction, least = direction_beside_rest(mean, deviation, rest), LEAST_IN_MOTION * deviation
     return np.where((direction != 0) & ~(direction * mean >= least), direction * least, mean)
 
