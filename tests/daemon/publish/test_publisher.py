@@ -352,7 +352,7 @@ async def test_a_broker_that_was_away_for_long_is_connected_to_within_seconds(
         await asyncio.to_thread(mosquitto.start)
         begun = time.monotonic()
         await until(lambda: publisher.connected)
-    assert time.monotonic() - begun < LONGEST_S + 1.0
+    assert time.monotonic() - begun < 2 * LONGEST_S  # the pause, and what the broker and a busy computer take
 
 
 async def test_a_pause_ends_with_its_time() -> None:
