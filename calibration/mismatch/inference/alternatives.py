@@ -7,7 +7,7 @@ another explains almost as well leaves a small margin to the answer with that on
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.selection.best_subsets import (
@@ -60,8 +60,8 @@ class Alternative:
 def alternatives(decision: Decision, *, refused: bool = False) -> tuple[Alternative, ...]:
     """Return the other answers of one step's difference, the best of each set of names, best first.
 
-    With `refused` also those that held-out readings refused: no answers, but evidence that something is there. Where a
-    law in a range was more probable than a name that holds everywhere, no further name is another answer.
+    With `refused` also those that held-out readings refused, and all their evidence: no answers, yet evidence.
+    Where a law in a range was more probable than a name that holds everywhere, no further name is another answer.
     """
     best: dict[tuple[str, ...], tuple[float, tuple[Term, ...]]] = {}
     margins = _Margins(decision)
@@ -76,6 +76,19 @@ def alternatives(decision: Decision, *, refused: bool = False) -> tuple[Alternat
     found = [Alternative(names, margin, of) for names, (margin, of) in best.items()]
     found = [other for other in found if other.margin >= 0 or _stands_optimised(decision, other)]
     return tuple(sorted(found, key=lambda each: each.margin))
+
+
+def with_refused(decision: Decision) -> tuple[Alternative, ...]:
+    """Return the other answers, and those that held-out readings refused as probable as this one at most, best first.
+
+    An effect that just enters may raise the held-out error where the blocks without some of its readings miss it.
+    """
+    others = alternatives(decision, refused=True)
+    told = [
+        replace(other, margin=max(other.margin, 0.0)) if frozenset(other.effects) in decision.refused else other
+        for other in others
+    ]
+    return tuple(sorted(told, key=lambda each: each.margin))
 
 
 def _is_another(decision: Decision, names: tuple[str, ...]) -> bool:

@@ -17,7 +17,7 @@ from regolithd.calibration.mismatch.answer import (
 )
 from regolithd.calibration.mismatch.changes import ChangedSize, changes_of
 from regolithd.calibration.mismatch.experiments.drives import DIRECTION
-from regolithd.calibration.mismatch.inference.alternatives import alternatives
+from regolithd.calibration.mismatch.inference.alternatives import with_refused
 from regolithd.calibration.mismatch.inference.dynamics import notes_on_dynamics
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values, wheel_names
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
@@ -123,7 +123,7 @@ def answer_of(
     problem, thresholds = equations.problem, equations.thresholds
     found = findings_of(decision, held_out, candidates, applicable, drawn)
     known = decided_by_evidence(decision)
-    rest = with_changed_or_moved(decision, alternatives(decision)) if known else ()
+    rest = with_changed_or_moved(decision, with_refused(decision)) if known else ()
     extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold, rest)
     after = held_out.after if decision.named.terms else held_out.before
     return Answer(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from linear_machine import CANDIDATES, equations_of, problem_of, table
 
-from regolithd.calibration.mismatch.inference.alternatives import Alternative, alternatives
+from regolithd.calibration.mismatch.inference.alternatives import Alternative, alternatives, with_refused
 from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
@@ -100,3 +100,18 @@ def test_what_held_out_readings_refused_is_no_alternative() -> None:
     left = alternatives(replace(decision, refused=frozenset({frozenset(refused)})))
     assert refused not in {each.effects for each in left}
     assert len(left) >= 1
+
+
+def test_an_answer_is_no_more_probable_than_one_that_held_out_readings_refused() -> None:
+    """Where it has more evidence than the answer; with less, it counts as any other does."""
+    found = decided(drag=0.06)
+    empty = found.equations.fit(())
+    refused = frozenset(map(frozenset, ({"drag"}, {"unexplained"})))
+    nothing = replace(found, named=empty, unnamed=(), whole=empty, refused=refused)
+    (ahead,) = (each for each in alternatives(nothing, refused=True) if each.effects == ("drag",))
+    assert ahead.margin < 0
+    assert ("drag",) not in {each.effects for each in alternatives(nothing)}
+    assert {each.effects: each.margin for each in with_refused(nothing)}["drag",] == 0
+    assert probability(with_refused(nothing), THRESHOLDS) <= 0.5 * HIGHEST
+    weaker = replace(found, refused=frozenset({frozenset(alternatives(found)[0].effects)}))
+    assert with_refused(weaker)[0].margin == alternatives(found)[0].margin
