@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.problem.covariates import LONGEST_STEP
 from regolithd.calibration.mismatch.signal.recursion import recursion
 
 if TYPE_CHECKING:
@@ -55,11 +54,9 @@ def displacement_of(problem: Problem) -> Array:
 def _displacement_of(problem: Problem) -> Array:
     recording, moving = problem.recording, problem.known("direction") != 0
     speed = np.where(moving, np.abs(problem.known("wheel_speed")), 0.0)
-    steps = np.diff(recording.time_s)
-    whole = (np.diff(recording.run) == 0) & (steps < LONGEST_STEP * recording.step_s)
-    travelled = 0.5 * (speed[1:] + speed[:-1]) * np.where(whole, steps, 0.0)[:, None]
+    travelled = 0.5 * (speed[1:] + speed[:-1]) * np.diff(recording.time_s)[:, None]
     displacement = np.full(speed.shape, np.inf)
-    displacement[1:] = np.where(whole[:, None], travelled, np.inf)
+    displacement[1:] = np.where(recording.without_gap[:, None], travelled, np.inf)
     return displacement
 
 

@@ -32,6 +32,8 @@ MOST_CLOCK_JUMPS = 3
 """Backward jumps of the clock up to which each begins a new run; more are rows out of order (a choice)."""
 GAP_STEPS = 5
 """Steps of time longer than so many usual ones are noted as gaps (a choice)."""
+LONGEST_STEP = 3.0
+"""Usual steps of time from which nothing is differentiated or integrated across a step (a choice)."""
 TIME_DECIMALS = 9
 """Times that agree to a nanosecond are one instant: less is rounding of the text."""
 LONGEST_STEP_S, SHORTEST_STEP_S = 100.0, 1e-6
@@ -82,6 +84,11 @@ class Recording:
         """The usual time from one instant to the next [s]."""
         steps = np.diff(self.time_s)[np.diff(self.run) == 0]
         return float(np.median(steps)) if steps.size else 1.0
+
+    @cached_property
+    def without_gap(self) -> NDArray[np.bool_]:
+        """Whether the next instant follows within the same run and `LONGEST_STEP`, shape (time − 1,)."""
+        return np.asarray((np.diff(self.run) == 0) & (np.diff(self.time_s) < LONGEST_STEP * self.step_s))
 
     @cached_property
     def runs(self) -> tuple[slice, ...]:

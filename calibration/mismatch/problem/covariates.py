@@ -46,8 +46,6 @@ ALTERNATING_SHARE = 0.15
 noise that reaches further, hardly a start or stop would be left)."""
 FEWEST_ALTERNATIONS = 3
 """Alternations about 0 from which they are noise (a choice: one may be a machine that was nudged)."""
-LONGEST_STEP = 3.0
-"""Steps of time longer than so many usual ones are gaps: nothing is differentiated across them."""
 
 
 def covariates_of(
@@ -198,7 +196,7 @@ def _derivative(values: Array, recording: Recording) -> Array:
     """Return the rate of change by central differences; 0 across gaps and between runs."""
     ahead = np.diff(values, axis=0)
     steps = np.diff(recording.time_s)
-    whole = (np.diff(recording.run) == 0) & (steps < LONGEST_STEP * recording.step_s) & (steps > 0)
+    whole = recording.without_gap & (steps > 0)
     rate = np.where(whole[:, None], ahead / np.where(whole, steps, 1.0)[:, None], 0.0)
     before, after = np.vstack((rate[:1] * 0, rate)), np.vstack((rate, rate[:1] * 0))
     return np.nan_to_num(0.5 * (before + after))

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.problem.covariates import LONGEST_STEP
 from regolithd.calibration.mismatch.signal.recursion import recursion
 
 if TYPE_CHECKING:
@@ -21,11 +20,9 @@ def filtered(recording: Recording, values: Array, time_constant_s: float) -> Arr
 
     Each run begins at its first value; so does what follows a gap.
     """
-    steps = np.diff(recording.time_s)
-    whole = (np.diff(recording.run) == 0) & (steps < LONGEST_STEP * recording.step_s)
     decay = float(np.exp(-recording.step_s / time_constant_s))
     slope = (1 - decay) * time_constant_s / recording.step_s
-    begins = np.concatenate(([True], ~whole))
+    begins = np.concatenate(([True], ~recording.without_gap))
     added = (1 - slope) * values
     added[1:] += (slope - decay) * values[:-1]
     added[begins] = values[begins]

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown, bridged
-from regolithd.calibration.mismatch.problem.covariates import LONGEST_STEP
 from regolithd.calibration.mismatch.regression.group import Group
 from regolithd.calibration.mismatch.regression.smooth_groups import SINES
 from regolithd.calibration.mismatch.regression.state_groups import ON_STATE
@@ -84,7 +83,6 @@ def differences(recording: Recording, values: Array, lags: tuple[int, ...], way:
 
 def _pieces(recording: Recording) -> tuple[Index, Index]:
     """Return the first and last row of the piece without a gap that each row is in."""
-    whole = (np.diff(recording.run) == 0) & (np.diff(recording.time_s) < LONGEST_STEP * recording.step_s)
-    starts = np.concatenate(([0], 1 + np.flatnonzero(~whole)))
+    starts = np.concatenate(([0], 1 + np.flatnonzero(~recording.without_gap)))
     lengths = np.diff(np.append(starts, len(recording.run)))
     return np.repeat(starts, lengths), np.repeat(starts + lengths - 1, lengths)
