@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.motion import PRESLIDING, TRANSITION, along_motion, displacement_of
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
+from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import WheelAngleRipple
 from regolithd.calibration.mismatch.problem.covariates import USUAL_SPEED_QUANTILE
 from regolithd.calibration.mismatch.signal.chi_squared import quantile
 from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED, Whitening, estimate_whitening
@@ -88,10 +90,17 @@ def _best_reversal(problem: Problem) -> Shape:
     if not tried:
         return {}
     beside = _beside_a_step(problem)
-    step = _Turn({}, beside.squares_left({}))
-    if not step.left > 0:
+    if not beside.squares_left({}) > 0:
         return {}  # a drive that was simulated without noise
-    gradual = _best_of(beside, tried)
+    found = _gradual(beside, tried)
+    if found and (ripple := _ripple(beside, found)):
+        found = _gradual(_beside_a_step(problem, ripple), tried)
+    return found
+
+
+def _gradual(beside: _Beside, tried: Sequence[Shape]) -> Shape:
+    """Return the best shape where it explains friction better than a step does, empty where none does."""
+    step, gradual = _Turn({}, beside.squares_left({})), _best_of(beside, tried)
     # Drag near standstill that decays with speed resembles a gradual reversal, with as many numbers, or hides how
     # gradual it is.
     decaying_step = _with_decay(beside, {})
@@ -100,8 +109,26 @@ def _best_reversal(problem: Problem) -> Shape:
     if beside.gain(min(decaying_step.left, decaying.left), gradual.left) > LEAST_GAIN:
         step, gradual = decaying_step, decaying
     of_friction = beside.independent * (beside.squares_without_friction / gradual.left - 1)
-    is_there = of_friction > quantile(beside.laws, problem.thresholds.single_test_level)
+    is_there = of_friction > quantile(beside.laws, beside.problem.thresholds.single_test_level)
     return gradual.shape if is_there and beside.gain(gradual.left, step.left) > LEAST_GAIN else {}
+
+
+def _ripple(beside: _Beside, shape: Shape) -> list[Array]:
+    """Return columns of a ripple in the wheel angle beside friction that reverses so, empty where there is none.
+
+    Of a machine that turns round at the same places a ripple has the same course after each reversal, as friction that
+    follows the displacement has.
+    """
+    problem, candidate = beside.problem, WheelAngleRipple()
+    if not problem.has("wheel_angle"):
+        return []
+    left = beside.left_as_read(shape)
+    proposed = [candidate.columns(problem, each) for each in candidate.propose_shapes(problem, left)]
+    tried = [(beside.with_free(columns).squares_left(shape), columns) for columns in proposed]
+    least, columns = min(tried, key=lambda pair: pair[0], default=(inf, np.zeros(0)))
+    by_chance = problem.thresholds.single_test_level / candidate.shape_count(problem)
+    gain = beside.gain(least, beside.squares_left(shape))
+    return list(columns) if gain > quantile(len(columns), by_chance) else []
 
 
 def _best_of(beside: _Beside, tried: Sequence[Shape]) -> _Turn:
@@ -173,9 +200,10 @@ class _Beside:
     Attributes
     ----------
     problem: the recording's
+    as_read: columns of the free parameters, and of what else acts about reversals, shape (time, wheel) each
     whitening, deviation: of that noise; its standard deviation has the shape (wheel,)
     independent: as many independent readings know as much as all whitened ones
-    free: columns of the free parameters, and of what else acts about reversals, shape (column, reading)
+    free: the same columns whitened, shape (column, reading)
     residual: shape (1, reading)
     laws: how many friction may follow
     decay: drag that decays from standstill among them; None: none
@@ -183,6 +211,7 @@ class _Beside:
     """
 
     problem: Problem
+    as_read: list[Array]
     whitening: Whitening
     deviation: Array
     independent: float
@@ -218,6 +247,19 @@ class _Beside:
         left, coefficient = _squares_left(with_decay)
         return left if coefficient >= 0 else _squares_left(products)[0]
 
+    def left_as_read(self, shape: Shape) -> Array:
+        """Return what they and friction with this shape leave of the readings, shape (time, wheel)."""
+        left = np.zeros(self.problem.mask.shape)
+        parts = _by_wheel(self.problem, _left_as_read(self.problem, [*self.as_read, *_laws(self.problem, shape)]))
+        for wheel, ((rows, _), part) in enumerate(zip(self.problem.courses, parts, strict=True)):
+            left[rows, wheel] = part
+        return left
+
+    def with_free(self, columns: Array) -> _Beside:
+        """Return the same with further columns (column, time, wheel) beside the free parameters."""
+        further = _in_order(self.problem, list(columns), self.whitening, self.deviation)
+        return replace(self, free=np.concatenate((self.free, further)), made={})
+
     def _products(self, *columns: Array) -> Array:
         """Return the products of columns, shape (column, reading), with each other."""
         return np.block([[one @ other.T for other in columns] for one in columns])
@@ -236,16 +278,12 @@ class _Beside:
         return self.made[key]
 
 
-def _beside_a_step(problem: Problem) -> _Beside:
+def _beside_a_step(problem: Problem, further: Sequence[Array] = ()) -> _Beside:
+    """Return the recording beside friction that reverses at once, the free parameters, and `further` columns."""
     parameters = [problem.tangent(name) for name in problem.free]
-    free = list(as_shown(problem, [*parameters, *_about_reversals(problem)]))
-    residual = problem.residual
-    ones = np.ones(residual.shape[1])
-    laws = _laws(problem, {})
-    as_read = _in_order(problem, [residual, *free, *laws], NOT_WHITENED, ones)
-    left = _left(as_read[1:], as_read[0])
-    ends = np.cumsum([len(rows) for rows, _ in problem.courses])[:-1]
-    parts = np.split(left, ends)
+    free = [*as_shown(problem, [*parameters, *_about_reversals(problem)]), *further]
+    residual, laws = problem.residual, _laws(problem, {})
+    parts = _by_wheel(problem, _left_as_read(problem, [*free, *laws]))
     deviation = np.array([np.sqrt(np.mean(part**2)) if part.size else 0.0 for part in parts])
     deviation = np.where(deviation > 0, deviation, 1.0)
     courses = [
@@ -259,6 +297,7 @@ def _beside_a_step(problem: Problem) -> _Beside:
         white[rows, wheel] = whitening.apply(part / deviation[wheel], runs)
     return _Beside(
         problem,
+        free,
         whitening,
         deviation,
         float(problem.mask.sum()) / problem.noise_of(white).autocorrelation_time,
@@ -309,9 +348,17 @@ def _in_order(problem: Problem, columns: Sequence[Array], whitening: Whitening, 
     return np.concatenate(parts, axis=1)
 
 
-def _left(columns: Array, residual: Array) -> Array:
-    """Return what columns, shape (column, reading), leave of a residual (reading,) by least squares."""
-    return np.asarray(residual - _fitted(columns @ columns.T, columns @ residual) @ columns)
+def _by_wheel(problem: Problem, values: Array) -> list[Array]:
+    """Return values (reading,) that are in order, of each wheel."""
+    return list(np.split(values, np.cumsum([len(rows) for rows, _ in problem.courses])[:-1]))
+
+
+def _left_as_read(problem: Problem, columns: Sequence[Array]) -> Array:
+    """Return what columns (time, wheel) leave of the residual by least squares, shape (reading,): wheel by wheel."""
+    ones = np.ones(problem.mask.shape[1])
+    residual, *fitted = _in_order(problem, [problem.residual, *columns], NOT_WHITENED, ones)
+    by = np.reshape(fitted, (len(columns), -1))
+    return np.asarray(residual - _fitted(by @ by.T, by @ residual) @ by)
 
 
 def _squares_left(products: Array) -> tuple[float, float]:

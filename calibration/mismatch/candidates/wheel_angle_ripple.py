@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -22,12 +23,24 @@ if TYPE_CHECKING:
 
 BINS_PER_CYCLE = 4
 """Least angle bins, for the spectrum, in a cycle of the highest order that is looked at."""
-FORMS = {"drag": "along the motion", "torque": "whatever the motion", "load": "in proportion to the prediction"}
-"""Names of the ripples, in the answer, by what the sine is a factor of: the direction, 1, the relative prediction."""
+FORMS = {
+    "drag": "along the motion",
+    "torque": "whatever the motion",
+    "load": "in proportion to the prediction",
+    "turning": "in motion, whatever its direction",
+}
+"""Names of the ripples, in the answer, by what the sine is a factor of: the direction, 1, the relative prediction, and
+the direction's magnitude: teeth of a motor pull as the sine says at standstill, too, the waves of a fan do not."""
+LEAST_AT_REST = 0.01
+"""Share of the readings that are at rest, from which it is asked whether a ripple acts there (a choice)."""
 LOWEST_ORDER, HIGHEST_ORDER = 0.9, 64
 """Cycles per turn (a choice: above any number of grousers; ripples of single teeth are faster than the readings)."""
 LAGS = (0.0, -0.5, 0.5)
-"""Lags of the angle in readings: a speed may be of the instant, or a mean before or after it."""
+"""Lags of the angle in readings that are tried first: a speed may be of the instant, or a mean before or after it."""
+LAG_STEPS = (0.25, 0.125, 0.0625)
+"""Then, about the best, in readings: a reading of the speed may be a part of a step apart from that of the channel."""
+GAIN_OF_LAG = 10.8
+"""Δχ² from which the angle lags: one chance in a thousand for one more coefficient."""
 OVERSAMPLING = 10.0
 """Factor on the number of resolved lines (a choice): a line's power is a sum of two squares for each wheel, and the
 largest of these sums exceeds the 2 ln of their number that is charged."""
@@ -89,9 +102,10 @@ class WheelAngleRipple(Candidate):
     forms = tuple(FORMS.values())
     shape_keys: ClassVar = {
         "order": "cycles per turn",
-        "kind": "factor of the sine: `drag` the direction, `torque` 1, `load` the prediction over `reference_size`",
+        "kind": "factor of the sine: `drag` the direction, `torque` 1, `load` the prediction over `reference_size`, "
+        "`turning` 1 in motion and 0 at rest",
         "sines": "1 (the fundamental alone) or 2 (with its first overtone)",
-        "lag": "readings before each instant of which the angle counts: 0, 0.5 or −0.5",
+        "lag": "readings before each instant of which the angle counts",
         "reference_size": "the predicted channel's mean magnitude in the recording in which it was found",
     }
     free: ClassVar = {"order": (LOWEST_ORDER, HIGHEST_ORDER)}
@@ -107,7 +121,7 @@ class WheelAngleRipple(Candidate):
     def shape_count(self, problem: Problem) -> float:
         """Return the number of lines that the turned angle can resolve, for each kind, with a factor for safety."""
         turns = float(np.ptp(problem.covariates["wheel_angle"])) / (2 * np.pi)
-        return max(OVERSAMPLING * 3 * HIGHEST_ORDER * turns, 1.0)
+        return max(OVERSAMPLING * len(_kinds(problem)) * HIGHEST_ORDER * turns, 1.0)
 
     def propose_shapes(self, problem: Problem, residual: Array) -> Sequence[Shape]:
         """Return the strongest order of each kind, with and without its overtone.
@@ -115,10 +129,9 @@ class WheelAngleRipple(Candidate):
         The order is where the spectrum of the residual over angle has its maximum: among those that the readings
         resolve, and among those beyond if one stands out there.
         """
-        kinds = ("drag", "torque", "load") if "direction" in problem.covariates else ("torque",)
         found: list[Shape] = []
         fast = _less_slow(problem, residual)
-        for kind in kinds:
+        for kind in _kinds(problem):
             base: Shape = {"kind": kind, "reference_size": problem.mean_size} if kind == "load" else {"kind": kind}
             factor = self._base(problem, base)
             for values, strongest in ((residual, self._strongest), (fast, self._beyond_resolved)):
@@ -168,7 +181,7 @@ class WheelAngleRipple(Candidate):
         """Return those of whole orders, where the angle was recorded: these alone have one phase in all recordings."""
         if not angle_is_recorded(problem.recording, problem.covariates):
             return None
-        kinds = ("drag", "torque", "load") if "direction" in problem.covariates else ("torque",)
+        kinds = tuple(FORMS) if "direction" in problem.covariates else ("torque",)  # the same in all recordings
         shapes: list[tuple[Shape, ...]] = []
         moments, energies = [], []
         for kind in kinds:
@@ -202,9 +215,11 @@ class WheelAngleRipple(Candidate):
         return moment / variance[:, None, None], energy / variance[:, None]
 
     def _base(self, problem: Problem, shape: Shape) -> Array:
-        """Return the factor of the sine: 1 (torque), the direction (drag), or the relative prediction (load)."""
+        """Return the factor of the sine: 1 (torque), the direction, its magnitude, or the relative prediction."""
         if shape["kind"] == "drag":
             return problem.covariates["direction"]
+        if shape["kind"] == "turning":
+            return np.abs(problem.covariates["direction"])
         if shape["kind"] == "torque":
             return np.ones(problem.mask.shape)
         return problem.filled / float(shape["reference_size"])
@@ -270,9 +285,19 @@ class WheelAngleRipple(Candidate):
         return top if top > resolved and alone else None
 
     def _lag(self, problem: Problem, weighted: Array, order: float) -> float:
-        """Return the lag of the angle [readings] at which the line is strongest."""
-        waves = {lag: np.exp(1j * order * _angle(problem, lag)) for lag in LAGS}
-        return max(waves, key=lambda lag: float(np.sum(np.abs(np.sum(weighted * waves[lag], axis=0)) ** 2)))
+        """Return the lag of the angle [readings] at which the line is strongest, 0 where it hardly matters."""
+        squares = np.sum(weighted**2, axis=0)
+
+        @cache
+        def gain(lag: float) -> float:
+            """Return the Δχ² of cosine and sine, in noise as large as what they are fitted to."""
+            summed = np.abs(np.sum(weighted * np.exp(1j * order * _angle(problem, lag)), axis=0)) ** 2
+            return float(np.sum(2 * summed[squares > 0] / squares[squares > 0]))
+
+        best = max(LAGS, key=gain)
+        for step in LAG_STEPS:
+            best = max((best, best - step, best + step), key=gain)
+        return best if gain(best) > gain(0.0) + GAIN_OF_LAG else 0.0
 
     def _spectrum(self, problem: Problem, weighted: Array, highest: float) -> tuple[Array, Array]:
         """Return orders and the residual's power at each, summed over the wheels; white noise has 1 on each wheel."""
@@ -287,6 +312,14 @@ class WheelAngleRipple(Candidate):
             power += summed / max(float(np.sum(weighted[here, k] ** 2)), 1e-300)
         order = np.arange(len(power)) * per_turn / length
         return order, power
+
+
+def _kinds(problem: Problem) -> tuple[str, ...]:
+    """Return what the sine may be a factor of in this recording."""
+    if "direction" not in problem.covariates:
+        return ("torque",)
+    at_rest = float(np.mean(problem.covariates["direction"][problem.mask] == 0)) if problem.mask.any() else 0.0
+    return ("drag", "torque", "load", *(["turning"] if at_rest > LEAST_AT_REST else []))
 
 
 def _less_slow(problem: Problem, residual: Array) -> Array:

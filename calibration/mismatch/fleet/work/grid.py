@@ -21,8 +21,8 @@ MOST_SHAPES = 6
 """Shapes of a candidate's grid (a choice: the shapes that single recordings were found to have come beside them)."""
 MOST_FOUND_SHAPES = 6
 """Shapes that were found in single recordings, of one candidate (a choice)."""
-MOST_RESPONSES = 4
-"""Responses of all recordings of which the shapes are tried (a choice: the factor of a sine has three kinds)."""
+MOST_RESPONSES = 5
+"""Responses of all recordings of which the shapes are tried (a choice: the factor of a sine has four kinds)."""
 AT_ONCE = "onset_s"
 """The shape parameter of what begins within a recording. Over a fleet it is there from its first instant."""
 

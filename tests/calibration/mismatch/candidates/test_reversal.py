@@ -16,6 +16,8 @@ from regolithd.calibration.mismatch.candidates.stribeck_friction import Stribeck
 
 FASTEST = 2.0
 """About the highest usual speed of the linear machine [rad/s]."""
+RIPPLE = 1.0
+"""Cycles of a ripple in a turn."""
 
 
 def with_friction(transition_rad_s: float, noise: float = 0.05) -> dict[str, np.ndarray]:
@@ -115,6 +117,30 @@ def test_friction_that_follows_the_displacement_is_found(presliding_rad: float) 
     """The linear machine swings by some thirty radians."""
     found = reversal_of(problem_of(with_presliding(presliding_rad)))
     assert found == {"presliding_rad": pytest.approx(presliding_rad, rel=0.2)}
+
+
+def cycling(presliding_rad: float, ripple: float) -> dict[str, np.ndarray]:
+    """Return a machine that goes to and fro between two places, with friction and a ripple in its angle."""
+    columns = table(noise=0.05)
+    fine = 50
+    cycle = 2 * np.pi * np.arange(fine * len(columns["t_s"]) // AXES) / (90 * fine)
+    speed = FASTEST * np.clip(3 * np.sin(cycle), -1, 1)
+    angle, state = np.cumsum(speed) * STEP_S / fine, np.sign(speed)
+    for step in range(1, len(speed) if presliding_rad else 0):
+        moved = abs(speed[step]) * STEP_S / fine / presliding_rad
+        state[step] = state[step - 1] + (np.sign(speed[step]) - state[step - 1]) * moved
+    reading = (0.8 * state + ripple * np.cos(RIPPLE * angle))[::fine]
+    read = {"speed_rad_s": np.repeat(speed[::fine], AXES), "reading_V": np.repeat(reading, AXES) + columns["reading_V"]}
+    return {**columns, **read}
+
+
+@pytest.mark.parametrize(("presliding_rad", "ripple"), [(0.0, 2.0), (4.0, 1.2)])
+def test_a_ripple_of_a_machine_that_turns_round_at_the_same_places_is_no_reversal(
+    presliding_rad: float, ripple: float
+) -> None:
+    """After each reversal it has the same course, as friction that follows the displacement has."""
+    found = reversal_of(problem_of(cycling(presliding_rad, ripple)))
+    assert found == ({"presliding_rad": pytest.approx(presliding_rad, rel=0.03)} if presliding_rad else {})
 
 
 def test_the_friction_of_one_axis_alone_shows_how_it_reverses() -> None:

@@ -14,7 +14,7 @@ from scipy.stats import chi2
 from regolithd.calibration.mismatch import Simulation
 from regolithd.calibration.mismatch.candidates.responses import strongest
 from regolithd.calibration.mismatch.candidates.sensor_delay import columns_of
-from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import WheelAngleRipple
+from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import FORMS, WheelAngleRipple
 from regolithd.calibration.mismatch.data.recording import from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
 
@@ -119,6 +119,39 @@ def test_a_late_channel_shows_an_earlier_angle_and_not_a_smaller_ripple() -> Non
     shape = {"order": 5.0, "kind": "torque", "sines": 1.0}
     np.testing.assert_allclose(columns_of(late, WheelAngleRipple(), shape)[0, :, 0], expected, atol=1e-6)
     assert 5.0 in orders_in(late, expected)
+
+
+@pytest.mark.parametrize(("lag", "told"), [(0.15, 0.15), (-0.4, -0.4), (0.01, 0.0)])
+def test_an_angle_that_lags_by_a_part_of_a_reading_is_found_so(lag: float, told: float) -> None:
+    """To a sixteenth of a reading; what noise hides is none."""
+    time_s = 0.2 * np.arange(6000)
+    problem = turning(7.0 * np.sin(2 * np.pi * time_s / 300))
+    angle = problem.covariates["wheel_angle"][:, 0] - lag * 0.2 * problem.covariates["wheel_speed"][:, 0]
+    noise = 0.5 * np.random.default_rng(5).standard_normal(len(angle))
+    proposed = WheelAngleRipple().propose_shapes(problem, (np.cos(2 * angle) + noise)[:, None])
+    found = [float(shape["lag"]) for shape in proposed if shape["kind"] == "torque" and abs(shape["order"] - 2) < 0.1]
+    assert found
+    assert found == pytest.approx([told] * len(found), abs=0.07)
+
+
+def test_a_ripple_that_stops_with_the_motion_is_told_from_one_that_does_not() -> None:
+    """Where the recording has rests; without any both are the same, and none of them is asked for."""
+    time_s = 0.2 * np.arange(6000)
+    problem = turning(7.0 * np.clip(np.sin(2 * np.pi * time_s / 300), 0.0, None))
+    shape = {"order": 2.0, "kind": "turning", "sines": 1.0}
+    at_rest = problem.covariates["direction"][:, 0] == 0
+    waves = columns_of(problem, WheelAngleRipple(), shape)[:, :, 0]
+    assert np.all(waves[:, at_rest] == 0)
+    always = columns_of(problem, WheelAngleRipple(), {**shape, "kind": "torque"})[:, :, 0]
+    np.testing.assert_array_equal(waves[:, ~at_rest], always[:, ~at_rest])
+    assert {kind for kind in FORMS if kind in kinds_proposed(problem)} == set(FORMS)
+    assert "turning" not in kinds_proposed(turning(7.0 + np.sin(2 * np.pi * time_s / 300)))
+
+
+def kinds_proposed(problem: Problem) -> set[str]:
+    """Return what the sines that are proposed are a factor of."""
+    residual = np.cos(2 * problem.covariates["wheel_angle"])
+    return {str(shape["kind"]) for shape in WheelAngleRipple().propose_shapes(problem, residual)}
 
 
 def test_at_one_speed_its_order_is_not_known() -> None:
