@@ -126,9 +126,8 @@ def _ripple(beside: _Beside, shape: Shape) -> list[Array]:
     proposed = [candidate.columns(problem, each) for each in candidate.propose_shapes(problem, left)]
     tried = [(beside.with_free(columns).squares_left(shape), columns) for columns in proposed]
     least, columns = min(tried, key=lambda pair: pair[0], default=(inf, np.zeros(0)))
-    by_chance = problem.thresholds.single_test_level / candidate.shape_count(problem)
-    gain = beside.gain(least, beside.squares_left(shape))
-    return list(columns) if gain > quantile(len(columns), by_chance) else []
+    needed = quantile(len(columns), problem.thresholds.single_test_level / candidate.shape_count(problem))
+    return list(columns) if beside.gain(least, beside.squares_left(shape)) > needed else []
 
 
 def _best_of(beside: _Beside, tried: Sequence[Shape]) -> _Turn:
@@ -207,7 +206,7 @@ class _Beside:
     residual: shape (1, reading)
     laws: how many friction may follow
     decay: drag that decays from standstill among them; None: none
-    made: columns of the other laws, and products of all, by the shape with which they reverse, of the last few shapes
+    made: columns of the other laws, and products of all, by the shape with which they reverse, of the last few
     """
 
     problem: Problem
@@ -319,8 +318,8 @@ def _about_reversals(problem: Problem) -> list[Array]:
 def _laws(problem: Problem, shape: Shape) -> list[Array]:
     """Return friction that is constant on each axis, grows with the root of speed, with it, its square, or the load.
 
-    The first three change with the temperature and with time: they would seem to reverse with a long displacement. A
-    late channel shows friction late: on time, it would seem to reverse with the displacement.
+    The first three change with temperature and time: they would seem to reverse with a long displacement. A late
+    channel shows friction late: on time, it would seem to reverse so, too.
     """
     direction, speed = along_motion(problem, shape), np.abs(problem.known("wheel_speed"))
     slow = [np.ones(speed.shape), problem.time_s / problem.length_s]

@@ -138,12 +138,14 @@ def _is_a_laws_misfit(decision: Decision, fit: Fit, named: Fit, curve: Term) -> 
     """Return whether a curve gains no more than an inexact law leaves, beside a set's names or in the place of others.
 
     Where the answer's names leave nothing, and the set lacks some of them, the curve stands in their place. Alone, a
-    curve of their covariate always does.
+    curve of their covariate always does; one in the place of several names of other covariates is no law's misfit.
     """
     missing = [term for term in decision.named.terms if term.name not in answer_names(named.terms)]
     in_place = bool(missing) and not decision.unnamed
-    if in_place and not named.terms and all(covariate_of(term) == curve.name for term in missing):
-        return True
+    if in_place and not named.terms:
+        of_its_covariate = all(covariate_of(term) == curve.name for term in missing)
+        if of_its_covariate or len(missing) > 1:
+            return of_its_covariate
     instead_of = decision.named if in_place else named
     if not instead_of.terms:
         return False
@@ -212,9 +214,12 @@ def _evidence(decision: Decision, fit: Fit) -> float:
 def _neighbours(decision: Decision) -> Iterator[tuple[Term, ...]]:
     """Yield the sets of terms with one less, one more, or one in another's place; of the names alone, too.
 
-    A curve may hold what the wrong name beside it leaves: the right name needs none.
+    A curve may hold what the wrong name beside it leaves: the right name needs none. And one curve may be what several
+    names imitate.
     """
     terms, named = decision.whole.terms, tuple(term for term in decision.whole.terms if term.group.named)
+    if len(named) > 1:
+        yield from ((curve,) for _, curve in best_of_each_smooth_term(decision.equations, ())[:1])
     for index in range(len(named)) if len(named) < len(terms) else ():
         rest = (*named[:index], *named[index + 1 :])
         yield from ((*rest, other) for other in _further(decision, rest))

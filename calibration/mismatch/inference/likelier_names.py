@@ -22,16 +22,18 @@ if TYPE_CHECKING:
 def likelier_names(decision: Decision) -> Decision | None:
     """Return the best answer that has more evidence than this one, None if there is none.
 
-    It has other names or none; or by more than chance fewer names, or a further one or another beside its curves; or a
-    curve of an answer without some of its names. Held-out readings have not been asked yet.
+    It has other names or none; or by more than chance fewer names, a further one or another beside its curves, or one
+    curve in the place of all names; or a curve of an answer without some of its names. Held-out readings have not been
+    asked yet.
     """
     told, chance = names_of(decision), decision.equations.thresholds.lead_margin
     for other in alternatives(decision):
         if other.margin >= 0:
             break
         if UNEXPLAINED in other.effects:
-            beside_curves = UNEXPLAINED in told and other.margin < -chance
-            found = _with_curve(decision, other) if told > set(other.effects) or beside_curves else None
+            one_for_all = UNEXPLAINED in told or other.effects == (UNEXPLAINED,)
+            likelier = told > set(other.effects) or (one_for_all and other.margin < -chance)
+            found = _with_curve(decision, other) if likelier else None
         else:
             fewer = bool(other.effects) and told > set(other.effects)
             found = None if fewer and other.margin > -chance else _named(decision, other)
