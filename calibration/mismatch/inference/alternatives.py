@@ -28,6 +28,7 @@ from regolithd.calibration.mismatch.selection.smooth_terms import (
     covariate_of,
     drop_what_a_curve_explains,
     power_share,
+    weigh_against_smooth_terms,
 )
 
 if TYPE_CHECKING:
@@ -35,6 +36,9 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.selection.decision import Decision
+
+_Terms = tuple["tuple[Term, ...]", "tuple[Term, ...]"]
+_Identities = tuple[tuple[int, ...], tuple[int, ...]]
 
 NEVER: tuple[float, tuple[Term, ...]] = (float("inf"), ())
 LARGEST_MARGIN = 40.0
@@ -99,9 +103,18 @@ def _is_another(decision: Decision, names: tuple[str, ...]) -> bool:
 
 
 def _stands_optimised(decision: Decision, other: Alternative) -> bool:
-    """Return whether an answer that is ahead is still acceptable once the shapes of its effects are optimised."""
+    """Return whether an answer that is ahead passes all tests once the shapes of its effects are optimised.
+
+    Names alone must leave nothing that is significant, and have nothing to do with what comes and goes.
+    """
     equations, terms = optimised_shapes(decision.equations, [term for term in other.terms if term.group.named])
-    return acceptable(equations, equations.fit(terms))
+    fit = equations.fit(terms)
+    if not acceptable(equations, fit):
+        return False
+    if not terms or len(terms) < len(other.terms):
+        return True
+    kept, left = weigh_against_smooth_terms(equations, fit, [equations.fit(())], decision.entry_threshold)
+    return len(kept.terms) == len(terms) and not left
 
 
 def _admissible(decision: Decision, fit: Fit) -> bool:
@@ -164,7 +177,8 @@ class _Margins:
         self._decision = decision
         self._by_weights_alone = {id(each.term) for each in decision.intermittent}
         self._by_weights_alone |= {id(each.region) for each in decision.confined}
-        self._beside_slow_noise: dict[tuple[int, ...], float] = {}
+        # With the terms, so that no other object has the identity of one while it is a key.
+        self._beside_slow_noise: dict[_Identities, tuple[_Terms, float]] = {}
 
     def to(self, fit: Fit) -> float:
         """Return the margin to the answer with these terms."""
@@ -186,12 +200,13 @@ class _Margins:
         by_weights = self._by_weights(further, shared)
         if not further or any(id(term) in self._by_weights_alone for term in further):
             return by_weights
-        equations, key = self._decision.equations, tuple(map(id, (*shared.terms, *further)))
+        equations, terms = self._decision.equations, (shared.terms, further)
+        key = tuple(map(id, shared.terms)), tuple(map(id, further))
         if key not in self._beside_slow_noise:
-            self._beside_slow_noise[key] = score_beside_slow_noise(equations, shared.terms, further)
+            self._beside_slow_noise[key] = terms, score_beside_slow_noise(equations, *terms)
         of_curve = None if instead else equations.thresholds.slow_noise_entry
         needed = entry_cost(equations, further, self._decision.entry_threshold, of_curve)
-        return min(by_weights, self._beside_slow_noise[key] - needed)
+        return min(by_weights, self._beside_slow_noise[key][1] - needed)
 
     def _by_weights(self, further: tuple[Term, ...], shared: Fit) -> float:
         fit = self._decision.equations.fit((*shared.terms, *further))

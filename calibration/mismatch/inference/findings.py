@@ -30,7 +30,12 @@ from regolithd.calibration.mismatch.inference.located import share_of_residual, 
 from regolithd.calibration.mismatch.inference.not_looked_for import not_looked_for
 from regolithd.calibration.mismatch.inference.other_covariates import notes_on_other_covariates
 from regolithd.calibration.mismatch.inference.parameter_information import parameter_covariance
-from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
+from regolithd.calibration.mismatch.inference.probability import (
+    decided_by_evidence,
+    is_known,
+    other_answers,
+    probability,
+)
 from regolithd.calibration.mismatch.inference.ranges import notes_on_confined_laws, range_of
 from regolithd.calibration.mismatch.inference.same_parameters import with_changed_or_moved
 from regolithd.calibration.mismatch.inference.sensitivity import sensitivities
@@ -122,8 +127,9 @@ def answer_of(
     equations, threshold = decision.equations, decision.entry_threshold
     problem, thresholds = equations.problem, equations.thresholds
     found = findings_of(decision, held_out, candidates, applicable, drawn)
-    known = decided_by_evidence(decision)
-    rest = with_changed_or_moved(decision, with_refused(decision)) if known else ()
+    rest = with_changed_or_moved(decision, with_refused(decision)) if decided_by_evidence(decision) else ()
+    known = is_known(decision, rest)
+    rest = rest if known else ()
     extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold, rest)
     after = held_out.after if decision.named.terms else held_out.before
     return Answer(

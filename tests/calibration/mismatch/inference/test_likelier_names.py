@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
+import fleet_arm
 import numpy as np
 import pytest
 from winch import Winch
@@ -16,9 +17,11 @@ from regolithd.calibration.mismatch.inference.alternatives import Alternative
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
+
+    from regolithd.calibration.mismatch import Candidate
 
     Array = NDArray[np.float64]
 
@@ -40,6 +43,29 @@ def smooth(rng: np.random.Generator, period_s: float) -> Array:
     time_s = STEP_S * np.arange(ROWS)
     course = sum(np.sin(2 * np.pi * time_s / (period_s * k) + rng.uniform(0, 6)) for k in (0.6, 1.0, 1.7))
     return np.asarray(course / np.std(course))
+
+
+class WarmArm(fleet_arm.Arm):
+    """The arm, with the whole library and a temperature."""
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return what a drag may follow."""
+        return {**super().covariates(inputs), "temperature": inputs["gear_temperature_degC"]}
+
+    def candidates(self, library: Sequence[Candidate]) -> Sequence[Candidate]:
+        """Return all."""
+        return library
+
+
+def test_one_curve_that_several_names_imitate_takes_their_place() -> None:
+    """A drag about 5 °C, where the gear is for the last third: a drag on each joint that begins is nearly the same."""
+    table = fleet_arm.columns(4)
+    temperature = -20.0 + 30.0 * (1 - np.exp(-table["t_s"] / 12))
+    drag = 0.25 * np.sign(table["speed_rad_s"]) * np.exp(-0.5 * ((temperature - 5.0) / 6.0) ** 2)
+    columns = {**table, "gear_temperature_degC": temperature, "torque_Nm": table["torque_Nm"] + drag}
+    answer = compare(columns, WarmArm()).answer
+    assert answer.effects == ()
+    assert [place.covariate for place in answer.unexplained] == ["temperature"]
 
 
 def test_a_drag_that_begins_is_named_beside_a_curve_that_was_found_before_it() -> None:

@@ -9,10 +9,15 @@ import pytest
 from linear_machine import CANDIDATES, equations_of, problem_of, table
 
 from regolithd.calibration.mismatch.inference.alternatives import Alternative, alternatives, with_refused
-from regolithd.calibration.mismatch.inference.probability import decided_by_evidence, other_answers, probability
+from regolithd.calibration.mismatch.inference.probability import (
+    decided_by_evidence,
+    is_known,
+    other_answers,
+    probability,
+)
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
-from regolithd.calibration.mismatch.selection.decision import Decision, decide
+from regolithd.calibration.mismatch.selection.decision import Decision, Intermittent, decide
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 HIGHEST, SCALE = THRESHOLDS.highest_probability, THRESHOLDS.evidence_scale
@@ -63,6 +68,16 @@ def test_a_strong_drag_is_surer_than_a_weak_one() -> None:
     sure, unsure = (probability(alternatives(each), THRESHOLDS) for each in (strong, weak))
     assert sure > 0.9
     assert sure > unsure
+
+
+def test_the_evidence_of_a_curve_says_nothing_of_what_comes_and_goes_where_another_answer_has_more() -> None:
+    """Its two levels tell it, which no curve over time describes."""
+    found = decided(drag=0.3)
+    spells = Intermittent(found.whole.terms[0], 0.0, 1.0, 0.5)
+    ahead, behind = Alternative(("power",), -3.0), Alternative(("power",), 3.0)
+    assert is_known(found, (ahead,))
+    assert is_known(replace(found, intermittent=(spells,)), (behind,))
+    assert not is_known(replace(found, intermittent=(spells,)), (ahead, behind))
 
 
 def test_the_alternatives_are_one_name_away() -> None:
