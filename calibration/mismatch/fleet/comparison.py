@@ -23,6 +23,7 @@ from regolithd.calibration.mismatch.fleet.corrected import acting_last, write_co
 from regolithd.calibration.mismatch.fleet.evidence import FleetEvidence
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
 from regolithd.calibration.mismatch.fleet.told.findings import Chosen, Names, answer_of_fleet
+from regolithd.calibration.mismatch.fleet.told.joint import joint_parameters
 from regolithd.calibration.mismatch.fleet.work.found import Found, found_in, one_channel
 from regolithd.calibration.mismatch.fleet.work.grid import GridGroup, grid_of, placed
 from regolithd.calibration.mismatch.fleet.work.kept_columns import KeptColumns
@@ -182,7 +183,7 @@ def compare_fleet(
     rows = tuple(
         row for chosen, answer in zip(compared, answers, strict=True) for row in catalogue_rows(chosen, answer)
     )
-    answer = answers[0] if len(answers) == 1 else joined(answers)
+    answer = answers[0] if len(answers) == 1 else replace(joined(answers), parameters=joint_parameters(compared))
     units = {channel: chosen.simulation.unit for channel, chosen in zip(channels, compared, strict=True)}
     wheels = tuple(dict.fromkeys(wheel for chosen in compared for wheel in chosen.equations.wheels))
     acting = tuple(

@@ -263,16 +263,22 @@ def _unexplained(chosen: Chosen, recording: int, rest: object) -> FleetUnexplain
     return FleetUnexplained(**vars(rest), rovers=(rover,), recordings=(names.recordings[recording],))
 
 
-def _parameters(chosen: Chosen, beside: Beside) -> tuple[FleetParameter, ...]:
-    """Return each parameter where the recordings moved it: of the fleet, or of each rover; of recordings, none."""
-    equations, names = chosen.equations, chosen.names
+def owners_of(chosen: Chosen) -> list[tuple[str, ...]]:
+    """Return whose the told parameters are: all rovers', or each rover's; where they are each recording's, none."""
+    rovers = chosen.names.rovers
     owners: dict[str, list[tuple[str, ...]]] = {
-        "shared": [names.rovers],
-        "rover": [(rover,) for rover in names.rovers],
+        "shared": [rovers],
+        "rover": [(rover,) for rover in rovers],
         "recording": [],
     }
+    return owners[chosen.equations.level]
+
+
+def _parameters(chosen: Chosen, beside: Beside) -> tuple[FleetParameter, ...]:
+    """Return each parameter where the recordings moved it: of the fleet, or of each rover; of recordings, none."""
+    equations = chosen.equations
     found = []
-    for place, rovers in enumerate(owners[equations.level]):
+    for place, rovers in enumerate(owners_of(chosen)):
         for name, prior in chosen.simulation.parameters.items():
             if not prior.told:
                 continue
