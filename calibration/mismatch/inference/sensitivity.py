@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 
-LARGEST_TOLD = 10.0
-"""Size over the mean reading beyond which an effect does not show, however large (a choice: nobody overlooks it)."""
+LARGEST_TOLD = 1.0
+"""Size over the mean reading beyond which an effect does not show, however large (a choice: nobody overlooks one as
+large as what is read)."""
 
 
 def sensitivities(

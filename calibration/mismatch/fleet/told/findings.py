@@ -219,11 +219,8 @@ def _statement(
     """Return one sentence: what, on which wheels of which rovers, since when, how large, and what it costs."""
     names, course = chosen.names, term.course
     rovers = [names.rovers[rover] for rover in term.units.rovers]
-    of = (
-        ""
-        if len(names.rovers) == 1
-        else f" of {'all rovers' if len(rovers) == len(names.rovers) else ', '.join(rovers)}"
-    )
+    whose = "all rovers" if len(rovers) == len(names.rovers) else ", ".join(rovers)
+    of = "" if len(names.rovers) == 1 else f" of {whose}" if wheels else f", on {whose}"
     at = names.date(course.first) or names.recordings[course.first]
     when = {
         "always": "",
