@@ -17,8 +17,8 @@ STEPS = tuple(timedelta(hours=hours) for hours in (1, 3, 6, 12, 24, 48, 96, 168,
 """Steps between marks, up to two weeks; longer seasons are marked at the first day of months."""
 MONTHS = (1, 2, 3, 6, 12, 24, 60, 120)
 """Steps in months."""
-MOST_MARKS = 7
-"""Marks on an axis (a choice: a date is 70 px wide)."""
+MOST_MARKS = 5
+"""Marks on an axis (a choice: a date is 75 px wide, and between two there is to be as much as a half of that)."""
 MARGIN = 0.02
 """Share of the season that is left free at either end."""
 

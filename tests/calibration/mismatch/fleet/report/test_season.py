@@ -18,9 +18,9 @@ FIRST = datetime(2026, 3, 1, 8, 0, tzinfo=UTC)
     [
         (timedelta(hours=5), "03-01 08:00", "03-01 09:00"),
         (timedelta(days=2), "03-01 12:00", "03-02 00:00"),
-        (timedelta(days=6), "2026-03-02", "2026-03-03"),
+        (timedelta(days=6), "2026-03-03", "2026-03-05"),
         (timedelta(days=60), "2026-03-15", "2026-03-29"),
-        (timedelta(days=200), "2026-04", "2026-05"),
+        (timedelta(days=200), "2026-05", "2026-07"),
         (timedelta(days=700), "2026-07", "2027-01"),
         (timedelta(days=3650), "2028-01", "2030-01"),
     ],
