@@ -44,7 +44,7 @@ TOLD_IN_THE_STATEMENT = ("relative_size", "onset_s")
 
 
 def print_answer(console: Console, answer: Answer, labels: Labels, wheels: Sequence[int | str] = ()) -> None:
-    """Print verdict, effects, changes, what is unexplained or indistinguishable, the held-out error and the notes.
+    """Print verdict, effects, changes, what is unexplained or indistinguishable, errors, and what bounds the answer.
 
     `wheels` are all that the recording has; empty: not known. On a terminal, lines that continue are indented; a file
     or a pipe gets each on one line.
@@ -82,14 +82,17 @@ def _wrapped(line: str, width: int) -> str:
 def _lines(answer: Answer, labels: Labels, wheels: Sequence[int | str]) -> list[str]:
     several = len(answer.fits) > 1
     moved = parameters_found(answer.parameters, unexplained=answer.verdict == "unexplained")
+    named = {*(effect.name for effect in answer.effects), *(change.name for change in answer.changes)}
+    told = [each for each in answer.indistinguishable if named.intersection(each.effects)]
     return [
         *(line for effect in answer.effects for line in _effect(effect, several=several)),
         *(f"changed{f' in {change.channel}' if several else ''}: {change.statement}" for change in answer.changes),
         *(f"parameter {beyond_prior_in_words(each)}" for each in moved),
         *_all_unexplained(answer.unexplained, labels, len(wheels), several=several),
-        *(_not_distinguished(each, answer, labels) for each in answer.indistinguishable),
+        *(_not_distinguished(each, answer, labels) for each in told),
         sure_of(answer),
         *map(_error, answer.fits or (answer.fit,)),
+        *(_not_found(each, answer, labels) for each in answer.indistinguishable if each not in told),
         *(f"note: {note}" for note in notes_beside_priors(answer.notes, moved)),
     ]
 
@@ -108,17 +111,22 @@ def _interval(parameter: Parameter) -> str:
 
 
 def _not_distinguished(found: Indistinguishable, answer: Answer, labels: Labels) -> str:
-    """Return a set of effects with its experiment; of one that has no finding in it, that nothing was found."""
+    """Return a set of effects, one of which was found, with its experiment."""
+    told = "these recordings do not" if isinstance(answer, FleetAnswer) else "this recording does not"
+    return f"{_names_of(found, answer, labels)}: {told} distinguish them. {found.experiment}"
+
+
+def _not_found(found: Indistinguishable, answer: Answer, labels: Labels) -> str:
+    """Return a set of effects without a finding, with its experiment: a limit of the recording, as the notes are."""
+    told = "these recordings" if isinstance(answer, FleetAnswer) else "this recording"
+    names = _names_of(found, answer, labels)
+    return f"not found: {names}. If there were one, {told} would not tell which. {found.experiment}"
+
+
+def _names_of(found: Indistinguishable, answer: Answer, labels: Labels) -> str:
     named = {effect.name for effect in answer.effects}
     names = " or ".join(labels.if_changed(name, named, name) for name in found.alone)
-    if found.beside:
-        names += f", or {found.alone[0]} with {' or '.join(found.beside)} beside it"
-    many = isinstance(answer, FleetAnswer)
-    if named.union(change.name for change in answer.changes).intersection(found.effects):
-        told = "these recordings do not" if many else "this recording does not"
-        return f"{names}: {told} distinguish them. {found.experiment}"
-    told = "these recordings" if many else "this recording"
-    return f"not found: {names}. If there were one, {told} would not tell which. {found.experiment}"
+    return f"{names}, or {found.alone[0]} with {' or '.join(found.beside)} beside it" if found.beside else names
 
 
 def _all_unexplained(found: Sequence[Unexplained], labels: Labels, of: int, *, several: bool) -> list[str]:
