@@ -14,6 +14,7 @@ from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import WheelAngleRipple
 from regolithd.calibration.mismatch.problem.covariates import USUAL_SPEED_QUANTILE
 from regolithd.calibration.mismatch.signal.chi_squared import quantile
+from regolithd.calibration.mismatch.signal.least_squares import fitted, squares_left
 from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED, Whitening, estimate_whitening
 
 if TYPE_CHECKING:
@@ -55,11 +56,6 @@ LEAST_GAIN = 10.8
 """Δχ² from which a gradual reversal is preferred to a step: one chance in a thousand for one more coefficient."""
 TURNED = 0.75
 """Share of the friction that has reversed where a reading is no more within a reversal: tanh 1."""
-ROUNDING = 1e-12
-"""Share of the residual's sum of squares below which what is left of it is rounding (a choice: double precision, with a
-margin)."""
-SINGULAR = 1e-12
-"""Relative singular value of the products below which laws are the same (a choice: double precision, with a margin)."""
 
 
 def reversal_of(problem: Problem) -> Shape:
@@ -227,7 +223,7 @@ class _Beside:
     @property
     def squares_without_friction(self) -> float:
         """Return the sum of squares that the free parameters alone leave."""
-        return _squares_left(self._products(self.free, self.residual))[0]
+        return squares_left(self._products(self.free, self.residual))[0]
 
     def squares_left(self, shape: Shape) -> float:
         """Return the sum of squares that the free parameters and friction of any usual law leave, with this shape.
@@ -236,15 +232,15 @@ class _Beside:
         """
         laws, products = self._laws_of(shape)
         if self.decay is None:
-            return _squares_left(products)[0]
+            return squares_left(products)[0]
         drag = _decaying(self.problem, shape, self.decay)
         decaying = _in_order(self.problem, [drag], self.whitening, self.deviation)
         beside = np.concatenate([each @ decaying[0] for each in (self.free, laws, decaying, self.residual)])
         at = len(self.free) + len(laws)
         with_decay = np.insert(np.insert(products, at, 0.0, axis=0), at, 0.0, axis=1)
         with_decay[at], with_decay[:, at] = beside, beside
-        left, coefficient = _squares_left(with_decay)
-        return left if coefficient >= 0 else _squares_left(products)[0]
+        left, coefficient = squares_left(with_decay)
+        return left if coefficient >= 0 else squares_left(products)[0]
 
     def left_as_read(self, shape: Shape) -> Array:
         """Return what they and friction with this shape leave of the readings, shape (time, wheel)."""
@@ -355,27 +351,9 @@ def _by_wheel(problem: Problem, values: Array) -> list[Array]:
 def _left_as_read(problem: Problem, columns: Sequence[Array]) -> Array:
     """Return what columns (time, wheel) leave of the residual by least squares, shape (reading,): wheel by wheel."""
     ones = np.ones(problem.mask.shape[1])
-    residual, *fitted = _in_order(problem, [problem.residual, *columns], NOT_WHITENED, ones)
-    by = np.reshape(fitted, (len(columns), -1))
-    return np.asarray(residual - _fitted(by @ by.T, by @ residual) @ by)
-
-
-def _squares_left(products: Array) -> tuple[float, float]:
-    """Return the sum of squares that columns leave of a residual, and the last column's coefficient.
-
-    `products` are those of the columns and, last, the residual with each other.
-    """
-    squares, moments = products[:-1, :-1], products[:-1, -1]
-    fitted = _fitted(squares, moments)
-    left = products[-1, -1] - 2 * fitted @ moments + fitted @ squares @ fitted
-    return max(float(left), ROUNDING * float(products[-1, -1])), float(fitted[-1]) if len(fitted) else 0.0
-
-
-def _fitted(squares: Array, moments: Array) -> Array:
-    """Return the coefficients of least squares, from products of columns with each other and with a residual."""
-    size = np.sqrt(np.diag(squares))
-    scale = np.where(size > 0, size, 1.0)
-    return np.asarray(np.linalg.lstsq(squares / np.outer(scale, scale), moments / scale, rcond=SINGULAR)[0] / scale)
+    residual, *in_order = _in_order(problem, [problem.residual, *columns], NOT_WHITENED, ones)
+    by = np.reshape(in_order, (len(columns), -1))
+    return np.asarray(residual - fitted(by @ by.T, by @ residual) @ by)
 
 
 def _refined(beside: _Beside, shape: Shape) -> _Turn:
