@@ -31,8 +31,10 @@ class Subscriber:
         """Receive until cancelled; reconnect after an error."""
         while True:
             with suppress(aiomqtt.MqttError):
-                async with aiomqtt.Client("127.0.0.1", self.port, identifier=self.name, clean_session=False) as client:
-                    client._client.on_message = self._take  # aiomqtt's messages have no `dup`
+                client = aiomqtt.Client("127.0.0.1", self.port, identifier=self.name, clean_session=False)
+                # aiomqtt's messages have no `dup`. What waits in the session comes with the acknowledgement of CONNECT.
+                client._client.on_message = self._take
+                async with client:
                     await client.subscribe(self.topic, qos=1)
                     self.ready.set()
                     async for _ in client.messages:
@@ -78,7 +80,8 @@ async def listening(subscriber: Subscriber) -> AsyncIterator[Subscriber]:
 
 def assert_complete(subscriber: Subscriber, count: int) -> None:
     """Assert that `count` snapshots came, in order, and that a repetition is marked late."""
-    assert subscriber.sequences() == list(range(count))
+    came = subscriber.sequences()
+    assert came == list(range(count)), f"lost {set(range(count)) - set(came)}; they came as {came}"
     seen: set[int] = set()
     for place, (topic, message, _) in enumerate(subscriber.messages):
         if topic == "snapshot":
