@@ -30,7 +30,7 @@ FORMS = {
     "turning": "in motion, whatever its direction",
 }
 """Names of the ripples, in the answer, by what the sine is a factor of: the direction, 1, the relative prediction, and
-the direction's magnitude: teeth of a motor pull as the sine says at standstill, too, the waves of a fan do not."""
+the direction's magnitude: the cogging torque of a motor acts at standstill, too, the blade forces of a fan do not."""
 LEAST_AT_REST = 0.01
 """Share of the readings that are at rest, from which it is asked whether a ripple acts there (a choice)."""
 LOWEST_ORDER, HIGHEST_ORDER = 0.9, 64

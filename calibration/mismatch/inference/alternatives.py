@@ -37,9 +37,6 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.selection.decision import Decision
 
-_Terms = tuple["tuple[Term, ...]", "tuple[Term, ...]"]
-_Identities = tuple[tuple[int, ...], tuple[int, ...]]
-
 NEVER: tuple[float, tuple[Term, ...]] = (float("inf"), ())
 LARGEST_MARGIN = 40.0
 """Margin beyond which an answer is no alternative: it is e^20 times less probable."""
@@ -64,7 +61,7 @@ class Alternative:
 def alternatives(decision: Decision, *, refused: bool = False) -> tuple[Alternative, ...]:
     """Return the other answers of one step's difference, the best of each set of names, best first.
 
-    With `refused` also those that held-out readings refused, and all their evidence: no answers, yet evidence.
+    With `refused` also those that held-out readings refused: their evidence still says that something is there.
     Where a law in a range was more probable than a name that holds everywhere, no further name is another answer.
     """
     best: dict[tuple[str, ...], tuple[float, tuple[Term, ...]]] = {}
@@ -177,8 +174,8 @@ class _Margins:
         self._decision = decision
         self._by_weights_alone = {id(each.term) for each in decision.intermittent}
         self._by_weights_alone |= {id(each.region) for each in decision.confined}
-        # With the terms, so that no other object has the identity of one while it is a key.
-        self._beside_slow_noise: dict[_Identities, tuple[_Terms, float]] = {}
+        # By the identities of shared and further terms, which are kept beside: else another object could have one.
+        self._beside_slow_noise: dict[tuple[tuple[int, ...], ...], tuple[tuple[tuple[Term, ...], ...], float]] = {}
 
     def to(self, fit: Fit) -> float:
         """Return the margin to the answer with these terms."""
@@ -201,7 +198,7 @@ class _Margins:
         if not further or any(id(term) in self._by_weights_alone for term in further):
             return by_weights
         equations, terms = self._decision.equations, (shared.terms, further)
-        key = tuple(map(id, shared.terms)), tuple(map(id, further))
+        key = tuple(tuple(map(id, each)) for each in terms)
         if key not in self._beside_slow_noise:
             self._beside_slow_noise[key] = terms, score_beside_slow_noise(equations, *terms)
         of_curve = None if instead else equations.thresholds.slow_noise_entry

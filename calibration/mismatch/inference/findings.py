@@ -127,9 +127,10 @@ def answer_of(
     equations, threshold = decision.equations, decision.entry_threshold
     problem, thresholds = equations.problem, equations.thresholds
     found = findings_of(decision, held_out, candidates, applicable, drawn)
-    rest = with_changed_or_moved(decision, with_refused(decision)) if decided_by_evidence(decision) else ()
-    known = is_known(decision, rest)
-    rest = rest if known else ()
+    by_evidence = decided_by_evidence(decision)
+    others = with_changed_or_moved(decision, with_refused(decision)) if by_evidence else ()
+    known = by_evidence and is_known(decision, others)
+    rest = others if known else ()
     extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold, rest)
     after = held_out.after if decision.named.terms else held_out.before
     return Answer(

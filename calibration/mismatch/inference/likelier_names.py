@@ -31,8 +31,9 @@ def likelier_names(decision: Decision) -> Decision | None:
         if other.margin >= 0:
             break
         if UNEXPLAINED in other.effects:
-            one_for_all = UNEXPLAINED in told or other.effects == (UNEXPLAINED,)
-            likelier = told > set(other.effects) or (one_for_all and other.margin < -chance)
+            curve_for_all_names = other.effects == (UNEXPLAINED,)
+            by_more_than_chance = other.margin < -chance and (UNEXPLAINED in told or curve_for_all_names)
+            likelier = told > set(other.effects) or by_more_than_chance
             found = _with_curve(decision, other) if likelier else None
         else:
             fewer = bool(other.effects) and told > set(other.effects)

@@ -46,12 +46,12 @@ def decided_by_evidence(decision: Decision) -> bool:
 
 
 def is_known(decision: Decision, others: Sequence[Alternative]) -> bool:
-    """Return whether the evidence says how probable an answer is beside others, best first.
+    """Return whether the evidence, which decided an answer, says how probable it is beside others, best first.
 
     What comes and goes is told by its two levels. A curve over time has less evidence than these: where another answer
     has more than the curve, the evidence says nothing.
     """
-    return decided_by_evidence(decision) and not (decision.intermittent and others and others[0].margin < 0)
+    return not (decision.intermittent and others and others[0].margin < 0)
 
 
 def probability(others: Sequence[Alternative], thresholds: Thresholds) -> float:
