@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import atexit
 import importlib
+import os
 import pkgutil
+import sys
 from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated
 
@@ -45,5 +48,29 @@ for module in pkgutil.iter_modules(commands.__path__):
 
 
 def main() -> None:
-    """Run the command line."""
-    app()
+    """Run the command line.
+
+    The process ends after the functions that Python runs at exit, without those that libraries in C++ run later: now
+    and then Apache Arrow aborts while it destroys the threads that read a file (apache/arrow issue 34314), and a
+    command that had done its work would end with the exit code of SIGABRT.
+    """
+    ended: list[SystemExit] = []
+    atexit.register(_end, ended)  # the last one to run: those that commands register come before the first
+    try:
+        app()
+    except SystemExit as end:
+        ended.append(end)
+        raise
+
+
+def _end(ended: list[SystemExit]) -> None:
+    """End the process with the exit code of `SystemExit`; a text, which Python has printed by now, stands for 1."""
+    if not ended:
+        return  # a traceback or a signal, which Python turns into an exit code
+    code = ended[0].code
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:  # nobody reads the pipe any more
+            code = code or 1
+    os._exit(code if isinstance(code, int) else int(code is not None))

@@ -102,3 +102,21 @@ def test_a_user_needs_a_file_and_a_broker_a_host(tmp_path: Path) -> None:
         done = CliRunner().invoke(app, ["ground", *arguments])
         assert (done.exit_code, done.stdout) == (78, "")
         assert told in done.stderr
+
+
+@pytest.mark.parametrize(("arguments", "code"), [(["--version"], 0), (["no-such-command"], 2)])
+def test_a_library_that_aborts_at_exit_leaves_the_exit_code_and_the_output(arguments: list[str], code: int) -> None:
+    """The exit code is the command's where a function that C runs at exit aborts, and what was printed is there."""
+    script = (
+        "import atexit, ctypes, sys\n"
+        "from regolithd.daemon import cli\n"
+        "c = ctypes.CDLL(None)\n"
+        "c.__cxa_atexit(c.abort, None, None)\n"
+        "real = cli.app\n"
+        "cli.app = lambda: (atexit.register(print, 'registered by the command'), real())\n"
+        "cli.main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=False)
+    assert done.returncode == code
+    assert "registered by the command" in done.stdout
+    assert ("regolithd" in done.stdout) == (code == 0)
