@@ -120,7 +120,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         *("_BetweenReadings", "MarkovChains", "SwitchingMean"),
         *("Gains", "JointPosterior", "_Likelihood", "Drawn", "Information"),
         *("NormalTruths", "NormalTruth", "MixingDensity", "Windows", "JumpChain", "Estimate", "Combination"),
-        *("Batch", "Left"),
+        *("Batch", "Left", "_Equations"),
         "Whitening",
         "NoiseSpectrum",
         *("Confined", "ConfinedLaw"),

@@ -20,12 +20,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from math import factorial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.signal.stein import Estimate, squared_error
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 Array = NDArray[np.float64]
 
@@ -43,6 +47,9 @@ MOST_PENALTY = 1e12
 ROUNDS = (0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.0)
 """Exponents of λ in the rounds of weighted least squares with heavy tails (a choice: a corner that the first round
 rounds off is found no more; begun with little smoothing, a half to two thirds of the error is left)."""
+ROUNDS_OF_A_WIDTH = 3
+"""Rounds with each width, where those of the width before are the beginning (a choice: of 64
+columns 62 have the same best spline as with all of `ROUNDS`, and 61 with two)."""
 MOVES = 2
 """Directions in which readings are moved (a choice: thousands of them average out)."""
 MOVED_BY = 0.1
@@ -84,7 +91,13 @@ class SmoothingSpline:
 
         `rows` are those of `differences`, of this order; `deviation` is the standard deviation of the readings' error.
         """
-        return self._fitted(readings, deviation, rows)[0]
+        equations, weights = _Equations.of(readings, rows, self.order), np.ones(len(rows))
+        for exponent in ROUNDS if self.heavy else (1.0,):
+            penalty = self.penalty ** (exponent if self.penalty > 1 else 1.0)
+            (found,) = equations.solved(penalty * weights)
+            if self.heavy:
+                weights = equations.weights(found, penalty, deviation)
+        return np.asarray(found)
 
     def estimate(self, readings: Array, deviation: float, rows: Array) -> Estimate:
         """Return the estimate with what stands for its variance in Stein's lemma: R times its change per reading."""
@@ -97,35 +110,66 @@ class SmoothingSpline:
             change += lot * (one - other) / (2 * step)
         return Estimate(mean, deviation**2 * change / MOVES)
 
-    def with_fixed_weights(self, readings: Array, deviation: float, rows: Array) -> Estimate:
-        """Return the estimate as if its weights did not depend on the readings: one whose error seems too small."""
-        mean, band = self._fitted(readings, deviation, rows)
-        (lot,) = _lots(1, len(mean))
-        return Estimate(mean, deviation**2 * lot * _solved(band, lot))
 
-    def _fitted(self, readings: Array, deviation: float, rows: Array) -> tuple[Array, Array]:
-        """Return the estimate, and the matrix of its equations in SciPy's upper form."""
+@dataclass(frozen=True, eq=False)
+class _Equations:
+    """Least squares of readings (time,) and weighted differences; `rows` (difference, order + 1) are the differences.
+
+    A blank has a reading on a straight line, with next to no weight.
+    """
+
+    read: Array
+    of_reading: Array
+    rows: Array
+
+    @classmethod
+    def of(cls, readings: Array, rows: Array, order: int) -> _Equations:
+        """Return those of readings with NaN where there are none."""
         known = np.isfinite(readings)
-        at, of_reading = np.arange(len(readings)), np.where(known, 1.0, UNKNOWN)
-        read = readings if known.all() else np.interp(at, at[known], readings[known])
-        if len(rows) and not known.all():  # within a long blank nothing is known, and nothing is asked
-            near = np.any(sliding_window_view(np.pad(known, BRIDGED), self.order + 1 + 2 * BRIDGED), axis=1)
+        if known.all():
+            return cls(readings, np.ones(len(readings)), rows)
+        at = np.arange(len(readings))
+        if len(rows):  # within a long blank nothing is known, and nothing is asked
+            near = np.any(sliding_window_view(np.pad(known, BRIDGED), order + 1 + 2 * BRIDGED), axis=1)
             rows = np.where(np.reshape(near, (-1, 1)), rows, 0.0)
-        found, band, weights = read, np.zeros((self.order + 1, len(readings))), np.ones(len(rows))
-        for exponent in ROUNDS if self.heavy else (1.0,):
-            penalty = self.penalty ** (exponent if self.penalty > 1 else 1.0)
-            band = np.zeros((self.order + 1, len(readings)))
-            weighted = (penalty * weights)[:, None] * rows
-            for i in range(self.order + 1):
-                for j in range(i, self.order + 1):
-                    band[self.order - (j - i), j : j + len(rows)] += weighted[:, i] * rows[:, j]
-            band[-1] += of_reading
-            found = _solved(band, of_reading * read)
-            if self.heavy:
-                parts = np.stack([found[k : k + len(rows)] for k in range(self.order + 1)], axis=1)
-                difference = np.einsum("tk,tk->t", rows, parts)
-                weights = 2 / (1 + penalty * (difference / deviation) ** 2)
-        return found, band
+        return cls(np.interp(at, at[known], readings[known]), np.where(known, 1.0, UNKNOWN), rows)
+
+    def solved(self, penalties: Array, *others: Array) -> Array:
+        """Return the estimates for the readings, and for other right sides, shape (1 + others, time)."""
+        from scipy.linalg import solveh_banded  # noqa: PLC0415  # reading a recording must not load SciPy
+
+        order = self.rows.shape[1] - 1
+        band = np.zeros((order + 1, len(self.read)))  # the upper form of SciPy
+        weighted = penalties[:, None] * self.rows
+        for i in range(order + 1):
+            for j in range(i, order + 1):
+                band[order - (j - i), j : j + len(self.rows)] += weighted[:, i] * self.rows[:, j]
+        band[-1] += self.of_reading
+        right = np.stack([self.of_reading * self.read, *others], axis=1)
+        return np.asarray(solveh_banded(band, right, overwrite_ab=True, overwrite_b=True, check_finite=False)).T
+
+    def weights(self, found: Array, penalty: float, deviation: float) -> Array:
+        """Return the weights with which least squares have the slope of a density with heavy tails."""
+        parts = np.stack([found[k : k + len(self.rows)] for k in range(self.rows.shape[1])], axis=1)
+        difference = np.einsum("tk,tk->t", self.rows, parts)
+        return np.asarray(2 / (1 + penalty * (difference / deviation) ** 2))
+
+
+def with_fixed_weights(
+    order: int, readings: Array, deviation: float, rows: Array
+) -> Iterator[tuple[SmoothingSpline, Estimate]]:
+    """Yield the splines with heavy tails, from the least width on, with an estimate whose error seems too small.
+
+    Its weights are found from those of the width before, and its variance is as if they did not depend on the readings.
+    """
+    equations, weights = _Equations.of(readings, rows, order), np.ones(len(rows))
+    (lot,) = _lots(1, len(readings))
+    for width in HEAVY_WIDTHS:
+        spline = SmoothingSpline(order, width, heavy=True)
+        for _ in range(ROUNDS_OF_A_WIDTH):
+            found, change = equations.solved(spline.penalty * weights, lot)
+            weights = equations.weights(found, spline.penalty, deviation)
+        yield spline, Estimate(found, deviation**2 * lot * change)
 
 
 def best_spline(
@@ -145,20 +189,13 @@ def best_spline(
     normal = (SmoothingSpline(order, each) for order in ORDERS for each in WIDTHS)
     normal = (each for each in normal if each.penalty * 4**each.order < MOST_PENALTY)
     least, best = min(((error(each.estimate(*given(each))), each) for each in normal), key=lambda pair: pair[0])
-    heavy = (SmoothingSpline(order, each, heavy=True) for order in HEAVY_ORDERS for each in HEAVY_WIDTHS)
-    seeming = sorted(((error(each.with_fixed_weights(*given(each))), each) for each in heavy), key=lambda pair: pair[0])
+    heavy = (pair for order in HEAVY_ORDERS for pair in with_fixed_weights(order, readings, deviation, rows[order]))
+    seeming = sorted(((error(estimate), spline) for spline, estimate in heavy), key=lambda pair: pair[0])
     for at_least, spline in seeming:
         if at_least >= least:
             break
         least, best = min((least, best), (error(spline.estimate(*given(spline))), spline), key=lambda pair: pair[0])
     return best
-
-
-def _solved(band: Array, right: Array) -> Array:
-    """Return the solution of equations whose matrix is in SciPy's upper form."""
-    from scipy.linalg import solveh_banded  # noqa: PLC0415  # reading a recording must not load SciPy
-
-    return np.asarray(solveh_banded(band, right))
 
 
 def _lots(count: int, length: int) -> Array:
