@@ -120,7 +120,7 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
         *("_BetweenReadings", "MarkovChains", "SwitchingMean"),
         *("Gains", "JointPosterior", "_Likelihood", "Drawn", "Information"),
         *("NormalTruths", "NormalTruth", "MixingDensity", "Windows", "JumpChain", "Estimate", "Combination"),
-        *("Batch", "Left", "_Equations"),
+        *("Batch", "Left", "_Equations", "OtherStatement", "_Release"),
         "Whitening",
         "NoiseSpectrum",
         *("Confined", "ConfinedLaw"),

@@ -251,11 +251,12 @@ JSON_KEYS = (
 
 @dataclass(frozen=True)
 class OtherAnswer:
-    """An answer that was not given: its names, whether something stays unexplained, and how probable it is."""
+    """An answer that was not given: names, whether something stays unexplained, parameters stated wrongly."""
 
     effects: tuple[str, ...]
     unexplained: bool
     probability: float
+    parameters: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

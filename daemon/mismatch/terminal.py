@@ -20,6 +20,7 @@ from regolithd.calibration.mismatch.inference.statements import (
     on_wheels,
     parameters_found,
     percent,
+    without_name,
 )
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def sure_of(answer: Answer) -> str:
     text = f"probability of this answer: {answer.probability:.2f}"
     if (other := answer.next_best) is None:
         return text
-    names = (*other.effects, *(("something unexplained",) if other.unexplained else ()))
+    names = (*other.effects, *without_name(other))
     order = "next" if other.probability <= answer.probability else REFUSED
     return f"{text}; {order}: {' + '.join(names) or 'nothing'} ({other.probability:.2f})"
 

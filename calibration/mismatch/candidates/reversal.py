@@ -52,8 +52,6 @@ MOST_KEPT = 3
 """Shapes of which the columns are kept (a choice: the step, the best, and the one that is tried)."""
 LEAST_WITHIN = 0.01
 """Share of the readings in motion that must be within a reversal, to tell it from a step (a choice)."""
-LEAST_GAIN = 10.8
-"""Δχ² from which a gradual reversal is preferred to a step: one chance in a thousand for one more coefficient."""
 TURNED = 0.75
 """Share of the friction that has reversed where a reading is no more within a reversal: tanh 1."""
 
@@ -102,11 +100,13 @@ def _gradual(beside: _Beside, tried: Sequence[Shape]) -> Shape:
     decaying_step = _with_decay(beside, {})
     others = (gradual.shape, _best_of(replace(beside, decay=decaying_step.decay), tried).shape)
     decaying = min((_with_decay(beside, shape) for shape in others), key=lambda turn: turn.left)
-    if beside.gain(min(decaying_step.left, decaying.left), gradual.left) > LEAST_GAIN:
+    level = beside.problem.thresholds.single_test_level
+    needed = quantile(1, level)  # for the number that a gradual reversal has, and a step has not
+    if beside.gain(min(decaying_step.left, decaying.left), gradual.left) > needed:
         step, gradual = decaying_step, decaying
     of_friction = beside.independent * (beside.squares_without_friction / gradual.left - 1)
-    is_there = of_friction > quantile(beside.laws, beside.problem.thresholds.single_test_level)
-    return gradual.shape if is_there and beside.gain(gradual.left, step.left) > LEAST_GAIN else {}
+    is_there = of_friction > quantile(beside.laws, level)
+    return gradual.shape if is_there and beside.gain(gradual.left, step.left) > needed else {}
 
 
 def _ripple(beside: _Beside, shape: Shape) -> list[Array]:

@@ -11,6 +11,7 @@ from regolithd.calibration.mismatch.candidates.candidate import Array, Candidate
 from regolithd.calibration.mismatch.candidates.responses import Responses
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.problem.covariates import angle_is_recorded
+from regolithd.calibration.mismatch.signal.chi_squared import quantile
 from regolithd.calibration.mismatch.signal.means import running_mean
 from regolithd.calibration.mismatch.signal.spectrum import padded_length, power_of_sums
 
@@ -39,8 +40,6 @@ LAGS = (0.0, -0.5, 0.5)
 """Lags of the angle in readings that are tried first: a speed may be of the instant, or a mean before or after it."""
 LAG_STEPS = (0.25, 0.125, 0.0625)
 """Then, about the best, in readings: a reading of the speed may be a part of a step apart from that of the channel."""
-GAIN_OF_LAG = 10.8
-"""Δχ² from which the angle lags: one chance in a thousand for one more coefficient."""
 OVERSAMPLING = 10.0
 """Factor on the number of resolved lines (a choice): a line's power is a sum of two squares for each wheel, and the
 largest of these sums exceeds the 2 ln of their number that is charged."""
@@ -297,7 +296,7 @@ class WheelAngleRipple(Candidate):
         best = max(LAGS, key=gain)
         for step in LAG_STEPS:
             best = max((best, best - step, best + step), key=gain)
-        return best if gain(best) > gain(0.0) + GAIN_OF_LAG else 0.0
+        return best if gain(best) > gain(0.0) + quantile(1, problem.thresholds.single_test_level) else 0.0
 
     def _spectrum(self, problem: Problem, weighted: Array, highest: float) -> tuple[Array, Array]:
         """Return orders and the residual's power at each, summed over the wheels; white noise has 1 on each wheel."""

@@ -50,12 +50,14 @@ class Alternative:
     ----------
     effects: its names, sorted; "unexplained" stands for a smooth term
     margin: by how much its evidence is behind that of the answer that was given, in Δχ²; negative: it is ahead
-    terms: of its fit
+    terms: of its fit, where the readings do not contradict the priors
+    parameters: that were stated wrongly, if this one is right
     """
 
     effects: tuple[str, ...]
     margin: float
     terms: tuple[Term, ...] = ()
+    parameters: tuple[str, ...] = ()
 
 
 def alternatives(decision: Decision, *, refused: bool = False) -> tuple[Alternative, ...]:
@@ -90,6 +92,17 @@ def with_refused(decision: Decision) -> tuple[Alternative, ...]:
         for other in others
     ]
     return tuple(sorted(told, key=lambda each: each.margin))
+
+
+def with_other_statements(decision: Decision, others: tuple[Alternative, ...]) -> tuple[Alternative, ...]:
+    """Return the other answers, and those with other names in which other parameters were stated wrongly, or none."""
+    best = {other.effects: other for other in others}
+    for each in decision.other_statements:
+        names = _names(each.terms)
+        if answer_names(each.instead_of) == answer_names(decision.whole.terms) != frozenset(names):
+            other = Alternative(names, each.margin, parameters=each.parameters)
+            best[names] = min(best.get(names, other), other, key=lambda one: one.margin)
+    return tuple(sorted(best.values(), key=lambda each: each.margin))
 
 
 def _is_another(decision: Decision, names: tuple[str, ...]) -> bool:

@@ -17,7 +17,7 @@ from regolithd.calibration.mismatch.answer import (
 )
 from regolithd.calibration.mismatch.changes import ChangedSize, changes_of
 from regolithd.calibration.mismatch.experiments.drives import DIRECTION
-from regolithd.calibration.mismatch.inference.alternatives import with_refused
+from regolithd.calibration.mismatch.inference.alternatives import with_other_statements, with_refused
 from regolithd.calibration.mismatch.inference.dynamics import notes_on_dynamics
 from regolithd.calibration.mismatch.inference.evidence import calibrated_values, wheel_names
 from regolithd.calibration.mismatch.inference.identifiability import indistinguishable
@@ -128,7 +128,8 @@ def answer_of(
     problem, thresholds = equations.problem, equations.thresholds
     found = findings_of(decision, held_out, candidates, applicable, drawn)
     by_evidence = decided_by_evidence(decision)
-    others = with_changed_or_moved(decision, with_refused(decision)) if by_evidence else ()
+    possible = with_other_statements(decision, with_refused(decision)) if by_evidence else ()
+    others = with_changed_or_moved(decision, possible) if by_evidence else ()
     known = by_evidence and is_known(decision, others)
     rest = others if known else ()
     extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold, rest)

@@ -67,6 +67,7 @@ def other_answers(others: Sequence[Alternative], thresholds: Thresholds) -> tupl
             effects=tuple(name for name in other.effects if name != UNEXPLAINED),
             unexplained=UNEXPLAINED in other.effects,
             probability=float(probable),
+            parameters=other.parameters,
         )
         for other, probable in zip(others[:TOLD], probabilities, strict=False)
     )

@@ -78,6 +78,7 @@ def other_answers(answers: Sequence[Answer]) -> tuple[OtherAnswer, ...]:
                 effects=tuple(sorted({*names, *other.effects})),
                 unexplained=other.unexplained or any(each.unexplained for each in kept),
                 probability=other.probability * (joint([each.probability for each in kept]) or 0.0),
+                parameters=other.parameters,
             )
             for other in answer.alternatives
         ]

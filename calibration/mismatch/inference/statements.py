@@ -16,7 +16,7 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.answer import CalibratedParameter, Parameter
+    from regolithd.calibration.mismatch.answer import CalibratedParameter, OtherAnswer, Parameter
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
@@ -55,6 +55,12 @@ LEAST_SHARE = 0.005
 def doubt_of(probability: float | None) -> str:
     """Return `WRONG_RATHER_THAN_RIGHT` for such an answer; nothing for others, and of an unknown probability."""
     return WRONG_RATHER_THAN_RIGHT if probability is not None and probability < EVEN else ""
+
+
+def without_name(other: OtherAnswer) -> list[str]:
+    """Return what another answer says beside its names: that something is unexplained, or was stated wrongly."""
+    wrong = [f"{listed(other.parameters)} stated wrongly"] if other.parameters else []
+    return [*(["something unexplained"] if other.unexplained else []), *wrong]
 
 
 def percent(share: float) -> str:

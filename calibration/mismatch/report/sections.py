@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from regolithd.calibration.mismatch.inference.statements import REFUSED, capital, doubt_of, listed, percent, plural
+from regolithd.calibration.mismatch.inference.statements import (
+    REFUSED,
+    capital,
+    doubt_of,
+    listed,
+    percent,
+    plural,
+    without_name,
+)
 from regolithd.calibration.mismatch.report.axes import interval, number
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.empirical import EmpiricalSection, empirical_section
@@ -119,7 +127,7 @@ def certainty(answer: Answer, labels: Labels) -> Certainty:
     given = "unknown" if answer.probability is None else f"{answer.probability:.2f}"
     if (other := answer.next_best) is None:
         return Certainty(given, doubt=doubt_of(answer.probability))
-    names = [*map(labels.effect, other.effects), *(["something unexplained"] if other.unexplained else [])]
+    names = [*map(labels.effect, other.effects), *without_name(other)]
     order = REFUSED if answer.probability is not None and other.probability > answer.probability else "next best"
     told = f"{order}: {listed(names or ['nothing missing'])} ({other.probability:.2f})"
     return Certainty(given, told, doubt_of(answer.probability))

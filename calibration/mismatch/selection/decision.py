@@ -23,7 +23,7 @@ from regolithd.calibration.mismatch.selection.noise_estimation import (
     whitened,
 )
 from regolithd.calibration.mismatch.selection.pulled_parameters import drop_what_pulls_parameters_out
-from regolithd.calibration.mismatch.selection.released_parameters import released
+from regolithd.calibration.mismatch.selection.released_parameters import OtherStatement, released
 from regolithd.calibration.mismatch.selection.shape_optimisation import with_best_developments
 from regolithd.calibration.mismatch.selection.sign_flip_test import entry_threshold
 from regolithd.calibration.mismatch.selection.smooth_terms import weigh_against_smooth_terms
@@ -89,6 +89,7 @@ class Decision:
     refused: answers, by their names, of which one name lowered no held-out error
     confined: laws that were more probable in a range than a name that holds everywhere
     notes: on what was decided
+    other_statements: answers in which other parameters were stated wrongly, or none was
     changed_or_moved: for each corrected effect that has changed, or else parameters have (`inference.same_parameters`),
         by how much the first is ahead of the second, in Δχ²
     """
@@ -103,6 +104,7 @@ class Decision:
     refused: frozenset[frozenset[str]] = frozenset()
     confined: tuple[ConfinedLaw, ...] = ()
     notes: tuple[str, ...] = ()
+    other_statements: tuple[OtherStatement, ...] = ()
     changed_or_moved: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -160,7 +162,8 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
     named, unnamed = weigh_against_smooth_terms(equations, chosen, simpler, threshold)
     kept = chosen if unnamed else named
     whole = equations.fit((*named.terms, *unnamed))
-    if (freed := released(equations, kept, whole, threshold)) is not None:
+    freed, other_statements = released(equations, kept, whole, threshold)
+    if freed is not None:
         (equations, named), unnamed = freed, ()
         whole = named
     left = residual_of(equations, whole)
@@ -173,6 +176,7 @@ def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decis
         named=equations.fit(named.terms),
         unnamed=unnamed,
         whole=equations.fit((*named.terms, *unnamed)),
+        other_statements=other_statements,
     )
 
 

@@ -7,6 +7,7 @@ need not go then. So the prior is widened; if the parameter is all that is wrong
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,34 +25,83 @@ if TYPE_CHECKING:
 
     Fitted = tuple[NormalEquations, Fit]
 
+LARGEST_MARGIN = 20.0
+"""Margin beyond which an answer is no other one: it is e^10 times less probable."""
 WRONG_STATEMENT_PENALTY = 9.2
 """Δχ² charged for a parameter that was stated wrongly: odds of one in a hundred before the recording, 2 ln 100. Beyond
 `Prior.reach` it grows with the square of the distance, as with a normal density of wrong values."""
 
 
-def released(equations: NormalEquations, named: Fit, whole: Fit, entry_threshold: float) -> Fitted | None:
+@dataclass(frozen=True, eq=False)
+class OtherStatement:
+    """An answer that differs in what is said to have been stated wrongly.
+
+    Attributes
+    ----------
+    instead_of, terms: of the answer that was given, and of this one
+    parameters: that were stated wrongly, if this one is right
+    margin: by how much its evidence is behind, in Δχ²; what passed every test is no less probable than what did not
+    """
+
+    instead_of: tuple[Term, ...]
+    terms: tuple[Term, ...]
+    parameters: tuple[str, ...]
+    margin: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Release:
+    """Some names beside parameters (`places`) whose priors are widened, by its evidence and the lead that it needs."""
+
+    equations: NormalEquations
+    fit: Fit
+    places: tuple[int, ...]
+    evidence: float
+    least: float
+
+    @property
+    def goes_too_far(self) -> bool:
+        """Whether a parameter goes further than a wrong statement explains."""
+        nuisance = self.equations.nuisance
+        away = nuisance.prior_stds_away(self.fit)
+        return any(away[place] > nuisance.furthest(place, self.equations.problem) for place in self.places)
+
+    @property
+    def leaves_nothing(self) -> bool:
+        """Whether nothing significant is left beside the parameters."""
+        return unexplained_beside(self.equations, self.fit, tolerated=0.0) is None
+
+
+def released(
+    equations: NormalEquations, named: Fit, whole: Fit, entry_threshold: float
+) -> tuple[Fitted | None, tuple[OtherStatement, ...]]:
     """Return equations with the priors of those parameters widened that the readings contradict, and the names' fit.
 
     Of parameters that could stand for each other the one whose release has most evidence is released, or all together.
     None where the readings contradict none, where the one with most evidence would go further than a wrong statement
     explains (`Prior.furthest`), where something stays unexplained all the same, or where the evidence of `whole`, names
-    and curves within the priors, is larger.
+    and curves within the priors, is larger. The second value are the other answers that were possible.
     """
-    best, most = None, _evidence(equations, whole, (), entry_threshold)
-    for removed in (None, *range(len(named.terms))):
-        kept = named.terms if removed is None else named.without(removed)
-        for freed, places in _releases(equations, kept):
-            fit = freed.fit(kept)
-            beside_names = len(whole.terms) == len(named.terms)
-            least = _least_lead(equations, named, removed, fit, places, beside_names=beside_names)
-            evidence = _evidence(equations, fit, places, entry_threshold) - least
-            if evidence < most:
-                continue
-            if _goes_too_far(equations, fit, places):
-                best, most = None, evidence  # what explains less is not released in its place
-            elif unexplained_beside(freed, fit, tolerated=0.0) is None:
-                best, most = (freed, fit), evidence
-    return best
+    within = _evidence(equations, whole, (), entry_threshold)
+    releases = list(_releases(equations, named, entry_threshold, beside_names=len(whole.terms) == len(named.terms)))
+    best, most = None, within
+    for each in releases:
+        evidence = each.evidence - each.least
+        if evidence < most:
+            continue
+        if each.goes_too_far:
+            best, most = None, evidence  # what explains less is not released in its place
+        elif each.leaves_nothing:
+            best, most = each, evidence
+    told, evidence = (whole.terms, within) if best is None else (best.fit.terms, best.evidence)
+    names = equations.nuisance.names
+    others = [OtherStatement(told, whole.terms, (), max(evidence - within, 0.0))]
+    others += [
+        OtherStatement(told, each.fit.terms, tuple(names[k] for k in each.places), max(evidence - each.evidence, 0.0))
+        for each in releases
+        if evidence - each.evidence < LARGEST_MARGIN and not each.goes_too_far and each.leaves_nothing
+    ]
+    return (None if best is None else (best.equations, best.fit)), tuple(others)
 
 
 def _least_lead(
@@ -86,30 +136,31 @@ def _acts_as(equations: NormalEquations, named: Fit, index: int, place: int) -> 
     return same_action(change, effect)
 
 
-def _releases(equations: NormalEquations, kept: Sequence[Term]) -> Iterator[tuple[NormalEquations, tuple[int, ...]]]:
-    """Yield equations with wider priors, and the places of these: each parameter's, then all that are contradicted.
+def _releases(
+    equations: NormalEquations, named: Fit, entry_threshold: float, *, beside_names: bool
+) -> Iterator[_Release]:
+    """Yield the names, and all but one, beside wider priors: of each parameter, then of all that are contradicted.
 
     Nothing where none is contradicted. Where one is, another may be the one that was stated wrongly: held by its own
     prior, it has left the way to those that act alike.
     """
     nuisance, problem = equations.nuisance, equations.problem
-    contradicted = tuple(nuisance.contradicting_their_priors(equations.fit(kept), problem).tolist())
-    if not contradicted:
-        return
-    for places in dict.fromkeys([*((place,) for place in nuisance.told(problem)), contradicted]):
-        yield equations.with_nuisance(nuisance.widened(places, problem)), places
+    for removed in (None, *range(len(named.terms))):
+        kept = named.terms if removed is None else named.without(removed)
+        contradicted = tuple(nuisance.contradicting_their_priors(equations.fit(kept), problem).tolist())
+        if not contradicted:
+            continue
+        for places in dict.fromkeys([*((place,) for place in nuisance.told(problem)), contradicted]):
+            freed = equations.with_nuisance(nuisance.widened(places, problem))
+            fit = freed.fit(kept)
+            evidence = _evidence(equations, fit, places, entry_threshold)
+            least = _least_lead(equations, named, removed, fit, places, beside_names=beside_names)
+            yield _Release(freed, fit, places, evidence, least)
 
 
 def price_of_wrong_statement(away: float, reach: float) -> float:
     """Return the Δχ² charged for a parameter that is so far from its stated value, with its `Prior.reach`."""
     return WRONG_STATEMENT_PENALTY * max(1.0, (away / reach) ** 2)
-
-
-def _goes_too_far(equations: NormalEquations, fit: Fit, places: Sequence[int]) -> bool:
-    """Return whether a released parameter goes further than a wrong statement explains."""
-    nuisance = equations.nuisance
-    away = nuisance.prior_stds_away(fit)
-    return any(away[place] > nuisance.furthest(place, equations.problem) for place in places)
 
 
 def _evidence(equations: NormalEquations, fit: Fit, free: Collection[int], entry_threshold: float) -> float:

@@ -81,7 +81,7 @@ def test_mismatch_prints_the_answer() -> None:
             CalibratedParameter("gain", "1", 1.0, 0.1, 1.2, 1.1, 1.3),
         ],
         probability=0.914,
-        next_best=SimpleNamespace(effects=("other",), unexplained=True, probability=0.05),
+        next_best=SimpleNamespace(effects=("other",), unexplained=True, probability=0.05, parameters=()),
         fits=(),
         notes=["short", "in b: loss had to leave its prior: 4.97 W/K."],
     )
@@ -185,7 +185,7 @@ def test_a_curve_of_several_regions_is_told_once() -> None:
 def test_an_answer_that_evidence_alone_disfavours_says_so() -> None:
     """A test of its own refused the other one."""
     console = Console(record=True, width=200, quiet=False)
-    other = SimpleNamespace(effects=(), unexplained=False, probability=0.91)
+    other = SimpleNamespace(effects=(), unexplained=False, probability=0.91, parameters=())
     print_answer(console, answer_with(verdict="unexplained", probability=0.07, next_best=other), Labels(), (1,))
     assert (
         "probability of this answer: 0.07; refused, though likelier by evidence alone: nothing (0.91)"

@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 from linear_machine import CANDIDATES, equations_of, problem_of, table
 
-from regolithd.calibration.mismatch.inference.alternatives import Alternative, alternatives, with_refused
+from regolithd.calibration.mismatch.inference.alternatives import (
+    Alternative,
+    alternatives,
+    with_other_statements,
+    with_refused,
+)
 from regolithd.calibration.mismatch.inference.probability import (
     decided_by_evidence,
     is_known,
@@ -18,6 +23,7 @@ from regolithd.calibration.mismatch.inference.probability import (
 from regolithd.calibration.mismatch.regression.smooth_groups import with_smooth_terms
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
 from regolithd.calibration.mismatch.selection.decision import Decision, Intermittent, decide
+from regolithd.calibration.mismatch.selection.released_parameters import OtherStatement
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 
 HIGHEST, SCALE = THRESHOLDS.highest_probability, THRESHOLDS.evidence_scale
@@ -90,6 +96,22 @@ def test_the_alternatives_are_one_name_away() -> None:
     margins = [each.margin for each in found]
     assert margins == sorted(margins)
     assert min(margins) > 0
+
+
+def test_a_wrong_statement_in_the_place_of_a_name_is_another_answer() -> None:
+    """It is told with the parameter, unless the name is none of the answer's any more."""
+    decision = decided(drag=0.3)
+    terms = decision.whole.terms
+    other = OtherStatement(terms, (), ("level",), 1.0)
+    same = OtherStatement(terms, terms, ("level",), 0.0)
+    found = with_other_statements(replace(decision, other_statements=(other, same)), ())
+    assert found == (Alternative((), 1.0, parameters=("level",)),)
+    (told,) = other_answers(found, THRESHOLDS)
+    assert told.parameters == ("level",)
+    changed = replace(decision, other_statements=(replace(other, instead_of=()),))
+    assert with_other_statements(changed, ()) == ()
+    nearer = Alternative((), 0.5)
+    assert with_other_statements(replace(decision, other_statements=(other,)), (nearer,)) == (nearer,)
 
 
 def test_a_curve_in_the_place_of_a_law_that_is_a_little_wrong_is_no_alternative() -> None:

@@ -311,6 +311,8 @@ def test_the_next_best_answer_is_told_where_it_is_not_negligible() -> None:
     frictions = OtherAnswer(("coulomb-friction", "viscous-friction"), True, 0.043)
     assert told(frictions) == "next best: Coulomb friction, viscous friction and something unexplained (0.04)"
     assert told(OtherAnswer((), False, 0.1)) == "next best: nothing missing (0.10)"
+    wrong = OtherAnswer((), False, 0.1, ("loss_W_K", "gain"))
+    assert told(wrong) == "next best: loss_W_K and gain stated wrongly (0.10)"
     assert told(replace(frictions, probability=0.004)) == ""
     assert certainty(sample_answer.ANSWER, labels).given == "unknown"
     refused = replace(sample_answer.ANSWER, probability=0.07, alternatives=(OtherAnswer((), False, 0.91),))

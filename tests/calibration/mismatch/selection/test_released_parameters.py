@@ -175,12 +175,29 @@ def test_a_name_that_a_wrong_statement_explains_as_well_is_given_up(wave: float,
     equations = equations_of(problem_of(columns), (*CANDIDATES, Waving()))
     equations = equations.weighted(np.full(2, 2.0**-2))
     named = equations.fit([term_of(equations, "waving")])
-    found = released_parameters.released(equations, named, named, 5.0)
+    found, others = released_parameters.released(equations, named, named, 5.0)
     assert (found is None) == is_named
     if found:
         freed, fit = found
         assert fit.terms == ()
         assert fit.coefficients[0] / freed.design.scale[0] == pytest.approx(3.0, abs=0.3)
+        (within,) = (each for each in others if not each.parameters)
+        assert (within.instead_of, within.terms) == ((), named.terms)
+        assert within.margin > 4
+
+
+@pytest.mark.parametrize("wave", [0.2, 0.082])
+def test_a_name_is_as_probable_as_how_far_a_wrong_statement_is_behind(wave: float) -> None:
+    """Of a small wave little is left beside a level that is off; the name that passed is no less probable than that."""
+    columns = table(noise=2.0)
+    columns["reading_V"] = columns["reading_V"] + 3.0 * (1 + wave * np.sin(columns["t_s"] / 3))
+    equations = equations_of(problem_of(columns), (*CANDIDATES, Waving()))
+    equations = equations.weighted(np.full(2, 2.0**-2))
+    named = equations.fit([term_of(equations, "waving")])
+    found, others = released_parameters.released(equations, named, named, 5.0)
+    margins = {each.parameters: each.margin for each in others if not each.terms}
+    assert found is None
+    assert margins == ({("level",): 0.0} if wave < 0.1 else {})
 
 
 class RubbingDrive(Simulation):
