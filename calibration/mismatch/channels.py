@@ -12,6 +12,7 @@ from regolithd.calibration.mismatch.calibration.step import Step
 from regolithd.calibration.mismatch.inference.joint_parameters import joint_posterior, known_better_by_others
 from regolithd.calibration.mismatch.inference.several_channels import (
     merged_answers,
+    no_surer_than_before,
     nothing_else_is_wrong,
     priors_from_others,
 )
@@ -47,6 +48,8 @@ def compare_channels(simulation: Simulation, of_channel: CompareChannel) -> Comp
     if restated := _joint(alone.values(), simulation).restated(simulation.parameters):
         again = [of_channel(channel, {**near[channel], **restated}) for channel in simulation.channels]
         if nothing_else_is_wrong(answers, [each.answer for each in again]):
+            sure = [no_surer_than_before(answer, one.answer) for answer, one in zip(answers, again, strict=True)]
+            again = [replace(one, answer=answer) for one, answer in zip(again, sure, strict=True)]
             return _merged(again, simulation)
     found = dict(alone)
     for channel, one in alone.items():

@@ -314,8 +314,8 @@ def _about_reversals(problem: Problem) -> list[Array]:
 def _laws(problem: Problem, shape: Shape) -> list[Array]:
     """Return friction that is constant on each axis, grows with the root of speed, with it, its square, or the load.
 
-    The first three change with temperature and time: they would seem to reverse with a long displacement. A late
-    channel shows friction late: on time, it would seem to reverse so, too.
+    On each axis it may grow with the speed, too. The first three change with temperature and time: they would seem to
+    reverse with a long displacement. A late channel shows friction late: on time, it would seem to reverse so, too.
     """
     direction, speed = along_motion(problem, shape), np.abs(problem.known("wheel_speed"))
     slow = [np.ones(speed.shape), problem.time_s / problem.length_s]
@@ -323,7 +323,8 @@ def _laws(problem: Problem, shape: Shape) -> list[Array]:
         slow.append(problem.known("temperature"))
     factors = [of_speed * each for of_speed in (1.0, np.sqrt(speed), speed) for each in slow]
     factors.append(speed**2)
-    of_axis = np.eye(speed.shape[1])[:, None] if speed.shape[1] > 1 else ()  # one axis alone may have friction
+    axes = np.eye(speed.shape[1])[:, None] if speed.shape[1] > 1 else ()  # one axis alone may have friction
+    of_axis = [each for axis in axes for each in (axis, axis * speed)]
     return list(as_shown(problem, [direction * factor for factor in (*factors, np.abs(problem.filled), *of_axis)]))
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors
-    from regolithd.calibration.mismatch.regression.group import Group
+    from regolithd.calibration.mismatch.regression.group import Fit, Group
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 TURNS = 2
@@ -38,8 +38,9 @@ def named_beside_spells(
 ) -> tuple[Decision, HeldOutErrors]:
     """Return the decision with the names that are found beside the course of its spells, and their held-out errors.
 
-    Where that course is not known, or where fewer names are found beside it, or none, the decision stays as it is.
-    `grid` are the groups before any data optimised their shapes.
+    Where fewer names are found beside it, those of the decision stay that gain beside it what a name must, and where
+    all do, or the course is not known, the decision stays as it is. `grid` are the groups before any data optimised
+    their shapes.
     """
     found = decision
     for _ in range(TURNS):
@@ -47,8 +48,33 @@ def named_beside_spells(
             return decision, held_out
         found = _chosen_beside(beside, groups_to_choose_from(beside, grid))
     if len(found.named.terms) < max(len(decision.named.terms), 1):
-        return decision, held_out
+        told = len(decision.named.terms)
+        beside = _beside_their_course(decision) if told else None
+        if beside is not None:
+            named = that_gain(beside)
+            whole = beside.equations.fit((*named.terms, *beside.unnamed))
+            found = replace(beside, named=named, whole=whole)
+        if len(found.named.terms) == told:
+            return decision, held_out
     return confirmed_beside_curves(found, grid)
+
+
+def that_gain(beside: Decision) -> Fit:
+    """Return the fit of those names that gain beside the curves what a name must, the worst left out first.
+
+    The mean of spells resembles an effect, which gains nothing beside their course.
+    """
+    equations, named = beside.equations, beside.named
+    while named.terms:
+        whole = equations.score(equations.fit((*named.terms, *beside.unnamed)))
+        gains = [
+            whole - equations.score(equations.fit((*named.without(index), *beside.unnamed)))
+            for index in range(len(named.terms))
+        ]
+        if min(gains) > beside.entry_threshold:
+            break
+        named = equations.fit(named.without(gains.index(min(gains))))
+    return named
 
 
 def _chosen_beside(beside: Decision, choice: Sequence[Group]) -> Decision:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.problem.state_memory import before_state, memory_s
+from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
 from regolithd.calibration.mismatch.regression.smooth_groups import curves_over_time
 from regolithd.calibration.mismatch.selection.decision import Intermittent
@@ -23,7 +24,7 @@ from regolithd.calibration.mismatch.selection.smooth_terms import drop_what_gain
 from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
 from regolithd.calibration.mismatch.signal.skewness import skewed_lengths
 from regolithd.calibration.mismatch.signal.spells import skewed_spells, switching_spells
-from regolithd.calibration.mismatch.signal.switching_mean import switching_mean
+from regolithd.calibration.mismatch.signal.switching_mean import FEWEST_PEERS, gain_as_noise, switching_mean
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -44,6 +45,7 @@ class TimedSpells:
     ----------
     from_s, to_s: begin of the first and end of the last
     share: of the power of what is left without them
+    gain: twice the logarithm of the likelihood ratio to noise alone, less what the free numbers cost; 0: by skewness
     acting: how probably a reading is in a spell, times the factor by which it acts, shape (time, wheel); None: their
         course is not known
     """
@@ -51,6 +53,7 @@ class TimedSpells:
     from_s: float
     to_s: float
     share: float
+    gain: float
     acting: Array | None
 
 
@@ -62,9 +65,9 @@ def unexplained_if_intermittent(decision: Decision) -> Decision:
     """Return the decision with a curve over time unexplained on each wheel whose residual has spells.
 
     An effect of constant size that was named there is the mean of what comes and goes, and loses its name; so does one
-    that gains little beside it.
+    that gains little beside it. A curve over a covariate that is less likely than spells on its wheels imitates them.
     """
-    equations = decision.equations
+    equations, decision = decision.equations, _without_imitated_spells(decision)
     explained = {wheel for term in decision.unnamed for wheel in term.wheels}
     in_spells = {wheels: each for wheels, each in wheels_with_spells(decision).items() if explained.isdisjoint(wheels)}
     found = _with_curves(decision, in_spells) if in_spells else ()
@@ -77,11 +80,47 @@ def unexplained_if_intermittent(decision: Decision) -> Decision:
     return replace(decision, named=named, unnamed=unnamed, whole=whole, intermittent=found)
 
 
+def _without_imitated_spells(decision: Decision) -> Decision:
+    """Return the decision without a curve over a covariate that gains less than the spells that it may imitate.
+
+    Both gains are twice a log likelihood ratio to noise, as it acts along the motion or as read, less what the free
+    numbers cost. Where the covariate itself switches, it knows when, and its curve gains more.
+    """
+    curves, limits = decision.unnamed, decision.equations.thresholds
+    if len(curves) != 1 or curves[0].name == "time" or curves[0].group.coupling in WITHOUT_CURVE:
+        return decision
+    (curve,), names = curves, replace(decision, unnamed=(), whole=decision.named)
+    found = wheels_with_spells(names)
+    of_spells = sum(spells.gain for wheels, spells in found.items() if set(wheels) <= set(curve.wheels))
+    if not of_spells:
+        return decision
+    courses = zip(_as_it_acts(names), _as_it_acts(decision), strict=True)
+    of_curve = max(before.gain_of(after, curve.wheels) for before, after in courses)
+    of_curve -= limits.coefficient_penalty * len(curve.group.columns)
+    return decision if of_spells <= of_curve else names
+
+
 def wheels_with_spells(decision: Decision) -> dict[tuple[int, ...], TimedSpells]:
     """Return the wheels on which the mean of what is left switches, as read or along the motion, and when.
 
-    Each wheel is asked alone; where none shows it, all together: what acts on all adds up, and their noise does not.
+    Each wheel is asked with the others' noise as evidence of what noise is like. Where several have spells, that is
+    none: those that show them without it are several, too. Where none does, all are asked together: what acts on all
+    adds up, and their noise does not.
     """
+    as_it_acts = _as_it_acts(decision)
+    every = tuple(range(decision.equations.problem.mask.shape[1]))
+    found: dict[tuple[int, ...], TimedSpells] = _on_each(every, as_it_acts, with_peers=True)
+    if len(found) < len(every) > FEWEST_PEERS:
+        rest = [wheel for wheel in every if (wheel,) not in found]
+        without_peers = _on_each(rest, as_it_acts, with_peers=False)
+        found |= without_peers if len(found) + len(without_peers) > 1 else {}
+    if len(every) > 1 and not found and (spells := _likeliest(courses.spells_on(every) for courses in as_it_acts)):
+        found[every] = spells
+    return found
+
+
+def _as_it_acts(decision: Decision) -> list[_Courses]:
+    """Return what is left as read, along the motion, and as it acted on a state before."""
     equations, problem = decision.equations, decision.equations.problem
     left = residual_of(equations, decision.whole)
     explained = np.zeros(left.shape)
@@ -89,23 +128,30 @@ def wheels_with_spells(decision: Decision) -> dict[tuple[int, ...], TimedSpells]
         explained += contribution(equations, decision.named, index)
     if problem.noise_size is not None:  # where noise is larger for what is predicted, its mean is no spell
         left, explained = (each / np.maximum(problem.noise_size, 1.0) for each in (left, explained))
-    every = tuple(range(left.shape[1]))
     direction = np.nan_to_num(problem.covariates.get("direction", np.ones(left.shape)))
     ways = (np.ones(left.shape), direction) if np.ptp(direction[problem.mask]) else (direction,)
     as_it_acts = [_Courses(problem, left, explained, along) for along in ways]
     if (memory := memory_s(problem)) > 0:
         (acted, known), (beside, _) = (before_state(problem, course, memory) for course in (left, explained))
         as_it_acts.append(_Courses(problem, acted, beside, known.astype(np.float64), as_read=False))
-    alone = ((wheel, _likeliest(courses.spells_on((wheel,)) for courses in as_it_acts)) for wheel in every)
-    found: dict[tuple[int, ...], TimedSpells] = {(wheel,): spells for wheel, spells in alone if spells}
-    if len(every) > 1 and not found and (spells := _likeliest(courses.spells_on(every) for courses in as_it_acts)):
-        found[every] = spells
+    return as_it_acts
+
+
+def _on_each(
+    wheels: Iterable[int], as_it_acts: Sequence[_Courses], *, with_peers: bool
+) -> dict[tuple[int, ...], TimedSpells]:
+    """Return those wheels that show spells, with these."""
+    found: dict[tuple[int, ...], TimedSpells] = {}
+    for wheel in wheels:
+        spells = _likeliest(courses.spells_on((wheel,), with_peers=with_peers) for courses in as_it_acts)
+        if spells:
+            found[wheel,] = spells
     return found
 
 
-def _likeliest(found: Iterable[tuple[float, TimedSpells] | None]) -> TimedSpells | None:
-    """Return the spells with the highest gain."""
-    return max((each for each in found if each), key=lambda each: each[0], default=(0.0, None))[1]
+def _likeliest(found: Iterable[TimedSpells | None]) -> TimedSpells | None:
+    """Return the spells with the highest gain; of those without one, the largest."""
+    return max((each for each in found if each), key=lambda each: (each.gain, each.share), default=None)
 
 
 class _Courses:
@@ -123,11 +169,14 @@ class _Courses:
         self._read, self._as_read = problem.mask & (along != 0), as_read
         self._of_wheel = [self._of((wheel,)) for wheel in range(left.shape[1])]
 
-    def spells_on(self, wheels: tuple[int, ...]) -> tuple[float, TimedSpells] | None:
-        """Return the spells in the sum of these wheels, with their gain; small ones are the misfit of a named law."""
+    def spells_on(self, wheels: tuple[int, ...], *, with_peers: bool = True) -> TimedSpells | None:
+        """Return the spells in the sum of these wheels; small ones are the misfit of a named law.
+
+        `with_peers`: whether the other wheels are evidence of what noise is like.
+        """
         problem, limits = self._problem, self._problem.thresholds
         course, beside = self._of(wheels) if len(wheels) > 1 else self._of_wheel[wheels[0]]
-        others = [wheel for wheel in range(len(self._of_wheel)) if wheel not in wheels]
+        others = [wheel for wheel in range(len(self._of_wheel)) if with_peers and wheel not in wheels]
         switching = switching_mean(course, [self._of_wheel[wheel][0] for wheel in others], limits)
         acting = None
         if switching and switching.power > limits.form_misfit * np.mean(beside**2):
@@ -135,11 +184,17 @@ class _Courses:
             acting = self._acting(wheels, np.repeat(switching.acting(course), switching.block))
         elif lengths := skewed_lengths(course, beside, limits):
             spells = skewed_spells(course, lengths)
-            gain = spells.share  # less than any two levels gain
+            gain = 0.0  # less than any two levels gain
         else:
             return None
         time_s = problem.time_s[self._read[:, list(wheels)].any(axis=1), 0]
-        return gain, TimedSpells(float(time_s[spells.first]), float(time_s[spells.last]), spells.share, acting)
+        first, last = float(time_s[spells.first]), float(time_s[spells.last])
+        return TimedSpells(first, last, spells.share, gain, acting)
+
+    def gain_of(self, after: _Courses, wheels: Sequence[int]) -> float:
+        """Return by how much the courses of some wheels are likelier to be noise after something was taken out."""
+        pairs = [(self._of_wheel[wheel][0], after._of_wheel[wheel][0]) for wheel in wheels]  # its own
+        return sum(gain_as_noise(course, rest) for course, rest in pairs if np.ptp(course) > 0)
 
     def _acting(self, wheels: tuple[int, ...], probability: Array) -> Array | None:
         """Return how probably a reading is in a spell (instant,), as it acts on these wheels, shape (time, wheel)."""

@@ -27,6 +27,8 @@ Index = NDArray[np.int64]
 
 OF_SIGN = {1: (0.0, np.inf), -1: (-np.inf, 0.0)}
 """Bounds of a coefficient that has one sign alone."""
+EXPONENT, PER_POWER = "power", "^p"
+"""Name of an exponent, and what the unit of a coefficient has that is per unit to the power of it."""
 UNIT_OF_ENDING = {"_rad_s": ANGULAR_SPEED, "_degC": "degC", "_K": "K", "_s": "s"}
 
 
@@ -132,13 +134,16 @@ def _of_term(
     central = candidate.parameters(shape, (fit.coefficients[at] / scale).tolist())
     drawn: dict[str, list[float]] = {name: [] for name in central}
     free = [(len(fit.columns) + k, slope) for k, slope in enumerate(linearisation.slopes) if slope.term == index]
+    growth = _growth_with_exponent(fit, index, linearisation)
     beyond = normal_draws(np.eye(1), len(moved))[:, 0]
     for row, more in zip(moved[: equations.thresholds.parameter_draws], beyond, strict=False):
         other = dict(shape)
         for place, slope in free:
             left_open = more * candidate.left_open(equations.problem, slope.name)
             other[slope.name] = float(shape[slope.name]) + row[place] / slope.scale + left_open
-        for name, value in candidate.parameters(other, ((fit.coefficients[at] + row[at]) / scale).tolist()).items():
+        more_power = float(other.get(EXPONENT, 0.0)) - float(shape.get(EXPONENT, 0.0)) if growth else 0.0
+        moved_to = (fit.coefficients[at] * (1 + growth * more_power) + row[at]) * np.exp(-growth * more_power)
+        for name, value in candidate.parameters(other, (moved_to / scale).tolist()).items():
             drawn[name].append(value)
     channel, labels = equations.problem.simulation.unit, equations.problem.labels
     units = {c.name: in_units(c.unit, channel, labels) for c in candidate.coefficients}
@@ -149,6 +154,10 @@ def _of_term(
     found = {
         name: interval(value, drawn[name], units.get(name, "1"), limits.get(name)) for name, value in central.items()
     }
+    if growth:  # the coefficient that goes with the exponent that is told
+        name, more_power = candidate.coefficients[0].name, found[EXPONENT].value - central[EXPONENT]
+        value = central[name] * float(np.exp(-growth * more_power))
+        found[name] = interval(value, drawn[name], units[name], limits.get(name))
     for name in candidate.refined:
         if name in found:
             found[name] = _within(found[name], fitted[name]) if name in fitted else held(central[name], units[name])
@@ -156,6 +165,24 @@ def _of_term(
     if onset in shape and onset in candidate.free:
         found[onset] = Parameter(*onset_interval(equations, fit, index), unit_of(onset, labels))
     return found
+
+
+def _growth_with_exponent(fit: Fit, index: int, linearisation: Linearisation) -> float:
+    """Return by which share a law grows with its exponent, where its coefficient's unit has that; 0 of other laws.
+
+    It is the mean logarithm of what the exponent is of. The law's size is known better than both: a coefficient for one
+    unit of speed, where one unit is far from all readings, falls exponentially as the exponent grows.
+    """
+    candidate = fit.terms[index].group.candidate
+    slopes = enumerate(linearisation.slopes, len(fit.columns))
+    of_exponent = [(place, slope) for place, slope in slopes if slope.term == index and slope.name == EXPONENT]
+    if candidate is None or not of_exponent or PER_POWER not in candidate.coefficients[0].unit:
+        return 0.0
+    (place, slope) = of_exponent[0]
+    at = fit.of_term(index)
+    law = np.tensordot(fit.coefficients[at], linearisation.columns[at], 1).ravel()
+    grown = slope.scale * linearisation.columns[place].ravel()
+    return float(grown @ law / max(float(law @ law), 1e-300))
 
 
 def _within(found: Parameter, ends: tuple[float, float]) -> Parameter:

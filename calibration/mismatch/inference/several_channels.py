@@ -125,5 +125,17 @@ def nothing_else_is_wrong(before: Sequence[Answer], after: Sequence[Answer]) -> 
     return not any(new) and all(answer.verdict != "unexplained" for answer in after)
 
 
+def no_surer_than_before(before: Answer, now: Answer) -> Answer:
+    """Return an answer that is found beside parameters as all channels have them, as probable as with those as stated.
+
+    Beside a parameter that was stated wrongly, an effect that acts as it does is no other answer any more.
+    """
+    if before.probability is None or now.probability is None or before.probability >= now.probability:
+        return now
+    if before.unexplained or set(told_names(before)) != set(told_names(now)):
+        return now
+    return replace(now, probability=before.probability, alternatives=before.alternatives)
+
+
 def _std(parameter: CalibratedParameter) -> float:
     return std_of_interval(parameter.low, parameter.high)

@@ -278,7 +278,12 @@ def _optimised(equations: NormalEquations, sets: Sequence[tuple[Term, ...]]) -> 
 
 
 def passes_entry_test(equations: NormalEquations, more: Fit, less: Fit, entry_threshold: float) -> bool:
-    """Return whether a larger set scores enough more than a smaller one for its further effects."""
+    """Return whether a larger set scores enough more than a smaller one for its further effects.
+
+    No law is exact to the last percent, so that a further effect must gain a share of what the others explain. Where a
+    law of the smaller set was bent away from its usual form, that has gained what its usual form misses: laws in their
+    usual form that enter beside it are better ones.
+    """
     limits = equations.thresholds
     remaining = float(chi2_of(equations, less).sum())
     worthwhile = min(limits.further_share * explained(equations, less), limits.remaining_share * remaining)
@@ -286,8 +291,32 @@ def passes_entry_test(equations: NormalEquations, more: Fit, less: Fit, entry_th
     if any(term.group.own_channel is None and set(term.wheels) <= faulty for term in more.terms):
         worthwhile = limits.beside_smooth_share * less.delta_chi2
     beside_a_choice = limits.further_term_entry if less.terms else 0.0
-    needed = max(entry_threshold + beside_a_choice, worthwhile) * (len(more.terms) - len(less.terms))
-    return equations.score(more) - equations.score(less) > needed
+    further, told = len(more.terms) - len(less.terms), equations.score(less)
+    entry = (entry_threshold + beside_a_choice) * further
+    gained = equations.score(more) - told
+    if gained > max(entry, worthwhile * further):
+        return True
+    bent = gained > entry and any(_is_bent(equations, term.group) for term in less.terms)
+    return bent and equations.score(_in_usual_form(equations, more)) - told > entry
+
+
+def _is_bent(equations: NormalEquations, group: Group) -> bool:
+    """Return whether a law was moved away from its usual form."""
+    return group.candidate is not None and bool(group.candidate.unusual(equations.problem, group.shape))
+
+
+def _in_usual_form(equations: NormalEquations, fit: Fit) -> Fit:
+    """Return the fit of the same effects, each that was bent with the best of its usual shapes."""
+    for index, term in enumerate(fit.terms):
+        if _is_bent(equations, term.group):
+            others = fit.without(index)
+            family = family_of(term, others, equations.design.groups)
+            usual = [group for group in family if not _is_bent(equations, group)]
+            found = [pair for pair in equations.further(others, usual) if pair[1].wheels == term.wheels]
+            if found:
+                best = max(found, key=lambda pair: pair[0])[1]
+                fit = equations.fit((*fit.terms[:index], best, *fit.terms[index + 1 :]))
+    return fit
 
 
 def entry_cost(

@@ -65,9 +65,10 @@ class Confined:
 def without_confined_laws(decision: Decision) -> Decision:
     """Return the decision without names in whose place a law in a range is more probable, regions in their place.
 
-    A curve that stood beside the name stays where it is significant beside the region.
+    A curve that stood beside the name stays where it is significant beside the region. What comes and goes is in no
+    region.
     """
-    while (found := _better_in_a_range(decision)) is not None:
+    while not decision.intermittent and (found := _better_in_a_range(decision)) is not None:
         index, confined = found
         rest = decision.equations.fit(decision.named.without(index))
         equations, whole = _with_region(decision.equations, rest, confined)

@@ -49,6 +49,8 @@ STEPS = (0.2, 0.3, 0.45)
 """Steps of a grid for its refinement, in logarithms."""
 LARGEST_SHARE, SHORTEST, LONGEST = 0.6, 3.0, 200.0
 """Limits of refined shares and durations [blocks]: a spell is no single block, which is an outlier."""
+FEWEST_PEERS = 2
+"""Peers below which they say nothing: a scatter needs two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +102,16 @@ def switching_mean(
     return max(found, key=lambda each: each.gain, default=None)
 
 
+def gain_as_noise(course: Array, rest: Array) -> float:
+    """Return by how much what is left of a course (reading,) is likelier to be noise, in twice the log likelihood."""
+    found = []
+    for length in {max(len(course) // blocks, 1) for blocks in BLOCKS}:
+        values, size = _standardised(block_means(course, length))
+        left = block_means(rest, length)
+        found.append(_autoregression_likelihood((left - left.mean()) / size) - _autoregression_likelihood(values))
+    return 2 * max(found)
+
+
 def _persistence(values: Array) -> float:
     """Return the correlation of values with the one before."""
     centred = values - values.mean()
@@ -135,12 +147,12 @@ def _switching(
 def _unlike_peers(peers: Sequence[Array]) -> Callable[[Array, Array], Array]:
     """Return by how much variance and correlation of noise are improbable beside those of peers (block,).
 
-    In log likelihood below the highest. Fewer than two peers say nothing. Logarithms of variances, and Fisher's
+    In log likelihood below the highest. Fewer than `FEWEST_PEERS` say nothing. Logarithms of variances, and Fisher's
     transforms of correlations, scatter at least as those of so many blocks do by chance: with variances of
     2 (1 + ρ²) / (1 − ρ²) over their number (Bartlett, 1946), and of one over it.
     """
     known = [peer for peer in peers if peer.size and np.ptp(peer) > 0]
-    if len(known) < 2:  # a scatter needs two
+    if len(known) < FEWEST_PEERS:
         return lambda variance, correlation: np.zeros(np.shape(variance))  # noqa: ARG005  # of both
     correlations, blocks = np.array([_persistence(peer) for peer in known]), np.array([len(peer) for peer in known])
     by_chance = 2 * (1 + correlations**2) / (1 - correlations**2) / blocks

@@ -8,7 +8,7 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
 from regolithd.calibration.mismatch.simulation.checked import checked
 from regolithd.calibration.mismatch.simulation.corrected_curves import stated_curves
 from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects
@@ -19,6 +19,8 @@ from regolithd.calibration.mismatch.simulation.user_code import defined_at, user
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+OF_CLASS = ("model", "path", "motor_constant_at_degC", "without_effects")
+"""Keys of `[simulation]` of a class that reads none of its own."""
 MODELS = 'model must be "rover-wheel", "package.module:ClassName" or "machine.fmu"'
 
 
@@ -143,7 +145,17 @@ def _made(kind: type[Simulation], tables: Mapping[str, Any]) -> Simulation:
         raise SimulationError(told, ("simulation", "model")) from error
     if not isinstance(made, Simulation):
         raise SimulationError(f"{kind.__name__}.from_tables must return a {kind.__name__}, not {type(made).__name__}")
+    _check_keys(made, tables["simulation"])
     return made
+
+
+def _check_keys(made: Simulation, table: Mapping[str, Any]) -> None:
+    """Check that every key of `[simulation]` is one that is read, unless the class may read more of it by itself."""
+    reads_by_itself = type(made).from_tables.__func__ is not Simulation.from_tables.__func__  # type: ignore[attr-defined]
+    for name in () if reads_by_itself or "simulation" in made.own_tables else table:
+        if name not in OF_CLASS:
+            told = f"[simulation] has no key {name}; {did_you_mean(name, OF_CLASS)}"
+            raise SimulationError(told, ("simulation", name))
 
 
 def _imported(model: str, folder: Path) -> type[Simulation]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.answer import Parameter
 from regolithd.calibration.mismatch.fleet.choice.intervals import size_stds
-from regolithd.calibration.mismatch.inference.intervals import unit_of
+from regolithd.calibration.mismatch.inference.intervals import OF_SIGN, unit_of
 from regolithd.calibration.mismatch.problem.words import in_units
 from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT_STDS
 
@@ -71,10 +71,11 @@ def parameters_of(
     laws = [own, *(found[0] for found in moved.values() if found is not None)]
     ranges = [_ranges(candidate, law, wide) for law in laws]
     units = {each.name: in_units(each.unit, unit, labels) for each in candidate.coefficients}
+    limits = {each.name: OF_SIGN[each.sign] for each in candidate.coefficients if each.sign} | dict(candidate.free)
     found = {}
     for name, value in candidate.parameters(own.shape, own.sizes.tolist()).items():
         if name != candidate.change_point:
-            ends = np.clip([value, *(end for each in ranges for end in each[name])], *candidate.free.get(name, ANY))
+            ends = np.clip([value, *(end for each in ranges for end in each[name])], *limits.get(name, ANY))
             if name in own.shape and moved.get(name) is None:  # the grid has no other value of it
                 ends = np.array([np.nan])
             told = units.get(name) or unit_of(name, labels)

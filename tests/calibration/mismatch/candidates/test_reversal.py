@@ -56,6 +56,14 @@ def test_a_stribeck_effect_fades_after_the_friction_has_turned_round() -> None:
     assert candidate.bounds(problem, {"transition_rad_s": found})["stribeck_speed_rad_s"][0] == found
 
 
+def test_viscous_friction_of_one_axis_is_no_gradual_reversal() -> None:
+    """Constant friction of that axis would seem to be less at low speeds."""
+    columns = table(noise=0.02)
+    speed, one = columns["speed_rad_s"], np.arange(len(columns["t_s"])) % AXES == 0
+    drag = 0.3 * one * speed
+    assert reversal_of(problem_of({**columns, "reading_V": columns["reading_V"] + drag})) == {}
+
+
 def test_without_friction_there_is_no_transition() -> None:
     """Noise alone prefers no transition."""
     assert reversal_of(problem_of(table())) == {}

@@ -54,3 +54,17 @@ def test_drag_that_decays_above_the_median_speed_is_stribeck_friction_alone(deca
     decay = effect.parameters["stribeck_speed_rad_s"]
     assert decay.low < decay.value < decay.high
     assert decay.unit == "m/s"
+
+
+def test_a_constant_drag_beside_one_that_decays_is_no_law_of_another_exponent() -> None:
+    """One stretched exponential explains all but a hundredth of both, and has as many numbers as they have together."""
+    generator = np.random.default_rng(5)
+    phase = np.arange(ROWS) / 40
+    speed = 4 * np.sin(phase) + 2 * np.sin(2.7 * phase)
+    drag = np.sign(speed) * (0.4 + 0.86 * np.exp(-np.abs(speed) / 1.3))
+    pull = 40 + 15 * np.sin(phase / 3)
+    current = 0.02 * pull + drag + generator.normal(0, 0.1, ROWS)
+    columns = {"t_s": 0.5 * np.arange(ROWS), "current_A": current, "pull_N": pull, "rope_speed_m_s": speed}
+    answer = compare(from_columns(columns), Hoist()).answer
+    assert sorted(effect.name for effect in answer.effects) == ["coulomb-friction", "stribeck-friction"]
+    assert answer.fit.held_out_rmse_after < 1.02 * answer.fit.noise_floor_rmse

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from linear_machine import CANDIDATES, NOISE, Power, equations_of, problem_of, table, term_of
 
-from regolithd.calibration.mismatch import Prior, Simulation, from_columns
+from regolithd.calibration.mismatch import Prior, Simulation, compare, from_columns
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.inference.intervals import (
     drawn_from,
@@ -291,3 +291,37 @@ def test_an_interval_holds_a_bound_that_a_tail_is_beyond() -> None:
 def test_a_shape_parameter_s_name_ends_in_its_unit(name: str, unit: str) -> None:
     """Without an ending that is known it has none."""
     assert unit_of(name, {}) == unit
+
+
+class Fan(Simulation):
+    """Torque of a fan whose speed is in revolutions per minute."""
+
+    channel, unit = "torque_Nm", "Nm"
+    inputs = ("speed_rpm", "vane_deg")
+    parameters: ClassVar = {"per_degree": Prior(0.4, 0.01, "Nm/deg")}
+    one_way = True
+    covariate_labels: ClassVar = {"wheel_speed": "speed (rpm)"}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the torque that the vanes take."""
+        return values["per_degree"] * inputs["vane_deg"]
+
+    def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
+        """Return the speed."""
+        return {"wheel_speed": inputs["speed_rpm"]}
+
+
+def test_a_coefficient_goes_with_the_exponent_that_is_told() -> None:
+    """A unit of speed is far from all readings: the law is known, its coefficient by a factor alone, and above 0."""
+    generator = np.random.default_rng(3)
+    time_s = 0.2 * np.arange(4000)
+    speed = np.repeat(generator.uniform(500, 1300, 40), 100)
+    vane = 30 + 8 * np.sin(time_s / 31)
+    torque = 0.4 * vane + 0.0025 * speed + generator.normal(0, 1.0, 4000)
+    columns = {"t_s": time_s, "speed_rpm": speed, "vane_deg": vane, "torque_Nm": torque}
+    (effect,) = compare(from_columns(columns), Fan()).answer.effects
+    drag, power = effect.parameters["viscous_coefficient"], effect.parameters["power"]
+    assert effect.name == "viscous-friction"
+    assert drag.value * 900**power.value == pytest.approx(0.0025 * 900, rel=0.15)
+    assert 0 < drag.low < 0.0025 < drag.high
+    assert drag.high / drag.low > 3

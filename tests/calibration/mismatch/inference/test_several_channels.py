@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -10,16 +11,18 @@ import pytest
 from sample_answer import ANSWER
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
-from regolithd.calibration.mismatch.answer import CalibratedParameter
+from regolithd.calibration.mismatch.answer import Answer, CalibratedParameter, FitImprovement, OtherAnswer
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.errors import SimulationError
-from regolithd.calibration.mismatch.inference.several_channels import notes_of, priors_from_others
+from regolithd.calibration.mismatch.inference.several_channels import (
+    no_surer_than_before,
+    notes_of,
+    priors_from_others,
+)
 from regolithd.calibration.mismatch.signal.normal_interval import std_of_interval
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from regolithd.calibration.mismatch.answer import Answer
 
 
 class Propeller(Simulation):
@@ -203,3 +206,18 @@ def test_channels_together_know_what_each_knows_in_combination() -> None:
     assert answer.verdict == "consistent"
     assert second.low < 1.05 < second.high
     assert std_of_interval(second.low, second.high) < 0.02
+
+
+def test_an_answer_beside_restated_parameters_is_no_surer_than_before() -> None:
+    """Beside the parameter as all channels have it, an effect that acts as it does gains nothing any more."""
+    fit = FitImprovement("torque_Nm", 1.0, 1.0, 1.0)
+    found = Answer("consistent", (), (), (), (), fit)
+    other = OtherAnswer(("load-dependent-efficiency",), unexplained=False, probability=0.49)
+    before = replace(found, probability=0.49, alternatives=(other,))
+    now = replace(found, probability=0.98, alternatives=())
+    assert no_surer_than_before(before, now) == replace(now, probability=0.49, alternatives=(other,))
+    assert no_surer_than_before(now, before) is before
+    unknown = replace(before, probability=None)
+    assert no_surer_than_before(unknown, now) is now
+    named = replace(before, changes=(SimpleNamespace(name="drag"),))  # type: ignore[arg-type]  # of other names
+    assert no_surer_than_before(named, now) is now

@@ -67,6 +67,13 @@ def test_a_key_has_a_line(keys: tuple[str, ...], line: int | None) -> None:
             "SIM.toml, line {line}: [parameters]: the simulation has no parameter",
         ),
         ("class", "# path =", "without_effects = 'x' #", "line {line}: [simulation] without_effects must be a list of"),
+        (
+            "class",
+            "# path =",
+            "motor_constant_degC = 20 #",
+            "{line}: [simulation] has no key motor_constant_degC;",
+        ),
+        ("class", "# path =", "without_effect = [] #", "did you mean without_effects?"),
         ("class", "# path =", "motor_constant_at_degC = 'x' #", "[simulation] motor_constant_at_degC must be a number"),
         ("class", "[parameters.v", "[effects]\n[parameters.v", "effects are tables, [[effects]]"),
         ("rover-wheel", "cohesion_Pa =", "cohesion_kPa =", "did you mean cohesion_Pa?"),
