@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 VALUES = (None, True, 0, -1, 1e308, -1e-308, 10**30, float("nan"), float("inf"), "", "1,5", "x" * 300, [], [1, 2], {})
 """What a mutation writes in place of a value of JSON."""
+TOML_VALUES = ("0", "-1", "0.004", "1.5", "1e308", "nan", "inf", "true", '""', '"x"', "[]", "[1, 2]", "[3]", "{}")
+"""What it writes in place of a value of TOML."""
 RENAMED = ("", "t_s", "wheel", "run", "t_ms", "load_N ", "Load_N", "motor_current_mA", "°C", "a" * 300)
 """What a mutation calls a column."""
 
@@ -35,6 +37,15 @@ def damaged_json(content: bytes, random: Random) -> bytes:
             break
         place = inner
     return json.dumps(message).encode()
+
+
+def damaged_value(text: str, random: Random) -> str:
+    """Return TOML in which one value is another; it is well-formed still."""
+    lines = text.splitlines(keepends=True)
+    at = random.choice([number for number, line in enumerate(lines) if " = " in line])
+    key, _ = lines[at].split(" = ", 1)
+    lines[at] = f"{key} = {random.choice(TOML_VALUES)}\n"
+    return "".join(lines)
 
 
 def _change(place: Any, key: Any, random: Random) -> None:

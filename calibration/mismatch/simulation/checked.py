@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
 
+DIVERGED = 1e100
+"""Size of a prediction from which a simulation has diverged, in any unit (a choice)."""
+
 
 class CheckedSimulation(Simulation):
     """A simulation around another: the same attributes, and methods whose errors and results are checked."""
@@ -76,12 +79,14 @@ class CheckedSimulation(Simulation):
         """Return the predicted channel, shape (time, wheel)."""
         found, shape, method = self._predicted(inputs, values), inputs["t_s"].shape, self._method("predict")
         if not self.channels:
-            return array_of(found, shape, method)
+            return _where_it_converges(array_of(found, shape, method))
         table = self._table("predict", found)
         if lacking := [channel for channel in self.channels if channel not in table]:
             raise SimulationError(f"{method} must return {lacking[0]} too, as `channels` states")
         # As `channels` says, a mapping: the engine compares one channel after the other.
-        return {name: array_of(table[name], shape, f"{method}: {name}") for name in self.channels}  # type: ignore[return-value]
+        return {  # type: ignore[return-value]
+            name: _where_it_converges(array_of(table[name], shape, f"{method}: {name}")) for name in self.channels
+        }
 
     def _predicted(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> object:
         try:
@@ -198,6 +203,11 @@ class CheckedSimulation(Simulation):
                     f"the predicted column {name} is 0 wherever it was measured: check that its sensor works and that "
                     "the column is the right one"
                 )
+
+
+def _where_it_converges(prediction: Array) -> Array:
+    """Return a prediction with NaN where it is so large that no reading is, and its square no number."""
+    return np.where(np.abs(prediction) < DIVERGED, prediction, np.nan)
 
 
 def checked(simulation: Simulation) -> Simulation:

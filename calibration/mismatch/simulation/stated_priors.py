@@ -18,6 +18,8 @@ FIELDS = ("value", "std", "unit")
 """Keys of `[parameters.NAME]`."""
 SENSORS = "sensors"
 """The table of the errors of recorded inputs; a key of it that is no parameter is one of these."""
+GREATEST_NUMBER = 1e100
+"""Size of a stated number up to which its square, and products with others, are numbers (a choice)."""
 LEAST_NUMBER = 1e-100
 """Size below which a number is 0."""
 
@@ -113,6 +115,8 @@ def finite_number(value: object, keys: tuple[str, ...]) -> float:
         raise SimulationError(f"{_shown(keys)}: a finite number is needed, not {value!r}", keys)
     if value < 0 and (keys[-1] == "std" or keys[-1].endswith("_std") or (keys[0] == SENSORS and "_std_" in keys[-1])):
         raise SimulationError(f"{_shown(keys)}: a standard deviation is 0 (exact) or more, not {value!r}", keys)
+    if abs(value) > GREATEST_NUMBER:
+        raise SimulationError(f"{_shown(keys)}: a number up to {GREATEST_NUMBER:g} is needed, not {value!r}", keys)
     return float(value) if abs(value) >= LEAST_NUMBER else 0.0
 
 

@@ -18,7 +18,7 @@ import pyarrow.parquet
 import pytest
 from jsonschema import Draft202012Validator
 from mutations import damaged_bytes, damaged_text
-from structural_mutations import damaged_json, damaged_table
+from structural_mutations import damaged_json, damaged_table, damaged_value
 from typer.testing import CliRunner
 
 from regolithd.calibration.mismatch import load_simulation
@@ -128,8 +128,10 @@ def _write_mcap(path: Path, random: Random | None) -> None:
 
 
 def _write_damaged(whole: Path, path: Path, random: Random) -> None:
-    """Write a damaged copy of a file: half of the tables and messages are well-formed, and hold something else."""
-    if path.suffix in {".csv", ".toml"}:
+    """Write a damaged copy of a file: half of those but CSV are well-formed, and hold something else."""
+    if path.suffix == ".toml" and random.random() < 0.5:
+        path.write_text(damaged_value(whole.read_text(), random))
+    elif path.suffix in {".csv", ".toml"}:
         path.write_bytes(damaged_text(whole.read_text(), random, "," if path.suffix == ".csv" else " "))
     elif random.random() < 0.5:
         path.write_bytes(damaged_bytes(whole.read_bytes(), random))
