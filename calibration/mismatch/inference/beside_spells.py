@@ -42,20 +42,17 @@ def named_beside_spells(
     all do, or the course is not known, the decision stays as it is. `grid` are the groups before any data optimised
     their shapes.
     """
-    found = decision
+    found, turns = decision, []
     for _ in range(TURNS):
         if (beside := _beside_their_course(found)) is None:
             return decision, held_out
+        turns.append(beside)
         found = _chosen_beside(beside, groups_to_choose_from(beside, grid))
     if len(found.named.terms) < max(len(decision.named.terms), 1):
-        told = len(decision.named.terms)
-        beside = _beside_their_course(decision) if told else None
-        if beside is not None:
-            named = that_gain(beside)
-            whole = beside.equations.fit((*named.terms, *beside.unnamed))
-            found = replace(beside, named=named, whole=whole)
-        if len(found.named.terms) == told:
+        beside, named = turns[0], that_gain(turns[0])
+        if len(named.terms) == len(decision.named.terms):
             return decision, held_out
+        found = replace(beside, named=named, whole=beside.equations.fit((*named.terms, *beside.unnamed)))
     return confirmed_beside_curves(found, grid)
 
 

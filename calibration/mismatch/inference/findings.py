@@ -49,6 +49,7 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.answer import Change, Indistinguishable, Verdict
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
+    from regolithd.calibration.mismatch.inference.alternatives import Alternative
     from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors
     from regolithd.calibration.mismatch.inference.intervals import Drawn
     from regolithd.calibration.mismatch.problem.problem import LeftOut, Problem
@@ -128,8 +129,9 @@ def answer_of(
     problem, thresholds = equations.problem, equations.thresholds
     found = findings_of(decision, held_out, candidates, applicable, drawn)
     by_evidence = decided_by_evidence(decision)
-    possible = with_other_statements(decision, with_refused(decision)) if by_evidence else ()
-    others = with_changed_or_moved(decision, possible) if by_evidence else ()
+    others: tuple[Alternative, ...] = ()
+    if by_evidence:
+        others = with_changed_or_moved(decision, with_other_statements(decision, with_refused(decision)))
     known = by_evidence and is_known(decision, others)
     rest = others if known else ()
     extended, sets = indistinguishable(equations, decision.named, decision.whole, threshold, rest)

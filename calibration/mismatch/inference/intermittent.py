@@ -67,37 +67,40 @@ def unexplained_if_intermittent(decision: Decision) -> Decision:
     An effect of constant size that was named there is the mean of what comes and goes, and loses its name; so does one
     that gains little beside it. A curve over a covariate that is less likely than spells on its wheels imitates them.
     """
-    equations, decision = decision.equations, _without_imitated_spells(decision)
-    explained = {wheel for term in decision.unnamed for wheel in term.wheels}
-    in_spells = {wheels: each for wheels, each in wheels_with_spells(decision).items() if explained.isdisjoint(wheels)}
+    equations, imitated = decision.equations, _imitated_spells(decision)
+    kept = () if imitated else decision.unnamed
+    explained = {wheel for term in kept for wheel in term.wheels}
+    possible = imitated or wheels_with_spells(decision)
+    in_spells = {wheels: each for wheels, each in possible.items() if explained.isdisjoint(wheels)}
     found = _with_curves(decision, in_spells) if in_spells else ()
     if not found:
         return decision
     curves = tuple(each.term for each in found)
     named = names_beside_spells(equations, decision.named.terms, curves)
-    unnamed = (*decision.unnamed, *curves)
+    unnamed = (*kept, *curves)
     whole = equations.fit((*named.terms, *unnamed))
     return replace(decision, named=named, unnamed=unnamed, whole=whole, intermittent=found)
 
 
-def _without_imitated_spells(decision: Decision) -> Decision:
-    """Return the decision without a curve over a covariate that gains less than the spells that it may imitate.
+def _imitated_spells(decision: Decision) -> dict[tuple[int, ...], TimedSpells]:
+    """Return what shows spells without the curve over a covariate that gains less than they do, nothing where none is.
 
     Both gains are twice a log likelihood ratio to noise, as it acts along the motion or as read, less what the free
     numbers cost. Where the covariate itself switches, it knows when, and its curve gains more.
     """
-    curves, limits = decision.unnamed, decision.equations.thresholds
+    curves = decision.unnamed
     if len(curves) != 1 or curves[0].name == "time" or curves[0].group.coupling in WITHOUT_CURVE:
-        return decision
-    (curve,), names = curves, replace(decision, unnamed=(), whole=decision.named)
-    found = wheels_with_spells(names)
+        return {}
+    (curve,) = curves
+    without = _as_it_acts(replace(decision, unnamed=(), whole=decision.named))
+    found = _spells_in(without)
     of_spells = sum(spells.gain for wheels, spells in found.items() if set(wheels) <= set(curve.wheels))
     if not of_spells:
-        return decision
-    courses = zip(_as_it_acts(names), _as_it_acts(decision), strict=True)
+        return {}
+    courses = zip(without, _as_it_acts(decision), strict=True)
     of_curve = max(before.gain_of(after, curve.wheels) for before, after in courses)
-    of_curve -= limits.coefficient_penalty * len(curve.group.columns)
-    return decision if of_spells <= of_curve else names
+    of_curve -= decision.equations.thresholds.coefficient_penalty * len(curve.group.columns)
+    return found if of_spells > of_curve else {}
 
 
 def wheels_with_spells(decision: Decision) -> dict[tuple[int, ...], TimedSpells]:
@@ -107,9 +110,13 @@ def wheels_with_spells(decision: Decision) -> dict[tuple[int, ...], TimedSpells]
     none: those that show them without it are several, too. Where none does, all are asked together: what acts on all
     adds up, and their noise does not.
     """
-    as_it_acts = _as_it_acts(decision)
-    every = tuple(range(decision.equations.problem.mask.shape[1]))
-    found: dict[tuple[int, ...], TimedSpells] = _on_each(every, as_it_acts, with_peers=True)
+    return _spells_in(_as_it_acts(decision))
+
+
+def _spells_in(as_it_acts: Sequence[_Courses]) -> dict[tuple[int, ...], TimedSpells]:
+    """Return the wheels that show spells in one of these ways of acting."""
+    every = as_it_acts[0].wheels
+    found = _on_each(every, as_it_acts, with_peers=True)
     if len(found) < len(every) > FEWEST_PEERS:
         rest = [wheel for wheel in every if (wheel,) not in found]
         without_peers = _on_each(rest, as_it_acts, with_peers=False)
@@ -169,6 +176,11 @@ class _Courses:
         self._read, self._as_read = problem.mask & (along != 0), as_read
         self._of_wheel = [self._of((wheel,)) for wheel in range(left.shape[1])]
 
+    @property
+    def wheels(self) -> tuple[int, ...]:
+        """All wheels, by their indices."""
+        return tuple(range(len(self._of_wheel)))
+
     def spells_on(self, wheels: tuple[int, ...], *, with_peers: bool = True) -> TimedSpells | None:
         """Return the spells in the sum of these wheels; small ones are the misfit of a named law.
 
@@ -176,7 +188,7 @@ class _Courses:
         """
         problem, limits = self._problem, self._problem.thresholds
         course, beside = self._of(wheels) if len(wheels) > 1 else self._of_wheel[wheels[0]]
-        others = [wheel for wheel in range(len(self._of_wheel)) if with_peers and wheel not in wheels]
+        others = [wheel for wheel in self.wheels if with_peers and wheel not in wheels]
         switching = switching_mean(course, [self._of_wheel[wheel][0] for wheel in others], limits)
         acting = None
         if switching and switching.power > limits.form_misfit * np.mean(beside**2):
@@ -193,7 +205,7 @@ class _Courses:
 
     def gain_of(self, after: _Courses, wheels: Sequence[int]) -> float:
         """Return by how much the courses of some wheels are likelier to be noise after something was taken out."""
-        pairs = [(self._of_wheel[wheel][0], after._of_wheel[wheel][0]) for wheel in wheels]  # its own
+        pairs = [(self._of_wheel[wheel][0], after._of_wheel[wheel][0]) for wheel in wheels]
         return sum(gain_as_noise(course, rest) for course, rest in pairs if np.ptp(course) > 0)
 
     def _acting(self, wheels: tuple[int, ...], probability: Array) -> Array | None:

@@ -68,7 +68,9 @@ def without_confined_laws(decision: Decision) -> Decision:
     A curve that stood beside the name stays where it is significant beside the region. What comes and goes is in no
     region.
     """
-    while not decision.intermittent and (found := _better_in_a_range(decision)) is not None:
+    if decision.intermittent:
+        return decision
+    while (found := _better_in_a_range(decision)) is not None:
         index, confined = found
         rest = decision.equations.fit(decision.named.without(index))
         equations, whole = _with_region(decision.equations, rest, confined)

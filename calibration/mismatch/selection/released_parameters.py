@@ -8,6 +8,7 @@ need not go then. So the prior is widened; if the parameter is all that is wrong
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     Fitted = tuple[NormalEquations, Fit]
 
 LARGEST_MARGIN = 20.0
-"""Margin beyond which an answer is no other one: it is e^10 times less probable."""
+"""Margin beyond which an answer is no other one: it is e^10 times less probable (a choice)."""
 WRONG_STATEMENT_PENALTY = 9.2
 """Δχ² charged for a parameter that was stated wrongly: odds of one in a hundred before the recording, 2 ln 100. Beyond
 `Prior.reach` it grows with the square of the distance, as with a normal density of wrong values."""
@@ -66,7 +67,7 @@ class _Release:
         away = nuisance.prior_stds_away(self.fit)
         return any(away[place] > nuisance.furthest(place, self.equations.problem) for place in self.places)
 
-    @property
+    @cached_property
     def leaves_nothing(self) -> bool:
         """Whether nothing significant is left beside the parameters."""
         return unexplained_beside(self.equations, self.fit, tolerated=0.0) is None

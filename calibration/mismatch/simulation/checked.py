@@ -17,6 +17,7 @@ from regolithd.calibration.mismatch.data.recording import Recording
 from regolithd.calibration.mismatch.errors import RecordingError, SimulationError, did_you_mean
 from regolithd.calibration.mismatch.simulation.checked_candidate import checked_candidate
 from regolithd.calibration.mismatch.simulation.simulation import Array, Simulation
+from regolithd.calibration.mismatch.simulation.stated_priors import GREATEST_NUMBER
 from regolithd.calibration.mismatch.simulation.stated_sensors import unrecorded
 from regolithd.calibration.mismatch.simulation.statement import check_statement
 from regolithd.calibration.mismatch.simulation.user_code import Columns, Parameters, array_of, called
@@ -25,9 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate
-
-DIVERGED = 1e100
-"""Size of a prediction from which a simulation has diverged, in any unit (a choice)."""
 
 
 class CheckedSimulation(Simulation):
@@ -207,7 +205,7 @@ class CheckedSimulation(Simulation):
 
 def _where_it_converges(prediction: Array) -> Array:
     """Return a prediction with NaN where it is so large that no reading is, and its square no number."""
-    return np.where(np.abs(prediction) < DIVERGED, prediction, np.nan)
+    return np.where(np.abs(prediction) < GREATEST_NUMBER, prediction, np.nan)
 
 
 def checked(simulation: Simulation) -> Simulation:

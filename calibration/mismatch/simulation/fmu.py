@@ -37,7 +37,11 @@ from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
 from regolithd.calibration.mismatch.problem.prior import Prior
 from regolithd.calibration.mismatch.simulation.fmu_inputs import ANY_INSTANT, INSTANT, continuous, follow_inputs
 from regolithd.calibration.mismatch.simulation.simulation import Simulation
-from regolithd.calibration.mismatch.simulation.stated_priors import SENSORS, finite_number
+from regolithd.calibration.mismatch.simulation.stated_priors import (
+    SENSORS,
+    check_keys_of_simulation,
+    finite_number,
+)
 from regolithd.calibration.mismatch.simulation.stated_sensors import stated_sensors
 
 if TYPE_CHECKING:
@@ -209,10 +213,7 @@ def _check_keys(tables: Mapping[str, Any]) -> None:
     for name in tables:
         if name not in TABLES:
             raise SimulationError(f"[{name}] is no table of an FMU's SIM.toml; {did_you_mean(name, TABLES)}", (name,))
-    for name in tables.get("simulation", {}):
-        if name not in OF_SIMULATION:
-            told = f"[simulation] has no key {name}; {did_you_mean(name, OF_SIMULATION)}"
-            raise SimulationError(told, ("simulation", name))
+    check_keys_of_simulation(tables.get("simulation", {}), OF_SIMULATION)
 
 
 def _stated_flag(table: Mapping[str, Any], name: str) -> bool | None:

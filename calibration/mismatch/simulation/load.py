@@ -8,11 +8,12 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
+from regolithd.calibration.mismatch.errors import SimulationError
 from regolithd.calibration.mismatch.simulation.checked import checked
 from regolithd.calibration.mismatch.simulation.corrected_curves import stated_curves
 from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects
 from regolithd.calibration.mismatch.simulation.simulation import Simulation
+from regolithd.calibration.mismatch.simulation.stated_priors import check_keys_of_simulation
 from regolithd.calibration.mismatch.simulation.toml_place import line_of
 from regolithd.calibration.mismatch.simulation.user_code import defined_at, user_line
 
@@ -152,10 +153,8 @@ def _made(kind: type[Simulation], tables: Mapping[str, Any]) -> Simulation:
 def _check_keys(made: Simulation, table: Mapping[str, Any]) -> None:
     """Check that every key of `[simulation]` is one that is read, unless the class may read more of it by itself."""
     reads_by_itself = type(made).from_tables.__func__ is not Simulation.from_tables.__func__  # type: ignore[attr-defined]
-    for name in () if reads_by_itself or "simulation" in made.own_tables else table:
-        if name not in OF_CLASS:
-            told = f"[simulation] has no key {name}; {did_you_mean(name, OF_CLASS)}"
-            raise SimulationError(told, ("simulation", name))
+    if not (reads_by_itself or "simulation" in made.own_tables):
+        check_keys_of_simulation(table, OF_CLASS)
 
 
 def _imported(model: str, folder: Path) -> type[Simulation]:

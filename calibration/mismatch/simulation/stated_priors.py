@@ -10,7 +10,7 @@ from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
 from regolithd.calibration.mismatch.problem.prior import Prior
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
 ENGINE_TABLES = ("simulation", "effects", "empirical_curves")
 """Tables that are no parameters."""
@@ -19,7 +19,7 @@ FIELDS = ("value", "std", "unit")
 SENSORS = "sensors"
 """The table of the errors of recorded inputs; a key of it that is no parameter is one of these."""
 GREATEST_NUMBER = 1e100
-"""Size of a stated number up to which its square, and products with others, are numbers (a choice)."""
+"""Size of a stated number, or a prediction, up to which its square and its products are numbers (a choice)."""
 LEAST_NUMBER = 1e-100
 """Size below which a number is 0."""
 
@@ -107,6 +107,13 @@ def _known(parameter: str, parameters: Mapping[str, Prior], where: str, keys: tu
         told = f"{where}: the simulation has no parameter {parameter}; {did_you_mean(parameter, parameters)}"
         raise SimulationError(told, keys)
     return parameter
+
+
+def check_keys_of_simulation(table: Iterable[str], known: Sequence[str]) -> None:
+    """Check that every key of `[simulation]` is a known one: another would be taken without a word."""
+    for name in table:
+        if name not in known:
+            raise SimulationError(f"[simulation] has no key {name}; {did_you_mean(name, known)}", ("simulation", name))
 
 
 def finite_number(value: object, keys: tuple[str, ...]) -> float:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch import Problem, Shape
     from regolithd.calibration.mismatch.answer import Answer
+    from regolithd.calibration.mismatch.regression.group import Fit
+    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
 
 ROWS = 3000
 
@@ -167,15 +169,22 @@ class Waving(Candidate):
         return np.broadcast_to(1 + 0.2 * np.sin(problem.time_s / 3), problem.mask.shape)[None]
 
 
-@pytest.mark.parametrize(("wave", "is_named"), [(0.0, False), (0.2, True)])
-def test_a_name_that_a_wrong_statement_explains_as_well_is_given_up(wave: float, is_named: bool) -> None:
-    """A level that is 6 deviations off is no effect; what has the effect's own wave is one."""
+def released_beside_a_wave(
+    wave: float,
+) -> tuple[Fit, tuple[NormalEquations, Fit] | None, tuple[released_parameters.OtherStatement, ...]]:
+    """Return the fit of the name for a level with this wave, what is released in its place, and the other answers."""
     columns = table(noise=2.0)
     columns["reading_V"] = columns["reading_V"] + 3.0 * (1 + wave * np.sin(columns["t_s"] / 3))
     equations = equations_of(problem_of(columns), (*CANDIDATES, Waving()))
     equations = equations.weighted(np.full(2, 2.0**-2))
     named = equations.fit([term_of(equations, "waving")])
-    found, others = released_parameters.released(equations, named, named, 5.0)
+    return named, *released_parameters.released(equations, named, named, 5.0)
+
+
+@pytest.mark.parametrize(("wave", "is_named"), [(0.0, False), (0.2, True)])
+def test_a_name_that_a_wrong_statement_explains_as_well_is_given_up(wave: float, is_named: bool) -> None:
+    """A level that is 6 deviations off is no effect; what has the effect's own wave is one."""
+    named, found, others = released_beside_a_wave(wave)
     assert (found is None) == is_named
     if found:
         freed, fit = found
@@ -189,12 +198,7 @@ def test_a_name_that_a_wrong_statement_explains_as_well_is_given_up(wave: float,
 @pytest.mark.parametrize("wave", [0.2, 0.082])
 def test_a_name_is_as_probable_as_how_far_a_wrong_statement_is_behind(wave: float) -> None:
     """Of a small wave little is left beside a level that is off; the name that passed is no less probable than that."""
-    columns = table(noise=2.0)
-    columns["reading_V"] = columns["reading_V"] + 3.0 * (1 + wave * np.sin(columns["t_s"] / 3))
-    equations = equations_of(problem_of(columns), (*CANDIDATES, Waving()))
-    equations = equations.weighted(np.full(2, 2.0**-2))
-    named = equations.fit([term_of(equations, "waving")])
-    found, others = released_parameters.released(equations, named, named, 5.0)
+    _, found, others = released_beside_a_wave(wave)
     margins = {each.parameters: each.margin for each in others if not each.terms}
     assert found is None
     assert margins == ({("level",): 0.0} if wave < 0.1 else {})
