@@ -22,6 +22,7 @@ from regolithd.calibration.mismatch.calibration.linearised import (
 )
 from regolithd.calibration.mismatch.calibration.starting_values import Start, starting_values
 from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, stated_late_inputs, with_changes
 from regolithd.calibration.mismatch.channels import compare_channels, labelled
 from regolithd.calibration.mismatch.data.recording import as_recording
@@ -29,6 +30,7 @@ from regolithd.calibration.mismatch.empirical.found import curves_of
 from regolithd.calibration.mismatch.empirical.refuted import without_refuted_curves
 from regolithd.calibration.mismatch.empirical.stated import beyond_the_range
 from regolithd.calibration.mismatch.inference.beside_spells import named_beside_spells
+from regolithd.calibration.mismatch.inference.dynamics import notes_on_held_inputs
 from regolithd.calibration.mismatch.inference.evidence import empirical_fits, evidence_of
 from regolithd.calibration.mismatch.inference.feedback import fed_back, notes_of_feedback
 from regolithd.calibration.mismatch.inference.findings import Findings, answer_of, findings_of
@@ -185,11 +187,17 @@ def decided(
         found = _decided(candidates, stated, pose, start, progress)
         further, decision = fed_back(found.decision), found.decision
         out = out_of_bounds(decision.equations, decision.whole) | beyond_their_doubt(decision.equations, decision.named)
-        if not further | out:
+        refused = decision.refused_delays(start.problem) if not further | out else frozenset()
+        if not further | out | refused:
             break
         fed, held = fed | further, held | out
-    notes = (*_notes_on_values(found.decision, start), *notes_of_feedback(found.decision.equations.problem))
-    return replace(found, decision=replace(found.decision, notes=(*found.decision.notes, *notes)))
+        candidates = [each.without(refused) if isinstance(each, SensorDelay) else each for each in candidates]
+    notes = (
+        *_notes_on_values(decision, start),
+        *notes_of_feedback(decision.equations.problem),
+        *notes_on_held_inputs(recorded, decision.late_inputs),
+    )
+    return replace(found, decision=replace(decision, notes=(*decision.notes, *notes)))
 
 
 def _notes_on_values(decision: Decision, start: Start) -> tuple[str, ...]:

@@ -84,13 +84,17 @@ class SensorDelay(Candidate):
 
     scaled_by = PASSED
 
-    def __init__(self, late_as_corrected: frozenset[str] = frozenset()) -> None:
-        """Make the candidate; columns that are late as corrected are not looked for."""
-        self._late_as_corrected = late_as_corrected
+    def __init__(self, not_of: frozenset[str] = frozenset()) -> None:
+        """Make the candidate, of all columns but these."""
+        self._not_of = not_of
 
     def beside(self, corrected: Sequence[Shape]) -> SensorDelay:
         """Return the delay of the other columns: each may be late by itself."""
-        return SensorDelay(frozenset(str(shape["late"]) for shape in corrected if "late" in shape))
+        return self.without({str(shape["late"]) for shape in corrected if "late" in shape})
+
+    def without(self, columns: Iterable[str]) -> SensorDelay:
+        """Return the delay of the other columns."""
+        return SensorDelay(self._not_of | frozenset(columns))
 
     def words_for(self, shape: Shape) -> str:
         """Return which column is late."""
@@ -117,7 +121,7 @@ class SensorDelay(Candidate):
             for name in simulation.inputs
             for delay in _delays(problem, RATIO_OF_INPUT, problem.on_time.get(name))
         ]
-        return [shape for shape in (*of_channel, *of_inputs) if shape["late"] not in self._late_as_corrected]
+        return [shape for shape in (*of_channel, *of_inputs) if shape["late"] not in self._not_of]
 
     def propose_shapes(self, problem: Problem, residual: Array) -> Sequence[Shape]:
         """Return each input at the delay that the residual fits best to first order.
@@ -125,7 +129,7 @@ class SensorDelay(Candidate):
         The grid is too coarse for delays that are longer than the input takes to change.
         """
         most = int(LONGEST_SHARE * problem.length_s / problem.recording.step_s)
-        known = {*problem.on_time, *self._late_as_corrected}
+        known = {*problem.on_time, *self._not_of}
         inputs = [name for name in problem.simulation.inputs if name not in known]
         lags = {
             name: best_lag(problem, problem.recording.channels[name], _slope(problem, name), residual, most)

@@ -29,6 +29,8 @@ LONGEST_GAP = 3.0
 
 FEWEST = 3
 """Readings of a slower sensor that show how much it changes between them, at least."""
+REGULAR_CHANGES = 0.9
+"""Share of a column's changes that are whole periods apart, from which it is a slower sensor's, held (a choice)."""
 OFTEN_THE_SAME = 0.5
 """Share of readings that repeat the one before, above which a held column is asked for at intervals (a choice)."""
 
@@ -80,6 +82,17 @@ def drawn_between(recording: Recording, filled: Recording, name: str, how: Betwe
             found[first + 1 : after, wheel] += off
             last[first + 1 : after, wheel] = first
     return found, last
+
+
+def rows_held(recording: Recording, name: str) -> int:
+    """Return for how many rows a column repeats each of its readings, as a logger that holds a slower sensor; or 1."""
+    found = 1
+    for column in recording.channels[name].T:
+        apart = np.diff(np.flatnonzero(np.diff(column[np.isfinite(column)])))
+        usual = int(np.median(apart)) if apart.size >= FEWEST else 1
+        if usual >= SLOWER and np.mean(apart % usual == 0) >= REGULAR_CHANGES:
+            found = max(found, usual)
+    return found
 
 
 def bridged(

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
+    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Fit, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.signal.noise import NoiseModel
@@ -142,6 +143,19 @@ class Decision:
         """Inputs of the simulation that are late by a named effect, and by how much [s]."""
         named = [(term.name, term.group.shape) for term in self.named.terms if not term.group.is_change]
         return late_inputs(named, self.equations.problem.simulation.inputs)
+
+    def refused_delays(self, stated: Problem) -> frozenset[str]:
+        """Return columns that were searched beside their delays, of which none has a name in the end.
+
+        `stated` is the problem before the search: it has late what a corrected simulation has late.
+        """
+        named = {str(term.group.shape["late"]) for term in self.named.terms if "late" in term.group.shape}
+        return _late_columns(self.equations.problem) - _late_columns(stated) - named
+
+
+def _late_columns(problem: Problem) -> frozenset[str]:
+    """Return the columns that a problem has late."""
+    return frozenset((*problem.on_time, *([problem.simulation.channel] if problem.late else [])))
 
 
 def decide(equations: NormalEquations, candidates: Sequence[Candidate]) -> Decision:
