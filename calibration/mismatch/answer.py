@@ -138,12 +138,11 @@ class Indistinguishable:
 
     Attributes
     ----------
-    effects: names of the effects, and of parameters of the simulation
+    effects: names of the effects, and of parameters of the simulation, in the predicted column `channel`
     beside: those of them that would act beside the first, not in its place
     experiment: what to do, as text
     vary: the same for a program: the covariates to vary, each apart from the others
-    duration_s: for how long in all
-    lift: whether a part of it is without load
+    duration_s, lift: for how long in all, and whether a part of it is without load
     """
 
     effects: tuple[str, ...]
@@ -152,6 +151,7 @@ class Indistinguishable:
     duration_s: float = 0.0
     lift: bool = False
     beside: tuple[str, ...] = ()
+    channel: str = ""
 
     @property
     def alone(self) -> tuple[str, ...]:

@@ -128,7 +128,8 @@ def _names_of(found: Indistinguishable, answer: Answer, labels: Labels) -> str:
     """Return the names of a set, each of which may stand alone, and those that may only stand beside the first."""
     named = {effect.name for effect in answer.effects}
     names = " or ".join(labels.if_changed(name, named, name) for name in found.alone)
-    return f"{names}, or {found.alone[0]} with {' or '.join(found.beside)} beside it" if found.beside else names
+    names += f", or {found.alone[0]} with {' or '.join(found.beside)} beside it" if found.beside else ""
+    return f"{names} in {found.channel}" if len(answer.fits) > 1 else names
 
 
 def _all_unexplained(found: Sequence[Unexplained], labels: Labels, of: int, *, several: bool) -> list[str]:

@@ -92,16 +92,14 @@ def _found(decision: Decision, terms: tuple[Term, ...], coupling: str) -> FoundC
     spline = fit_spline(whole, sums.at, knots)
     curve = _curve(decision.equations.problem, term, spline, _held_out(sums, knots))
     others = whole.others(spline.in_bins)
-    # What happened at some time has no law over time.
-    forms = best_forms(sums, decision.noise.autocorrelation_time)[:SUGGESTED] if term.name != "time" else []
-    told = [_suggestion(decision.equations.problem, curve, term, sums, form, bic - forms[0][0]) for bic, form in forms]
+    told = _suggestions(decision, curve, term, sums)
     return FoundCurve(
         terms=terms,
         curve=curve,
-        suggestions=tuple(told),
+        suggestions=tuple(suggestion for _, suggestion in told),
         fit=replace(decision.named, coefficients=others),
         points=points_beside(sums, others),
-        suggested=forms[0][1].values(spline.at) if forms else np.zeros(0),
+        suggested=told[0][0].values(spline.at) if told else np.zeros(0),
     )
 
 
@@ -138,9 +136,32 @@ def _curve(problem: Problem, term: Term, spline: Spline, held_out: tuple[float, 
     )
 
 
+def _suggestions(
+    decision: Decision, curve: EmpiricalCurve, term: Term, sums: CovariateSums
+) -> list[tuple[FittedForm, Suggestion]]:
+    """Return the closed forms that lower the held-out error, the best first; none over time.
+
+    What happened at some time has no law over time.
+    """
+    forms = best_forms(sums, decision.noise.autocorrelation_time)[:SUGGESTED] if term.name != "time" else []
+    found = [(bic, form, _rms(sums, held_out_squares(sums, form))) for bic, form in forms]
+    found = [each for each in found if each[2] < curve.held_out_rmse_before]
+    problem = decision.equations.problem
+    return [
+        (form, _suggestion(problem, curve, term, sums, form, error, bic - found[0][0])) for bic, form, error in found
+    ]
+
+
 def _suggestion(
-    problem: Problem, curve: EmpiricalCurve, term: Term, sums: CovariateSums, found: FittedForm, behind: float
+    problem: Problem,
+    curve: EmpiricalCurve,
+    term: Term,
+    sums: CovariateSums,
+    found: FittedForm,
+    error: float,
+    behind: float,
 ) -> Suggestion:
+    """Return a closed form with its parameters, its held-out error, and its BIC less that of the best form."""
     form = found.form
     names = (*form.coefficients, *(("b",) if found.constant else ()), *form.names)
     values = (*found.coefficients, *found.shape)
@@ -156,7 +177,7 @@ def _suggestion(
         form=form.family,
         equation=_equation(problem, curve, term, found),
         parameters=parameters,
-        held_out_rmse=_rms(sums, held_out_squares(sums, found)),
+        held_out_rmse=error,
         bic_behind=float(behind),
     )
 

@@ -96,6 +96,7 @@ def with_experiment(
         vary=tuple(dict.fromkeys((*choice.varied, *(name for each in apart for name in varied_by(each, problem))))),
         duration_s=duration_s,
         lift=lift,
+        channel=problem.simulation.channel,
     )
 
 
@@ -182,7 +183,8 @@ def _expectation(choice: Choice, names: Collection[str]) -> str:
     told = f"{choice.needed:.0f} tells them apart nine times in ten" + (f": {times} times as long" if times > 1 else "")
     further = [name for name in choice.pair if name not in names]
     of_others = f" ({listed(further)} in another likely answer)" if further else ""
-    return f"Expected Δχ² between {listed(choice.pair)}, the closest two{of_others}: {choice.margin:.0f} ({told})."
+    closest = ", the closest two" if set(choice.pair) != set(names) else ""
+    return f"Expected Δχ² between {listed(choice.pair)}{closest}{of_others}: {choice.margin:.0f} ({told})."
 
 
 def _with_additions(
@@ -222,6 +224,7 @@ def _own_experiments(
         vary=tuple(dict.fromkeys(name for candidate in candidates for name in varied_by(candidate, problem))),
         duration_s=duration_s,
         lift=lift,
+        channel=problem.simulation.channel,
     )
 
 

@@ -265,7 +265,8 @@ def confusions(answer: Answer, labels: Labels) -> tuple[ConfusionRow, ...]:
     def of_set(one: Indistinguishable) -> str:
         alone = listed([labels.if_changed(name, named, labels.effect(name)) for name in one.alone])
         more = " or ".join(labels.effect(name) for name in one.beside)
-        return capital(f"{alone}, or {labels.effect(one.alone[0])} with {more} beside it" if more else alone)
+        of_all = f"{alone}, or {labels.effect(one.alone[0])} with {more} beside it" if more else alone
+        return capital(f"{of_all} in {one.channel}" if len(answer.fits) > 1 else of_all)
 
     return tuple(
         ConfusionRow(of_set(one), not found.isdisjoint(one.effects), one.experiment) for one in answer.indistinguishable

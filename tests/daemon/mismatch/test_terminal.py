@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from rich.console import Console
 
 from regolithd.calibration.mismatch.answer import (
+    Answer,
     CalibratedParameter,
     FitImprovement,
     Indistinguishable,
@@ -210,4 +211,20 @@ def test_what_a_fleet_leaves_unexplained_names_recording_and_rover() -> None:
         "  unexplained in a.csv and b.csv of asper: 40 % of the residual follows the height, on wheel 1, 0 to 9 s",
         "  unexplained in a.csv and b.csv: 40 % of the residual follows the height, on wheel 1, 0 to 9 s",
         "  not found: one or other. If there were one, these recordings would not tell which. Drive fast.",
+    ]
+
+
+def test_what_one_of_several_columns_does_not_distinguish_names_the_column() -> None:
+    """With one predicted column there is no need to."""
+    fits = tuple(FitImprovement(name, 1.0, 1.0, 1.0) for name in ("current", "voltage"))
+    sets = (Indistinguishable(("one", "other"), "Drive fast.", channel="voltage"),)
+    told = []
+    for of in (fits, fits[1:]):
+        answer = Answer("consistent", (), (), sets, (), fits[1], fits=of)
+        console = Console(record=True, width=200, quiet=False)
+        print_answer(console, answer, Labels())
+        told += [line for line in console.export_text().splitlines() if "not found" in line]
+    assert [line.split(".")[0].strip() for line in told] == [
+        "not found: one or other in voltage",
+        "not found: one or other",
     ]

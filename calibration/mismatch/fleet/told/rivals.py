@@ -82,4 +82,5 @@ def _with_experiment(
         vary=tuple(dict.fromkeys(name for each in candidates for name in as_it_runs(each.vary, simulation))),
         duration_s=0.0,
         lift=lift,
+        channel=simulation.channel,
     )

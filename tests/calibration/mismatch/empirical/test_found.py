@@ -76,7 +76,11 @@ def test_the_held_out_error_with_the_curve_is_that_of_the_true_model(found: Comp
 def test_a_bump_is_suggested_and_no_name_given(found: Comparison) -> None:
     """Among the first three, with its place and width; the verdict stays `unexplained`."""
     assert (found.answer.verdict, found.answer.effects) == ("unexplained", ())
-    bump = next(each for each in found.answer.unexplained[0].suggestions if each.form == "bump")
+    place = found.answer.unexplained[0]
+    assert place.curve is not None
+    assert place.suggestions[0].bic_behind == 0
+    assert all(each.held_out_rmse < place.curve.held_out_rmse_before for each in place.suggestions)
+    bump = next(each for each in place.suggestions if each.form == "bump")
     assert bump.equation.startswith("Δcurrent_A = (c · exp(−((|speed| − a)/k)²/2)")
     assert bump.parameters["a"].value == pytest.approx(0.8, abs=0.05)
     assert bump.parameters["a"].low < 0.8 < bump.parameters["a"].high

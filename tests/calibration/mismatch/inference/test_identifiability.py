@@ -293,7 +293,7 @@ def test_a_predicted_experiment_says_ranges_margin_and_the_closest_pair() -> Non
     experimenter = experimenter_of(equations, THRESHOLD)
     found = with_experiment(("offset", "power"), experimenter, (), members[::2])
     assert "(speed 0.4 to 1.2 rad/s)" in found.experiment
-    assert "Expected Δχ² between offset and power, the closest two: " in found.experiment
+    assert "Expected Δχ² between offset and power: " in found.experiment
     assert "tells them apart nine times in ten)" in found.experiment
     assert "wheel_speed" in found.vary
     faulty = replace(members[1], group=replace(members[1].group, shape={"onset_s": 1.0}))
