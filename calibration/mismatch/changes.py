@@ -27,7 +27,7 @@ from regolithd.calibration.mismatch.problem.problem import StatedEffect
 from regolithd.calibration.mismatch.problem.words import in_units, in_words
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from regolithd.calibration.mismatch.answer import Parameter
     from regolithd.calibration.mismatch.problem.empirical_curve import StatedCurve
@@ -205,9 +205,10 @@ def stated_in(
     for inside, listed in ((False, _merged(effects)), (True, _merged(in_simulation))):
         for effect in listed:
             if effect.name not in known:
+                place = "stated_effects" if inside else "[[effects]]"
                 raise SimulationError(
-                    f"the simulation has the effect {effect.name}, but there is no such candidate, by which a change "
-                    f"of it would be seen: leave none out that it has; {did_you_mean(effect.name, sorted(known))}"
+                    f"{place} has {effect.name}, which is not looked for with this simulation, so that no change of it "
+                    f"would be seen; {did_you_mean(effect.name, sorted(known))}"
                 )
             found.append(Stated(known[effect.name], effect, inside))
     laws = [EmpiricalCurveLaw(curve) for curve in curves]
@@ -252,7 +253,8 @@ def _summed(effects: Sequence[Contribution]) -> Contribution:
 def corrected_problem(problem: Problem, stated: Sequence[Stated]) -> Problem:
     """Return the problem whose prediction has the effects, with how well the size of each is known."""
     known = [(each.contribution.name, each.contribution.shape) for each in stated]
-    problem = replace(problem, late=lateness(known, problem.simulation.channel))
+    recording = problem.recording.with_notes(*_notes_on_wheels(stated, problem.recording.wheels))
+    problem = replace(problem, recording=recording, late=lateness(known, problem.simulation.channel))
     effects = tuple(
         StatedEffect(
             name=each.contribution.name,
@@ -268,6 +270,15 @@ def corrected_problem(problem: Problem, stated: Sequence[Stated]) -> Problem:
     )
     added = replace(problem, stated=effects).added
     return replace(problem, stated=effects, prediction=problem.prediction + added)
+
+
+def _notes_on_wheels(stated: Sequence[Stated], wheels: Sequence[int | str]) -> Iterator[str]:
+    """Yield a note on each effect that is stated for a wheel which the recording does not have."""
+    for each in stated:
+        for name in each.contribution.wheels:
+            if name not in wheels:
+                near = did_you_mean(str(name), map(str, wheels))
+                yield f"{each.contribution.name} is corrected on {name}, which the recording does not have: {near}"
 
 
 def stated_late_inputs(stated: Sequence[Stated], inputs: Sequence[str]) -> dict[str, float]:

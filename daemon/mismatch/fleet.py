@@ -85,6 +85,9 @@ def files_of_rovers(paths: Sequence[Path], rover_from: RoverFrom | None) -> list
     RecordingError
         When a recording does not say whose it is, and was to.
     """
+    places = [path.resolve() for path in paths]
+    if twice := [path for k, path in enumerate(paths) if places[k] in places[:k]]:
+        raise RecordingError(f"{twice[0]} is given twice: the same readings would count as two recordings")
     found = [each for path in paths for each in _rovers_of(path, rover_from)]
     if rover_from and (silent := [str(each.path) for each in found if not each.rover and not each.damaged]):
         raise RecordingError(f"{silent[0]} does not say whose it is: it has no {rover_from} that names a rover")

@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 
 from regolithd.calibration.mismatch.comparison import compare
-from regolithd.calibration.mismatch.errors import RecordingError
+from regolithd.calibration.mismatch.errors import MismatchError, RecordingError
 from regolithd.calibration.mismatch.report.labels import Labels
 from regolithd.calibration.mismatch.simulation.load import load_simulation
 from regolithd.daemon.mismatch.files import Outputs, write_json, write_page
@@ -51,9 +51,12 @@ def run(recordings: Sequence[Path], simulation: Path, outputs: Outputs, options:
             raise RecordingError(f"{', '.join(map(str, recordings))}: {error}") from error
     if outputs.json:
         write_json(outputs.json, found.answer)
-    if outputs.corrected:
-        found.write_corrected(outputs.corrected, empirical=outputs.empirical)
     if outputs.report:
         write_page(outputs.report, found, recordings, simulation)
     print_answer(Console(), found.answer, Labels.of(found.evidence), found.evidence.wheels)
+    if outputs.corrected:  # last: an answer that it cannot hold is an answer all the same
+        try:
+            found.write_corrected(outputs.corrected, empirical=outputs.empirical)
+        except MismatchError as error:
+            raise MismatchError(f"{outputs.corrected} is not written: {error}") from error
     return found.answer

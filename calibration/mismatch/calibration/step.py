@@ -80,9 +80,12 @@ class Step:
         return np.asarray(moved[problem.mask])
 
     def is_bent(self) -> bool:
-        """Return whether the prediction differs from its tangents by more than the noise lets pass."""
-        share = self.problem.thresholds.linearisation_share
-        return self.is_defined and power(self.run - self.along) > share**2 * power(self.measured - self.run)
+        """Return whether the prediction differs from its tangents by more than the noise lets pass.
+
+        Noise is what is left beside all that is added: what is left out would hide that tangents do not hold.
+        """
+        share, left = self.problem.thresholds.linearisation_share, self.measured - self.run - self.beside
+        return self.is_defined and power(self.run - self.along) > share**2 * power(left)
 
     def leads_to_another_law(self) -> bool:
         """Return whether what is a share of the prediction, such as a loss, would have another law at the end.

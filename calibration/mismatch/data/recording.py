@@ -26,6 +26,8 @@ Index = NDArray[np.int64]
 TIME = "t_s"
 TIME_UNITS_S = {"t_s": 1.0, "t_ms": 1e-3, "t_us": 1e-6, "t_ns": 1e-9, "t_min": 60.0, "t_h": 3600.0}
 """Names that the column of time may have, and their unit in seconds."""
+TIME_LIKE = ("time", "timestamp", "seconds")
+"""What names of columns that are likely to be the time begin with."""
 UNIT = "wheel"
 RUN = "run"
 MOST_CLOCK_JUMPS = 3
@@ -194,7 +196,11 @@ def _table(
     """Return the wheels' names, and the rows that have time and wheel as numbers, each with its run."""
     given = {str(name): np.asarray(values) for name, values in columns.items()}
     if clock not in given:
-        raise RecordingError(f"there is no column of time ({', '.join(TIME_UNITS_S)}); the table has {listed(given)}")
+        times = [name for name in given if name.lower().startswith(TIME_LIKE)]
+        cure = f"; if {times[0]} is the time in seconds, name it {TIME}" if times else ""
+        raise RecordingError(
+            f"there is no column of time ({', '.join(TIME_UNITS_S)}); the table has {listed(given)}{cure}"
+        )
     rows = given[clock].shape[0] if given[clock].ndim else 0
     for name, values in given.items():
         if values.shape != (rows,):

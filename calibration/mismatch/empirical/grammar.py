@@ -41,14 +41,12 @@ class Span:
 
     Attributes
     ----------
-    gap: the largest step from one of its values to the next; of gears it is 1
     usual_step: half of the range is crossed in steps of at most this; of gears it is 1, and one gap hardly changes it
     """
 
     low: float
     high: float
     least: float
-    gap: float = 0.0
     usual_step: float = 0.0
 
     @property
@@ -59,7 +57,7 @@ class Span:
     @property
     def narrowest(self) -> float:
         """The least width or length: what is narrower could lie between two values, and have any size there."""
-        return max(NARROWEST * self.width, self.gap / 4)
+        return max(NARROWEST * self.width, self.usual_step / 4)
 
     @property
     def most_cycles(self) -> float:

@@ -63,11 +63,11 @@ class FittedForm:
 
 
 def span_of(x: Array) -> Span:
-    """Return the ends of a covariate (ascending), its least magnitude, its largest gap and its usual step."""
+    """Return the ends of a covariate (ascending), its least magnitude and its usual step."""
     steps = np.sort(np.diff(x))
     crossed = np.cumsum(steps)
-    gap, usual = (steps[-1], steps[np.searchsorted(crossed, crossed[-1] / 2)]) if len(steps) else (0.0, 0.0)
-    return Span(float(x[0]), float(x[-1]), float(np.min(np.abs(x))), float(gap), float(usual))
+    usual = steps[np.searchsorted(crossed, crossed[-1] / 2)] if len(steps) else 0.0
+    return Span(float(x[0]), float(x[-1]), float(np.min(np.abs(x))), float(usual))
 
 
 def best_forms(sums: CovariateSums, autocorrelation_time: float) -> list[tuple[float, FittedForm]]:
@@ -80,7 +80,7 @@ def best_forms(sums: CovariateSums, autocorrelation_time: float) -> list[tuple[f
         for constant in (False, True) if form.suits(span) else ():
             found = fitted(whole, x, form, constant=constant)
             criterion = per_parameter * found.parameters - found.gain + (0.0 if form.usual else AMONG_EXPONENTS)
-            if on_an_edge(found, span):
+            if on_an_edge(found, span) or in_a_gap(found, x):
                 continue
             if form.family not in best or criterion < best[form.family][0]:
                 best[form.family] = (criterion, found)
@@ -93,6 +93,12 @@ def on_an_edge(found: FittedForm, span: Span) -> bool:
     low, high = grid.min(axis=0), grid.max(axis=0)
     near = EDGE * (high - low)
     return bool(np.any((found.shape <= low + near) | (found.shape >= high - near)))
+
+
+def in_a_gap(found: FittedForm, x: Array) -> bool:
+    """Return whether a form has its place further than its width from all values (ascending): it may have any size."""
+    at = dict(zip(found.form.names, found.shape.tolist(), strict=True))
+    return {"a", "k"} <= at.keys() and float(np.min(np.abs(x - at["a"]))) > at["k"]
 
 
 def fitted(of: Profile, x: Array, form: ClosedForm, *, constant: bool) -> FittedForm:

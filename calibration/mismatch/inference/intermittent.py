@@ -3,8 +3,9 @@
 A cable that rubs now and then, a valve that sticks three times, or an hour of tail wind adds to some readings alone.
 Its mean resembles a constant friction or offset; its spells lengthen the noise's memory, in which they would be lost.
 They are told from noise by their two levels (`signal/switching_mean.py`); few large ones, of any course, by their
-skewness (`signal/skewness.py`). Where the simulation has a state, what comes and goes may act on that (a mist that
-cools a greenhouse), and the readings follow it slowly: it is looked for in what acted on the state, too.
+skewness (`signal/skewness.py`), and such that parameters have bent by their jumps (`signal/jumps.py`). Where the
+simulation has a state, what comes and goes may act on that (a mist that cools a greenhouse), and the readings follow it
+slowly: it is looked for in what acted on the state, too.
 """
 
 from __future__ import annotations
@@ -21,9 +22,10 @@ from regolithd.calibration.mismatch.regression.residuals import contribution, re
 from regolithd.calibration.mismatch.regression.smooth_groups import curves_over_time
 from regolithd.calibration.mismatch.selection.decision import Intermittent
 from regolithd.calibration.mismatch.selection.smooth_terms import drop_what_gains_little
+from regolithd.calibration.mismatch.signal.jumps import jumps, levels
 from regolithd.calibration.mismatch.signal.local_size import of_usual_noise
 from regolithd.calibration.mismatch.signal.skewness import skewed_lengths
-from regolithd.calibration.mismatch.signal.spells import skewed_spells, switching_spells
+from regolithd.calibration.mismatch.signal.spells import levelled_spells, skewed_spells, switching_spells
 from regolithd.calibration.mismatch.signal.switching_mean import FEWEST_PEERS, gain_as_noise, switching_mean
 
 if TYPE_CHECKING:
@@ -197,11 +199,28 @@ class _Courses:
         elif lengths := skewed_lengths(course, beside, limits):
             spells = skewed_spells(course, lengths)
             gain = 0.0  # less than any two levels gain
+        elif (at := jumps(course, self._rounding(wheels, course), limits)).size:
+            spells, power = levelled_spells(course, at), float(np.var(levels(course, at)))
+            # A jump has an instant and a size.
+            gain = gain_as_noise(course, course - levels(course, at)) - 2 * limits.coefficient_penalty * len(at)
+            if spells.share < limits.smooth_term_power or power <= limits.form_misfit * np.mean(beside**2):
+                return None
         else:
             return None
         time_s = problem.time_s[self._read[:, list(wheels)].any(axis=1), 0]
         first, last = float(time_s[spells.first]), float(time_s[spells.last])
         return TimedSpells(first, last, spells.share, gain, acting)
+
+    def _rounding(self, wheels: tuple[int, ...], course: Array) -> float:
+        """Return twice the step between the values that readings of these wheels have, in the unit of their course."""
+        on, read = list(wheels), self._read[:, list(wheels)]
+        steps = [
+            float(np.median(np.diff(values)))
+            for k in range(len(on))
+            if (values := np.unique(self._problem.measured[:, on][read[:, k], k])).size > 1
+        ]
+        size = float(np.sqrt(np.mean(self._left[:, on][read] ** 2)))
+        return 2 * max(steps, default=0.0) * float(np.sqrt(np.mean(course**2))) / size if size > 0 else 0.0
 
     def gain_of(self, after: _Courses, wheels: Sequence[int]) -> float:
         """Return by how much the courses of some wheels are likelier to be noise after something was taken out."""

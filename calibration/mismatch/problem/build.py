@@ -27,6 +27,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+BEYOND_ALL = 1e9
+"""Times the largest reading, beyond which a prediction is no value (a choice: no unit is wrong by more)."""
+ANOTHER_UNIT = 30.0
+"""Times what is predicted, or its reciprocal, from which a reading is likely to be in another unit (a choice: minutes,
+degrees and all prefixes are further off, and a simulation that is worse is none)."""
 SAME = 1e-9
 """One less the correlation of two columns, up to which they are one, in whatever unit: their digits."""
 
@@ -61,6 +66,7 @@ def build_problem(
     prepared, prediction = run.recording, run.prediction
     measured = run.as_read.channel(simulation.channel)  # as read, also where it is an input that is smoothed
     compared = run.known & np.isfinite(measured)
+    _check_bounded(simulation, recording, prediction, measured)
     faults = FaultyReadings.of(measured, prediction, compared, recording.run, thresholds)
     as_read = None if run.as_read is prepared else complete_inputs(run.as_read)
     found, constants = covariates_of(
@@ -73,18 +79,21 @@ def build_problem(
     )
     found, notes = without_the_reading_itself(found, measured, simulation.channel)
     far = note_on_far_readings(simulation.channel, faults.compared, compared, thresholds)
-    prepared = prepared.with_notes(*notes, *note_on_zero(simulation, measured), *far)
+    of_size = _note_on_size(simulation.channel, measured[compared], prediction[compared])
+    prepared = prepared.with_notes(*notes, *note_on_zero(simulation, measured), *far, *of_size)
     covariates, blanks = blanks_of(found, simulation.undefined_at_times, compared, thresholds)
     mask = compared & ~faults.all
     for blank in blanks.values():
         mask &= ~blank
-    if mask.sum() < thresholds.fewest_readings:
-        raise RecordingError(
-            f"only {mask.sum()} values of {simulation.channel} can be compared; "
-            f"at least {thresholds.fewest_readings} are needed"
-        )
     predicted = {simulation.channel: np.abs(prediction)}
     labels = labels_of(simulation.covariate_labels, {**constants, **covariates}, prepared.channels, predicted)
+    not_compared = left_out(simulation.channel, measured, run, faults, blanks, labels)
+    if mask.sum() < thresholds.fewest_readings:
+        reasons = "".join(f"; {each.readings} are not: {each.reason}" for each in not_compared)
+        raise RecordingError(
+            f"only {mask.sum()} values of {simulation.channel} can be compared; "
+            f"at least {thresholds.fewest_readings} are needed{reasons}"
+        )
     return Problem(
         recording=prepared,
         simulation=simulation,
@@ -97,13 +106,35 @@ def build_problem(
         labels=labels,
         side=simulation.side(recording.wheels),
         row=simulation.row(recording.wheels),
-        left_out=left_out(simulation.channel, measured, run, faults, blanks, labels),
+        left_out=not_compared,
         thresholds=thresholds,
         doubt=inputs.doubt,
         on_time=dict(late or {}),
         as_recorded=as_recorded,
         smoothed=inputs.smoothed,
     )
+
+
+def _check_bounded(simulation: Predictor, recording: Recording, prediction: Array, measured: Array) -> None:
+    """Raise an error where a prediction (time, wheel) is beyond all readings: a state has grown without bound."""
+    most = float(np.nanmax(np.abs(measured), initial=0.0))
+    instants = np.flatnonzero((np.abs(prediction) > BEYOND_ALL * most).any(axis=1)) if most > 0 else np.zeros(0)
+    if instants.size:
+        time_s, step_s = recording.time_s[instants[0]], recording.step_s
+        raise RecordingError(
+            f"the predicted {simulation.channel} grows without bound: at t = {time_s:g} s it is more than "
+            f"{BEYOND_ALL:g} times the largest reading, {most:.4g}. The rows are {step_s:g} s apart: check that t_s is "
+            "in seconds, and that a state of the simulation stands such steps"
+        )
+
+
+def _note_on_size(channel: str, measured: Array, prediction: Array) -> tuple[str, ...]:
+    """Return a note where readings are of another size than the prediction, as in another unit."""
+    read, predicted = (float(np.sqrt(np.mean(values**2))) if values.size else 0.0 for values in (measured, prediction))
+    if not (read > 0 and predicted > 0) or 1 / ANOTHER_UNIT < read / predicted < ANOTHER_UNIT:
+        return ()
+    told = f"{channel} is {read / predicted:.3g} times what is predicted (root mean square): check its unit, and the "
+    return (f"{told}inputs' units.",)
 
 
 def without_the_reading_itself(

@@ -14,8 +14,8 @@ density, and for a truth that keeps its value for a while and then takes another
 the truth, and how to combine them (`signal/stein.py`); where that is no clear gain, the normal model stays alone. It
 also does for what the speed is computed from: a speed is differentiated, and its sign is the direction of friction.
 
-A sensor with noise does not read exactly 0 twice: where it does, it is at rest or within its dead band, and stays 0. A
-simulation may have a step there, as friction has.
+A sensor with noise does not read exactly 0 twice, nor as a run begins or ends: where it does, it is at rest or within
+its dead band, and stays 0. A simulation may have a step there, as friction has.
 """
 
 from __future__ import annotations
@@ -86,9 +86,9 @@ def expected_inputs(
     values = np.concatenate([recording.channels[name] for name in names], axis=1)
     owners = [name for name in names for _ in recording.wheels]
     scales = [ReadingScale.of(column, sensors[name]) for name, column in zip(owners, values.T, strict=True)]
-    starts = np.array([rows.start for rows in recording.runs], np.int64)
+    starts = run_starts(recording)
     stabilised = np.stack([scale.stabilised(column) for scale, column in zip(scales, values.T, strict=True)], axis=1)
-    rest = at_rest(values)
+    rest = at_rest(values, starts)
     truths = normal_truths(stabilised, np.array([scale.deviation for scale in scales]) ** 2, starts)
     smooth = truths.mean.copy()
     for k, name in enumerate(owners):
@@ -110,10 +110,22 @@ def expected_inputs(
     return recording.with_channels(**dict(zip(names, parts, strict=True)))
 
 
-def at_rest(values: Array) -> NDArray[np.bool_]:
-    """Return where a reading, shape (time, column), and one beside it are exactly 0."""
-    zero = np.pad(values == 0, ((1, 1), (0, 0)))
-    return zero[1:-1] & (zero[:-2] | zero[2:])
+def run_starts(recording: Recording) -> NDArray[np.int64]:
+    """Return the instants with which a run begins."""
+    return np.array([rows.start for rows in recording.runs], np.int64)
+
+
+def at_rest(values: Array, starts: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Return where a reading, shape (time, column), is exactly 0, and one beside it is, or it begins or ends a run.
+
+    `starts` are the instants where a run begins. Before and after a run a machine usually rests.
+    """
+    zero = values == 0
+    before, after = np.ones_like(zero), np.ones_like(zero)
+    before[1:], after[:-1] = zero[:-1], zero[1:]
+    later = starts[starts > 0]
+    before[later], after[later - 1] = True, True
+    return zero & (before | after)
 
 
 def known_mean(values: Array, axis: int = 0) -> Array:

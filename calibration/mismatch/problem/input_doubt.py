@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.problem.errors_in_variables import at_rest, known_mean
+from regolithd.calibration.mismatch.problem.errors_in_variables import at_rest, known_mean, run_starts
 from regolithd.calibration.mismatch.problem.predictor import complete_inputs
 from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
 from regolithd.calibration.mismatch.problem.true_values import direction_beside_rest
@@ -83,7 +83,8 @@ def input_doubt(
         if name in as_read.channels and name in inputs
     }
     # What is at rest is known to be (`errors_in_variables.py`): a simulation may have a step beside it.
-    stated = {name: _in_motion(inputs[name], scale) for name, scale in scales.items() if scale.deviation > 0}
+    starts = run_starts(as_read)
+    stated = {name: _in_motion(inputs[name], scale, starts) for name, scale in scales.items() if scale.deviation > 0}
     if not stated:
         return None
     before = simulation.predict(inputs, values)
@@ -107,12 +108,12 @@ def input_doubt(
     return InputDoubt(alone, together, bias, draws)
 
 
-def _in_motion(values: Array, scale: ReadingScale) -> Array:
+def _in_motion(values: Array, scale: ReadingScale, starts: NDArray[np.int64]) -> Array:
     """Return the standard deviation of an input's error (time, wheel): 0 at rest, and without a change of sign beside.
 
     Where a motion begins at a rest or ends there, its direction is known (`true_values.direction_beside_rest`).
     """
-    error, rest = np.where(values == 0, 0.0, scale.error(values)), at_rest(values)
+    error, rest = np.where(values == 0, 0.0, scale.error(values)), at_rest(values, starts)
     for k in np.flatnonzero(rest.any(axis=0)):
         beside = direction_beside_rest(values[:, k], scale.absolute, rest[:, k]) != 0
         error[beside, k] = np.minimum(error[beside, k], KEPT_IN_MOTION * np.abs(values[beside, k]))

@@ -91,11 +91,11 @@ def scatter(values: Array, run: NDArray[np.int64]) -> float:
     rounded.
     """
     found = []
-    for order in ORDERS:
+    for order in ORDERS[: max(len(run) - 1, 0)]:
         same = (run[order:] == run[: len(run) - order])[:, None]
         each = np.where(same, np.diff(values, order, axis=0), np.nan)
         found.append(robust_std(each[np.isfinite(each)]) / np.sqrt(comb(2 * order, order)))
-    return float(min(found))
+    return float(min(found, default=0.0))
 
 
 def notes_on_errors(

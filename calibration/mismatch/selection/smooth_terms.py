@@ -165,13 +165,15 @@ def drop_what_a_curve_explains(equations: NormalEquations, named: Fit, curve: Te
 
 
 def drop_what_gains_little(equations: NormalEquations, named: Fit, curve: Term) -> Fit:
-    """Leave out effects that gain little beside a curve that gains much."""
+    """Leave out effects that gain little beside a curve that gains much, on their part of its wheels."""
     both = equations.fit((*named.terms, curve))
     least = equations.thresholds.beside_smooth_share * (both.delta_chi2 - named.delta_chi2)
-    gains = [
-        both.delta_chi2 - equations.fit((*named.without(index), curve)).delta_chi2 for index in range(len(named.terms))
-    ]
-    return equations.fit([term for term, gain in zip(named.terms, gains, strict=True) if gain >= least])
+    kept = []
+    for index, term in enumerate(named.terms):
+        gain = both.delta_chi2 - equations.fit((*named.without(index), curve)).delta_chi2
+        if gain >= least * len(set(term.wheels) & set(curve.wheels)) / len(curve.wheels):
+            kept.append(term)
+    return equations.fit(kept)
 
 
 def _same_quantity(problem: Problem, term: Term, curve: Term) -> bool:
@@ -186,28 +188,34 @@ def _same_quantity(problem: Problem, term: Term, curve: Term) -> bool:
 def drop_transients(equations: NormalEquations, named: Fit) -> Fit:
     """Leave out changes that come and go: what wears, or drives onto other soil, does not heal.
 
-    They show in a curve over time on the same wheels that is significant beside them. One covariate on given wheels
-    was not selected from many, so a plain test of its Δχ² suffices.
+    They show in a curve over time on the same wheels that is significant beside them, and beside what a curve over
+    another covariate explains better. One covariate on given wheels was not selected from many, so a plain test of its
+    Δχ² suffices.
     """
-    curves = curves_over_time(equations.design)
-    kept = []
+    if not any(map(_is_lasting_change, named.terms)):
+        return named
+    left = best_curve(equations, named.terms, best_of_each_smooth_term(equations, named.terms))
+    given = named if left is None or left.name == "time" else equations.fit((*named.terms, left))
+    beside, kept = equations.further(given.terms, curves_over_time(equations.design)), []
     for term in named.terms:
-        # A sensor's fault, which its own channel shows, may come and go.
-        is_change = covariate_of(term) == "time" and term.group.own_channel is None
-        beside = equations.further(named.terms, curves) if is_change else []
         shares = [
             gain / (gain + named.delta_chi2)
             for gain, curve in beside
-            if curve.wheels == term.wheels and _is_significant(equations, named, curve, gain)
+            if curve.wheels == term.wheels and _is_significant(equations, given, curve, gain)
         ]
-        if max(shares, default=0.0) < equations.thresholds.form_misfit:
+        if not _is_lasting_change(term) or max(shares, default=0.0) < equations.thresholds.form_misfit:
             kept.append(term)
     return named if len(kept) == len(named.terms) else equations.fit(kept)
 
 
-def _is_significant(equations: NormalEquations, named: Fit, curve: Term, gain: float) -> bool:
-    """Return whether one curve gains more beside names than chance, by the weights and in noise of any spectrum."""
+def _is_lasting_change(term: Term) -> bool:
+    """Return whether a term begins some time and lasts; a sensor's fault, which its own channel shows, may go."""
+    return covariate_of(term) == "time" and term.group.own_channel is None
+
+
+def _is_significant(equations: NormalEquations, given: Fit, curve: Term, gain: float) -> bool:
+    """Return whether one curve gains more beside others than chance, by the weights and in noise of any spectrum."""
     by_chance = chi2_quantile(equations, len(curve.group.columns))
     if gain <= by_chance:
         return False
-    return score_beside_slow_noise(equations, named.terms, [curve]) + equations.penalty(curve) > by_chance
+    return score_beside_slow_noise(equations, given.terms, [curve]) + equations.penalty(curve) > by_chance

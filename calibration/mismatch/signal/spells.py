@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.signal.jumps import levels
 from regolithd.calibration.mismatch.signal.means import running_mean
 from regolithd.calibration.mismatch.signal.skewness import third_cumulant
 
@@ -64,6 +65,13 @@ def skewed_spells(course: Array, lengths: Sequence[int]) -> Spells:
     middle = (lengths[-1] - 1) // 2
     share = float(np.clip(power / max(whole, 1e-300), 0.0, 1.0))
     return Spells(int(acting[0]) + middle, int(acting[-1]) + middle, share)
+
+
+def levelled_spells(course: Array, jumps: NDArray[np.int64]) -> Spells:
+    """Return what is between the first and the last jump of a course (reading,), or after the only one."""
+    power = float(np.var(levels(course, jumps)))
+    last = int(jumps[-1]) - 1 if len(jumps) > 1 else len(course) - 1
+    return Spells(int(jumps[0]), last, power / max(float(np.mean(course**2)), 1e-300))
 
 
 def _upwards(course: Array, length: int) -> Array:

@@ -153,7 +153,8 @@ class CheckedSimulation(Simulation):
         known = sorted({each.name for each in (*library, *of)})
         for name in self.without_effects:
             if name not in known:
-                raise SimulationError(f"without_effects: there is no effect {name}; {did_you_mean(name, known)}")
+                told = f"without_effects: there is no effect {name}; {did_you_mean(name, known)}"
+                raise SimulationError(told, ("simulation", "without_effects"))
         return tuple(each for each in of if each.name not in self.without_effects)
 
     def corrected_tables(self, values: Mapping[str, float]) -> dict[str, Any]:

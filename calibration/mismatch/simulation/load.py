@@ -8,7 +8,8 @@ import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.errors import SimulationError, did_you_mean
 from regolithd.calibration.mismatch.simulation.checked import checked
 from regolithd.calibration.mismatch.simulation.corrected_curves import stated_curves
 from regolithd.calibration.mismatch.simulation.corrected_effects import stated_effects
@@ -95,7 +96,10 @@ def _loaded(
     made.source = source
     made.without_effects = (*made.without_effects, *_without_effects(table.get("without_effects", [])))
     made.motor_constant_at_degC = _stated_temperature(table, made.motor_constant_at_degC)
-    return checked(made)
+    found = checked(made)
+    if "without_effects" in table:
+        found.candidates(library())  # a name that no effect has is told with its line
+    return found
 
 
 def _of_model(model: str, tables: Mapping[str, Any], folder: Path, announce: Callable[[str], None]) -> Simulation:
@@ -165,18 +169,26 @@ def _imported(model: str, folder: Path) -> type[Simulation]:
     place = str(folder.resolve())
     sys.path[:] = [place, *(each for each in sys.path if each != place)]
     try:
-        found = getattr(importlib.import_module(module_name), class_name, None)
+        module = importlib.import_module(module_name)
+        found = getattr(module, class_name, None)
     except (Exception, SystemExit) as error:  # a user's module may raise anything
         told = f"the simulation {model} cannot be imported{user_line(error)}: {type(error).__name__}: {error}"
         if not user_line(error):
             told += f". It is looked for in {folder}; say where it is with [simulation] path"
         raise SimulationError(told, keys) from error
-    if not (isinstance(found, type) and issubclass(found, Simulation)):
+    if found is None:
+        classes = [name for name, each in vars(module).items() if _is_simulation(each) and each is not Simulation]
+        raise SimulationError(f"{model}: {module_name} has no {class_name}; {did_you_mean(class_name, classes)}", keys)
+    if not _is_simulation(found):
         raise SimulationError(
             f"{model}: {class_name} in {module_name} must be a subclass of regolithd.calibration.mismatch.Simulation",
             keys,
         )
     return found
+
+
+def _is_simulation(found: object) -> bool:
+    return isinstance(found, type) and issubclass(found, Simulation)
 
 
 def _make_room(module_name: str, folder: Path) -> None:

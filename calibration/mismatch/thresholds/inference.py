@@ -59,6 +59,13 @@ class InferenceThresholds:
         f"{TRIALS}: in 94 recordings of twelve machines with nothing, or what was found, left out, it was at most 0.6 "
         "where it was beyond 2.5 standard errors; with drag in spells, a sticking valve or slipstream 0.9 to 1.7",
     )
+    most_jump_deviates: float = threshold(
+        7.0,
+        "Standard deviations of the differences between the medians before and after an instant, beyond which a level "
+        "jumps.",
+        f"{TRIALS}: of 1080 courses of Gaussian noise of 600 to 10 000 readings, with memories of 3 to 300 of them, "
+        "the largest of all differences was 6.2; three spells of a stranger's kettle, six times the noise, have 8.6",
+    )
     noise_size_readings: int = threshold(
         32,
         "Differences from one reading to the next that show how large the noise is about an instant.",

@@ -139,3 +139,49 @@ def test_a_missing_column_is_told_with_the_recording(start: Path, tmp_path: Path
         f"regolithd mismatch: {path}: the simulation needs column torque_Nm, which the recording does not have; did "
         "you mean torqe_Nm?\n"
     )
+
+
+def test_a_file_that_is_given_twice_is_an_error(start: Path, tmp_path: Path) -> None:
+    """Its readings would count as two recordings, however it is spelled."""
+    recording = joint(tmp_path / "joint.csv", 1)
+    done = call(recording, tmp_path / "." / "joint.csv", "--simulation", start / "SIM.toml")
+    assert (done.exit_code, done.stderr.splitlines()[-1].count("is given twice")) == (65, 1)
+
+
+def test_an_answer_that_a_corrected_file_cannot_hold_is_printed_all_the_same(start: Path, tmp_path: Path) -> None:
+    """What is unexplained over time has no curve for another recording; answer and report are there nevertheless."""
+    path = joint(tmp_path / "joint.csv", 1, friction_Nm=0.0)
+    table = pyarrow.csv.read_csv(path).to_pydict()
+    spells = np.isin(np.arange(1500) // 100, (2, 3, 7, 11, 12))
+    table["torque_Nm"] = np.array(table["torque_Nm"]) + 0.4 * spells
+    pyarrow.csv.write_csv(pa.table(table), path)
+    new, report = tmp_path / "NEW.toml", tmp_path / "report.html"
+    options = ("--simulation", start / "SIM.toml", "--corrected", new, "--empirical", "--report", report)
+    done = call(path, *options)
+    assert done.exit_code == 65
+    assert done.stdout.splitlines()[0].strip().startswith("unexplained")
+    assert f"{new} is not written: --empirical: what is unexplained follows time" in done.stderr.replace("\n", "")
+    assert report.exists()
+    assert not new.exists()
+
+
+def test_a_wheel_of_a_corrected_effect_that_is_not_recorded_is_told(start: Path, tmp_path: Path) -> None:
+    """A misspelt name would correct nothing, silently."""
+    text = (start / "SIM.toml").read_text() + (
+        '\n[[effects]]\nname = "coulomb-friction"\nshape = {}\ncoefficients = [0.2]\nwheels = ["elbow"]\n'
+    )
+    (start / "SIM.toml").write_text(text)
+    done = call(joint(tmp_path / "joint.csv", 1), "--simulation", start / "SIM.toml")
+    assert done.exit_code == 0
+    assert "coulomb-friction is corrected on elbow, which the recording does not have: it has 1" in done.stdout
+
+
+@pytest.mark.parametrize(("name", "told"), [("time_s", True), ("Timestamp", True), ("torque_V", False)])
+def test_a_column_that_is_likely_the_time_is_named(name: str, told: bool, start: Path, tmp_path: Path) -> None:
+    """One message says what the column of time is called, and which it may be."""
+    path = joint(tmp_path / "joint.csv", 1)
+    path.write_text(path.read_text().replace('"t_s"', f'"{name}"', 1))
+    done = call(path, "--simulation", start / "SIM.toml")
+    assert done.exit_code == 65
+    assert "there is no column of time (t_s, t_ms," in done.stderr
+    assert (f"if {name} is the time in seconds, name it t_s" in done.stderr) is told

@@ -133,3 +133,13 @@ def test_an_effect_that_moves_parameters_far_is_searched_for_once() -> None:
     columns = {**columns, "t_s": recording.time_s, "level_m": columns["level_m"] + leak[:, 0]}
     compare(from_columns(columns), Tank(), progress=told.append)
     assert told.count("searching") == 1
+
+
+def test_a_step_is_bent_by_what_noise_lets_pass_not_by_what_is_left_out() -> None:
+    """A drag that is left out hides that tangents do not hold; once it stands beside the prediction, it does not."""
+    problem = pipe_problem()
+    off = replace(problem, measured=problem.measured + 100.0)
+    beside = np.full(int(problem.mask.sum()), 100.0)
+    assert Step(problem, {"head_m": 2.5}).is_bent()
+    assert not Step(off, {"head_m": 2.5}).is_bent()
+    assert Step(off, {"head_m": 2.5}, beside).is_bent()

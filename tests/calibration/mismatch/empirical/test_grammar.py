@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from regolithd.calibration.mismatch.empirical.grammar import Span, grammar
-from regolithd.calibration.mismatch.empirical.suggestions import span_of
+from regolithd.calibration.mismatch.empirical.suggestions import FittedForm, in_a_gap, span_of
 
 RANGES = [Span(0.2, 3.0, 0.2), Span(-3.0, -0.2, 0.2), Span(-1.0, 2.0, 0.0)]
 
@@ -35,7 +35,7 @@ def test_a_sine_has_half_a_cycle_or_more_within_the_range() -> None:
 def test_nothing_is_fitted_between_the_values_of_a_gear() -> None:
     """A sine of less than three gears a cycle, or a bump between two gears, could have any size there."""
     gears = span_of(np.array([1.0, 2.0, 3.0, 4.0, 5.0]))
-    assert gears.gap == 1.0
+    assert gears.usual_step == 1.0
     forms = {form.text: form for form in grammar() if form.suits(gears)}
     assert forms["c cos(2π x/k) + d sin(2π x/k)"].shapes(gears).min() == pytest.approx(3.0)
     for form in forms.values():
@@ -52,9 +52,18 @@ def test_the_gaps_of_a_continuous_covariate_limit_nothing() -> None:
     assert span.narrowest == pytest.approx(0.015)
 
 
-def test_one_gap_in_a_continuous_covariate_limits_no_sine() -> None:
-    """Where the values beyond a gap of an eighth are few, a sine of four cycles is looked for all the same."""
+def test_one_gap_in_a_continuous_covariate_limits_neither_sine_nor_bump() -> None:
+    """Where the values beyond a gap of an eighth are few, four cycles or a narrow bump are looked for all the same."""
     (sine,) = (form for form in grammar() if form.family == "sine")
     span = span_of(np.concatenate((np.linspace(0.0, 0.8, 200), np.linspace(0.93, 1.0, 5))))
-    assert span.gap == pytest.approx(0.13)
     assert sine.shapes(span).min() == pytest.approx(1 / 24)
+    assert span.narrowest == pytest.approx(0.015)
+
+
+@pytest.mark.parametrize(("place", "width", "lost"), [(350.0, 45.0, False), (100.0, 20.0, True), (100.0, 120.0, False)])
+def test_a_bump_between_all_values_is_none(place: float, width: float, lost: bool) -> None:
+    """A roller without a log has diameter 0, and no log is thinner than 210 mm: what is between has any size."""
+    (bump,) = (form for form in grammar() if form.family == "bump")
+    diameters = np.concatenate(([0.0], np.linspace(210.0, 510.0, 200)))
+    found = FittedForm(bump, False, np.array([place, width]), np.ones(1), 0.0)
+    assert in_a_gap(found, diameters) is lost

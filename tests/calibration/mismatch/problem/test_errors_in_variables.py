@@ -49,6 +49,16 @@ def test_a_sensor_that_rests_at_zero_stays_there() -> None:
     assert found[~resting].all()
 
 
+def test_a_run_that_begins_or_ends_with_one_reading_at_rest_does_so() -> None:
+    """Exactly 0 in the first and the last reading of each run; in the middle of a run it may be chance."""
+    random = np.random.default_rng(6)
+    speed, at_rest = 5 + random.normal(0, 0.2, 1200), np.array([0, 599, 600, 1199])
+    speed[[*at_rest, 300]] = 0.0
+    columns = {"t_s": np.arange(1200) / 10, "speed": speed, "run": np.repeat([1, 2], 600)}
+    found = expected_inputs(from_columns(columns), {"speed": SensorError(absolute=0.2)}).channels["speed"][:, 0]
+    np.testing.assert_array_equal(np.flatnonzero(found == 0), at_rest)
+
+
 def test_a_force_that_is_mostly_none_is_none_there() -> None:
     """A press pushes with up to 400 errors of its load cell, and reads its error alone while it rests."""
     random = np.random.default_rng(5)

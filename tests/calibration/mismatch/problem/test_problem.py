@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from linear_machine import AXES, INSTANTS, STEP_S, Level, problem_of, table
 
-from regolithd.calibration.mismatch import RecordingError, compare, from_columns
+from regolithd.calibration.mismatch import Prior, RecordingError, Simulation, compare, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.prior import SensorError, own_name
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
@@ -139,6 +139,39 @@ def test_what_cannot_be_compared_is_an_error() -> None:
     columns["reading_V"][60:] = np.nan
     with pytest.raises(RecordingError, match=r"only 60 values of reading_V .* at least 100"):
         problem_of(columns)
+    columns = table()
+    columns["speed_rad_s"][60:] = np.nan
+    with pytest.raises(RecordingError, match=r"only 60 values .*; 1540 are not: speed_rad_s was not measured there"):
+        problem_of(columns)
+
+
+class Doubling(Simulation):
+    """A state that each step of the clock doubles."""
+
+    channel, unit = "reading_V", "V"
+    inputs = ("speed_rad_s",)
+    parameters: ClassVar = {"gain": Prior(1.0, 0.1)}
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the state."""
+        return values["gain"] * 2.0 ** np.arange(float(len(inputs["t_s"])))[:, None] + 0 * inputs["speed_rad_s"]
+
+
+def test_a_prediction_without_bound_is_an_error_that_names_when_and_the_step() -> None:
+    """A billion times the largest reading is no value of any unit."""
+    columns = {"t_s": 7 * np.arange(300.0), "reading_V": np.ones(300), "speed_rad_s": np.ones(300)}
+    with pytest.raises(
+        RecordingError, match=r"grows without bound: at t = 210 s .* rows are 7 s apart: check that t_s"
+    ):
+        build_problem(from_columns(columns), Doubling())
+
+
+@pytest.mark.parametrize(("factor", "told"), [(1000.0, True), (0.001, True), (3.0, False)])
+def test_readings_in_another_unit_have_a_note(factor: float, told: bool) -> None:
+    """A thousand times what is predicted is no physics."""
+    columns = table()
+    columns["reading_V"] = columns["reading_V"] * factor
+    assert any("check its unit" in note for note in problem_of(columns).recording.notes) is told
 
 
 def test_a_simulation_without_sides_has_no_sets_and_no_contrasts() -> None:
