@@ -32,6 +32,7 @@ from regolithd.calibration.mismatch.signal.normal_interval import NINETY_PERCENT
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.group import Group, Term
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.selection.decision import Decision
@@ -124,7 +125,7 @@ def _weigh(
     problem, nuisance, effect = equations.problem, equations.nuisance, equations.problem.stated[place]
     posterior, size = effect.posterior, stated_names(problem)[place]
     assert posterior is not None  # noqa: S101  # only such effects come here
-    kept = [k for k, name in enumerate(posterior.parameters) if name in nuisance.names]
+    kept = [k for k, name in enumerate(posterior.parameters) if name in nuisance.names and _acts(problem, name)]
     if not kept or size not in nuisance.names:
         return None
     names = [posterior.parameters[k] for k in kept]
@@ -147,6 +148,11 @@ def _weigh(
     moved, there, _ = readings.least(within, stated)
     differs = bool(abs(now[-1]) > NINETY_PERCENT_STDS * np.sqrt(spread[-1, -1]))
     return _Weighed(change, places, mean, covariance, same - changed, moved - changed, differs, there)
+
+
+def _acts(problem: Problem, parameter: str) -> bool:
+    """Return whether the predicted channel depends on a parameter: others of a simulation are of other channels."""
+    return bool(problem.tangent(parameter)[problem.mask].any())
 
 
 @dataclass(frozen=True, eq=False)
