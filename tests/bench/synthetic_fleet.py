@@ -37,7 +37,7 @@ ALL = (0, 1)
 class Drag(Candidate):
     """A drag of one coefficient, on all wheels or one."""
 
-    name, covariate, equation, words = "steady-drag", "wheel_speed", "ΔI = k ω", "drag that grows with speed"
+    name, covariate, equation, words = "steady-drag", "wheel_speed", "Δy = k ω", "drag that grows with speed"
     experiment = "drive at several {wheel_speed}s"
     coefficients: ClassVar = (Coefficient("drag", "{unit} s/rad"),)
 
@@ -45,7 +45,7 @@ class Drag(Candidate):
 class Wear(Candidate):
     """A change by its nature, of one wheel."""
 
-    name, covariate, equation, words = "wear", "time", "ΔI = I_b g(t)", "drag that was not there at first"
+    name, covariate, equation, words = "wear", "time", "Δy = y_b g(t)", "drag that was not there at first"
     experiment = "repeat the beginning"
     run_unloaded = True
     coefficients: ClassVar = (Coefficient("worn"),)
@@ -55,7 +55,7 @@ class Wear(Candidate):
 class Wave(Candidate):
     """Two coefficients of either sign, on all wheels."""
 
-    name, covariate, equation, words = "wave", "wheel_angle", "ΔI = a sin θ + b cos θ", "a wave over the angle"
+    name, covariate, equation, words = "wave", "wheel_angle", "Δy = a sin θ + b cos θ", "a wave over the angle"
     experiment = "turn a whole turn of the wheel_angle"
     coefficients: ClassVar = (Coefficient("sine", sign=0), Coefficient("cosine", sign=0))
     sharing: ClassVar = ("all",)

@@ -20,7 +20,7 @@ search, the answer's sentence, the report, `--corrected` and the documentation t
 
         name = "aerodynamic-drag"
         covariate = "wheel_speed"
-        equation = "ΔI = d sign(ω) ω²"
+        equation = "Δy = d sign(ω) ω²"
         words = "drag that grows with the square of speed"
         signature = "a residual along the motion that is a parabola over speed"
         experiment = "hold at least four values of the {wheel_speed}, both ways"

@@ -42,7 +42,7 @@ class BearingDrag(Candidate):
 
     name = "bearing-drag"
     covariate = "time"
-    equation = "ΔI = I_b g(t − t_0) sign(ω)"
+    equation = "Δy = y_b g(t − t_0) sign(ω)"
     words = "drag that was not there at first"
     signature = "one wheel's residual along sign(ω), none before its onset, growing after"
     experiment = "repeat the beginning of what was recorded as it was"

@@ -53,7 +53,7 @@ class ColdLubricantFriction(Candidate):
 
     name = "cold-lubricant-friction"
     covariate = "temperature"
-    equation = "ΔI = I_cold g(T) sign(ω) |ω|^p,  g falling with T"
+    equation = "Δy = y_cold g(T) sign(ω) |ω|^p,  g falling with T"
     words = "drag that grows as the {temperature} falls"
     signature = "a residual along sign(ω) that shrinks as the motor warms"
     experiment = "start cold, warm up, cool down and repeat, so that the {temperature} does not follow the time"

@@ -19,7 +19,7 @@ class CoulombFriction(Candidate):
 
     name = "coulomb-friction"
     covariate = "direction"
-    equation = "ΔI = I_c sign(ω)"
+    equation = "Δy = y_c sign(ω)"
     words = "constant drag against the motion (Coulomb friction, no-load current)"
     signature = "a residual of constant size that changes sign with the direction of rotation"
     experiment = "run to and fro at one and the same {wheel_speed}"

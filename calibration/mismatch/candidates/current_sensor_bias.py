@@ -17,7 +17,7 @@ class CurrentSensorBias(Candidate):
 
     name = "current-sensor-bias"
     covariate = "none"
-    equation = "ΔI = I_0"
+    equation = "Δy = y_0"
     words = "an offset of the current sensor, whatever the direction"
     signature = "one wheel's residual is constant and keeps its sign when the wheel reverses"
     experiment = "read the sensor at rest and without power, then run to and fro"

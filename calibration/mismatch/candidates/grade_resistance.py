@@ -19,7 +19,7 @@ class GradeResistance(Candidate):
 
     name = "grade-resistance"
     covariate = "pitch"
-    equation = "ΔI = k (W/W_ref) sin(pitch)"
+    equation = "Δy = k (W/W_ref) sin(pitch)"
     words = "the weight's part along the slope"
     signature = "a residual along sin(pitch) that does not change sign with the direction of travel"
     experiment = "drive one slope up and down, forwards and backwards"

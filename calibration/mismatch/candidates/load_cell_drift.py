@@ -55,7 +55,7 @@ class LoadCellDrift(Candidate):
     name = "load-cell-drift"
     covariate = "time"
     channel: ClassVar[str | None] = "load_N"
-    equation = "W = W_cell − D(t);  ΔI = −(∂I/∂W) D(t)"
+    equation = "W = W_cell − D(t);  Δy = −(∂y/∂W) D(t)"
     words = "a load cell whose reading drifts"
     signature = "one wheel's load departs from what pitch and roll explain, and its current does not follow"
     experiment = "repeat the beginning of what was recorded as it was, with the same load"

@@ -61,18 +61,18 @@ class LoadDependentEfficiency(Candidate):
     name = "load-dependent-efficiency"
     covariate = "torque"
     equation = (
-        "ΔI = a |I_sim| |I_sim/I_ref|^p sign(ω), a |I_sim| exp(−|I_sim|/(l I_ref)) sign(ω), "
-        "or |I_sim| (1/(1 − a x) − 1) sign(ω), x = |I_sim|/I_ref − 1"
+        "Δy = a |y_sim| |y_sim/y_ref|^p sign(ω), a |y_sim| exp(−|y_sim|/(l y_ref)) sign(ω), "
+        "or |y_sim| (1/(1 − a x) − 1) sign(ω), x = |y_sim|/y_ref − 1"
     )
     words = "a loss that depends on the transmitted torque"
-    signature = "a residual along the predicted current, curved against it"
+    signature = "a residual along the prediction, curved against it"
     experiment = "carry at least three different loads at each {wheel_speed}"
     source = "CSF-11 efficiency over load (maker's chart): 0.3 to 0.7 from a tenth of rated torque to rated"
     requires = ("torque",)
     loads = True
     forms = ("constant share", "power of the torque", "exponential decay with the torque", "linear efficiency")
     shape_keys: ClassVar = {
-        "reference_size": "I_ref",
+        "reference_size": "y_ref",
         "power": "p (0: a constant share)",
         "light": "l",
         "bent": "a of the linear efficiency",

@@ -46,7 +46,7 @@ class MultiPassCompaction(Candidate):
 
     name = "multi-pass-compaction"
     covariate = "wheel_row"
-    equation = "ΔI = p(row) (a I_sim),  or p(row) Σ a_k ∂I_sim/∂ln k over the soil's stiffness, shear modulus, cohesion"
+    equation = "Δy = p(row) (a y_sim),  or p(row) Σ a_k ∂y_sim/∂ln k over the soil's stiffness, shear modulus, cohesion"
     words = "soil that earlier wheels have compacted for later ones"
     signature = "a residual along the predicted current that is the same for both wheels of a row and differs by row"
     experiment = "drive one virgin lane, then twice more in the same ruts"

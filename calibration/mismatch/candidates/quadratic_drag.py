@@ -17,7 +17,7 @@ class QuadraticDrag(Candidate):
 
     name = "quadratic-drag"
     covariate = "wheel_speed"
-    equation = "ΔI = d sign(ω) ω²"
+    equation = "Δy = d sign(ω) ω²"
     words = "drag that grows with the square of speed"
     signature = "a residual along sign(ω) that rises with ω² and is flat near standstill"
     experiment = "hold at least four values of the {wheel_speed}, from the slowest to the highest, both ways"

@@ -30,7 +30,7 @@ class RotorInertia(Candidate):
 
     name = "rotor-inertia"
     covariate = "wheel_acceleration"
-    equation = "ΔI(t) = (J/k) dω/dt (t − lag)"
+    equation = "Δy(t) = (J/k) dω/dt (t − lag)"
     words = "inertia of the parts that move"
     signature = "short residuals at each change of speed, with the acceleration's sign"
     experiment = "start, stop and reverse sharply, twenty times"

@@ -44,7 +44,7 @@ class StribeckFriction(Candidate):
 
     name = "stribeck-friction"
     covariate = "wheel_speed"
-    equation = "ΔI = I_s sign(ω) exp(−(|ω|/ω_s)^δ), or I_s sign(ω) / (1 + (ω/ω_s)²)"
+    equation = "Δy = y_s sign(ω) exp(−(|ω|/ω_s)^δ), or y_s sign(ω) / (1 + (ω/ω_s)²)"
     words = "extra drag near standstill that decays with speed"
     signature = "a residual along sign(ω) that is largest at the slowest speeds"
     experiment = "hold at least four values of the {wheel_speed}, from the slowest to the highest, both ways"

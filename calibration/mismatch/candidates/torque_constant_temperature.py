@@ -46,7 +46,7 @@ class TorqueConstantTemperature(Candidate):
 
     name = "torque-constant-temperature"
     covariate = "temperature"
-    equation = "ΔI = I_sim (1/(1 − α (T − T_0)) − 1)"
+    equation = "Δy = y_sim (1/(1 − α (T − T_0)) − 1)"
     words = "a torque constant that falls as the {temperature} rises"
     signature = "a residual along the predicted current that grows with temperature, through zero at T_0"
     experiment = "start cold, warm up, cool down and repeat, so that the {temperature} does not follow the time"

@@ -32,7 +32,7 @@ class TurningResistance(Candidate):
 
     name = "turning-resistance"
     covariate = "yaw_rate"
-    equation = "ΔI = a g(|ψ̇|) sign(ω) + m g(|ψ̇|) sign(ψ̇) side,  g rising"
+    equation = "Δy = a g(|ψ̇|) sign(ω) + m g(|ψ̇|) sign(ψ̇) side,  g rising"
     words = "scrub of the wheels while the machine turns"
     signature = "a residual only while turning: alike on all wheels (drag) or opposite on the two sides (moment)"
     experiment = "turn on the spot and along arcs of several radii, both ways"

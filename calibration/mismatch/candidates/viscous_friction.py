@@ -23,7 +23,7 @@ class ViscousFriction(Candidate):
 
     name = "viscous-friction"
     covariate = "wheel_speed"
-    equation = "ΔI = b sign(ω) |ω|^p"
+    equation = "Δy = b sign(ω) |ω|^p"
     words = "drag that grows with speed"
     signature = "a residual along sign(ω) that rises with |ω| and vanishes towards standstill"
     experiment = "hold at least four values of the {wheel_speed}, from the slowest to the highest, both ways"

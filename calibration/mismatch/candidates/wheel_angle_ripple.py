@@ -88,7 +88,7 @@ class WheelAngleRipple(Candidate):
 
     name = "wheel-angle-ripple"
     covariate = "wheel_angle"
-    equation = "ΔI = Σ a_k cos(order θ) + b_k sin(order θ), wheel by wheel"
+    equation = "Δy = Σ a_k cos(order θ) + b_k sin(order θ), each axis its own a_k, b_k"
     words = "a ripple that is periodic in the {wheel_angle}"
     signature = "a line in the residual's spectrum over wheel angle that stays put when the speed changes"
     experiment = "hold three values of the {wheel_speed}, sampled at four times the ripple's frequency"

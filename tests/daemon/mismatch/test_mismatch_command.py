@@ -87,7 +87,7 @@ def test_effects_are_listed_with_law_needs_and_parameters() -> None:
     """Every effect of the library is there, and no recording is needed."""
     done = call("--effects")
     assert done.exit_code == 0
-    assert "viscous-friction: drag that grows with speed\n  law         ΔI = b sign(ω) |ω|^p\n" in done.output
+    assert "viscous-friction: drag that grows with speed\n  law         Δy = b sign(ω) |ω|^p\n" in done.output
     assert "  needs       a predicted column in A, mA, µA or kA\n" in done.output
     assert [each.name for each in library() if f"{each.name}: " not in done.output] == []
 

@@ -60,7 +60,7 @@ def test_it_is_in_the_answer_with_its_sentence(found: Comparison) -> None:
     assert effect.wheels == (1, 2, 3, 4, 5, 6)
     assert effect.statement.startswith("Drag that grows with the square of speed, on all 6 wheels: ")
     assert effect.parameters["drag_coefficient"].unit == "A s²/rad²"
-    assert json.loads(json.dumps(found.answer.to_json()))["effects"][0]["equation"] == "ΔI = d sign(ω) ω²"
+    assert json.loads(json.dumps(found.answer.to_json()))["effects"][0]["equation"] == "Δy = d sign(ω) ω²"
 
 
 def test_it_has_a_sensitivity_once_it_is_not_there(found: Comparison) -> None:

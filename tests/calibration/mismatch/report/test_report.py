@@ -250,7 +250,7 @@ def test_a_page_about_another_machine_has_no_wheels(evidence: Evidence) -> None:
 
 def test_an_equation_has_subscripts_and_superscripts_and_no_markup_of_its_own() -> None:
     """What the candidate writes is escaped first."""
-    assert equation("ΔI = I_c |ω|^p <b>") == "ΔI = I<sub>c</sub> |ω|<sup>p</sup> &lt;b&gt;"
+    assert equation("Δy = y_c |ω|^p <b>") == "Δy = y<sub>c</sub> |ω|<sup>p</sup> &lt;b&gt;"
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ DRAG = FleetEffect(
     wheels=("wrist",),
     covariate="time",
     onset_s=None,
-    equation="ΔI = I_b g(t − t_0) sign(ω)",
+    equation="Δy = y_b g(t − t_0) sign(ω)",
     statement="drag on axis wrist of bruno <b> since the third day: 25 % of the mean reading.",
     parameters={"drag_current": Parameter(0.25, 0.2, 0.3, "N·m"), "relative_size": Parameter(0.25, 0.2, 0.3, "1")},
     rmse_before=0.2,
