@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 NO_BREAK = "\u00a0"
 """A space at which a line is not broken."""
+MOST_NOT_FOUND = 2
+"""Sets of effects without a finding that are told with their experiments (a choice: a terminal's page)."""
 TOLD_IN_THE_STATEMENT = ("relative_size", "onset_s")
 """Parameters of an effect that its statement has in words."""
 
@@ -93,7 +95,7 @@ def _lines(answer: Answer, labels: Labels, wheels: Sequence[int | str]) -> list[
         *(_not_distinguished(each, answer, labels) for each in told),
         sure_of(answer),
         *map(_error, answer.fits or (answer.fit,)),
-        *(_not_found(each, answer, labels) for each in answer.indistinguishable if each not in told),
+        *_all_not_found([each for each in answer.indistinguishable if each not in told], answer, labels),
         *(f"note: {note}" for note in notes_beside_priors(answer.notes, moved)),
     ]
 
@@ -115,6 +117,14 @@ def _not_distinguished(found: Indistinguishable, answer: Answer, labels: Labels)
     """Return a set of effects, one of which was found, with its experiment."""
     told = "these recordings do not" if isinstance(answer, FleetAnswer) else "this recording does not"
     return f"{_names_of(found, answer, labels)}: {told} distinguish them. {found.experiment}"
+
+
+def _all_not_found(sets: Sequence[Indistinguishable], answer: Answer, labels: Labels) -> list[str]:
+    """Return the lines about the first sets without a finding, and how many more there are."""
+    lines = [_not_found(each, answer, labels) for each in sets[:MOST_NOT_FOUND]]
+    if more := len(sets) - len(lines):
+        lines.append(f"not found: {more} more such {'set' if more == 1 else 'sets'} (--report or --json)")
+    return lines
 
 
 def _not_found(found: Indistinguishable, answer: Answer, labels: Labels) -> str:

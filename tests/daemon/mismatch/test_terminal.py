@@ -228,3 +228,17 @@ def test_what_one_of_several_columns_does_not_distinguish_names_the_column() -> 
         "not found: one or other in voltage",
         "not found: one or other",
     ]
+
+
+def test_of_many_sets_without_a_finding_two_are_told() -> None:
+    """Each has an experiment of some lines; the rest is counted."""
+    fit = FitImprovement("current", 1.0, 1.0, 1.0)
+    sets = tuple(Indistinguishable((f"one-{k}", f"other-{k}"), "Drive fast.") for k in range(5))
+    console = Console(record=True, width=200, quiet=False)
+    print_answer(console, Answer("consistent", (), (), sets, (), fit), Labels())
+    told = [line.strip() for line in console.export_text().splitlines() if "not found" in line]
+    assert [line.split(".")[0] for line in told] == [
+        "not found: one-0 or other-0",
+        "not found: one-1 or other-1",
+        "not found: 3 more such sets (--report or --json)",
+    ]

@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
 from regolithd.calibration.mismatch.fleet.report.figures import sizes_figure
+from regolithd.calibration.mismatch.fleet.told.answer import to_the_minute
 from regolithd.calibration.mismatch.inference.statements import capital, percent, plural
 from regolithd.calibration.mismatch.report import sections, tables
 from regolithd.calibration.mismatch.report.axes import number
@@ -143,7 +144,7 @@ def _since(found: FleetEffect) -> str:
 
 
 def _day(date: str | None) -> str:
-    return date[:16].replace("T", " ") if date else "–"
+    return to_the_minute(date) if date else "–"
 
 
 def unexplained(answer: FleetAnswer, labels: Labels, wheels: Sequence[int | str]) -> tuple[UnexplainedRow, ...]:

@@ -11,6 +11,11 @@ from regolithd.calibration.mismatch.fleet.member import ONLY_ROVER
 from regolithd.calibration.mismatch.inference.statements import listed
 
 
+def to_the_minute(date: str) -> str:
+    """Return a date and time of the answer (ISO 8601) as a sentence has it: 2026-05-10 00:00."""
+    return date[:16].replace("T", " ")
+
+
 @dataclass(frozen=True)
 class FleetEffect(Effect):
     """An effect that the simulation leaves out, on some rovers and from some date on.

@@ -20,6 +20,7 @@ from regolithd.calibration.mismatch.fleet.told.answer import (
     FleetParameter,
     FleetUnexplained,
     RoverOfFleet,
+    to_the_minute,
 )
 from regolithd.calibration.mismatch.fleet.told.rivals import rivals
 from regolithd.calibration.mismatch.fleet.told.sensitivity import sensitivities
@@ -221,7 +222,8 @@ def _statement(
     rovers = [names.rovers[rover] for rover in term.units.rovers]
     whose = "all rovers" if len(rovers) == len(names.rovers) else ", ".join(rovers)
     of = "" if len(names.rovers) == 1 else f" of {whose}" if wheels else f", on {whose}"
-    at = names.date(course.first) or names.recordings[course.first]
+    date = names.date(course.first)
+    at = to_the_minute(date) if date else names.recordings[course.first]
     when = {
         "always": "",
         "since": f" since {at}",
