@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.data.recording import LONGEST_STEP
 from regolithd.calibration.mismatch.problem.state_memory import before_state, memory_s
 from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
 from regolithd.calibration.mismatch.regression.residuals import contribution, residual_of
@@ -199,7 +200,7 @@ class _Courses:
         elif lengths := skewed_lengths(course, beside, limits):
             spells = skewed_spells(course, lengths)
             gain = 0.0  # less than any two levels gain
-        elif (at := jumps(course, self._rounding(wheels, course), limits)).size:
+        elif (at := jumps(course, self._breaks(wheels), self._rounding(wheels, course), limits)).size:
             spells, power = levelled_spells(course, at), float(np.var(levels(course, at)))
             # A jump has an instant and a size.
             gain = gain_as_noise(course, course - levels(course, at)) - 2 * limits.coefficient_penalty * len(at)
@@ -210,6 +211,14 @@ class _Courses:
         time_s = problem.time_s[self._read[:, list(wheels)].any(axis=1), 0]
         first, last = float(time_s[spells.first]), float(time_s[spells.last])
         return TimedSpells(first, last, spells.share, gain, acting)
+
+    def _breaks(self, wheels: tuple[int, ...]) -> NDArray[np.int64]:
+        """Return which readings of a course follow no other: after a gap or a rest, in another run or another way."""
+        recording, along = self._problem.recording, self._along[:, list(wheels)]
+        at = np.flatnonzero(self._read[:, list(wheels)].any(axis=1))
+        apart = np.diff(recording.time_s[at]) > LONGEST_STEP * recording.step_s
+        apart |= (np.diff(recording.run[at]) != 0) | (np.diff(np.sign(along[at]), axis=0) != 0).any(axis=1)
+        return np.flatnonzero(apart) + 1
 
     def _rounding(self, wheels: tuple[int, ...], course: Array) -> float:
         """Return twice the step between the values that readings of these wheels have, in the unit of their course."""

@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+NONE: Index = np.zeros(0, np.int64)
 LENGTHS = (5, 9, 17)
 """Readings before and after an instant whose medians are compared (a choice: five medians outvote two readings)."""
 BESIDE = 0.8
@@ -27,20 +28,26 @@ FEWEST_LENGTHS = 20
 """Lengths that a course has at least, so that few of its differences are at its jumps (a choice)."""
 
 
-def jumps(course: Array, least: float = 0.0, thresholds: Thresholds = THRESHOLDS) -> Index:
+def jumps(course: Array, breaks: Index = NONE, least: float = 0.0, thresholds: Thresholds = THRESHOLDS) -> Index:
     """Return the readings with which another level begins, in ascending order, where noise does not jump so by chance.
 
-    A jump is larger than `least`: readings that are rounded jump by what they are rounded to. Beside one that is no
-    chance there are smaller ones.
+    Beside one that is no chance there are smaller ones.
+
+    Parameters
+    ----------
+    course: shape (reading,)
+    breaks: readings that do not follow the one before: slow noise may be another there
+    least: size of a jump, beyond which it is one: readings that are rounded jump by what they are rounded to
     """
     found: dict[int, bool] = {}
     for length in LENGTHS:
         if len(course) < FEWEST_LENGTHS * length:
             break
-        if not (_deviates(running_mean(course, length), length) > BESIDE * thresholds.most_jump_deviates).any():
+        together = _together(len(course), length, breaks)
+        if not (_deviates(running_mean(course, length), together) > BESIDE * thresholds.most_jump_deviates).any():
             continue  # medians take a hundred times as long
         medians = np.median(sliding_window_view(course, length), axis=-1)
-        deviates = np.where(np.abs(medians[length:] - medians[:-length]) > least, _deviates(medians, length), 0.0)
+        deviates = np.where(np.abs(medians[length:] - medians[:-length]) > least, _deviates(medians, together), 0.0)
         edges = np.flatnonzero(np.diff(deviates > BESIDE * thresholds.most_jump_deviates, prepend=False, append=False))
         for first, end in zip(edges[::2], edges[1::2], strict=True):
             jump = first + int(np.argmax(deviates[first:end])) + length
@@ -50,13 +57,23 @@ def jumps(course: Array, least: float = 0.0, thresholds: Thresholds = THRESHOLDS
     return np.array(sorted(found) if any(found.values()) else [], np.int64)
 
 
-def _deviates(centres: Array, length: int) -> Array:
-    """Return how far apart the centres of so many readings before and after are, in standard deviations.
+def _together(count: int, length: int, breaks: Index) -> NDArray[np.bool_]:
+    """Return at which readings so many before and after have no break between them, shape (count - 2 length + 1,)."""
+    broken = np.zeros(count + 1, np.int64)
+    broken[breaks] = 1
+    total = np.cumsum(broken)
+    first = np.arange(count - 2 * length + 1)
+    return np.asarray(total[first + 2 * length - 1] == total[first])
+
+
+def _deviates(centres: Array, compared: NDArray[np.bool_]) -> Array:
+    """Return how far apart centres are of readings before and after, in standard deviations; 0 where not compared.
 
     A course that is coarser than its noise has no scatter, and is nowhere apart.
     """
+    length = len(centres) - len(compared)
     steps = centres[length:] - centres[:-length]
-    return np.asarray(np.abs(steps) / (robust_std(steps) or np.inf))
+    return np.where(compared, np.abs(steps) / (robust_std(steps[compared]) or np.inf), 0.0)
 
 
 def levels(course: Array, at: Index) -> Array:

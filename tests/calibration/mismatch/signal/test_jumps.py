@@ -53,6 +53,14 @@ def test_rounded_readings_do_not_jump_by_what_they_are_rounded_to() -> None:
     assert not jumps(left, least=6.0).size
 
 
+def test_slow_noise_that_turns_round_does_not_jump() -> None:
+    """Read along a motion that reverses, or across a gap of an hour, it is another noise after that."""
+    course, breaks = 5 * noise(4, memory=300.0, white=0.02), np.arange(120, COUNT, 120)
+    along = np.repeat([1.0, -1.0], 120)[np.arange(COUNT) % 240]
+    assert jumps(course * along).size
+    assert not jumps(course * along, breaks).size
+
+
 def test_a_short_or_constant_course_has_none() -> None:
     """Nothing is asked of what cannot show it."""
     assert not jumps(np.zeros(COUNT)).size
