@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
+import numpy as np
+
 from regolithd.calibration.mismatch.calibration.step import Step
 from regolithd.calibration.mismatch.inference.joint_parameters import joint_posterior, known_better_by_others
 from regolithd.calibration.mismatch.inference.several_channels import (
@@ -97,8 +99,11 @@ def _near_each_other(
 
 def _is_bent_up_to(values: Mapping[str, float], one: Comparison) -> bool:
     """Return whether the tangents of a channel's comparison do not hold up to these values."""
-    problem = one.evidence.problem
-    return problem is not None and Step(problem, {**problem.values, **values}).is_bent()
+    problem, evidence = one.evidence.problem, one.evidence
+    if problem is None:
+        return False
+    beside = np.nan_to_num(evidence.after - evidence.before)[problem.mask]
+    return Step(problem, {**problem.values, **values}, beside).is_bent()
 
 
 def _joint(comparisons: Iterable[Comparison], simulation: Simulation, *, may_release: bool = True) -> JointPosterior:

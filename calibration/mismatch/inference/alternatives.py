@@ -74,7 +74,10 @@ def alternatives(decision: Decision, *, refused: bool = False) -> tuple[Alternat
         most = min(LARGEST_MARGIN, best.get(names, NEVER)[0])
         told = refused or frozenset(names) not in decision.refused
         possible = told and margins.least(fit) < most and _is_another(decision, names)
-        if possible and _admissible(decision, fit) and (margin := margins.to(fit)) < most:
+        if not (possible and _admissible(decision, fit)):
+            continue
+        margin = margins.to(fit)
+        if (margin := max(margin, 0.0) if _is_over_another_covariate(decision, fit) else margin) < most:
             best[names] = margin, fit.terms
     found = [Alternative(names, margin, of) for names, (margin, of) in best.items()]
     found = [other for other in found if other.margin >= 0 or _stands_optimised(decision, other)]
@@ -165,6 +168,8 @@ def _is_a_laws_misfit(decision: Decision, fit: Fit, named: Fit, curve: Term) -> 
     """
     missing = [term for term in decision.named.terms if term.name not in answer_names(named.terms)]
     in_place = bool(missing) and not decision.unnamed
+    if _is_over_another_covariate(decision, fit):
+        return False
     if in_place and not named.terms:
         of_its_covariate = all(covariate_of(term) == curve.name for term in missing)
         if of_its_covariate or len(missing) > 1:
@@ -173,6 +178,21 @@ def _is_a_laws_misfit(decision: Decision, fit: Fit, named: Fit, curve: Term) -> 
     if not instead_of.terms:
         return False
     return law_misfit(decision.equations, instead_of, fit) < decision.equations.thresholds.form_misfit
+
+
+def _is_over_another_covariate(decision: Decision, fit: Fit) -> bool:
+    """Return whether a curve alone stands in the place of one name of another covariate, and gains no more than misfit.
+
+    Where two covariates go together, as time and a temperature that rises, a law of one is nearly a curve over the
+    other. It may be a little wrong, so that the curve is no more probable, and as probable at most. A curve over time
+    follows anything.
+    """
+    if decision.unnamed or len(decision.named.terms) != 1 or len(fit.terms) != 1:
+        return False
+    (told,), (curve,) = decision.named.terms, fit.terms
+    if curve.group.named or curve.name in {"time", covariate_of(told)} or curve.wheels != told.wheels:
+        return False
+    return law_misfit(decision.equations, decision.named, fit) < decision.equations.thresholds.form_misfit
 
 
 class _Margins:

@@ -28,7 +28,10 @@ from regolithd.calibration.mismatch.inference.intervals import (
 )
 from regolithd.calibration.mismatch.inference.located import share_of_residual, spell_of
 from regolithd.calibration.mismatch.inference.not_looked_for import not_looked_for
-from regolithd.calibration.mismatch.inference.other_covariates import notes_on_other_covariates
+from regolithd.calibration.mismatch.inference.other_covariates import (
+    notes_on_a_curve_in_place,
+    notes_on_other_covariates,
+)
 from regolithd.calibration.mismatch.inference.parameter_information import parameter_covariance
 from regolithd.calibration.mismatch.inference.probability import (
     decided_by_evidence,
@@ -148,7 +151,7 @@ def answer_of(
         left_out=found.left_out,
         probability=probability(rest, thresholds) if known else None,
         alternatives=other_answers(rest, thresholds),
-        notes=(*found.all_notes, *one_way_only(problem, sets)),
+        notes=(*notes_on_a_curve_in_place(decision, rest), *found.all_notes, *one_way_only(problem, sets)),
     )
 
 

@@ -11,8 +11,13 @@ from regolithd.calibration.mismatch.problem.words import word_for
 from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
 from regolithd.calibration.mismatch.regression.smooth_groups import same_covariate
 from regolithd.calibration.mismatch.selection.best_subsets import best_of_each_smooth_term
+from regolithd.calibration.mismatch.selection.decision import UNEXPLAINED
+from regolithd.calibration.mismatch.selection.smooth_terms import covariate_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from regolithd.calibration.mismatch.inference.alternatives import Alternative
     from regolithd.calibration.mismatch.regression.group import Term
     from regolithd.calibration.mismatch.selection.decision import Decision
 
@@ -44,6 +49,26 @@ def notes_on_other_covariates(decision: Decision) -> tuple[str, ...]:
     there = " and the ".join(word_for(name, problem.labels) for name in others)
     note = f"What is unexplained over the {here} follows the {there} nearly as well"
     why = "they go together in this recording, or it hardly depends on any of them"
+    return (f"{note}: {why}. One has to vary without the other to tell which it depends on.",)
+
+
+def notes_on_a_curve_in_place(decision: Decision, others: Sequence[Alternative]) -> tuple[str, ...]:
+    """Return a note where a curve over another covariate is as probable as the only name, or nearly.
+
+    `others` are the other answers, with their terms.
+    """
+    labels, chance = decision.equations.problem.labels, decision.equations.thresholds.lead_margin
+    curves = [
+        other.terms[0]
+        for other in others
+        if other.effects == (UNEXPLAINED,) and len(other.terms) == 1 and other.margin <= chance
+    ]
+    if len(decision.named.terms) != 1 or not curves or curves[0].group.coupling in WITHOUT_CURVE:
+        return ()
+    (named,) = decision.named.terms
+    here, there = word_for(covariate_of(named), labels), word_for(curves[0].name, labels)
+    note = f"{named.name} is about as probable as something without a name that follows the {there}"
+    why = f"{here} and {there} go together in this recording"
     return (f"{note}: {why}. One has to vary without the other to tell which it depends on.",)
 
 
