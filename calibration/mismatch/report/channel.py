@@ -78,7 +78,7 @@ def _part(answer: Answer, evidence: Evidence, *, alone: bool) -> ChannelPart:
         effects=[
             sections.effect(effect, evidence, labels, several=len(answer.effects) > 1) for effect in answer.effects
         ],
-        unexplained=[sections.unexplained(place, evidence, labels) for place in answer.unexplained],
+        unexplained=sections.all_unexplained(answer.unexplained, evidence, labels),
         fit=sections.fit(answer, evidence, labels),
         sensitivity=sections.sensitivity(answer, evidence, labels),
         undetectable=sections.undetectable(answer, labels),

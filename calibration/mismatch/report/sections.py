@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +23,8 @@ from regolithd.calibration.mismatch.report.empirical import EmpiricalSection, em
 from regolithd.calibration.mismatch.report.figures import curve_figure, fit_figure, interval_figure, map_figure
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from regolithd.calibration.mismatch.answer import (
         Answer,
         Change,
@@ -76,11 +78,12 @@ class EffectSection:
 
 @dataclass(frozen=True)
 class UnexplainedSection:
-    """One structure in the residual that no candidate explains."""
+    """One structure in the residual that no candidate explains; `above`: its curve is drawn with another range."""
 
     covariate: str
     facts: tuple[str, ...]
     empirical: EmpiricalSection | None = None
+    above: bool = False
 
 
 @dataclass(frozen=True)
@@ -229,6 +232,16 @@ def _unit_of(found: Effect, evidence: Evidence) -> str:
     if found.channel == evidence.channel:
         return evidence.unit
     return found.channel.rsplit("_", 1)[-1] if "_" in found.channel else ""
+
+
+def all_unexplained(places: Sequence[Unexplained], evidence: Evidence, labels: Labels) -> list[UnexplainedSection]:
+    """Return what no candidate explains; a curve that several ranges have is drawn once."""
+    found = []
+    for number_of, place in enumerate(places):
+        above = any(place.curve is not None and place.curve == other.curve for other in places[:number_of])
+        section = unexplained(replace(place, curve=None) if above else place, evidence, labels)
+        found.append(replace(section, above=above))
+    return found
 
 
 def unexplained(place: Unexplained, evidence: Evidence, labels: Labels) -> UnexplainedSection:

@@ -27,6 +27,7 @@ from regolithd.calibration.mismatch.answer import (
 from regolithd.calibration.mismatch.candidates.candidate import Candidate
 from regolithd.calibration.mismatch.candidates.coulomb_friction import CoulombFriction
 from regolithd.calibration.mismatch.inference.statements import plural, statement
+from regolithd.calibration.mismatch.problem.empirical_curve import EmpiricalCurve
 from regolithd.calibration.mismatch.report.axes import number, ticks
 from regolithd.calibration.mismatch.report.curves import curve_of
 from regolithd.calibration.mismatch.report.labels import Labels, verdict_sentence
@@ -320,3 +321,16 @@ def test_the_next_best_answer_is_told_where_it_is_not_negligible() -> None:
     assert doubtful.next == "refused, though likelier by evidence alone: nothing missing (0.91)"
     assert doubtful.doubt == "more probably wrong than right"
     assert certainty(replace(refused, probability=0.5), labels).doubt == ""
+
+
+def test_a_curve_that_several_ranges_have_is_drawn_once(evidence: Evidence) -> None:
+    """The other ranges say that it is above."""
+    curve = EmpiricalCurve(
+        "offset", False, "A", "V", (20.0, 28.0), (0.0, 1e-3), (-1e-4, 9e-4), (1e-4, 2e-3), 6e-3, 5e-3
+    )
+    place = Unexplained("motor_current_A", (1, 2), "voltage", 0.0, 900.0, 0.1, curve=curve)
+    page = render_report(
+        answer(verdict="unexplained", unexplained=(place, replace(place, to_s=1800.0))), evidence, FROM
+    )
+    assert page.count("Empirical curve: no physics is known for it.") == 1
+    assert page.count("A range of what is drawn above, with the same curve.") == 1
