@@ -228,7 +228,7 @@ class _Courses:
             for k in range(len(on))
             if (values := np.unique(self._problem.measured[:, on][read[:, k], k])).size > 1
         ]
-        size = float(np.sqrt(np.mean(self._left[:, on][read] ** 2)))
+        size = float(np.sqrt(np.mean(self._left[:, on][read] ** 2))) if read.any() else 0.0
         return 2 * max(steps, default=0.0) * float(np.sqrt(np.mean(course**2))) / size if size > 0 else 0.0
 
     def gain_of(self, after: _Courses, wheels: Sequence[int]) -> float:

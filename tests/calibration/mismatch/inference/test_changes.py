@@ -152,7 +152,7 @@ def test_a_correction_of_a_correction_is_one_effect() -> None:
 
 def test_an_effect_that_no_candidate_has_is_refused_by_name() -> None:
     """The message lists what is known."""
-    with pytest.raises(SimulationError, match="the effect stiction, but there is no such candidate"):
+    with pytest.raises(SimulationError, match="has stiction, which is not looked for with this simulation"):
         stated_in([], [Contribution("stiction", {}, (1.0,), (1,))], [])
 
 
