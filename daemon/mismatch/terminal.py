@@ -16,6 +16,7 @@ from regolithd.calibration.mismatch.inference.statements import (
     after_number,
     beyond_prior_in_words,
     doubt_of,
+    has_curve_of,
     notes_beside_priors,
     on_wheels,
     parameters_found,
@@ -146,9 +147,8 @@ def _all_unexplained(found: Sequence[Unexplained], labels: Labels, of: int, *, s
     """Return the lines about all that is unexplained; a curve that several regions have is told once."""
     told: list[str] = []
     for place, rest in enumerate(found):
-        before = any(rest.curve is not None and rest.curve == other.curve for other in found[:place])
         lines = _unexplained(rest, labels, of, several=several)
-        told += lines[:1] if before else lines
+        told += lines[:1] if has_curve_of(rest, found[:place]) else lines
     return told
 
 

@@ -200,10 +200,11 @@ class _Courses:
         elif lengths := skewed_lengths(course, beside, limits):
             spells = skewed_spells(course, lengths)
             gain = 0.0  # less than any two levels gain
-        elif (at := jumps(course, self._breaks(wheels), self._rounding(wheels, course), limits)).size:
-            spells, power = levelled_spells(course, at), float(np.var(levels(course, at)))
+        elif (at := self._jumps(wheels, course)).size:
+            between = levels(course, at)
+            spells, power = levelled_spells(course, at, between), float(np.var(between))
             # A jump has an instant and a size.
-            gain = gain_as_noise(course, course - levels(course, at)) - 2 * limits.coefficient_penalty * len(at)
+            gain = gain_as_noise(course, course - between) - 2 * limits.coefficient_penalty * len(at)
             if spells.share < limits.smooth_term_power or power <= limits.form_misfit * np.mean(beside**2):
                 return None
         else:
@@ -211,6 +212,13 @@ class _Courses:
         time_s = problem.time_s[self._read[:, list(wheels)].any(axis=1), 0]
         first, last = float(time_s[spells.first]), float(time_s[spells.last])
         return TimedSpells(first, last, spells.share, gain, acting)
+
+    def _jumps(self, wheels: tuple[int, ...], course: Array) -> NDArray[np.int64]:
+        """Return the readings of the course of these wheels with which another level begins."""
+        breaks, limits = self._breaks(wheels), self._problem.thresholds
+        found = jumps(course, breaks, thresholds=limits)
+        # Most courses have none, of whatever size: what their readings are rounded to need not be known.
+        return jumps(course, breaks, self._rounding(wheels, course), limits) if found.size else found
 
     def _breaks(self, wheels: tuple[int, ...]) -> NDArray[np.int64]:
         """Return which readings of a course follow no other: after a gap or a rest, in another run or another way."""

@@ -16,7 +16,7 @@ from regolithd.calibration.mismatch.thresholds import THRESHOLDS
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from regolithd.calibration.mismatch.answer import CalibratedParameter, OtherAnswer, Parameter
+    from regolithd.calibration.mismatch.answer import CalibratedParameter, OtherAnswer, Parameter, Unexplained
     from regolithd.calibration.mismatch.candidates.candidate import Candidate, Shape
     from regolithd.calibration.mismatch.thresholds import Thresholds
 
@@ -249,3 +249,8 @@ def notes_beside_priors(notes: Sequence[str], moved: Sequence[CalibratedParamete
 def after_number(unit: str) -> str:
     """Return a unit as it follows a number; nothing for a pure number."""
     return f" {unit}" if unit not in {"", "1"} else ""
+
+
+def has_curve_of(place: Unexplained, before: Sequence[Unexplained]) -> bool:
+    """Return whether the curve of what is unexplained was told with another range of it before."""
+    return place.curve is not None and any(place.curve == other.curve for other in before)

@@ -12,6 +12,7 @@ from regolithd.calibration.mismatch.inference.statements import (
     REFUSED,
     capital,
     doubt_of,
+    has_curve_of,
     listed,
     percent,
     plural,
@@ -237,8 +238,8 @@ def _unit_of(found: Effect, evidence: Evidence) -> str:
 def all_unexplained(places: Sequence[Unexplained], evidence: Evidence, labels: Labels) -> list[UnexplainedSection]:
     """Return what no candidate explains; a curve that several ranges have is drawn once."""
     found = []
-    for number_of, place in enumerate(places):
-        above = any(place.curve is not None and place.curve == other.curve for other in places[:number_of])
+    for index, place in enumerate(places):
+        above = has_curve_of(place, places[:index])
         section = unexplained(replace(place, curve=None) if above else place, evidence, labels)
         found.append(replace(section, above=above))
     return found

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.signal.jumps import levels
 from regolithd.calibration.mismatch.signal.means import running_mean
 from regolithd.calibration.mismatch.signal.skewness import third_cumulant
 
@@ -67,11 +66,13 @@ def skewed_spells(course: Array, lengths: Sequence[int]) -> Spells:
     return Spells(int(acting[0]) + middle, int(acting[-1]) + middle, share)
 
 
-def levelled_spells(course: Array, jumps: NDArray[np.int64]) -> Spells:
-    """Return what is between the first and the last jump of a course (reading,), or after the only one."""
-    power = float(np.var(levels(course, jumps)))
+def levelled_spells(course: Array, jumps: NDArray[np.int64], levels: Array) -> Spells:
+    """Return what is between the first and the last jump of a course, or after the only one; levels and it (reading,).
+
+    `levels` are those between the jumps (`signal/jumps.py`).
+    """
     last = int(jumps[-1]) - 1 if len(jumps) > 1 else len(course) - 1
-    return Spells(int(jumps[0]), last, power / max(float(np.mean(course**2)), 1e-300))
+    return Spells(int(jumps[0]), last, float(np.var(levels)) / max(float(np.mean(course**2)), 1e-300))
 
 
 def _upwards(course: Array, length: int) -> Array:
