@@ -307,14 +307,14 @@ class Problem:
         return self.run_once("input " + column, step, change)
 
     def with_input(self, column: str, values: Array) -> Array:
-        """Return the prediction for other readings of one input, 0 where there is none."""
+        """Return the prediction for other readings of one input: see `with_inputs`."""
         return self.with_inputs({column: values})
 
     def with_inputs(self, readings: Mapping[str, Array]) -> Array:
-        """Return the prediction for other readings of some inputs, 0 where there is none."""
+        """Return the prediction for other readings of some inputs; as it is where there is none for these."""
         inputs = {**complete_inputs(self.recording), **readings}
         moved = self.simulation.predict(inputs, self._all_values) + self.added + self.error_bias
-        return np.where(np.isfinite(moved), self._where_predicted(moved), 0.0)
+        return np.where(np.isfinite(moved), self._where_predicted(moved), self.filled)
 
     def _where_predicted(self, values: Array) -> Array:
         """Return a prediction, 0 where there is none, and NaN where it is compared and has no value."""

@@ -22,6 +22,7 @@ from regolithd.calibration.mismatch.problem.build import build_problem
 from regolithd.calibration.mismatch.problem.problem import StatedEffect
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
 
@@ -72,6 +73,28 @@ def test_a_delay_may_be_longer_than_its_input_takes_to_change(delay_s: float) ->
         assert delay.high - delay.low < 1.0
         assert delay.value == pytest.approx(delay_s, abs=0.1)
         assert found.unexplained == ()
+
+
+class Downhill(Tram):
+    """A tram whose simulation says nothing downhill, where its brakes work."""
+
+    def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
+        """Return the current uphill."""
+        return np.where(inputs["grade"] > 0, super().predict(inputs, values), np.nan)
+
+
+def test_where_the_input_on_time_has_no_prediction_the_delay_changes_nothing() -> None:
+    """What a prediction of nothing would change is not taken for the delay's: it is found all the same."""
+    recording = driven(2)
+    problem = build_problem(recording, Downhill())
+    (column,) = SensorDelay().columns(problem, {"late": "grade", "input_secant_s": DELAY_S})
+    on_time = np.roll(recording.channels["grade"][:, 0], -int(DELAY_S))
+    unknown = problem.mask[:, 0] & (on_time <= 0)
+    assert unknown.any()
+    np.testing.assert_array_equal(column[unknown, 0], 0.0)
+    (effect,) = compare(recording, Downhill()).answer.effects
+    assert effect.name == "sensor-delay"
+    assert effect.parameters["delay_s"].low < DELAY_S < effect.parameters["delay_s"].high
 
 
 def test_each_of_two_late_inputs_has_its_own_change() -> None:

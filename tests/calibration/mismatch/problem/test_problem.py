@@ -104,7 +104,7 @@ def test_tangents_and_secants_are_difference_quotients() -> None:
     assert problem.secant("level", 0.5) is problem.secant("level", 0.5)
     np.testing.assert_allclose(problem.changed(level=5.0), 5.0)
     np.testing.assert_allclose(problem.input_tangent("speed_rad_s"), 0.0)
-    np.testing.assert_allclose(problem.with_input("speed_rad_s", np.full((INSTANTS, AXES), np.nan)), 0.0)
+    np.testing.assert_allclose(problem.with_input("speed_rad_s", np.full((INSTANTS, AXES), np.nan)), problem.filled)
 
 
 def test_a_covariate_without_blanks_is_made_once_for_each_set_of_covariates() -> None:
