@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.candidates.motion import along_motion
 from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
+from regolithd.calibration.mismatch.problem.errors_in_variables import known_mean
 from regolithd.calibration.mismatch.regression.group import Group
 from regolithd.calibration.mismatch.signal.hat_basis import FEWEST_KNOTS, hat_functions
 from regolithd.calibration.mismatch.signal.spectrum import padded_length, power_of_sums
@@ -113,11 +114,16 @@ def couplings_of(problem: Problem) -> dict[str, Array]:
     """Return the factors, shape (time, wheel), by which a smooth function may act on the prediction."""
     found = {
         "offset": np.ones(problem.mask.shape),
-        "gain": problem.filled - (np.mean(problem.filled, axis=0) if problem.arbitrary_zero else 0.0),
+        "gain": problem.filled - (_mean_prediction(problem) if problem.arbitrary_zero else 0.0),
     }
     if "direction" in problem.covariates:
         found["drag"] = motion_of(problem)
     return found
+
+
+def _mean_prediction(problem: Problem) -> Array:
+    """Return the mean of what is predicted of the compared readings of each wheel, 0 where none is compared."""
+    return known_mean(np.where(problem.mask, problem.prediction, np.nan))
 
 
 def acting(problem: Problem, covariate: str, coupling: str) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ from regolithd.calibration.mismatch.regression.residuals import active_rms, cont
 from regolithd.calibration.mismatch.regression.smooth_groups import (
     PERIODIC,
     PERIODIC_OFFSET,
+    couplings_of,
     has_smooth_term,
     with_periodic_terms,
     with_smooth_terms,
@@ -48,6 +49,18 @@ def test_each_wheel_may_have_a_deviation_of_its_own(monkeypatch: pytest.MonkeyPa
     np.testing.assert_allclose(shift_std, [0.5, 0.5 / 3, 0.5 / 3])
     assert not design.columns([1])[0, 1].any()
     assert not design.columns([2])[0, 0].any()
+
+
+def test_what_acts_in_proportion_to_a_prediction_without_a_zero_does_so_about_what_is_compared(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where nothing is predicted it is not taken for a prediction of 0."""
+    prediction = np.where(np.arange(INSTANTS)[:, None] % 2, 290.0 + np.arange(INSTANTS)[:, None], np.nan)
+    known = np.isfinite(prediction) & PROBLEM.mask
+    monkeypatch.setattr(Level, "zero_means_nothing", True)
+    problem = replace(PROBLEM, prediction=np.broadcast_to(prediction, known.shape), mask=known)
+    gain = couplings_of(problem)["gain"]
+    np.testing.assert_allclose(np.mean(gain, axis=0, where=known), 0.0, atol=1e-9)
 
 
 def test_a_candidate_has_a_group_for_each_shape() -> None:
