@@ -37,6 +37,7 @@ from regolithd.calibration.mismatch.inference.findings import Findings, answer_o
 from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, beside_regions, earned
 from regolithd.calibration.mismatch.inference.improbable import in_probable_regions
 from regolithd.calibration.mismatch.inference.joint_parameters import information_of
+from regolithd.calibration.mismatch.inference.opposite_sign import notes_on_opposite_sign
 from regolithd.calibration.mismatch.inference.parameter_information import drawn_for
 from regolithd.calibration.mismatch.inference.same_parameters import with_changes_beside_same_parameters
 from regolithd.calibration.mismatch.problem.build import build_problem
@@ -196,6 +197,7 @@ def decided(
         *_notes_on_values(decision, start),
         *notes_of_feedback(decision.equations.problem),
         *notes_on_held_inputs(recorded, decision.late_inputs),
+        *notes_on_opposite_sign(decision),
     )
     return replace(found, decision=replace(decision, notes=(*decision.notes, *notes)))
 
