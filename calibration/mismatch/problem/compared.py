@@ -60,6 +60,7 @@ def left_out(
     reasons = [
         (known & silent, "the simulation predicts nothing there"),
         *((known & ~silent & blank, f"{name} was not measured there") for name, blank in run.blanks.items()),
+        (known & run.after_gap, "the prediction depends on what the inputs were in a gap of the recording"),
         (known & run.carried, f"the prediction depends on {', '.join(run.blanks)} where it was not measured"),
         *(
             (known & changed, f"{name}, which is measured less often, changed between its readings")

@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.data.slow_channels import bridged, drawn_bet
 from regolithd.calibration.mismatch.errors import RecordingError, SimulationError
 from regolithd.calibration.mismatch.problem.delayed import beyond_the_end, shifted
 from regolithd.calibration.mismatch.problem.errors_in_variables import expected_inputs
+from regolithd.calibration.mismatch.problem.gaps import carried_over_gaps, inputs_otherwise_in_gaps
 from regolithd.calibration.mismatch.problem.input_doubt import (
     InputDoubt,
     bias_of,
@@ -59,6 +60,8 @@ class Inputs:
     undefined: where the simulation predicts nothing from the readings as they are, shape (time, wheel); None: nowhere
     doubt: of the prediction by the inputs' stated errors, and between the readings of slower ones; None: there is none
     between: by how much the prediction is uncertain since a slower column was read, by column, shape (time, wheel)
+    otherwise_in_gaps: `expected` with the inputs as they may have been where rows are missing; None where no state of
+        the simulation carries that on
     """
 
     as_read: Recording
@@ -68,6 +71,7 @@ class Inputs:
     undefined: Mask | None = None
     doubt: InputDoubt | None = None
     between: Mapping[str, Array] = field(default_factory=dict)
+    otherwise_in_gaps: Recording | None = None
 
     @property
     def smoothed(self) -> dict[str, Array]:
@@ -90,6 +94,7 @@ class Simulated:
     blanks: where each input was not measured
     carried: where the prediction depends on an input that was not measured earlier
     changed: where it depends on how a slower column changed between its readings, by column
+    after_gap: where it depends on what the inputs were while rows are missing
     """
 
     recording: Recording
@@ -98,11 +103,12 @@ class Simulated:
     blanks: Mapping[str, Mask]
     carried: Mask
     changed: Mapping[str, Mask]
+    after_gap: Mask
 
     @property
     def known(self) -> Mask:
         """Where the prediction is made from what was measured."""
-        unknown = np.any([self.carried, *self.blanks.values(), *self.changed.values()], axis=0)
+        unknown = np.any([self.carried, self.after_gap, *self.blanks.values(), *self.changed.values()], axis=0)
         return np.asarray(np.isfinite(self.prediction) & ~unknown)
 
 
@@ -146,7 +152,24 @@ def inputs_of(
     within = {name: each.within for name, each in between.items()}
     undefined = _undefined(predicted()) if expected is not as_read else None
     expected = expected.with_notes(*notes_on_errors(shown, simulation.sensors, as_read, simulation.channel))
-    return Inputs(as_read, expected, otherwise, blanks, undefined, total_doubt(doubts), within)
+    in_gaps = inputs_otherwise_in_gaps(expected, simulation.inputs)
+    if in_gaps is not None and not _is_carried_over_gaps(as_read, simulation, values, predicted()):
+        in_gaps = None
+    return Inputs(as_read, expected, otherwise, blanks, undefined, total_doubt(doubts), within, in_gaps)
+
+
+def _is_carried_over_gaps(
+    recording: Recording, simulation: Predictor, values: Mapping[str, float], predicted: Array
+) -> bool:
+    """Return whether the prediction after a gap depends on the inputs in it; False of what accepts no other inputs."""
+    other = inputs_otherwise_in_gaps(recording, simulation.inputs)
+    if other is None:
+        return False
+    try:
+        moved = simulation.predict(complete_inputs(other), values)
+    except SimulationError:
+        return False
+    return bool(carried_over_gaps(recording, np.isfinite(predicted) & (moved != predicted)).any())
 
 
 def put_on_time(inputs: Inputs, late: Mapping[str, float]) -> Inputs:
@@ -159,7 +182,8 @@ def put_on_time(inputs: Inputs, late: Mapping[str, float]) -> Inputs:
         columns = {name: shifted(recording, recording.channels[name], delay) for name, delay in late.items()}
         return recording.with_channels(**columns)
 
-    otherwise = None if inputs.bridged_otherwise is None else moved(inputs.bridged_otherwise)
+    others = (inputs.bridged_otherwise, inputs.otherwise_in_gaps)
+    otherwise, in_gaps = (None if other is None else moved(other) for other in others)
     blanks = {
         name: shifted(inputs.expected, blank.astype(np.float64), late.get(name, 0.0)) > 0
         for name, blank in inputs.blanks.items()
@@ -172,11 +196,12 @@ def put_on_time(inputs: Inputs, late: Mapping[str, float]) -> Inputs:
         expected=moved(inputs.expected),
         bridged_otherwise=otherwise,
         blanks=blanks,
+        otherwise_in_gaps=in_gaps,
     )
 
 
 def simulated(inputs: Inputs, simulation: Predictor, values: Mapping[str, float], thresholds: Thresholds) -> Simulated:
-    """Run the simulation with these parameters; twice where an input has blanks."""
+    """Run the simulation with these parameters; once more where an input has blanks, and where rows are missing."""
     prepared, other, blanks = inputs.expected, inputs.bridged_otherwise, inputs.blanks
     prediction = simulation.predict(complete_inputs(prepared), values) + bias_of(inputs.doubt)
     if inputs.undefined is not None:
@@ -187,13 +212,20 @@ def simulated(inputs: Inputs, simulation: Predictor, values: Mapping[str, float]
     residual = (inputs.as_read.channel(simulation.channel) - prediction)[~blank]
     residual = residual[np.isfinite(residual)]
     rounding, deviation = 1e-9 * float(np.max(np.abs(residual), initial=0.0)), robust_std(residual)
-    if other is not None:
-        apart = np.abs(simulation.predict(complete_inputs(other), values) - prediction)
+
+    def depends_on(other: Recording) -> Mask:
+        apart = np.abs(simulation.predict(complete_inputs(other), values) + bias_of(inputs.doubt) - prediction)
         least = max(thresholds.carried_share * deviation, rounding)
-        carried = np.isfinite(prediction) & ~blank & ~(apart <= least)
+        return np.asarray(np.isfinite(prediction) & ~blank & ~(apart <= least))
+
+    if other is not None:
+        carried = depends_on(other)
+    after_gap = np.zeros(prediction.shape, np.bool_)
+    if inputs.otherwise_in_gaps is not None:
+        after_gap = carried_over_gaps(prepared, depends_on(inputs.otherwise_in_gaps)) & ~carried
     most = max(thresholds.between_share * deviation, rounding)
-    changed = {name: ~blank & ~carried & (within > most) for name, within in inputs.between.items()}
-    return Simulated(prepared, inputs.as_read, prediction, blanks, carried, changed)
+    changed = {name: ~blank & ~carried & ~after_gap & (within > most) for name, within in inputs.between.items()}
+    return Simulated(prepared, inputs.as_read, prediction, blanks, carried, changed, after_gap)
 
 
 def _undefined(predicted: Array) -> Mask | None:
