@@ -30,7 +30,7 @@ from regolithd.calibration.mismatch.empirical.found import curves_of
 from regolithd.calibration.mismatch.empirical.refuted import without_refuted_curves
 from regolithd.calibration.mismatch.empirical.stated import beyond_the_range
 from regolithd.calibration.mismatch.inference.beside_spells import named_beside_spells
-from regolithd.calibration.mismatch.inference.dynamics import notes_on_held_inputs
+from regolithd.calibration.mismatch.inference.dynamics import notes_on_held_inputs, notes_on_initial_states
 from regolithd.calibration.mismatch.inference.evidence import empirical_fits, evidence_of
 from regolithd.calibration.mismatch.inference.feedback import fed_back, notes_of_feedback
 from regolithd.calibration.mismatch.inference.findings import Findings, answer_of, findings_of
@@ -196,7 +196,8 @@ def decided(
     notes = (
         *_notes_on_values(decision, start),
         *notes_of_feedback(decision.equations.problem),
-        *notes_on_held_inputs(recorded, decision.late_inputs),
+        *notes_on_held_inputs(recorded, decision.late_inputs, simulation.between_readings),
+        *notes_on_initial_states(decision.equations.problem),
         *notes_on_opposite_sign(decision),
     )
     return replace(found, decision=replace(decision, notes=(*decision.notes, *notes)))

@@ -110,12 +110,13 @@ def out_of_bounds(equations: NormalEquations, fit: Fit) -> frozenset[str]:
 
 
 def beyond_their_doubt(equations: NormalEquations, fit: Fit) -> frozenset[str]:
-    """Return the sizes of corrected effects that a fit moves further than their uncertainty: they have changed.
+    """Return the sizes of corrected effects, and initial states, that a fit moves further than their uncertainty.
 
-    A change is looked for beside what the uncertainty allows, and would hardly be seen beside it.
+    A change of such an effect is looked for beside what the uncertainty allows, and would hardly be seen beside it. An
+    initial state that is further off than a reading's noise is evidence.
     """
     nuisance, furthest = equations.nuisance, equations.thresholds.furthest_prior_stds
-    sizes = set(stated_names(equations.problem))
+    sizes = {*stated_names(equations.problem), *nuisance.states}
     away = zip(nuisance.names, nuisance.prior_stds_away(fit), strict=True)
     return frozenset(name for name, stds in away if name in sizes and stds > furthest)
 

@@ -312,7 +312,7 @@ def _about_reversals(problem: Problem) -> list[Array]:
 
 
 def _laws(problem: Problem, shape: Shape) -> list[Array]:
-    """Return friction that is constant on each axis, grows with the root of speed, with it, its square, or the load.
+    """Return friction that is constant, or grows with the speed, its root, its square, the load, or its square.
 
     On each axis it may grow with the speed, too. The first three change with temperature and time: they would seem to
     reverse with a long displacement. A late channel shows friction late: on time, it would seem to reverse so, too.
@@ -325,7 +325,8 @@ def _laws(problem: Problem, shape: Shape) -> list[Array]:
     factors.append(speed**2)
     axes = np.eye(speed.shape[1])[:, None] if speed.shape[1] > 1 else ()  # one axis alone may have friction
     of_axis = [each for axis in axes for each in (axis, axis * speed)]
-    return list(as_shown(problem, [direction * factor for factor in (*factors, np.abs(problem.filled), *of_axis)]))
+    load = np.abs(problem.filled)
+    return list(as_shown(problem, [direction * factor for factor in (*factors, load, load**2, *of_axis)]))
 
 
 def _decaying(problem: Problem, shape: Shape, decay: _Decay) -> Array:

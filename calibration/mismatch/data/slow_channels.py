@@ -33,6 +33,8 @@ REGULAR_CHANGES = 0.9
 """Share of a column's changes that are whole periods apart, from which it is a slower sensor's, held (a choice)."""
 OFTEN_THE_SAME = 0.5
 """Share of readings that repeat the one before, above which a held column is asked for at intervals (a choice)."""
+MOST_NOISE = 0.1
+"""Share of the largest change between two readings, up to which one repeats the other but for noise (a choice)."""
 
 
 def filled_between(recording: Recording, predicted: str, between: Mapping[str, Between]) -> Recording:
@@ -71,7 +73,7 @@ def drawn_between(recording: Recording, filled: Recording, name: str, how: Betwe
         steps = np.diff(column[known])
         about = np.pad(np.diff(steps) / 2, 1) ** 2
         lot = random.choice([-1.0, 1.0], size=len(steps))
-        asked = np.mean(steps == 0) > OFTEN_THE_SAME
+        asked = np.mean(np.abs(steps) <= MOST_NOISE * np.max(np.abs(steps))) > OFTEN_THE_SAME
         for gap in np.flatnonzero((np.diff(known) > 1) & np.isfinite(found[known[:-1] + 1, wheel])):
             first, after = known[gap], known[gap + 1]
             share = np.arange(1, after - first) / (after - first)
@@ -93,6 +95,12 @@ def rows_held(recording: Recording, name: str) -> int:
         if usual >= SLOWER and np.mean(apart % usual == 0) >= REGULAR_CHANGES:
             found = max(found, usual)
     return found
+
+
+def rows_apart(recording: Recording, name: str) -> int:
+    """Return how many rows the readings of a column are usually apart, where there are blanks between them; or 1."""
+    apart = [np.diff(np.flatnonzero(np.isfinite(column))) for column in recording.channels[name].T]
+    return max((int(np.median(each)) for each in apart if each.size >= FEWEST), default=1)
 
 
 def bridged(

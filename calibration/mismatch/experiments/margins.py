@@ -230,7 +230,7 @@ def expected_of(
 def precisions(equations: NormalEquations) -> Array:
     """Return one over the prior variance of each free parameter in its own unit, shape (parameter,)."""
     nuisance = equations.nuisance
-    return np.asarray(nuisance.precision * equations.design.scale[list(nuisance.columns)] ** 2)
+    return np.asarray(nuisance.precision * equations.design.scale[list(nuisance.columns)] ** 2)[: nuisance.count]
 
 
 def worst(margins: Mapping[Pair, float], pairs: Sequence[Pair]) -> tuple[Pair, float]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from regolithd.calibration.mismatch.data.slow_channels import rows_held
-from regolithd.calibration.mismatch.problem.state_memory import memory_s
+from regolithd.calibration.mismatch.data.slow_channels import rows_apart, rows_held
+from regolithd.calibration.mismatch.inference.statements import listed
+from regolithd.calibration.mismatch.problem.initial_states import name_of
+from regolithd.calibration.mismatch.problem.state_memory import longest_memory_s, memory_s
 from regolithd.calibration.mismatch.problem.words import word_for
 from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 from regolithd.calibration.mismatch.regression.state_groups import ON_STATE
@@ -14,6 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from regolithd.calibration.mismatch.data.recording import Recording
+    from regolithd.calibration.mismatch.data.slow_channels import Between
+    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 AS_HELD = 0.75
@@ -26,22 +30,56 @@ def notes_on_dynamics(decision: Decision) -> tuple[str, ...]:
     return (*_note_on_lags(decision), *_notes_on_states(decision))
 
 
-def notes_on_held_inputs(recording: Recording, late_inputs: Mapping[str, float]) -> tuple[str, ...]:
-    """Return a note on each late input that repeats its readings for about twice its delay [s].
+def notes_on_held_inputs(
+    recording: Recording, late_inputs: Mapping[str, float], between: Mapping[str, Between]
+) -> tuple[str, ...]:
+    """Return a note on each late input whose readings are held for about twice its delay [s].
 
-    `recording` is as it was read: an input that is put on time may change a row later.
+    `recording` is as it was read: an input that is put on time may change a row later. Readings are held by the logger,
+    which repeats them, or as the simulation asks, which says so in `between`.
     """
     notes = []
     for name, delay_s in late_inputs.items():
-        held = rows_held(recording, name)
+        repeated, asked = rows_held(recording, name), rows_apart(recording, name) if between.get(name) == "hold" else 1
+        held = max(repeated, asked)
         on_average = held * recording.step_s / 2
-        if held > 1 and abs(delay_s / on_average - 1) <= AS_HELD:
+        if held == 1 or abs(delay_s / on_average - 1) > AS_HELD:
+            continue
+        if repeated > 1:
             notes.append(
                 f"{name} repeats each of its readings for {held} rows. If its logger holds them, they are "
                 f"{on_average:g} s old on average, which is about the delay: leave the repetitions blank, and it is "
                 f"on straight lines between its readings."
             )
+        else:
+            notes.append(
+                f"{name} is read every {held} rows and held in between, as `between_readings` says. If it changes "
+                f"between its readings, these are {on_average:g} s old on average, which is about the delay: state "
+                f'"linear" for it, and it is on straight lines.'
+            )
     return tuple(notes)
+
+
+def notes_on_initial_states(problem: Problem) -> tuple[str, ...]:
+    """Return a note on the runs whose initial state is further off than the noise of a reading, which is evidence."""
+    runs, recording = [], problem.recording
+    for rows in recording.runs:
+        run = int(recording.run[rows.start])
+        if any(name_of(run, wheel) in problem.held for wheel in recording.wheels):
+            runs.append(str(run))
+    if not runs:
+        return ()
+    if len(recording.runs) == 1:
+        where = "the recording begins"
+    else:
+        where = f"run {runs[0]} begins" if len(runs) == 1 else f"runs {listed(runs)} begin"
+    memory = float(f"{longest_memory_s(problem):.2g}")
+    note = (
+        f"As {where}, {problem.simulation.channel} is off by more than a reading's noise, and by ever less as the "
+        f"simulation's state forgets, for about {memory:g} s. Check the initial state: let `predict` begin with what "
+        f"was measured there, or state it as a parameter."
+    )
+    return (note,)
 
 
 def _note_on_lags(decision: Decision) -> tuple[str, ...]:

@@ -92,7 +92,7 @@ def calibrated_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:
     problem, nuisance = equations.problem, equations.nuisance
     shift = fit.coefficients[: len(nuisance.names)] / equations.design.scale[list(nuisance.columns)]
     moved = dict(zip(nuisance.names, shift.tolist(), strict=True))
-    known = {name: shift for name, shift in moved.items() if name not in nuisance.stated}
+    known = {name: shift for name, shift in moved.items() if name not in {*nuisance.stated, *nuisance.states}}
     return {name: problem.values.get(name, 0.0) + known.get(name, 0.0) for name in {**problem.values, **known}}
 
 

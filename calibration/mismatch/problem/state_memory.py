@@ -35,7 +35,16 @@ SHORTEST, LONGEST = 2.0, 0.2
 
 
 def memory_s(problem: Problem) -> float:
-    """Return the time constant of the simulation's response to its inputs [s]; 0 where it has no state."""
+    """Return the time constant of the simulation's response to its inputs [s]; 0 where it has no state.
+
+    0 as well where that is so long that what acts on it would be a drift.
+    """
+    memory = longest_memory_s(problem)
+    return memory if memory < LONGEST * problem.length_s else 0.0
+
+
+def longest_memory_s(problem: Problem) -> float:
+    """Return the same, however long it is."""
     return float(problem.once("memory of a state", lambda: np.array(_memory(problem))))
 
 
@@ -63,8 +72,7 @@ def _memory(problem: Problem) -> float:
     kept = _share_kept(response, list(changes.values()), np.diff(problem.recording.run) == 0)
     if not np.exp(-1 / SHORTEST) < kept < 1:
         return 0.0
-    memory = -problem.recording.step_s / float(np.log(kept))
-    return memory if memory < LONGEST * problem.length_s else 0.0
+    return -problem.recording.step_s / float(np.log(kept))
 
 
 def _share_kept(response: Array, changes: list[Array], same_run: NDArray[np.bool_]) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
+from regolithd.calibration.mismatch.problem.initial_states import initial_states
 from regolithd.calibration.mismatch.problem.prior import own_name
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ class Nuisance:
     precision: one over the prior variance of each scaled coefficient, shape (parameter,)
     centre: the prior's mean of each scaled coefficient: 0 at the stated values, shape (parameter,)
     stated: those of the names that are sizes of effects which the simulation was corrected by
+    states: those that are initial states of runs, which are last
     """
 
     names: tuple[str, ...]
@@ -45,6 +47,12 @@ class Nuisance:
     precision: Array
     centre: Array
     stated: frozenset[str] = frozenset()
+    states: tuple[str, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """How many there are without initial states, which another recording does not have."""
+        return len(self.names) - len(self.states)
 
     def with_precision(self, place: int, value: float) -> Nuisance:
         """Return the same parameters with another precision of one of them."""
@@ -110,8 +118,14 @@ def beyond_prior_predictive(away: Array, variance: Array, thresholds: Thresholds
 
 
 def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:
-    """Add ∂prediction/∂parameter of every parameter whose prior has a spread, and of each wheel's own deviation."""
+    """Add ∂prediction/∂parameter of every parameter whose prior has a spread, and of each wheel's own deviation.
+
+    Last, what the initial states of runs change.
+    """
     names, stds, columns = tangents(design.problem)
+    states = dict(initial_states(design.problem))
+    names, stds = [*names, *states], [*stds, *[1.0] * len(states)]
+    columns = [*columns, *as_shown(design.problem, list(states.values()))]
     away = np.array([_from_prior(design.problem, name) for name in names])
     design, places = design.extended(columns)
     # The coefficient of a column that was divided by its scale is the parameter's shift times that scale.
@@ -119,7 +133,7 @@ def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:
     centre = away * design.scale[list(places)] if places else np.zeros(0)
     about = stated_names(design.problem)
     stated = frozenset(name for name in names if name.startswith(about))
-    return design, Nuisance(tuple(names), places, precision, centre, stated)
+    return design, Nuisance(tuple(names), places, precision, centre, stated, tuple(states))
 
 
 def _from_prior(problem: Problem, name: str) -> float:

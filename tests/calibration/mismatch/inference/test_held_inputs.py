@@ -79,8 +79,18 @@ def test_a_delay_by_holding_is_told_with_its_cure() -> None:
 def test_a_delay_that_holding_does_not_make_has_no_note(delay_s: float, told: bool) -> None:
     """Readings that are kept for 20 s are 10 s old on average: a delay of 30 s has another cause."""
     recording = from_columns(recorded(1, varies_pct=0.25, noise_kW=12, rows=20))
-    assert bool(notes_on_held_inputs(recording, {HELD: delay_s})) is told
-    assert not notes_on_held_inputs(recording, {"flow_L_s": delay_s})
+    assert bool(notes_on_held_inputs(recording, {HELD: delay_s}, {})) is told
+    assert not notes_on_held_inputs(recording, {"flow_L_s": delay_s}, {})
+
+
+def test_a_delay_by_holding_as_the_simulation_asks_is_told_with_its_cure() -> None:
+    """Readings with blanks between them are held where `between_readings` says so, and on straight lines elsewhere."""
+    columns = recorded(1, varies_pct=0.25, noise_kW=12, rows=20)
+    recording = from_columns({**columns, HELD: np.where(np.arange(COUNT) % 20 == 0, columns[HELD], np.nan)})
+    (note,) = notes_on_held_inputs(recording, {HELD: 10.0}, {HELD: "hold"})
+    assert "is read every 20 rows and held in between" in note
+    assert not notes_on_held_inputs(recording, {HELD: 30.0}, {HELD: "hold"})
+    assert not notes_on_held_inputs(recording, {HELD: 10.0}, {})
 
 
 def test_a_refused_delay_puts_nothing_on_time() -> None:
