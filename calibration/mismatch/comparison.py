@@ -6,7 +6,7 @@ recording, simulation ─▶ problem ─▶ equations ─▶ decision ─▶ ans
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.calibration.beside_delay import fitted_where_late
 from regolithd.calibration.mismatch.calibration.linearised import (
@@ -18,10 +18,12 @@ from regolithd.calibration.mismatch.calibration.linearised import (
     out_of_bounds,
     put_on_time_by,
     step_to,
+    unknown_states,
     worse_than_stated,
 )
 from regolithd.calibration.mismatch.calibration.starting_values import Start, starting_values
 from regolithd.calibration.mismatch.candidates.library import library
+from regolithd.calibration.mismatch.candidates.reversal import reversal_of
 from regolithd.calibration.mismatch.candidates.sensor_delay import SensorDelay
 from regolithd.calibration.mismatch.changes import corrected_problem, stated_in, stated_late_inputs, with_changes
 from regolithd.calibration.mismatch.channels import compare_channels, labelled
@@ -30,12 +32,13 @@ from regolithd.calibration.mismatch.empirical.found import curves_of
 from regolithd.calibration.mismatch.empirical.refuted import without_refuted_curves
 from regolithd.calibration.mismatch.empirical.stated import beyond_the_range
 from regolithd.calibration.mismatch.inference.beside_spells import named_beside_spells
-from regolithd.calibration.mismatch.inference.dynamics import notes_on_held_inputs, notes_on_initial_states
+from regolithd.calibration.mismatch.inference.dynamics import notes_on_held_inputs
 from regolithd.calibration.mismatch.inference.evidence import empirical_fits, evidence_of
 from regolithd.calibration.mismatch.inference.feedback import fed_back, notes_of_feedback
 from regolithd.calibration.mismatch.inference.findings import Findings, answer_of, findings_of
 from regolithd.calibration.mismatch.inference.held_out import HeldOutErrors, beside_regions, earned
 from regolithd.calibration.mismatch.inference.improbable import in_probable_regions
+from regolithd.calibration.mismatch.inference.initial_states import with_initial_states
 from regolithd.calibration.mismatch.inference.joint_parameters import information_of
 from regolithd.calibration.mismatch.inference.opposite_sign import notes_on_opposite_sign
 from regolithd.calibration.mismatch.inference.parameter_information import drawn_for
@@ -58,6 +61,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.contribution import Contribution
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.problem.problem import Problem
+    from regolithd.calibration.mismatch.problem.simulated import Inputs
     from regolithd.calibration.mismatch.regression.group import Group
     from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
     from regolithd.calibration.mismatch.selection.decision import Decision
@@ -142,7 +146,7 @@ def compare(
     comparison = chosen.told(simulation)
     if chosen.decision.unnamed:
         progress("fitting a curve to what stays unexplained")
-    return with_curves(comparison, chosen.decision)
+    return with_initial_states(with_curves(comparison, chosen.decision), chosen.decision)
 
 
 def with_curves(comparison: Comparison, decision: Decision) -> Comparison:
@@ -174,33 +178,38 @@ def decided(
     stated = stated_in(candidates, effects, simulation.stated_effects(), simulation.empirical_curves)
 
     inputs, on_time = inputs_of(recorded, simulation, thresholds), stated_late_inputs(stated, simulation.inputs)
+    pose = _Pose(recorded, simulation, inputs, on_time, stated, thresholds)
+    found, start = _settled(candidates, stated, pose, progress)
+    if found.decision.unnamed and reversal_of(found.decision.equations.problem):
+        # What has no name may have been taken for friction that reverses so, and then no law fits that reverses so.
+        at_once, start_at_once = _settled(candidates, stated, replace(pose, at_once=True), progress)
+        if at_once.decision.does_without_curves_of(found.decision):
+            found, start = at_once, start_at_once
+    decision = found.decision
+    notes = (
+        *_notes_on_values(decision, start),
+        *notes_of_feedback(decision.equations.problem),
+        *notes_on_held_inputs(recorded, decision.late_inputs, simulation.between_readings),
+        *notes_on_opposite_sign(decision),
+    )
+    return replace(found, decision=replace(decision, notes=(*decision.notes, *notes)))
 
-    fed: frozenset[str] = frozenset()
-    held: frozenset[str] = frozenset()
 
-    def pose(values: Mapping[str, float] | None, late: Mapping[str, float] | None = None) -> Problem:
-        late = {**on_time, **(late or {})}
-        problem = build_problem(recorded, simulation, values, inputs=inputs, late=late, thresholds=thresholds)
-        return replace(corrected_problem(problem, stated), fed_back=fed, held=held)
-
+def _settled(
+    candidates: Sequence[Candidate], stated: Sequence[Stated], pose: _Pose, progress: Callable[[str], None]
+) -> tuple[Decided, Start]:
+    """Search until nothing more is fed back, held, unknown, or late without a name; with where the search began."""
     while True:
         start = starting_values(pose(None))
         found = _decided(candidates, stated, pose, start, progress)
         further, decision = fed_back(found.decision), found.decision
         out = out_of_bounds(decision.equations, decision.whole) | beyond_their_doubt(decision.equations, decision.named)
-        refused = decision.refused_delays(start.problem) if not further | out else frozenset()
-        if not further | out | refused:
-            break
-        fed, held = fed | further, held | out
+        unknown = unknown_states(decision.equations, decision.whole)
+        refused = decision.refused_delays(start.problem) if not further | out | unknown else frozenset()
+        if not further | out | unknown | refused:
+            return found, start
+        pose = replace(pose, fed=pose.fed | further, held=pose.held | out, unknown=pose.unknown | unknown)
         candidates = [each.without(refused) if isinstance(each, SensorDelay) else each for each in candidates]
-    notes = (
-        *_notes_on_values(decision, start),
-        *notes_of_feedback(decision.equations.problem),
-        *notes_on_held_inputs(recorded, decision.late_inputs, simulation.between_readings),
-        *notes_on_initial_states(decision.equations.problem),
-        *notes_on_opposite_sign(decision),
-    )
-    return replace(found, decision=replace(decision, notes=(*decision.notes, *notes)))
 
 
 def _notes_on_values(decision: Decision, start: Start) -> tuple[str, ...]:
@@ -238,10 +247,43 @@ def _decided(
     return Decided(decision, held_out, search.candidates, search.applicable)
 
 
-class _Pose(Protocol):
-    """The problem at these values of the parameters, or at the stated ones, with late inputs put on time [s]."""
+@dataclass(frozen=True, eq=False)
+class _Pose:
+    """Poses the problem at values of the parameters.
 
-    def __call__(self, values: Mapping[str, float] | None, late: Mapping[str, float] | None = None, /) -> Problem: ...
+    Attributes
+    ----------
+    recorded, simulation, inputs, thresholds: what is compared
+    on_time: inputs that a corrected simulation has on time, and how late they are recorded [s]
+    stated: effects that the simulation has already
+    fed, held, unknown: covariates that follow the noise; what stays as it was stated; initial states that are far off
+    at_once: whether friction is taken to reverse at once
+    """
+
+    recorded: Recording
+    simulation: Simulation
+    inputs: Inputs
+    on_time: Mapping[str, float]
+    stated: Sequence[Stated]
+    thresholds: Thresholds
+    fed: frozenset[str] = frozenset()
+    held: frozenset[str] = frozenset()
+    unknown: frozenset[str] = frozenset()
+    at_once: bool = False
+
+    def __call__(self, values: Mapping[str, float] | None, late: Mapping[str, float] | None = None) -> Problem:
+        """Return the problem at these values, or at the stated ones, with late inputs put on time [s]."""
+        late = {**self.on_time, **(late or {})}
+        problem = build_problem(
+            self.recorded, self.simulation, values, inputs=self.inputs, late=late, thresholds=self.thresholds
+        )
+        return replace(
+            corrected_problem(problem, self.stated),
+            fed_back=self.fed,
+            held=self.held,
+            unknown=self.unknown,
+            at_once=self.at_once,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -110,15 +110,22 @@ def out_of_bounds(equations: NormalEquations, fit: Fit) -> frozenset[str]:
 
 
 def beyond_their_doubt(equations: NormalEquations, fit: Fit) -> frozenset[str]:
-    """Return the sizes of corrected effects, and initial states, that a fit moves further than their uncertainty.
+    """Return the sizes of corrected effects that a fit moves further than their uncertainty: they have changed.
 
-    A change of such an effect is looked for beside what the uncertainty allows, and would hardly be seen beside it. An
-    initial state that is further off than a reading's noise is evidence.
+    A change is looked for beside what the uncertainty allows, and would hardly be seen beside it.
     """
     nuisance, furthest = equations.nuisance, equations.thresholds.furthest_prior_stds
-    sizes = {*stated_names(equations.problem), *nuisance.states}
+    sizes = set(stated_names(equations.problem))
     away = zip(nuisance.names, nuisance.prior_stds_away(fit), strict=True)
     return frozenset(name for name, stds in away if name in sizes and stds > furthest)
+
+
+def unknown_states(equations: NormalEquations, fit: Fit) -> frozenset[str]:
+    """Return the initial states that a fit moves further than the noise of a reading does, and were not known to be."""
+    nuisance, furthest = equations.nuisance, equations.thresholds.furthest_prior_stds
+    away = nuisance.prior_stds_away(fit)[nuisance.count :]
+    of_states = zip(nuisance.states, away, strict=True)
+    return frozenset(state.name for state, stds in of_states if stds > furthest) - equations.problem.unknown
 
 
 def _fitted(equations: NormalEquations, fit: Fit) -> dict[str, float]:

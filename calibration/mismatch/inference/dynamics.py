@@ -5,9 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from regolithd.calibration.mismatch.data.slow_channels import rows_apart, rows_held
-from regolithd.calibration.mismatch.inference.statements import listed
-from regolithd.calibration.mismatch.problem.initial_states import name_of
-from regolithd.calibration.mismatch.problem.state_memory import longest_memory_s, memory_s
+from regolithd.calibration.mismatch.problem.state_memory import memory_s
 from regolithd.calibration.mismatch.problem.words import word_for
 from regolithd.calibration.mismatch.regression.lagged_groups import LAGGED
 from regolithd.calibration.mismatch.regression.state_groups import ON_STATE
@@ -17,7 +15,6 @@ if TYPE_CHECKING:
 
     from regolithd.calibration.mismatch.data.recording import Recording
     from regolithd.calibration.mismatch.data.slow_channels import Between
-    from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 AS_HELD = 0.75
@@ -58,28 +55,6 @@ def notes_on_held_inputs(
                 f'"linear" for it, and it is on straight lines.'
             )
     return tuple(notes)
-
-
-def notes_on_initial_states(problem: Problem) -> tuple[str, ...]:
-    """Return a note on the runs whose initial state is further off than the noise of a reading, which is evidence."""
-    runs, recording = [], problem.recording
-    for rows in recording.runs:
-        run = int(recording.run[rows.start])
-        if any(name_of(run, wheel) in problem.held for wheel in recording.wheels):
-            runs.append(str(run))
-    if not runs:
-        return ()
-    if len(recording.runs) == 1:
-        where = "the recording begins"
-    else:
-        where = f"run {runs[0]} begins" if len(runs) == 1 else f"runs {listed(runs)} begin"
-    memory = float(f"{longest_memory_s(problem):.2g}")
-    note = (
-        f"As {where}, {problem.simulation.channel} is off by more than a reading's noise, and by ever less as the "
-        f"simulation's state forgets, for about {memory:g} s. Check the initial state: let `predict` begin with what "
-        f"was measured there, or state it as a parameter."
-    )
-    return (note,)
 
 
 def _note_on_lags(decision: Decision) -> tuple[str, ...]:

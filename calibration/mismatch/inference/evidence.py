@@ -90,9 +90,10 @@ def wheel_names(problem: Problem, wheels: Sequence[int]) -> tuple[int | str, ...
 def calibrated_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:
     """Return the simulation's parameters, and each wheel's own deviations, as the fit has them."""
     problem, nuisance = equations.problem, equations.nuisance
-    shift = fit.coefficients[: len(nuisance.names)] / equations.design.scale[list(nuisance.columns)]
-    moved = dict(zip(nuisance.names, shift.tolist(), strict=True))
-    known = {name: shift for name, shift in moved.items() if name not in {*nuisance.stated, *nuisance.states}}
+    columns = nuisance.columns[: nuisance.count]
+    shift = fit.coefficients[: nuisance.count] / equations.design.scale[list(columns)]
+    moved = dict(zip(nuisance.names, shift.tolist(), strict=False))
+    known = {name: shift for name, shift in moved.items() if name not in nuisance.stated}
     return {name: problem.values.get(name, 0.0) + known.get(name, 0.0) for name in {**problem.values, **known}}
 
 

@@ -102,6 +102,8 @@ class Problem:
     held: parameters that stay at their values, as the recording would move them out of their bounds; and, by the names
         that `tangents` gives them, sizes of corrected effects
     smoothed: inputs that were replaced by their expectation, shape (time, wheel); empty where any was bridged as well
+    at_once: whether friction is taken to reverse at once, however the recording shows it to
+    unknown: initial states of runs, by their names, that are known no better than anything may be
     """
 
     recording: Recording
@@ -127,6 +129,8 @@ class Problem:
     fed_back: frozenset[str] = frozenset()
     held: frozenset[str] = frozenset()
     smoothed: Mapping[str, Array] = field(default_factory=dict, repr=False)
+    at_once: bool = False
+    unknown: frozenset[str] = frozenset()
     _derived: dict[str, Array] = field(default_factory=dict, init=False, repr=False, compare=False)
     """What was computed from covariates and readings, by name: a cache, which a copy begins anew."""
     _lately: RecentArrays = field(default_factory=RecentArrays, init=False, repr=False, compare=False)

@@ -15,6 +15,7 @@ from regolithd.calibration.mismatch.problem.prior import own_name
 if TYPE_CHECKING:
     from collections.abc import Collection
 
+    from regolithd.calibration.mismatch.problem.initial_states import InitialState
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
     from regolithd.calibration.mismatch.regression.group import Fit
@@ -39,7 +40,7 @@ class Nuisance:
     precision: one over the prior variance of each scaled coefficient, shape (parameter,)
     centre: the prior's mean of each scaled coefficient: 0 at the stated values, shape (parameter,)
     stated: those of the names that are sizes of effects which the simulation was corrected by
-    states: those that are initial states of runs, which are last
+    states: the initial states of runs, whose names are last
     """
 
     names: tuple[str, ...]
@@ -47,7 +48,7 @@ class Nuisance:
     precision: Array
     centre: Array
     stated: frozenset[str] = frozenset()
-    states: tuple[str, ...] = ()
+    states: tuple[InitialState, ...] = ()
 
     @property
     def count(self) -> int:
@@ -123,9 +124,9 @@ def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:
     Last, what the initial states of runs change.
     """
     names, stds, columns = tangents(design.problem)
-    states = dict(initial_states(design.problem))
-    names, stds = [*names, *states], [*stds, *[1.0] * len(states)]
-    columns = [*columns, *as_shown(design.problem, list(states.values()))]
+    states = tuple(initial_states(design.problem))
+    names, stds = [*names, *(state.name for state in states)], [*stds, *(state.std for state in states)]
+    columns = [*columns, *as_shown(design.problem, [state.column for state in states])]
     away = np.array([_from_prior(design.problem, name) for name in names])
     design, places = design.extended(columns)
     # The coefficient of a column that was divided by its scale is the parameter's shift times that scale.
@@ -133,7 +134,7 @@ def with_nuisance(design: DesignMatrix) -> tuple[DesignMatrix, Nuisance]:
     centre = away * design.scale[list(places)] if places else np.zeros(0)
     about = stated_names(design.problem)
     stated = frozenset(name for name in names if name.startswith(about))
-    return design, Nuisance(tuple(names), places, precision, centre, stated, tuple(states))
+    return design, Nuisance(tuple(names), places, precision, centre, stated, states)
 
 
 def _from_prior(problem: Problem, name: str) -> float:

@@ -128,6 +128,12 @@ class Decision:
         """Mean square of what is left of the compared readings beside all that was found."""
         return float(np.mean(residual_of(self.equations, self.whole)[self.equations.problem.mask] ** 2))
 
+    def does_without_curves_of(self, other: Decision) -> bool:
+        """Return whether names alone explain as much as another decision, but for what its curves have by chance."""
+        independent = float(self.equations.problem.mask.sum()) / self.noise.autocorrelation_time
+        by_chance = sum(other.equations.penalty(term) for term in other.unnamed)
+        return not self.unnamed and independent * (self.power_left / other.power_left - 1) <= by_chance
+
     @property
     def is_late_alone(self) -> bool:
         """Whether the predicted channel is late, and nothing else was found but late inputs."""
