@@ -69,6 +69,8 @@ def test_what_the_engine_computes_with_is_compared_by_identity() -> None:
     found = {node.name for _, node, options in dataclasses_of("calibration/mismatch") if not options.get("eq", True)}
     assert found == {
         "_Names",
+        "_Pose",
+        "InitialState",
         "_Course",
         "_Fitted",
         "Addition",

@@ -146,7 +146,8 @@ def compare(
     comparison = chosen.told(simulation)
     if chosen.decision.unnamed:
         progress("fitting a curve to what stays unexplained")
-    return with_initial_states(with_curves(comparison, chosen.decision), chosen.decision)
+    comparison = with_curves(comparison, chosen.decision)
+    return replace(comparison, answer=with_initial_states(comparison.answer, chosen.decision))
 
 
 def with_curves(comparison: Comparison, decision: Decision) -> Comparison:

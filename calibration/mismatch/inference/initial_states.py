@@ -16,22 +16,22 @@ from regolithd.calibration.mismatch.regression.residuals import residual_of
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from regolithd.calibration.mismatch.result import Comparison
+    from regolithd.calibration.mismatch.answer import Answer
     from regolithd.calibration.mismatch.selection.decision import Decision
 
 SHOWN = 3.0
 """Time constants after which the rest is not told (a choice: a twentieth is left)."""
 
 
-def with_initial_states(comparison: Comparison, decision: Decision) -> Comparison:
-    """Return the comparison; unexplained from the first to the last run whose initial state is off, if any is."""
+def with_initial_states(told: Answer, decision: Decision) -> Answer:
+    """Return the answer; unexplained from the first to the last run whose initial state is off, if any is."""
     equations, whole = decision.equations, decision.whole
     problem, nuisance, scale = equations.problem, equations.nuisance, equations.design.scale
     shifts = whole.coefficients[nuisance.count : len(nuisance.names)] / scale[list(nuisance.columns[nuisance.count :])]
     furthest = equations.thresholds.furthest_prior_stds
     off = [(shift, state) for shift, state in zip(shifts, nuisance.states, strict=True) if abs(shift) > furthest]
     if not off:
-        return comparison
+        return told
     added = sum(shift * state.column for shift, state in off)
     on = problem.mask & np.isin(np.arange(problem.mask.shape[1]), [state.wheel for _, state in off])
     shown, left = np.asarray(added)[on], residual_of(equations, whole)[on]
@@ -47,9 +47,7 @@ def with_initial_states(comparison: Comparison, decision: Decision) -> Compariso
     )
     numbers = sorted({state.run for _, state in off})
     note = _note(problem.simulation.channel, numbers, len(problem.recording.runs), memory)
-    told = comparison.answer
-    unexplained, notes = (*told.unexplained, place), (*told.notes, note)
-    return replace(comparison, answer=replace(told, verdict="unexplained", unexplained=unexplained, notes=notes))
+    return replace(told, verdict="unexplained", unexplained=(*told.unexplained, place), notes=(*told.notes, note))
 
 
 def _note(channel: str, off: Sequence[int], runs: int, memory_s: float) -> str:

@@ -73,7 +73,8 @@ def test_what_is_left_out_is_counted_with_its_reason() -> None:
     blank[5:8] = True
     recording = from_columns({"t_s": np.arange(len(measured))})
     changed = np.arange(10)[:, None] == 9
-    run = Simulated(recording, recording, prediction, {}, none, {"load_N": changed, "slip": none})
+    after_gap = np.arange(10)[:, None] == 4
+    run = Simulated(recording, recording, prediction, {}, none, {"load_N": changed, "slip": none}, after_gap)
     told = left_out(
         "current_A",
         measured,
@@ -82,10 +83,11 @@ def test_what_is_left_out_is_counted_with_its_reason() -> None:
         {"yaw_rate": blank},
         {"yaw_rate": "turning (rad/s)"},
     )
-    assert [(each.channel, each.readings) for each in told] == [("current_A", 2), ("current_A", 1), ("current_A", 3)]
+    assert [(each.channel, each.readings) for each in told] == [("current_A", readings) for readings in (2, 1, 1, 3)]
     assert "predicts nothing" in told[0].reason
-    assert told[1].reason == "load_N, which is measured less often, changed between its readings"
-    assert told[2].reason == "turning was not measured there"
+    assert told[1].reason == "the prediction depends on what the inputs were in a gap of the recording"
+    assert told[2].reason == "load_N, which is measured less often, changed between its readings"
+    assert told[3].reason == "turning was not measured there"
 
 
 def test_a_covariate_that_is_known_nowhere_is_left_out() -> None:
