@@ -75,6 +75,11 @@ LATE_SEARCHES = 4
 """Searches beside a late column, at most (a choice: most need one, parameters that move far as the delay is found two,
 a corrected delay that has changed, or one that was taken for another column's at first, up to four)."""
 
+INTERVALS_BESIDE_UNEXPLAINED = (
+    "Beside what stays unexplained, values and intervals of effects and parameters hold as far as that does not act as "
+    "they do."
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Decided:
@@ -217,7 +222,9 @@ def _notes_on_values(decision: Decision, start: Start) -> tuple[str, ...]:
     """Return notes on values of the parameters: others that fit as well, and such that fit only beside a curve."""
     equations, whole = decision.equations, decision.whole
     others = start.notes(equations.problem, added_by(equations, whole)) if start.others else ()
-    return (*others, *(worse_than_stated(equations, whole, start.problem) if decision.unnamed else ()))
+    if not decision.unnamed:
+        return others
+    return (*others, *worse_than_stated(equations, whole, start.problem), INTERVALS_BESIDE_UNEXPLAINED)
 
 
 def _decided(

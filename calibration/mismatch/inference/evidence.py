@@ -134,7 +134,7 @@ def _curves(decision: Decision, before: Array, after: Array) -> tuple[Curve, ...
     problem = decision.equations.problem
     wheels = sorted({w for term in decision.whole.terms for w in term.wheels}) or list(decision.equations.all_wheels)
     couplings = {"offset": np.ones(problem.mask.shape), "gain": np.sign(problem.filled)}
-    if "direction" in problem.covariates:
+    if problem.reverses:
         couplings["drag"] = problem.covariates["direction"]
     curves = [
         curve

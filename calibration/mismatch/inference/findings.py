@@ -226,7 +226,9 @@ def _effect(problem: Problem, term: Term, parameters: Mapping[str, Parameter], e
         covariate=candidate.covariate,
         onset_s=None if onset is None else onset.value,
         equation=candidate.equation,
-        statement=statement(words, wheels, all_wheels, parameters, errors, simulation.wheel_column),
+        statement=statement(
+            words, wheels, all_wheels, parameters, errors, simulation.wheel_column, about_mean=problem.arbitrary_zero
+        ),
         parameters=parameters,
         rmse_before=errors[0],
         rmse_after=errors[1],

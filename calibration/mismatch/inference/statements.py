@@ -134,6 +134,8 @@ def statement(
     parameters: Mapping[str, Parameter],
     errors: tuple[float, float],
     kind: str,
+    *,
+    about_mean: bool = False,
 ) -> str:
     """Return one sentence about an effect.
 
@@ -143,13 +145,14 @@ def statement(
     wheels: names of those that have it, of `of`; `kind` is the recording's column that tells them apart
     parameters: with `relative_size`, and `onset_s` where it has an onset
     errors: held-out root mean squares on these wheels without and with the effect
+    about_mean: whether readings are measured from their mean
     """
     onset = parameters.get("onset_s")
     begins = ""
     if onset:
         value, low, high = told(onset.value, onset.low, onset.high)
         begins = f", from {value} s on (90 % sure: {low} to {high} s)"
-    size = size_and_cost(parameters["relative_size"], errors)
+    size = size_and_cost(parameters["relative_size"], errors, about_mean=about_mean)
     return f"{capital(words)}{on_wheels(wheels, of, kind)}{begins}: {size}."
 
 
@@ -160,13 +163,17 @@ def told(value: float, low: float, high: float) -> tuple[str, str, str]:
     return f"{value:.{places}f}", f"{low:.{places}f}", f"{high:.{places}f}"
 
 
-def size_and_cost(size: Parameter, errors: tuple[float, float]) -> str:
-    """Return how large an effect is over the mean reading, and what leaving it out costs."""
+def size_and_cost(size: Parameter, errors: tuple[float, float], *, about_mean: bool = False) -> str:
+    """Return how large an effect is over the mean reading, and what leaving it out costs.
+
+    `about_mean`: whether readings are measured from their mean, as temperatures are.
+    """
     costs = 100 * (errors[0] / errors[1] - 1) if errors[1] > 0 else 0.0
     much = f"{abs(costs):.1f} %" if abs(costs) >= LEAST_COST else f"less than {LEAST_COST} %"
     value, low, high = told(100 * size.value, 100 * size.low, 100 * size.high)
+    of = "how far readings are from their mean" if about_mean else "the mean reading"
     return (
-        f"{value} % of the mean reading (90 % sure: {low} to {high} %); "
+        f"{value} % of {of} (90 % sure: {low} to {high} %); "
         f"left out, it makes the held-out error there {much} {'larger' if costs >= 0 else 'smaller'}"
     )
 
@@ -181,7 +188,7 @@ def beyond_prior_in_words(parameter: CalibratedParameter) -> str:
     begins, away = had_to_leave_its_prior(parameter.told_name), parameter.prior_stds_away
     return (
         f"{begins}: {parameter.value:.4g}{after_number(parameter.unit)} instead of "
-        f"{parameter.prior:.4g} ± {parameter.prior_std:.2g}, {away:.1f} standard deviations away. "
+        f"{parameter.prior:.4g} ± {float(f'{parameter.prior_std:.2g}'):g}, {away:.1f} standard deviations away. "
         "Check the stated value and its standard deviation, or look for physics that acts as this parameter does."
     )
 

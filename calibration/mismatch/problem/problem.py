@@ -152,6 +152,11 @@ class Problem:
         return zero_is_arbitrary(self.simulation, self.measured)
 
     @cached_property
+    def reverses(self) -> bool:
+        """Whether the machine moves backwards as well: else the sign of the speed says nothing."""
+        return "direction" in self.covariates and bool((self.covariates["direction"] < 0).any())
+
+    @cached_property
     def mean_size(self) -> float:
         """The predicted channel's mean magnitude: what effects are measured against.
 

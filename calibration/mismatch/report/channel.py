@@ -71,7 +71,7 @@ def _part(answer: Answer, evidence: Evidence, *, alone: bool) -> ChannelPart:
     labels = Labels.of(evidence, alone=True)
     return ChannelPart(
         heading="" if alone else evidence.channel,
-        along_motion=evidence.problem is None or "direction" in evidence.problem.covariates,
+        along_motion=evidence.problem is None or evidence.problem.reverses,
         corrected=bool(answer.effects or answer.changes),
         map=sections.residual_map(answer, evidence, labels),
         curves=sections.curves(answer, evidence, labels),

@@ -41,7 +41,7 @@ def curve_of(
         return None
     on = np.isin(np.asarray(evidence.wheels), list(wheels))
     known = np.isfinite(evidence.before) & np.isfinite(values) & on
-    drag = along_motion and covariate != "direction" and "direction" in problem.covariates
+    drag = along_motion and covariate != "direction" and problem.reverses
     along = problem.covariates["direction"] if drag else np.ones(known.shape)
     if known.sum() < LEAST_IN_A_BIN * BINS:
         return None

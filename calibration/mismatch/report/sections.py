@@ -289,7 +289,8 @@ def confusions(answer: Answer, labels: Labels) -> tuple[ConfusionRow, ...]:
 
 def sensitivity(answer: Answer, evidence: Evidence, labels: Labels) -> tuple[SensitivityRow, ...]:
     """Return the smallest detectable effect of each candidate that was not found, where there is one."""
-    mean = float(np.nanmean(np.abs(evidence.measured)))
+    problem = evidence.problem
+    mean = float(np.nanmean(np.abs(evidence.measured))) if problem is None else problem.mean_size
     found = {each.name for each in answer.effects}
     rows = []
     for one in answer.sensitivity:

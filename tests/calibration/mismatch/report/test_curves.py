@@ -24,7 +24,8 @@ OFFSET = 0.4
 def seen(*, row: Any = None, **covariates: Any) -> Evidence:
     """Return ten minutes of two wheels with an offset before the effects, and noise after them."""
     known = {"time": np.broadcast_to(TIME_S[:, None], SPEED.shape), "wheel_speed": SPEED, **covariates}
-    problem = SimpleNamespace(covariates=known, row=row, mask=np.ones(SPEED.shape, np.bool_), stated=())
+    mask, reverses = np.ones(SPEED.shape, np.bool_), "direction" in known
+    problem = SimpleNamespace(covariates=known, row=row, mask=mask, stated=(), reverses=reverses)
     nothing = np.zeros((1, WHEELS))
     return Evidence(
         channel="motor_current_A",

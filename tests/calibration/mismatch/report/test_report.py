@@ -176,7 +176,7 @@ def test_an_effect_s_curve_shows_its_own_wheels(evidence: Evidence) -> None:
     drag[:, 3] = 0.5 * direction[:, 3]
     time_s = np.broadcast_to(evidence.time_s[:, None], (900, 6))
     problem = SimpleNamespace(
-        covariates={"time": time_s, "direction": direction}, row=None, mask=np.ones((900, 6), bool)
+        reverses=True, covariates={"time": time_s, "direction": direction}, row=None, mask=np.ones((900, 6), bool)
     )
     noise = 0.01 * rng.normal(size=(900, 6))
     seen = replace(evidence, measured=drag + noise, before=0 * drag, after=drag, problem=problem)  # type: ignore[arg-type]
