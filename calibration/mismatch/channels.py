@@ -39,16 +39,16 @@ class CompareChannel(Protocol):
         """Return the comparison of a channel."""
 
 
-def compare_channels(simulation: Simulation, of_channel: CompareChannel) -> Comparison:
-    """Return the comparison of all channels, each posed by itself first.
+def compare_channels(simulation: Simulation, channels: Sequence[str], of_channel: CompareChannel) -> Comparison:
+    """Return the comparison of these channels of a simulation, each posed by itself first.
 
     Where all channels together contradict a stated parameter, they are compared again with it as they have it. If that
     is not all that is wrong, a channel that pulls a parameter out of its prior is told what the others know of it.
     """
-    alone, near = _near_each_other(simulation, of_channel)
+    alone, near = _near_each_other(simulation, channels, of_channel)
     answers = [each.answer for each in alone.values()]
     if restated := _joint(alone.values(), simulation).restated(simulation.parameters):
-        again = [of_channel(channel, {**near[channel], **restated}) for channel in simulation.channels]
+        again = [of_channel(channel, {**near[channel], **restated}) for channel in channels]
         if nothing_else_is_wrong(answers, [each.answer for each in again]):
             sure = [no_surer_than_before(answer, one.answer) for answer, one in zip(answers, again, strict=True)]
             again = [replace(one, answer=answer) for one, answer in zip(again, sure, strict=True)]
@@ -73,7 +73,7 @@ def labelled(comparison: Comparison, channel: str) -> Comparison:
 
 
 def _near_each_other(
-    simulation: Simulation, of_channel: CompareChannel
+    simulation: Simulation, channels: Sequence[str], of_channel: CompareChannel
 ) -> tuple[dict[str, Comparison], dict[str, Known]]:
     """Return each channel's comparison, and what the others know of the parameters that are hardly known.
 
@@ -81,8 +81,8 @@ def _near_each_other(
     both far from where another channel has one: there its tangents do not tell what all channels know together. It is
     told what the others know, and compared again, until the tangents of all reach as far as the values of all.
     """
-    alone = {channel: of_channel(channel, {}) for channel in simulation.channels}
-    near: dict[str, Known] = {channel: {} for channel in alone}
+    alone = {channel: of_channel(channel, {}) for channel in channels}
+    near: dict[str, Known] = {channel: {} for channel in channels}
     for _ in range(LINEARISATIONS):
         together = _joint(alone.values(), simulation).values(simulation.parameters)
         far = [channel for channel, one in alone.items() if _is_bent_up_to(together, one)]

@@ -146,7 +146,11 @@ def compare(
             one = OneChannel(simulation, channel, known)
             return labelled(compare(recorded, one, effects=own, thresholds=thresholds, progress=progress), channel)
 
-        return compare_channels(simulation, of_channel)
+        blank = [name for name in simulation.channels if recorded.holds_no_reading(name)]
+        channels = [name for name in simulation.channels if name not in blank]
+        comparison = compare_channels(simulation, channels or tuple(simulation.channels), of_channel)
+        notes = [f"{name} holds no reading: it is not compared." for name in blank]
+        return replace(comparison, answer=replace(comparison.answer, notes=(*comparison.answer.notes, *notes)))
     chosen = decided(recorded, simulation, effects=effects, thresholds=thresholds, progress=progress)
     comparison = chosen.told(simulation)
     if chosen.decision.unnamed:

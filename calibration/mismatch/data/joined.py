@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from regolithd.calibration.mismatch.data.recording import Array, Index, Recording
+from regolithd.calibration.mismatch.data.recording import Array, Index, Recording, told_constant
 from regolithd.calibration.mismatch.errors import RecordingError, listed
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def joined(recordings: Sequence[Recording], names: Sequence[str]) -> Recording:
     channels = sorted({name for recording in recordings for name in recording.channels})
     if not set.intersection(*(set(recording.channels) for recording in recordings)):
         raise RecordingError(f"no column is in all of {listed(names)}; they are not of one machine")
-    runs, first = [], 0
+    runs, first = [], 1  # as the notes tell them
     for recording in recordings:
         numbers = np.unique(recording.run, return_inverse=True)[1] + first
         first = int(numbers[-1]) + 1
@@ -67,10 +67,18 @@ def _notes(
     """Return which runs a recording has become, what it lacks, and its own notes."""
     notes = []
     for recording, name, run in zip(recordings, names, runs, strict=True):
-        first, last = int(run[0]) + 1, int(run[-1]) + 1
+        first, last = int(run[0]), int(run[-1])
         notes.append(f"{name}: run {first}." if first == last else f"{name}: runs {first} to {last}.")
         lacking = [channel for channel in channels if channel not in recording.channels]
         if lacking:
             notes.append(f"{name}: {listed(lacking)} was not recorded.")
-        notes += [f"{name}: {note}" for note in recording.notes]
+        varies = tuple(told_constant(channel) for channel in channels if not _is_constant(recordings, channel))
+        notes += [f"{name}: {note}" for note in recording.notes if not note.startswith(varies)]
     return notes
+
+
+def _is_constant(recordings: Sequence[Recording], channel: str) -> bool:
+    """Return whether a channel has one value in all recordings: where each has its own, that shows."""
+    known = [recording.channel(channel)[np.isfinite(recording.channel(channel))] for recording in recordings]
+    values = np.concatenate(known)
+    return bool(values.size == 0 or values.min() == values.max())

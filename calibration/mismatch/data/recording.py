@@ -103,6 +103,10 @@ class Recording:
         found = self.channels.get(name)
         return np.full(self.shape, np.nan) if found is None else found
 
+    def holds_no_reading(self, name: str) -> bool:
+        """Return whether a channel is there and blank throughout."""
+        return name in self.channels and not np.isfinite(self.channels[name]).any()
+
     def rate_of_change(self, values: Array) -> Array:
         """Return the change per second of values (time, wheel): central differences within each run."""
         found = np.full(self.shape, np.nan)
@@ -118,6 +122,11 @@ class Recording:
     def with_channels(self, **channels: Array) -> Recording:
         """Return the recording with channels added or replaced (derived ones, say)."""
         return replace(self, channels={**self.channels, **channels})
+
+
+def told_constant(name: str) -> str:
+    """Return how the note on a channel of one value begins."""
+    return f"{name} is constant"
 
 
 def read_recording(
@@ -383,4 +392,4 @@ def _note_channels(channels: Mapping[str, Array], wheels: tuple[int | str, ...],
         if silent:
             notes.append(f"{name} was never measured at {unit} {', '.join(map(str, silent))}.")
         if np.nanmax(values) == np.nanmin(values):
-            notes.append(f"{name} is constant ({np.nanmax(values):g}): nothing that depends on it can show.")
+            notes.append(f"{told_constant(name)} ({np.nanmax(values):g}): nothing that depends on it can show.")

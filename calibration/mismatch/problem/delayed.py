@@ -45,6 +45,7 @@ def shifted(recording: Recording, values: Array, by_s: float) -> Array:
 
 def beyond_the_end(recording: Recording, by_s: float) -> NDArray[np.bool_]:
     """Return where `shifted` by so much holds the end of a run, shape (time, wheel)."""
-    ends = np.zeros(recording.run.max() + 1)
-    np.maximum.at(ends, recording.run, recording.time_s)
-    return np.repeat((recording.time_s + by_s > ends[recording.run])[:, None], recording.shape[1], axis=1)
+    runs, of_run = np.unique(recording.run, return_inverse=True)  # a run's number may be a date
+    ends = np.zeros(len(runs))
+    np.maximum.at(ends, of_run, recording.time_s)
+    return np.repeat((recording.time_s + by_s > ends[of_run])[:, None], recording.shape[1], axis=1)

@@ -186,8 +186,13 @@ class CheckedSimulation(Simulation):
         return None if found is None else array_of(found, (len(wheels),), self._method(method))
 
     def _check_needed(self, channels: Mapping[str, Array], read: Columns) -> None:
-        """Check that the predicted channel and the inputs are there, and tell the cause where one is not."""
+        """Check that the predicted channel and the inputs are there, and tell the cause where one is not.
+
+        Of several predicted channels some may hold no reading: the others are compared.
+        """
         predicted = tuple(self.channels) or (self.channel,)
+        read_channels = [name for name in predicted if name not in channels or np.isfinite(channels[name]).any()]
+        predicted = tuple(read_channels) or predicted
         for name in (*predicted, *self.inputs):
             if name not in channels:
                 raise read.missing(name, "the simulation needs")

@@ -15,7 +15,7 @@ def test_each_recording_is_a_run_of_its_own() -> None:
     one = from_columns({"t_s": [0.0, 1, 2, 3], "run": [5.0, 5, 7, 7], "y": [1.0, 2, 3, 4]})
     two = from_columns({"t_s": [10.0, 11], "y": [5.0, 6]})
     found = joined([one, two], ["a.csv", "b.csv"])
-    np.testing.assert_array_equal(found.run, [0, 0, 1, 1, 2, 2])
+    np.testing.assert_array_equal(found.run, [1, 1, 2, 2, 3, 3])
     np.testing.assert_array_equal(found.time_s, [0, 1, 0, 1, 0, 1])
     np.testing.assert_array_equal(found.channels["y"][:, 0], [1, 2, 3, 4, 5, 6])
     assert found.notes[:2] == ("a.csv: runs 1 to 2.", "b.csv: run 3.")
@@ -50,3 +50,12 @@ def test_recordings_of_two_machines_are_refused() -> None:
     recordings = [from_columns({"t_s": [0.0, 1], name: [1.0, 2]}) for name in "xy"]
     with pytest.raises(RecordingError, match="no column is in all of a, b"):
         joined(recordings, ["a", "b"])
+
+
+def test_a_channel_that_is_constant_in_each_recording_but_not_in_all_has_no_note() -> None:
+    """What depends on it shows; one that is constant in all of them is told of each."""
+    one = from_columns({"t_s": [0.0, 1, 2], "start_K": [290.0, 290, 290], "head_m": [7.0, 7, 7], "y": [1.0, 2, 3]})
+    two = from_columns({"t_s": [0.0, 1, 2], "start_K": [310.0, 310, 310], "head_m": [7.0, 7, 7], "y": [1.0, 2, 3]})
+    notes = joined([one, two], ["a.csv", "b.csv"]).notes
+    assert not any("start_K" in note for note in notes)
+    assert [note.split(":")[0] for note in notes if "head_m is constant" in note] == ["a.csv", "b.csv"]

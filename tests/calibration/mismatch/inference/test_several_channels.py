@@ -13,13 +13,14 @@ from sample_answer import ANSWER
 from regolithd.calibration.mismatch import Prior, Simulation, compare
 from regolithd.calibration.mismatch.answer import Answer, CalibratedParameter, FitImprovement, OtherAnswer
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
-from regolithd.calibration.mismatch.errors import SimulationError
+from regolithd.calibration.mismatch.errors import MismatchError, SimulationError
 from regolithd.calibration.mismatch.inference.several_channels import (
     no_surer_than_before,
     notes_of,
     priors_from_others,
 )
 from regolithd.calibration.mismatch.signal.normal_interval import std_of_interval
+from regolithd.calibration.mismatch.simulation.checked import checked
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -67,6 +68,18 @@ def test_an_effect_is_told_in_its_channel_and_unit() -> None:
     size = effect.parameters["coulomb_current"]
     assert size.unit == "N·m"
     assert size.low < 0.01 < size.high
+
+
+def test_a_channel_that_holds_no_reading_is_not_compared() -> None:
+    """The others are, and a note says so; without a reading of any there is nothing to compare."""
+    recording = spun(drag_Nm=0.01)
+    dead = np.full(recording.shape, np.nan)
+    answer = compare(recording.with_channels(thrust_N=dead), checked(Propeller())).answer
+    assert [(effect.name, effect.channel) for effect in answer.effects] == [("coulomb-friction", "torque_Nm")]
+    assert "thrust_N holds no reading: it is not compared." in answer.notes
+    assert [fit.channel for fit in answer.fits] == ["torque_Nm"]
+    with pytest.raises(MismatchError, match="thrust_N"):
+        compare(recording.with_channels(thrust_N=dead, torque_Nm=dead), checked(Propeller()))
 
 
 def test_a_prediction_without_one_of_its_channels_is_refused() -> None:
