@@ -130,10 +130,10 @@ def unknown_states(equations: NormalEquations, fit: Fit) -> frozenset[str]:
 
 def _fitted(equations: NormalEquations, fit: Fit) -> dict[str, float]:
     """Return the values of the free parameters in a fit."""
-    problem, nuisance = equations.problem, equations.nuisance
+    problem, shifts = equations.problem, equations.shifts_of_parameters(fit).tolist()
     return {
-        name: problem.values[name] + float(fit.coefficients[place] / equations.design.scale[nuisance.columns[place]])
-        for place, name in enumerate(nuisance.names)
+        name: problem.values[name] + shift
+        for name, shift in zip(equations.nuisance.names, shifts, strict=True)
         if name in problem.simulation.parameters
     }
 

@@ -65,20 +65,19 @@ def _notes(
     recordings: Sequence[Recording], names: Sequence[str], runs: Sequence[Index], channels: Sequence[str]
 ) -> list[str]:
     """Return which runs a recording has become, what it lacks, and its own notes."""
-    notes = []
+    notes, varies = [], tuple(told_constant(name) for name in channels if not _is_constant(recordings, name))
     for recording, name, run in zip(recordings, names, runs, strict=True):
         first, last = int(run[0]), int(run[-1])
         notes.append(f"{name}: run {first}." if first == last else f"{name}: runs {first} to {last}.")
         lacking = [channel for channel in channels if channel not in recording.channels]
         if lacking:
             notes.append(f"{name}: {listed(lacking)} was not recorded.")
-        varies = tuple(told_constant(channel) for channel in channels if not _is_constant(recordings, channel))
         notes += [f"{name}: {note}" for note in recording.notes if not note.startswith(varies)]
     return notes
 
 
 def _is_constant(recordings: Sequence[Recording], channel: str) -> bool:
     """Return whether a channel has one value in all recordings: where each has its own, that shows."""
-    known = [recording.channel(channel)[np.isfinite(recording.channel(channel))] for recording in recordings]
-    values = np.concatenate(known)
-    return bool(values.size == 0 or values.min() == values.max())
+    values = np.concatenate([recording.channel(channel).ravel() for recording in recordings])
+    known = values[np.isfinite(values)]
+    return bool(known.size == 0 or known.min() == known.max())

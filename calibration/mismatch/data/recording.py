@@ -371,12 +371,17 @@ def _note_duplicates(row: Index, column: Index, shape: tuple[int, int], unit: st
         notes.append(f"Instants without a row, counted for each {unit}: {absent} of {taken.size}.")
 
 
-def _note_gaps(time_s: Array, run: Index, notes: list[str]) -> None:
+def gaps_in(time_s: Array, run: Index) -> Index:
+    """Return the last row before each gap: a step within a run that is longer than `GAP_STEPS` usual ones."""
     steps = np.where(np.diff(run) == 0, np.diff(time_s), np.nan)
     usual = np.nanmedian(steps) if np.isfinite(steps).any() else np.nan
-    gaps = np.flatnonzero(steps > GAP_STEPS * usual)
+    return np.flatnonzero(steps > GAP_STEPS * usual)
+
+
+def _note_gaps(time_s: Array, run: Index, notes: list[str]) -> None:
+    gaps = gaps_in(time_s, run)
     if gaps.size:
-        lost = float(np.sum(steps[gaps]))
+        lost = float(np.sum(np.diff(time_s)[gaps]))
         notes.append(
             f"{counted(gaps.size, 'gap')}, {lost:.1f} s in all; nothing is assumed about what happened in between."
         )

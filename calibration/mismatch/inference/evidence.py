@@ -90,9 +90,8 @@ def wheel_names(problem: Problem, wheels: Sequence[int]) -> tuple[int | str, ...
 def calibrated_values(equations: NormalEquations, fit: Fit) -> dict[str, float]:
     """Return the simulation's parameters, and each wheel's own deviations, as the fit has them."""
     problem, nuisance = equations.problem, equations.nuisance
-    columns = nuisance.columns[: nuisance.count]
-    shift = fit.coefficients[: nuisance.count] / equations.design.scale[list(columns)]
-    moved = dict(zip(nuisance.names, shift.tolist(), strict=False))
+    shifts = equations.shifts_of_parameters(fit).tolist()
+    moved = dict(zip(nuisance.names[: nuisance.count], shifts[: nuisance.count], strict=True))
     known = {name: shift for name, shift in moved.items() if name not in nuisance.stated}
     return {name: problem.values.get(name, 0.0) + known.get(name, 0.0) for name in {**problem.values, **known}}
 

@@ -26,8 +26,8 @@ SHOWN = 3.0
 def with_initial_states(told: Answer, decision: Decision) -> Answer:
     """Return the answer; unexplained from the first to the last run whose initial state is off, if any is."""
     equations, whole = decision.equations, decision.whole
-    problem, nuisance, scale = equations.problem, equations.nuisance, equations.design.scale
-    shifts = whole.coefficients[nuisance.count : len(nuisance.names)] / scale[list(nuisance.columns[nuisance.count :])]
+    problem, nuisance = equations.problem, equations.nuisance
+    shifts = equations.shifts_of_parameters(whole)[nuisance.count :]
     furthest = equations.thresholds.furthest_prior_stds
     off = [(shift, state) for shift, state in zip(shifts, nuisance.states, strict=True) if abs(shift) > furthest]
     if not off:

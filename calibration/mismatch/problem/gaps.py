@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.data.recording import GAP_STEPS
+from regolithd.calibration.mismatch.data.recording import gaps_in
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-Index = NDArray[np.int64]
 
 FEWEST_STRETCHES = 10
 """Stretches without a gap by which an input's change is known (a choice); of fewer, its distance from its mean is."""
@@ -35,7 +34,7 @@ def inputs_otherwise_in_gaps(recording: Recording, inputs: Sequence[str]) -> Rec
 
     Each keeps within the range of its readings.
     """
-    gaps = _gaps(recording)
+    gaps = gaps_in(recording.time_s, recording.run)
     if not gaps.size:
         return None
     lengths = np.diff(recording.time_s)[gaps] / recording.step_s
@@ -59,9 +58,11 @@ def after_gaps(recording: Recording) -> Mask:
 
     There the inputs themselves are off, and a prediction without a state is, too.
     """
-    found, gaps = np.zeros(len(recording.run), np.bool_), _gaps(recording)
-    for gap in gaps.tolist():
-        found[gap:] |= recording.run[gap:] == recording.run[gap]
+    found, gaps = np.zeros(len(recording.run), np.bool_), gaps_in(recording.time_s, recording.run)
+    for rows in recording.runs:
+        first = np.searchsorted(gaps, rows.start)
+        if first < len(gaps) and gaps[first] < rows.stop:
+            found[gaps[first] : rows.stop] = True
     found[gaps] = found[gaps + 1] = False
     return found
 
@@ -72,16 +73,10 @@ def carried_over_gaps(recording: Recording, differs: Mask) -> Mask:
     The instant that follows a gap does where the next one does.
     """
     found = differs & after_gaps(recording)[:, None]
-    gaps = _gaps(recording)
+    gaps = gaps_in(recording.time_s, recording.run)
     first = gaps[gaps + 2 < len(found)] + 1
     found[first] = found[first + 1]
     return found
-
-
-def _gaps(recording: Recording) -> Index:
-    """Return the last row before each gap."""
-    long = np.diff(recording.time_s) > GAP_STEPS * recording.step_s
-    return np.flatnonzero(long & (np.diff(recording.run) == 0))
 
 
 def _usual_change(recording: Recording, values: Array, rows: int) -> Array:

@@ -152,16 +152,18 @@ def inputs_of(
     within = {name: each.within for name, each in between.items()}
     undefined = _undefined(predicted()) if expected is not as_read else None
     expected = expected.with_notes(*notes_on_errors(shown, simulation.sensors, as_read, simulation.channel))
-    in_gaps = inputs_otherwise_in_gaps(expected, simulation.inputs)
-    if in_gaps is not None and not _is_carried_over_gaps(as_read, simulation, values, predicted()):
-        in_gaps = None
+    carries = _carries_over_gaps(as_read, simulation, values, predicted)
+    in_gaps = inputs_otherwise_in_gaps(expected, simulation.inputs) if carries else None
     return Inputs(as_read, expected, otherwise, blanks, undefined, total_doubt(doubts), within, in_gaps)
 
 
-def _is_carried_over_gaps(
-    recording: Recording, simulation: Predictor, values: Mapping[str, float], predicted: Array
+def _carries_over_gaps(
+    recording: Recording, simulation: Predictor, values: Mapping[str, float], predicted: Callable[[], Array]
 ) -> bool:
-    """Return whether the prediction after a gap depends on the inputs in it; False of what accepts no other inputs."""
+    """Return whether the prediction after a gap depends on the inputs in it; False of what accepts no other inputs.
+
+    `predicted` returns the prediction from the readings as they are.
+    """
     other = inputs_otherwise_in_gaps(recording, simulation.inputs)
     if other is None:
         return False
@@ -169,7 +171,7 @@ def _is_carried_over_gaps(
         moved = simulation.predict(complete_inputs(other), values)
     except SimulationError:
         return False
-    return bool(carried_over_gaps(recording, np.isfinite(predicted) & (moved != predicted)).any())
+    return bool(carried_over_gaps(recording, np.isfinite(predicted()) & (moved != predicted())).any())
 
 
 def put_on_time(inputs: Inputs, late: Mapping[str, float]) -> Inputs:

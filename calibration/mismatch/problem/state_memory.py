@@ -45,7 +45,8 @@ def memory_s(problem: Problem) -> float:
 
 def longest_memory_s(problem: Problem) -> float:
     """Return the same, however long it is."""
-    return float(problem.once("memory of a state", lambda: np.array(_memory(problem))))
+    # Copies of a problem share what was run once.
+    return float(problem.run_once("memory of a state", 0.0, lambda: np.array(_memory(problem))))
 
 
 def _memory(problem: Problem) -> float:

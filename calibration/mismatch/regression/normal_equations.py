@@ -139,6 +139,11 @@ class NormalEquations:
         solved = inverse @ moment
         return Fit(terms, columns, solved, inverse, float(moment @ solved) - self._explained_by_parameters)
 
+    def shifts_of_parameters(self, fit: Fit) -> Array:
+        """Return how far a fit moves each free parameter, in its own unit, shape (parameter,)."""
+        columns = list(self.nuisance.columns)
+        return np.asarray(fit.coefficients[: len(columns)] / self.design.scale[columns])
+
     def normal_matrix(self, fit: Fit) -> Array:
         """Return the matrix of a fit's normal equations, the priors included, shape (column, column)."""
         return self._normal(fit.columns)[0]
