@@ -104,7 +104,7 @@ def in_a_gap(found: FittedForm, x: Array) -> bool:
 def fitted(of: Profile, x: Array, form: ClosedForm, *, constant: bool) -> FittedForm:
     """Return a form at its best shape: the best of its grid, refined between the grid's points."""
     grid = form.shapes(span_of(x))
-    gains = [_gain(of, _columns(form, x, shape, constant=constant))[0] for shape in grid]
+    gains, _ = _gains(of, np.stack([_columns(form, x, shape, constant=constant) for shape in grid]))
     shape = grid[int(np.argmax(gains))]
     if shape.size:
         shape = _refined(of, x, form, grid, shape, constant=constant)
@@ -161,14 +161,21 @@ def _columns(form: ClosedForm, x: Array, shape: Array, *, constant: bool) -> Arr
 
 def _gain(of: Profile, columns: Array) -> tuple[float, Array]:
     """Return the Δχ² of columns over the bins, shape (column, bin), and their coefficients."""
+    gains, coefficients = _gains(of, columns[None])
+    return float(gains[0]), coefficients[0]
+
+
+def _gains(of: Profile, columns: Array) -> tuple[Array, Array]:
+    """Return the Δχ² of each set of columns over the bins, shape (set, column, bin), and their coefficients."""
     scaled, size = _scaled(columns)
-    moment = scaled @ of.moment
-    inverse = np.linalg.pinv(scaled @ of.matrix @ scaled.T, rcond=SINGULAR, hermitian=True)
-    coefficients = inverse @ moment
-    return float(moment @ coefficients), coefficients / size
+    values, vectors = np.linalg.eigh((scaled @ of.matrix) @ scaled.swapaxes(-1, -2))
+    along = ((scaled @ of.moment)[:, None] @ vectors)[:, 0]
+    independent = values > SINGULAR * values[:, -1:]
+    solved = np.divide(along, values, out=np.zeros(along.shape), where=independent)
+    return np.sum(along * solved, axis=-1), (vectors @ solved[..., None])[..., 0] / size
 
 
 def _scaled(columns: Array) -> tuple[Array, Array]:
-    """Return columns with a greatest magnitude of 1, and what they were divided by."""
-    size = np.maximum(np.max(np.abs(columns), axis=1), 1e-300)
-    return columns / size[:, None], size
+    """Return columns, shape (…, column, bin), with a greatest magnitude of 1, and what they were divided by."""
+    size = np.maximum(np.max(np.abs(columns), axis=-1), 1e-300)
+    return columns / size[..., None], size

@@ -102,7 +102,7 @@ def sums_of(equations: NormalEquations, beside: Fit, term: Term, whole: Fit) -> 
     it, whose long memory would be taken for the noise's.
     """
     design, weights = equations.design, long_run_weights(equations, whole)
-    columns, residual = columns_on_wheels(equations, beside), design.residual_as_read.astype(np.float64)
+    columns, residual = columns_on_wheels(equations, beside.columns), design.residual_as_read.astype(np.float64)
     values, factor = _course(equations, term)
     at, index = _bins(values, factor != 0)
     folds, wheels, bins = len(design.cuts) - 1, len(weights), len(at)

@@ -112,7 +112,7 @@ class Linearisation:
 
 def linearised(equations: NormalEquations, fit: Fit) -> Linearisation:
     """Return the linearisation of a fit."""
-    columns = list(equations.design.in_time(columns_on_wheels(equations, fit)))
+    columns = list(equations.design.in_time(columns_on_wheels(equations, fit.columns)))
     slopes = []
     for slope, column in _shape_slopes(equations, fit):
         slopes.append(slope)

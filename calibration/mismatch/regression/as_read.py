@@ -20,7 +20,7 @@ from regolithd.calibration.mismatch.signal.whitening import NOT_WHITENED
 
 if TYPE_CHECKING:
     from regolithd.calibration.mismatch.regression.group import Fit
-    from regolithd.calibration.mismatch.regression.normal_equations import NormalEquations
+    from regolithd.calibration.mismatch.regression.normal_equations import Columns, NormalEquations
 
 Array = NDArray[np.float64]
 
@@ -43,10 +43,10 @@ class AsRead:
     weights: Array
 
 
-def columns_on_wheels(equations: NormalEquations, fit: Fit) -> Array:
-    """Return a fit's columns as read, 0 on wheels that they do not act on, shape (column, wheel, time by folds)."""
-    columns = equations.design.columns_as_read([column for column, _ in fit.columns])
-    on = membership(fit.columns, len(equations.weights))
+def columns_on_wheels(equations: NormalEquations, of: Columns) -> Array:
+    """Return columns as read, 0 on wheels that they do not act on, shape (column, wheel, time by folds)."""
+    columns = equations.design.columns_as_read([column for column, _ in of])
+    on = membership(of, len(equations.weights))
     return np.asarray(columns * on[:, :, None], np.float64)
 
 
@@ -58,9 +58,12 @@ def left_beside(equations: NormalEquations, fit: Fit, series: Array) -> Array:
     """
     design, courses = equations.design, equations.design.in_folds(np.where(equations.problem.mask, series, 0.0))
     on = membership(fit.columns, len(equations.weights))[:, :, None]
-    columns = design.columns([column for column, _ in fit.columns]) * on
+    columns, as_they_are = (
+        design.columns([column for column, _ in fit.columns]) * on,
+        columns_on_wheels(equations, fit.columns),
+    )
     moment = np.einsum("cwt,swt,w->cs", columns, design.whitened(courses), equations.weights, optimize=True)
-    taken_up = np.einsum("cs,cwt->swt", fit.covariance @ moment, columns_on_wheels(equations, fit), optimize=True)
+    taken_up = np.einsum("cs,cwt->swt", fit.covariance @ moment, as_they_are, optimize=True)
     return np.asarray(design.in_time(courses - taken_up))
 
 
@@ -76,7 +79,7 @@ def as_read(equations: NormalEquations, fit: Fit) -> AsRead:
     design, nuisance = equations.design, equations.nuisance
     weights = long_run_weights(equations, fit)
     residual = design.residual_as_read.astype(np.float64)
-    columns = columns_on_wheels(equations, fit)
+    columns = columns_on_wheels(equations, fit.columns)
     weighted = columns * weights[:, None]
     matrix = np.einsum("awt,bwt->ab", weighted, columns, optimize=True)
     moment = np.einsum("awt,wt->a", weighted, residual, optimize=True)

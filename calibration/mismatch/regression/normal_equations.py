@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ from regolithd.calibration.mismatch.regression.penalties import least_penalty, p
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from regolithd.calibration.mismatch.problem.problem import Problem
     from regolithd.calibration.mismatch.regression.design_matrix import DesignMatrix
@@ -39,6 +39,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Single = NDArray[np.float32]
 Columns = tuple[tuple[int, tuple[int, ...]], ...]
+Derived = TypeVar("Derived")
 
 KINDS = ("all", "some", "one")
 """Of sets of wheels that may share an effect."""
@@ -133,11 +134,23 @@ class NormalEquations:
     def fit(self, terms: Iterable[Term]) -> Fit:
         """Fit terms and free parameters together."""
         terms = tuple(terms)
-        columns = self._columns(terms)
+        columns = self.columns_of(terms)
         matrix, moment = self._normal(columns)
         inverse = pseudo_inverse(matrix, SINGULAR)
         solved = inverse @ moment
         return Fit(terms, columns, solved, inverse, float(moment @ solved) - self._explained_by_parameters)
+
+    def beside(self, terms: Sequence[Term], derive: Callable[[], Derived]) -> Derived:
+        """Return what is derived beside these terms, one thing for each set; the latest is kept for what follows."""
+        key = tuple(map(id, terms))
+        if key not in self._latest:
+            self._latest.clear()
+            self._latest[key] = tuple(terms), derive()  # the terms are kept so that no other one gets its identity
+        return self._latest[key][1]
+
+    @cached_property
+    def _latest(self) -> dict[tuple[int, ...], tuple[tuple[Term, ...], Any]]:
+        return {}
 
     def shifts_of_parameters(self, fit: Fit) -> Array:
         """Return how far a fit moves each free parameter, in its own unit, shape (parameter,)."""
@@ -151,7 +164,7 @@ class NormalEquations:
     @cached_property
     def _explained_by_parameters(self) -> float:
         """Return the Δχ² of the free parameters alone, of which one may act on nothing and have no prior."""
-        matrix, moment = self._normal(self._columns(()))
+        matrix, moment = self._normal(self.columns_of(()))
         return float(moment @ pseudo_inverse(matrix, SINGULAR) @ moment)
 
     def information(self, terms: Iterable[Term], kept: Sequence[int]) -> tuple[Array, Array]:
@@ -160,7 +173,7 @@ class NormalEquations:
         They are of the readings alone, without these parameters' own priors; `kept` are their places. The vector has
         the covariance M + V, where errors of the inputs that last add V: what it knows is M (M + V)⁻¹ M.
         """
-        columns = self._columns(tuple(terms))
+        columns = self.columns_of(tuple(terms))
         return information_of_some(
             *self._normal(columns), self.moments_of_errors(columns), self.nuisance, kept, SINGULAR
         )
@@ -261,7 +274,7 @@ class NormalEquations:
 
     def own_and_complement(self, given: Iterable[Term], term: Term) -> tuple[Array, Array]:
         """Return a term's sums of products, and their Schur complement beside `given` and the free parameters."""
-        columns = self._columns((*given, term))
+        columns = self.columns_of((*given, term))
         size = len(columns) - len(term.group.columns)
         matrix, _ = self._normal(columns)
         inverse = pseudo_inverse(matrix[:size, :size], SINGULAR) if size else np.zeros((0, 0))
@@ -273,7 +286,8 @@ class NormalEquations:
         own, complement = self.own_and_complement(given, term)
         return float(complement[0, 0] / max(float(own[0, 0]), 1e-300))
 
-    def _columns(self, terms: tuple[Term, ...]) -> Columns:
+    def columns_of(self, terms: Iterable[Term]) -> Columns:
+        """Return the columns of a fit of terms: those of the free parameters, then each term's."""
         base = [(column, self.all_wheels) for column in self.nuisance.columns]
         return tuple(base + [(column, term.wheels) for term in terms for column in term.group.columns])
 

@@ -11,6 +11,7 @@ there are of them, however slow the noise.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import log
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
-from regolithd.calibration.mismatch.signal.noise_spectrum import Bands, NoiseSpectrum
+from regolithd.calibration.mismatch.signal.noise_spectrum import Bands, cosine_transform, likeliest_powers
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
@@ -60,8 +61,8 @@ class Priors:
 NO_PRIORS = Priors(np.zeros(0), np.zeros(0))
 
 
-class FurtherColumns:
-    """What columns gain beside others in noise that has a spectrum of its own in each course.
+class GivenColumns:
+    """What is fitted anyway to courses whose noise has a spectrum of its own in each, and the likeliest spectra beside.
 
     Courses that are too short to have a spectrum, or that are 0, are left out.
 
@@ -69,7 +70,6 @@ class FurtherColumns:
     ----------
     courses: readings that followed each other, each of shape (reading,)
     columns: what is fitted to each by generalised least squares, with the same coefficients, shape (column, reading)
-    given: how many of the first columns are fitted anyway, and gain nothing
     priors: of the coefficients of the first columns
     """
 
@@ -77,20 +77,48 @@ class FurtherColumns:
         self,
         courses: Sequence[Array],
         columns: Sequence[Array],
-        given: int = 0,
         priors: Priors = NO_PRIORS,
         thresholds: Thresholds = THRESHOLDS,
     ) -> None:
-        series = [np.vstack([of_course, values]) for values, of_course in zip(courses, columns, strict=True)]
-        known = [each for each in series if each.shape[1] >= FEWEST_READINGS and each[-1].any()]
-        count = len(series[0]) - 1 if series else 0
+        self._known = [k for k, each in enumerate(courses) if len(each) >= FEWEST_READINGS and each.any()]
+        self.count = len(columns[0]) if columns else 0
+        self._priors = priors
+        self._transformed = [cosine_transform(np.vstack([columns[k], courses[k]])) for k in self._known]
+        usual = [Bands.of(len(courses[k]), thresholds) for k in self._known]
+        slower = [each.with_slowest(thresholds.slowest_possible_noise_share) for each in usual]
+        self._bands = usual, slower
+        self._before = tuple(
+            likelihood.fitted(self.count, likelihood.courses.spectra(np.zeros(0), np.zeros((0, 0))))
+            for likelihood in self._likelihoods(self._transformed, self.count)
+        )
+
+    def with_further(self, columns: Sequence[Array]) -> FurtherColumns:
+        """Return what further columns gain, of each course as the given ones are."""
+        total = self.count + (len(columns[0]) if columns else 0)
+        series = [
+            np.vstack([of_given[:-1], cosine_transform(columns[k]), of_given[-1:]])
+            for k, of_given in zip(self._known, self._transformed, strict=True)
+        ]
+        usual, slow = (
+            _InNoise(likelihood, self.count, before)
+            for likelihood, before in zip(self._likelihoods(series, total), self._before, strict=True)
+        )
+        return FurtherColumns(usual, slow)
+
+    def _likelihoods(self, transformed: Sequence[Array], count: int) -> tuple[_Likelihood, ...]:
+        """Return the likelihood of so many columns in noise that is as slow as usually, and in slower noise."""
         held, mean = np.zeros((2, count))
-        held[: len(priors.mean)], mean[: len(priors.mean)] = priors.precision, priors.mean
-        courses_of = [_Course.of(each, thresholds) for each in known]
-        self._usual = _InNoise(_Likelihood(courses_of, np.diag(held), mean), given)
-        share = thresholds.slowest_possible_noise_share
-        slower = [replace(each, bands=each.bands.with_slowest(share)) for each in courses_of]
-        self._slow = _InNoise(_Likelihood(slower, np.diag(held), mean), given)
+        held[: len(self._priors.mean)], mean[: len(self._priors.mean)] = self._priors.precision, self._priors.mean
+        sums = [each.products(series) for each, series in zip(self._bands[0], transformed, strict=True)]
+        return tuple(_Likelihood(_Courses.of(bands, sums, count), np.diag(held), mean) for bands in self._bands)
+
+
+@dataclass(frozen=True, eq=False)
+class FurtherColumns:
+    """What columns gain beside given ones, in noise that is as slow as usually, and in slower noise."""
+
+    _usual: _InNoise
+    _slow: _InNoise
 
     def gain(self) -> float:
         """Return by how much twice the restricted log likelihood rises, whatever the coefficients."""
@@ -113,29 +141,31 @@ class FurtherColumns:
         return slow - min(usual - gain, slow - gain_in_slow())
 
 
+@dataclass(frozen=True, eq=False)
 class _InNoise:
     """The fits to courses in noise up to some correlation time.
 
     Attributes
     ----------
-    before: the fit of the columns that are given
+    likelihood: of all columns
+    given: how many of the first are given
+    before: the fit of these
     """
 
-    def __init__(self, likelihood: _Likelihood, given: int) -> None:
-        self._likelihood, self._given = likelihood, given
-        spectra = [course.spectrum(np.zeros(0), np.zeros((0, 0))) for course in likelihood.courses]
-        self.before = likelihood.fitted(given, spectra)
+    likelihood: _Likelihood
+    given: int
+    before: _Fitted
 
     def gain(self) -> float:
         """Return what the further columns gain."""
-        return self._gain(self._likelihood)
+        return self._gain(self.likelihood)
 
     def smooth(self, roughness: Array) -> tuple[float, int]:
         """Return what they gain if they are smooth, and how many numbers are free."""
-        if not self._likelihood.courses:
+        if not len(self.likelihood.courses.products):
             return 0.0, 0
-        given, count = self._given, len(roughness)
-        matrix, moment, _ = self._likelihood.sums(given + count, self.before.spectra)
+        given, count = self.given, len(roughness)
+        matrix, moment, _ = self.likelihood.sums(given + count, self.before.spectra)
         scale = _scale(matrix)
         matrix, moment = matrix * np.outer(scale, scale), moment * scale
         seen = scale[given:] > 0
@@ -157,8 +187,8 @@ class _InNoise:
             tried.append((explained - price, times, price))
         _, times, price = max(tried)
         back = np.divide(1.0, scale, out=np.zeros(len(scale)), where=scale > 0)
-        smooth = self._likelihood.precision + times * prior * np.outer(back, back)
-        gain = self._gain(replace(self._likelihood, precision=smooth)) - price
+        smooth = self.likelihood.precision + times * prior * np.outer(back, back)
+        gain = self._gain(replace(self.likelihood, precision=smooth)) - price
         return gain, int(seen.sum() - rough.sum()) + 1
 
     def _gain(self, likelihood: _Likelihood) -> float:
@@ -168,39 +198,73 @@ class _InNoise:
 
 
 @dataclass(frozen=True, eq=False)
-class _Course:
-    """Readings that followed each other, as products of the transforms of columns and readings.
+class _Spectra:
+    """The spectrum of the noise in each course: powers, shape (course, process), and levels, shape (course, band)."""
+
+    powers: Array
+    level: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Courses:
+    """Courses, each of readings that followed each other, as products of the transforms of columns and readings.
+
+    A course with fewer bands or processes than another has bands without a coefficient, and processes that are 0.
 
     Attributes
     ----------
-    bands: of frequency
-    products: of the columns, and of the readings as the last series, shape (band, series, series)
+    shapes: spectrum of each process of variance 1, shape (course, process, band)
+    counts: coefficients in each band, shape (course, band)
+    products: of the columns, and of the readings as the last series, shape (course, band, series, series)
     """
 
-    bands: Bands
+    shapes: Array
+    counts: Array
     products: Array
 
     @classmethod
-    def of(cls, series: Array, thresholds: Thresholds) -> _Course:
-        bands = Bands.of(series.shape[1], thresholds)
-        return cls(bands, bands.products(series))
+    def of(cls, bands: Sequence[Bands], products: Sequence[Array], columns: int) -> _Courses:
+        """Return courses with these bands, and in each the products of so many columns and of the readings."""
+        most = max((len(each.count) for each in bands), default=1)
+        shapes = np.zeros((len(bands), max((len(each.times) for each in bands), default=1), most))
+        counts, sums = np.zeros((len(bands), most)), np.zeros((len(bands), most, columns + 1, columns + 1))
+        for place, (of_course, each) in enumerate(zip(bands, products, strict=True)):
+            own = len(of_course.count)
+            shapes[place, : len(of_course.times), :own], shapes[place, :, own:] = of_course.shapes, 1.0
+            counts[place, :own], sums[place, :own] = of_course.count, each
+        return cls(shapes, counts, sums)
 
-    def spectrum(self, coefficients: Array, covariance: Array, start: NoiseSpectrum | None = None) -> NoiseSpectrum:
-        """Return the spectrum of what a fit of the first columns leaves, found from `start` on.
+    def spectra(self, coefficients: Array, covariance: Array, start: _Spectra | None = None) -> _Spectra:
+        """Return the spectra of what a fit of the first columns leaves, found from `start` on.
 
         The fit takes degrees of freedom of each band: its uncertainty there over the spectrum that it was made with.
         """
-        count = len(coefficients)
-        solved, moment = self.products[:, :count, :count], self.products[:, :count, -1]
-        left = self.products[:, -1, -1] - 2 * moment @ coefficients
-        left += np.einsum("bij,ij->b", solved, np.outer(coefficients, coefficients))
-        taken = 0.0 if start is None else np.einsum("bij,ij->b", solved, covariance) / start.level
-        return self.bands.fitted(np.maximum(left, 0.0), np.maximum(self.bands.count - taken, 0.0), start)
+        solved, moment = self._of_first(len(coefficients))
+        left = self.products[..., -1, -1] - 2 * moment @ coefficients
+        left += solved @ np.outer(coefficients, coefficients).ravel()
+        taken = 0.0 if start is None else solved @ covariance.ravel() / start.level
+        free, begin = np.maximum(self.counts - taken, 0.0), None if start is None else start.powers
+        powers = likeliest_powers(self.shapes, np.maximum(left, 0.0), free, begin)
+        return _Spectra(powers, (powers[:, None] @ self.shapes)[:, 0])
 
-    def weighted(self, spectrum: NoiseSpectrum, count: int) -> tuple[Array, Array, float]:
-        """Return matrix and moment of the first columns' normal equations, and the readings' sum of squares."""
-        sums = np.asarray(np.tensordot(1 / spectrum.level, self.products, axes=1), np.float64)
-        return sums[:count, :count], sums[:count, -1], float(sums[-1, -1])
+    def weighted(self, spectra: _Spectra, count: int) -> tuple[Array, Array, float]:
+        """Return matrix and moment of the first columns' normal equations, and −2 ln of the likelihood without them."""
+        solved, moment = self._of_first(count)
+        weights = 1 / spectra.level
+        rest = float(np.sum(weights * self.products[..., -1, -1]) + np.sum(self.counts * np.log(spectra.level)))
+        matrix = np.asarray(np.tensordot(weights, solved, axes=2)).reshape(count, count)
+        return matrix, np.asarray(np.tensordot(weights, moment, axes=2)), rest
+
+    def _of_first(self, count: int) -> tuple[Array, Array]:
+        """Return the products of the first columns with each other, (course, band, …), and with the readings."""
+        if count not in self._first:
+            solved = self.products[..., :count, :count].reshape(*self.counts.shape, count * count)
+            self._first[count] = solved, np.ascontiguousarray(self.products[..., :count, -1])
+        return self._first[count]
+
+    @cached_property
+    def _first(self) -> dict[int, tuple[Array, Array]]:
+        return {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,7 +283,7 @@ class _Fitted:
     restricted: float
     at_the_start: float
     at_the_end: float
-    spectra: Sequence[NoiseSpectrum]
+    spectra: _Spectra
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,11 +297,11 @@ class _Likelihood:
     mean: of each
     """
 
-    courses: Sequence[_Course]
+    courses: _Courses
     precision: Array
     mean: Array
 
-    def fitted(self, count: int, spectra: Sequence[NoiseSpectrum]) -> _Fitted:
+    def fitted(self, count: int, spectra: _Spectra) -> _Fitted:
         """Return the fit of the first columns at its likeliest spectra, found from these on."""
         kept = _independent(self.sums(count, spectra)[0])
         start, best = None, None
@@ -251,21 +315,16 @@ class _Likelihood:
             if best is not None and value > best.restricted - CONVERGED:
                 break
             best = _Fitted(value, start, determinant, spectra)
-            of_courses = zip(self.courses, spectra, strict=True)
-            spectra = [course.spectrum(coefficients, covariance, spectrum) for course, spectrum in of_courses]
+            spectra = self.courses.spectra(coefficients, covariance, spectra)
         assert best is not None  # noqa: S101  # the first fit is always one
         return best
 
-    def sums(self, count: int, spectra: Sequence[NoiseSpectrum]) -> tuple[Array, Array, float]:
+    def sums(self, count: int, spectra: _Spectra) -> tuple[Array, Array, float]:
         """Return matrix and moment of the first columns' normal equations, and −2 ln of the likelihood without them."""
-        matrix, mean = self.precision[:count, :count], self.mean[:count]
-        moment = matrix @ mean
-        rest = float(mean @ moment)
-        for course, spectrum in zip(self.courses, spectra, strict=True):
-            of_course = course.weighted(spectrum, count)
-            matrix, moment = matrix + of_course[0], moment + of_course[1]
-            rest += of_course[2] + spectrum.log_determinant
-        return matrix, moment, rest
+        precision, mean = self.precision[:count, :count], self.mean[:count]
+        matrix, moment, rest = self.courses.weighted(spectra, count)
+        held = precision @ mean
+        return matrix + precision, moment + held, rest + float(mean @ held)
 
 
 def _independent(matrix: Array) -> Array:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.as_read import columns_on_wheels
 from regolithd.calibration.mismatch.regression.lagged_groups import WITHOUT_CURVE
-from regolithd.calibration.mismatch.regression.restricted_likelihood import FEWEST_READINGS, FurtherColumns, Priors
+from regolithd.calibration.mismatch.regression.restricted_likelihood import FEWEST_READINGS, GivenColumns, Priors
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,24 +34,29 @@ def score_beside_slow_noise(equations: NormalEquations, rest: Sequence[Term], te
     The free parameters are fitted with them, held by their priors: where the weights know slow noise badly, it bends
     these. Where no wheel has readings enough for a spectrum, it is what the terms gain by the weights.
     """
-    design, nuisance, fit = equations.design, equations.nuisance, equations.fit((*rest, *terms))
-    given = len(fit.columns) - sum(len(term.group.columns) for term in terms)
-    read = [places for places, _ in design.readings]
+    read = [places for places, _ in equations.design.readings]
     if max((len(places) for places in read), default=0) < FEWEST_READINGS:
-        return equations.score(fit) - equations.score(equations.fit(rest))
-    columns, residual = columns_on_wheels(equations, fit), design.residual_as_read.astype(np.float64)
-    further = FurtherColumns(
-        [residual[w, places] for w, places in enumerate(read)],
-        [columns[:, w, places] for w, places in enumerate(read)],
-        given,
-        Priors(nuisance.precision, nuisance.centre),
-        equations.thresholds,
-    )
+        return equations.score(equations.fit((*rest, *terms))) - equations.score(equations.fit(rest))
+    given = equations.beside(rest, lambda: _given(equations, rest))
+    own = columns_on_wheels(equations, equations.columns_of(terms)[len(equations.nuisance.columns) :])
+    further = given.with_further([own[:, wheel, places] for wheel, places in enumerate(read)])
     gain, penalty = further.gain(), sum(equations.penalty(term) for term in terms)
     if (roughness := _roughness(equations, terms)) is not None:
         smooth, free = further.gain_if_smooth(roughness)
         gain = max(gain, smooth + equations.thresholds.coefficient_penalty * (len(roughness) - free))
     return gain - penalty
+
+
+def _given(equations: NormalEquations, terms: Sequence[Term]) -> GivenColumns:
+    """Return the free parameters and terms as what is fitted anyway to the readings of each wheel."""
+    design, nuisance = equations.design, equations.nuisance
+    columns, residual = columns_on_wheels(equations, equations.columns_of(terms)), design.residual_as_read
+    return GivenColumns(
+        [residual[wheel, places].astype(np.float64) for wheel, (places, _) in enumerate(design.readings)],
+        [columns[:, wheel, places] for wheel, (places, _) in enumerate(design.readings)],
+        Priors(nuisance.precision, nuisance.centre),
+        equations.thresholds,
+    )
 
 
 def _roughness(equations: NormalEquations, terms: Sequence[Term]) -> Array | None:

@@ -29,8 +29,12 @@ CONVERGED = 1e-3
 thousand times as much)."""
 SHARES_OF_A_STEP = tuple(0.5**power for power in range(20))
 """Shares of a step that are tried in turn until the likelihood rises, which the whole step nearly always does."""
-MOST_EXCHANGES = 30
-"""Exchanges of powers that are 0 at most (a choice: with two for each of fifteen none is left, but for rounding)."""
+EXCHANGES_OF_ALL = 5
+"""Exchanges of all powers that are 0 wrongly, before one at a time is exchanged (a choice: one to three are usual)."""
+MOST_EXCHANGES = 60
+"""Exchanges at most (a choice: of ten processes none needs half as many)."""
+SMALL = 1e-4
+"""Share of the largest power below which one may be 0: where the search for those that are 0 begins (a choice)."""
 RIDGE = 1e-6
 """By what share the information of each power is raised, since spectra of neighbouring times are nearly the same."""
 
@@ -71,21 +75,18 @@ class Bands:
         edges = np.array(self.edges, np.float64)
         return _spectra(self.times, (edges[:-1] + edges[1:] - 1) / 4 / self.edges[-1])
 
-    def products(self, series: Array) -> Array:
-        """Return sums of products of the series' coefficients in each band, shape (band, series, series).
+    def products(self, transformed: Array) -> Array:
+        """Return sums of products of the coefficients of series in each band, shape (band, series, series).
 
         Parameters
         ----------
-        series: that followed each other as the readings did, shape (series, reading)
+        transformed: cosine transforms of series that followed each other as the readings did, shape (series, reading)
         """
-        transformed = cosine_transform(series)
         bands = [transformed[:, start:end] for start, end in zip(self.edges[:-1], self.edges[1:], strict=True)]
         return np.array([of_band @ of_band.T for of_band in bands])
 
     def fitted(self, power: Array, free: Array | None = None, start: NoiseSpectrum | None = None) -> NoiseSpectrum:
         """Return the spectrum that is likeliest for sums of squared coefficients, shape (band,).
-
-        It is found by Fisher scoring with powers that are not below 0 (Bertsekas, 1982).
 
         Parameters
         ----------
@@ -93,36 +94,8 @@ class Bands:
         start: where the search begins
         """
         free = self.count if free is None else free
-        variance = float(np.sum(power) / np.sum(free)) if free.any() else 0.0
-        if not variance > 0:
-            return NoiseSpectrum(self, np.zeros(len(self.times)))
-        equal = np.full(len(self.times), variance / len(self.times))
-        powers = equal if start is None else np.maximum(start.powers, RIDGE * equal)
-        value = self._minus_two_log(powers, power, free)
-        for _ in range(MOST_STEPS):
-            step, before = self._step(powers, power, free), value
-            for share in SHARES_OF_A_STEP:
-                value = self._minus_two_log(tried := powers + share * step, power, free)
-                if value <= before:
-                    powers = tried
-                    break
-            if not before - value >= CONVERGED:
-                break
-        return NoiseSpectrum(self, powers)
-
-    def _minus_two_log(self, powers: Array, power: Array, free: Array) -> float:
-        """Return −2 ln of Whittle's likelihood of powers, but for a constant."""
-        level = powers @ self.shapes
-        return float(free @ np.log(level) + np.sum(power / level)) if level.min() > 0 else np.inf
-
-    def _step(self, powers: Array, power: Array, free: Array) -> Array:
-        """Return the step to the least of the quadratic that has the likelihood's slope and Fisher information here."""
-        level = powers @ self.shapes
-        slope = self.shapes @ ((free - power / level) / level)
-        relative = self.shapes / level
-        information = (relative * free) @ relative.T
-        information[np.diag_indices(len(powers))] *= 1 + RIDGE
-        return _least_not_below_zero(information, information @ powers - slope, powers > 0) - powers
+        begin = None if start is None else start.powers[None]
+        return NoiseSpectrum(self, likeliest_powers(self.shapes[None], power[None], free[None], begin)[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +116,63 @@ class NoiseSpectrum:
         return float(self.bands.count @ np.log(self.level))
 
 
+def likeliest_powers(shapes: Array, power: Array, free: Array, start: Array | None = None) -> Array:
+    """Return the powers of processes, shape (course, process), that are likeliest for courses, each by itself.
+
+    They are found by Fisher scoring with powers that are not below 0 (Bertsekas, 1982), of all courses together.
+
+    Parameters
+    ----------
+    shapes: spectrum of each process of variance 1, shape (course, process, band)
+    power, free: sums of squared coefficients, and their degrees of freedom, shape (course, band)
+    start: where the search begins, shape (course, process)
+    """
+    variance = power.sum(axis=1) / np.maximum(free.sum(axis=1), RIDGE)
+    equal = np.repeat(variance[:, None] / shapes.shape[1], shapes.shape[1], axis=1)
+    powers = equal if start is None else np.maximum(start, RIDGE * equal)
+    value, moving = _minus_two_log(shapes, powers, power, free), variance > 0
+    for _ in range(MOST_STEPS):
+        if not moving.any():
+            break
+        step, before = _step(shapes, powers, power, free), value
+        left = moving
+        for share in SHARES_OF_A_STEP:
+            tried = np.where(left[:, None], powers + share * step, powers)
+            reached = _minus_two_log(shapes, tried, power, free)
+            better = left & (reached <= before)
+            powers, value = np.where(better[:, None], tried, powers), np.where(better, reached, value)
+            left = left & ~better
+            if not left.any():
+                break
+        moving = moving & (before - value >= CONVERGED)
+    return np.where(variance[:, None] > 0, powers, 0.0)
+
+
+def _minus_two_log(shapes: Array, powers: Array, power: Array, free: Array) -> Array:
+    """Return −2 ln of Whittle's likelihood of powers, but for a constant, shape (course,)."""
+    level = _level(shapes, powers)
+    known = np.maximum(level, np.finfo(float).tiny)
+    return np.where(level.min(axis=1) > 0, np.sum(free * np.log(known) + power / known, axis=1), np.inf)
+
+
+def _level(shapes: Array, powers: Array) -> Array:
+    """Return spectra, shape (course, band)."""
+    return np.asarray((powers[:, None] @ shapes)[:, 0])
+
+
+def _step(shapes: Array, powers: Array, power: Array, free: Array) -> Array:
+    """Return the step to the least of the quadratic that has the likelihood's slope and Fisher information here."""
+    level = np.maximum(_level(shapes, powers), np.finfo(float).tiny)
+    relative = shapes / level[:, None]
+    slope = (relative @ (free - power / level)[..., None])[..., 0]
+    information = (relative * free[:, None]) @ relative.swapaxes(1, 2)
+    diagonal = np.einsum("cpp->cp", information)
+    diagonal *= 1 + RIDGE
+    diagonal[diagonal == 0] = 1.0  # a process that no band shows stays as it is
+    right = (information @ powers[..., None])[..., 0] - slope
+    return _least_not_below_zero(information, right, powers > SMALL * powers.max(axis=1, keepdims=True)) - powers
+
+
 def cosine_transform(series: Array) -> Array:
     """Return the orthonormal discrete cosine transform (DCT-II) of series, shape (…, reading).
 
@@ -160,17 +190,21 @@ def cosine_transform(series: Array) -> Array:
 
 
 def _least_not_below_zero(matrix: Array, right: Array, above: NDArray[np.bool_]) -> Array:
-    """Return the x, not below 0, for which x' matrix x / 2 − right' x is least.
+    """Return the x, not below 0, for which x' matrix x / 2 − right' x is least, of each course.
 
-    Those that are 0 are found by exchange, from a guess of those that are `above` (Portugal, Júdice and Vicente, 1994).
+    Those that are 0 are found by exchange, from a guess of those that are `above`. Exchanges of all that are wrong may
+    go round in a circle, those of the last alone do not (Portugal, Júdice and Vicente, 1994).
     """
-    for _ in range(MOST_EXCHANGES):
-        found, at = np.zeros(len(right)), np.flatnonzero(above)
-        found[at] = np.linalg.solve(matrix[at[:, None], at], right[at])
-        kept = np.where(above, found >= 0, right - matrix @ found > 0)
-        if np.array_equal(kept, above):
+    for exchange in range(MOST_EXCHANGES):
+        among = matrix * (above[:, :, None] & above[:, None])
+        np.einsum("cpp->cp", among)[~above] = 1.0
+        found = np.linalg.solve(among, np.where(above, right, 0.0)[..., None])[..., 0]
+        wrong = np.where(above, found < 0, right - (matrix @ found[..., None])[..., 0] > 0)
+        if not wrong.any():
             break
-        above = kept
+        if exchange >= EXCHANGES_OF_ALL:
+            wrong &= np.cumsum(wrong[:, ::-1], axis=1)[:, ::-1] == 1
+        above = above ^ wrong
     return np.maximum(found, 0.0)
 
 

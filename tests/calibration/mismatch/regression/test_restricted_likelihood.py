@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import chi2
 from wandering_noise import READINGS, noise
 
-from regolithd.calibration.mismatch.regression.restricted_likelihood import NO_PRIORS, FurtherColumns, Priors
+from regolithd.calibration.mismatch.regression.restricted_likelihood import NO_PRIORS, GivenColumns, Priors
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,7 +25,13 @@ def gain_of_columns(
     courses: Sequence[Array], columns: Sequence[Array], given: int = 0, priors: Priors = NO_PRIORS
 ) -> float:
     """Return what the further columns gain whatever their coefficients."""
-    return FurtherColumns(courses, columns, given, priors).gain()
+    fitted_anyway = GivenColumns(courses, [each[:given] for each in columns], priors)
+    return fitted_anyway.with_further([each[given:] for each in columns]).gain()
+
+
+def smooth_gain(reading: Array, curve: Array, roughness: Array) -> tuple[float, int]:
+    """Return what a curve's columns gain if they are smooth, and how many numbers that leaves free."""
+    return GivenColumns([reading], [curve[:0]]).with_further([curve]).gain_if_smooth(roughness)
 
 
 @pytest.mark.parametrize(("count", "time"), [(1, 20.0), (8, 20.0), (8, 100.0), (48, 20.0), (48, 100.0)])
@@ -100,7 +106,7 @@ def hats(knots: int) -> Array:
 def if_smooth(reading: Array, knots: int) -> float:
     """Return what a curve gains if it is smooth, less what its free numbers gain by chance."""
     second = np.diff(np.eye(knots), 2, axis=0)
-    gain, free = FurtherColumns([reading], [hats(knots)]).gain_if_smooth(second.T @ second)
+    gain, free = smooth_gain(reading, hats(knots), second.T @ second)
     assert free == 3  # a line's two, and how smooth it is
     return gain - free
 
@@ -129,5 +135,5 @@ def test_knots_that_no_reading_sees_do_not_matter() -> None:
     reading, columns = noise(20.0, 4) + 0.8 * np.sin(ALONG), hats(8)
     with_more = np.vstack([columns, np.zeros((3, READINGS))])
     more = np.diff(np.eye(11), 2, axis=0)
-    gain, free = FurtherColumns([reading], [columns]).gain_if_smooth(second.T @ second)
-    assert FurtherColumns([reading], [with_more]).gain_if_smooth(more.T @ more) == (pytest.approx(gain, abs=0.01), free)
+    gain, free = smooth_gain(reading, columns, second.T @ second)
+    assert smooth_gain(reading, with_more, more.T @ more) == (pytest.approx(gain, abs=0.01), free)

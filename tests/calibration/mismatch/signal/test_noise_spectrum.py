@@ -7,9 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from scipy.fft import dct
+from scipy.optimize import nnls
 from wandering_noise import READINGS, noise
 
-from regolithd.calibration.mismatch.signal.noise_spectrum import Bands, NoiseSpectrum, cosine_transform
+from regolithd.calibration.mismatch.signal.noise_spectrum import (
+    Bands,
+    NoiseSpectrum,
+    _least_not_below_zero,
+    cosine_transform,
+    likeliest_powers,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,7 +25,7 @@ if TYPE_CHECKING:
 def fitted_spectrum(values: NDArray[np.float64]) -> NoiseSpectrum:
     """Return the spectrum of readings that followed each other, shape (reading,)."""
     bands = Bands.of(len(values))
-    return bands.fitted(bands.products(values[None])[:, 0, 0])
+    return bands.fitted(bands.products(cosine_transform(values[None]))[:, 0, 0])
 
 
 @pytest.mark.parametrize("time", [2.0, 20.0, 60.0])
@@ -43,7 +50,7 @@ def test_no_other_powers_are_likelier(time: float) -> None:
     """Where a power is above 0 the likelihood has no slope along it, and where it is 0, it falls."""
     wave = 2 * np.cos(4 * np.pi * np.arange(READINGS) / READINGS)
     bands = Bands.of(READINGS)
-    power = bands.products((noise(time, 0) + wave)[None])[:, 0, 0]
+    power = bands.products(cosine_transform((noise(time, 0) + wave)[None]))[:, 0, 0]
     found = bands.fitted(power)
     slope = bands.shapes @ ((power / found.level - bands.count) / found.level)
     along = slope * power.sum() / READINGS
@@ -54,7 +61,7 @@ def test_no_other_powers_are_likelier(time: float) -> None:
 def test_the_search_may_begin_anywhere() -> None:
     """The likeliest spectrum of other readings, and one without slow noise, lead to the same one."""
     bands = Bands.of(READINGS)
-    power = bands.products(noise(60.0, 0)[None])[:, 0, 0]
+    power = bands.products(cosine_transform(noise(60.0, 0)[None]))[:, 0, 0]
     found = bands.fitted(power)
     quick = NoiseSpectrum(bands, np.where(bands.times > 0, 0.0, 1.0))
     for start in (quick, fitted_spectrum(noise(2.0, 1))):
@@ -64,7 +71,7 @@ def test_the_search_may_begin_anywhere() -> None:
 def test_what_a_fit_takes_is_no_power() -> None:
     """Where a fit left nothing of the first bands' coefficients, the spectrum there is that of noise alone."""
     bands = Bands.of(READINGS)
-    power = bands.products(noise(20.0, 0)[None])[:, 0, 0]
+    power = bands.products(cosine_transform(noise(20.0, 0)[None]))[:, 0, 0]
     free = np.where(np.arange(len(power)) < 8, 0.0, bands.count)
     kept = bands.fitted(np.where(free > 0, power, 0.0), free, NoiseSpectrum(bands, np.ones(len(bands.times))))
     np.testing.assert_allclose(kept.level, bands.fitted(power).level, rtol=0.35)
@@ -80,3 +87,34 @@ def test_the_cosine_transform_is_that_of_scipy(count: int) -> None:
     """Of an even and of an odd number of readings, and of several series."""
     series = np.random.default_rng(count).standard_normal((3, count))
     np.testing.assert_allclose(cosine_transform(series), dct(series, axis=-1, norm="ortho"), atol=1e-12)
+
+
+def test_courses_together_are_as_each_alone() -> None:
+    """Also where one has fewer bands, of which the others have no coefficient."""
+    alone = [Bands.of(count) for count in (READINGS, READINGS // 2)]
+    powers = [
+        each.products(cosine_transform(noise(time, seed)[None, : each.edges[-1]]))[:, 0, 0]
+        for seed, (each, time) in enumerate(zip(alone, (20.0, 2.0), strict=True))
+    ]
+    shape = 2, len(alone[0].times), len(alone[0].count)
+    shapes, power, free = np.zeros(shape), np.zeros(shape[::2]), np.zeros(shape[::2])
+    for place, (each, of_course) in enumerate(zip(alone, powers, strict=True)):
+        shapes[place, : len(each.times), : len(each.count)] = each.shapes
+        shapes[place, :, len(each.count) :] = 1.0
+        power[place, : len(each.count)], free[place, : len(each.count)] = of_course, each.count
+    together = likeliest_powers(shapes, power, free)
+    for found, each, of_course in zip(together, alone, powers, strict=True):
+        level = found[: len(each.times)] @ each.shapes
+        np.testing.assert_allclose(level, each.fitted(of_course).level, rtol=0.01)
+
+
+def test_powers_that_are_0_are_found_where_spectra_are_nearly_the_same() -> None:
+    """The least of a quadratic over numbers that are not below 0 is that of SciPy, of each of many."""
+    rng, shapes = np.random.default_rng(1), Bands.of(READINGS).shapes
+    roots = [shapes / rng.uniform(0.2, 5.0, shapes.shape[1]) for _ in range(200)]
+    rights = [rng.normal(size=shapes.shape[1]) for _ in roots]
+    matrix = np.array([root @ root.T for root in roots])
+    right = np.array([root @ values for root, values in zip(roots, rights, strict=True)])
+    found = _least_not_below_zero(matrix, right, np.ones(right.shape, bool))
+    expected = [nnls(root.T, values)[0] for root, values in zip(roots, rights, strict=True)]
+    np.testing.assert_allclose(found, expected, atol=1e-6)
