@@ -1,4 +1,4 @@
-"""Recordings of seven minutes for the tests: the stated simulation itself, driven, with noise and whatever a test adds.
+"""Recordings of five minutes for the tests: the stated simulation itself, driven, with noise and whatever a test adds.
 
 They test the machinery; whether physics of another hand is found is what `regolithd prove` is for.
 """
@@ -45,7 +45,7 @@ def simulation() -> RoverWheel:
 
 
 def columns(
-    seed: int = 0, *, length_s: float = 400.0, speed: float | None = None, noise: float = 0.2
+    seed: int = 0, *, length_s: float = 300.0, speed: float | None = None, noise: float = 0.2
 ) -> dict[str, Array]:
     """Return a drive as a long table, with nothing missing from the simulation; `speed` [rad/s] for a constant one."""
     rng = np.random.default_rng(seed)

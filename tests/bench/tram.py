@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 Array = NDArray[np.float64]
-COUNT, DELAY_S = 5000, 7.0
+COUNT, DELAY_S = 3000, 7.0
 
 
 class Tram(Simulation):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from regolithd.calibration.mismatch import Prior, compare, direction_of
 from regolithd.calibration.mismatch.contribution import Contribution
@@ -219,11 +220,8 @@ class Winding(Simulation):
 
 def heated(current: Array, heating: float, step_s: float = 0.5) -> Array:
     """Return a winding's temperature [°C], (time, wheel): warmed by the current, cooled to 20 °C within 150 s."""
-    found = np.full(current.shape, 20.0)
-    for k in range(1, len(found)):
-        rate = (heating * current[k - 1] ** 2 - (found[k - 1] - 20) / 1.5) / 100
-        found[k] = found[k - 1] + step_s * rate
-    return found
+    warmed = step_s * heating / 100 * np.concatenate([np.zeros((1, *current.shape[1:])), current[:-1] ** 2])
+    return np.asarray(20 + lfilter([1.0], [1.0, step_s / 150 - 1], warmed, axis=0))
 
 
 @pytest.mark.parametrize(("recorded", "verdict"), [(False, "unexplained"), (True, "missing-physics")])

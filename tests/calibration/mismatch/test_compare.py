@@ -107,7 +107,7 @@ def test_what_was_found_is_still_told_how_small_it_could_have_been(coulomb: Comp
 
 def test_a_wheel_whose_gain_is_a_little_off_lacks_no_physics() -> None:
     """Each wheel's gain has an error of its own; the corrected simulation has it too."""
-    table, sim = columns(5), simulation()
+    table, sim = columns(5, length_s=400.0), simulation()
     table["motor_current_A"] = table["motor_current_A"] * np.where(table["wheel"] == 6, 1.05, 1.0)
     found = compare(from_columns(table), sim)
     assert found.answer.verdict == "consistent"
@@ -141,7 +141,7 @@ def test_constant_speed_on_flat_ground_cannot_tell_frictions_apart() -> None:
 
 def test_a_twentieth_of_drag_shows_once_the_wheels_are_lifted() -> None:
     """A drive on soil may hide it in cohesion and gain; wheels that carry nothing have neither."""
-    table, sim = with_drag(0.05), simulation()
+    table, sim = with_drag(0.05, length_s=400.0), simulation()
     on_soil = from_columns(table)
     assert not compare(on_soil, sim).answer.effects
     asked = np.nan_to_num(build_problem(on_soil, sim).prediction).ravel()
@@ -170,7 +170,7 @@ def test_missing_columns_cost_only_what_needs_them(missing: tuple[str, ...]) -> 
 
 def test_a_wheel_that_never_turns_is_said_and_left_out() -> None:
     """Nothing is claimed of it."""
-    table = with_drag(0.3)
+    table = with_drag(0.3, length_s=200.0)
     table["motor_speed_rad_s"] = np.where(table["wheel"] == 5, 0.0, table["motor_speed_rad_s"])
     answer = compare(from_columns(table), simulation()).answer
     assert any("nothing to compare at wheel 5" in note for note in answer.notes)

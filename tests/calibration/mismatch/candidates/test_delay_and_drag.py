@@ -43,9 +43,9 @@ class Axis(Simulation):
 
 
 def swinging(seed: int, quadratic: float = 0.0, delay_s: float = 0.0, coulomb: float = 0.0) -> Recording:
-    """Return 160 s of a joint that swings, under autocorrelated noise of a tenth of the mean current."""
+    """Return 100 s of a joint that swings, under autocorrelated noise of a tenth of the mean current."""
     generator = np.random.default_rng(seed)
-    time_s = STEP_S * np.arange(8000)
+    time_s = STEP_S * np.arange(5000)
     waves = [(generator.uniform(0.05, 0.8), generator.uniform(0.2, 1), generator.uniform(0, 6)) for _ in range(6)]
     angle = sum(size * np.sin(2 * np.pi * f * time_s + phase) / (1 + 2 * f) for f, size, phase in waves)
     speed = np.gradient(angle, STEP_S)

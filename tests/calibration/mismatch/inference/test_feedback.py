@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from regolithd.calibration.mismatch import Prior, Simulation, compare
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
 Array = NDArray[np.float64]
-COUNT, STEP_S, NOISE_K = 2500, 5.0, 0.35
+COUNT, STEP_S, NOISE_K = 1500, 5.0, 0.35
 
 
 class Chamber(Simulation):
@@ -33,11 +34,11 @@ class Chamber(Simulation):
     def predict(self, inputs: Mapping[str, Array], values: Mapping[str, float]) -> Array:
         """Return the temperature by explicit steps."""
         duty, outside = inputs["duty_pct"], inputs["outside_degC"]
-        found = np.full(duty.shape, values["start_degC"])
-        for k in range(1, len(found)):
-            net = values["power_W"] * duty[k - 1] / 100 - values["loss_W_K"] * (found[k - 1] - outside[k - 1])
-            found[k] = found[k - 1] + STEP_S * net / values["capacity_J_K"]
-        return found
+        rate = STEP_S / values["capacity_J_K"]
+        kept = 1 - rate * values["loss_W_K"]
+        gained = rate * (values["power_W"] * duty / 100 + values["loss_W_K"] * outside)
+        steps = np.concatenate([np.full((1, *duty.shape[1:]), values["start_degC"]), gained[:-1]])
+        return np.asarray(lfilter([1.0], [1.0, -kept], steps, axis=0))
 
     def covariates(self, inputs: Mapping[str, Array]) -> dict[str, Array]:
         """Return what the controller sets, and the temperature outside."""
@@ -76,7 +77,7 @@ def test_a_controller_that_acts_on_the_noise_is_no_physics(seed: int, memory: fl
 
 def test_the_note_says_what_cannot_be_told_apart() -> None:
     """It names the covariate and the reading, and what to record instead."""
-    notes = [compare(heated(seed, acts_on_noise=1.0), Chamber()).answer.notes for seed in range(4)]
+    notes = [compare(heated(seed, acts_on_noise=1.0), Chamber()).answer.notes for seed in range(2)]
     (told, *_) = [note for each in notes for note in each if "controller" in note]
     assert told.startswith("Duty follows the noise of the reading of temperature_degC")
     assert "record another sensor" in told
@@ -85,7 +86,7 @@ def test_the_note_says_what_cannot_be_told_apart() -> None:
 @pytest.mark.parametrize("acts_on_noise", [0.0, 0.3])
 def test_what_follows_the_duty_itself_stays_unexplained(acts_on_noise: float) -> None:
     """An offset by the duty's square is followed by its past as well as by what is new."""
-    for seed in range(3):
+    for seed in range(2):
         found = compare(heated(seed, acts_on_noise, offset_K=2.0), Chamber()).answer
         assert found.verdict == "unexplained"
         assert "duty" in {place.covariate for place in found.unexplained}

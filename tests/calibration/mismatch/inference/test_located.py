@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-ROWS, DRUMS, STEP_S = 4000, 3, 0.5
+ROWS, DRUMS, STEP_S = 2000, 3, 1.0
 TIME_S = STEP_S * np.arange(ROWS)
 PHASE = np.stack([TIME_S / 20 + drum for drum in range(DRUMS)], axis=1)
 SPEED, PULL = np.sin(PHASE) + 0.5 * np.sin(2.7 * PHASE), 40 + 15 * np.sin(PHASE / 3)

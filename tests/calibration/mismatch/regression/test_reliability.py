@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from regolithd.calibration.mismatch.problem.problem import Problem
 
 Array = NDArray[np.float64]
-COUNT, LEAST_N, SHARE = 5000, 3.0, 0.05
+COUNT, LEAST_N, SHARE = 3000, 3.0, 0.05
 
 
 class Thruster(Simulation):

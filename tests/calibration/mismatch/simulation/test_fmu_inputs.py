@@ -117,9 +117,9 @@ def test_a_command_that_is_late_by_steps_is_no_instant_within_one(tmp_path: Path
     """Three steps of delay are out of the bounds of what a recording does not say, and are named."""
     simulation = _lag(tmp_path, "co-simulation")
     rng = np.random.default_rng(6)
-    time_s = STEP_S * np.arange(2000)
-    command = np.convolve(rng.normal(0, 1, 2000), np.ones(20) / 20, "same") * 5
-    reading = np.append(np.zeros(3), _lagged(command, held=False)[:-3]) + rng.normal(0, 0.05, 2000)
+    time_s = STEP_S * np.arange(1200)
+    command = np.convolve(rng.normal(0, 1, 1200), np.ones(20) / 20, "same") * 5
+    reading = np.append(np.zeros(3), _lagged(command, held=False)[:-3]) + rng.normal(0, 0.05, 1200)
     found = compare({"t_s": time_s, "command": command, "reading": reading}, simulation).answer
     assert [effect.name for effect in found.effects] == ["sensor-delay"]
     delay = found.effects[0].parameters["delay_s"]
