@@ -27,6 +27,9 @@ Single = NDArray[np.float32]
 LEAST_LOST = 0.02
 """Share of what all readings know, weighted alike, below which their doubt is passed over (a choice: it would hardly
 change an answer, and costs a second file of columns)."""
+LEAST_RELIABILITY = 0.2
+"""What a reading is multiplied by at least where that is passed over (a choice): a single one whose prediction is in
+doubt by five deviations of the noise, beside a step of the simulation say, would be evidence by itself."""
 LEAST_STDS = 5.0
 """Standard deviations by which noise has to grow with the size (a choice: of thousands of courses none by chance)."""
 FURTHEST_STEP = 6.0
@@ -47,7 +50,7 @@ def reliability_of(design: DesignMatrix, residual: Array) -> Single | None:
     if problem.noise_size is not None:
         found /= np.maximum(design.in_folds(problem.noise_size), 1.0)
     kept = np.concatenate([found[wheel, at] for wheel, (at, _) in enumerate(design.readings)])
-    return found if 1 - np.mean(kept**2) > LEAST_LOST else None
+    return found if 1 - np.mean(kept**2) > LEAST_LOST or kept.min(initial=1.0) < LEAST_RELIABILITY else None
 
 
 def noise_size_of(equations: NormalEquations, fit: Fit) -> Array | None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.signal.markov_chain import MarkovChains
 from regolithd.calibration.mismatch.signal.means import block_means
+from regolithd.calibration.mismatch.signal.noise_spectrum import Bands, cosine_transform, likeliest_powers
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ HIGHEST_ORDER = 6
 """Order of the noise's autoregression, at most (a choice: over blocks, which have little memory left)."""
 FREE = 3
 """Numbers that either kind of switching has beyond an autoregression, each a unit of log likelihood (Akaike, 1974)."""
+WANDERING_NUMBERS = 2
+"""Numbers that noise which wanders has beyond white noise: its share and its time."""
 HIGHEST_CORRELATION = 0.98
 """From one block to the next, of the noise beside the spells (a choice: what is slower is no noise)."""
 LEAST_NOISE = 0.1
@@ -108,7 +111,7 @@ def gain_as_noise(course: Array, rest: Array) -> float:
     for length in {max(len(course) // blocks, 1) for blocks in BLOCKS}:
         values, size = _standardised(block_means(course, length))
         left = block_means(rest, length)
-        found.append(_autoregression_likelihood((left - left.mean()) / size) - _autoregression_likelihood(values))
+        found.append(_noise_likelihood((left - left.mean()) / size) - _noise_likelihood(values))
     return 2 * max(found)
 
 
@@ -133,7 +136,7 @@ def _switching(
         beside = unlike(np.array(size**2), np.array(_persistence(values)))
         return of_noise - float(beside) + thresholds.switching_entry / 2
 
-    amplitudes, needed = (*AMPLITUDES, *(-each for each in AMPLITUDES)), least(_autoregression_likelihood(values))
+    amplitudes, needed = (*AMPLITUDES, *(-each for each in AMPLITUDES)), least(_noise_likelihood(values))
     (amplitude, *spells), most = _maximised(likelihood, _grid(amplitudes, SHARES, DURATIONS), needed)
     if most <= needed:
         return None
@@ -208,6 +211,26 @@ def _limited(models: Array) -> Array:
     return np.stack(
         (models[:, 0], np.minimum(models[:, 1], LARGEST_SHARE), np.clip(models[:, 2], SHORTEST, LONGEST)), axis=-1
     )
+
+
+def _noise_likelihood(values: Array) -> float:
+    """Return the log likelihood of Gaussian noise: autoregression, or white noise and what wanders about it."""
+    return max(_autoregression_likelihood(values), _wandering_likelihood(values))
+
+
+def _wandering_likelihood(values: Array) -> float:
+    """Return Whittle's log likelihood of white noise and one first-order process, less one for each number of that.
+
+    An autoregression would need a coefficient for each block that the mixture remembers.
+    """
+    bands = Bands.of(len(values))
+    power = bands.products(cosine_transform(values[None]))[:, 0, 0]
+    white, *processes = bands.shapes
+    shapes = np.array([(white, process) for process in processes])
+    powers, free = np.tile(power, (len(shapes), 1)), np.tile(bands.count, (len(shapes), 1))
+    level = np.einsum("cp,cpb->cb", likeliest_powers(shapes, powers, free), shapes)
+    minus_two_log = np.log(level) @ bands.count + (1 / level) @ power
+    return -0.5 * float(minus_two_log.min()) - WANDERING_NUMBERS
 
 
 def _autoregression_likelihood(values: Array) -> float:

@@ -31,6 +31,13 @@ def test_noise_hardly_ever_comes_and_goes(noise: Callable[[Generator], Array]) -
     assert sum(bool(found_in(noise(np.random.default_rng(seed)))) for seed in range(RECORDINGS)) <= RECORDINGS / 20
 
 
+@pytest.mark.parametrize("share", [0.1, 0.25])
+def test_a_little_slow_noise_in_a_short_course_does_not_come_and_go(share: float) -> None:
+    """An autoregression of few coefficients alone, instead of white and slow noise, takes 5 or 12 of 60 for spells."""
+    courses = [partly(np.random.default_rng(seed), 40, share)[:1100] for seed in range(RECORDINGS)]
+    assert sum(bool(found_in(course)) for course in courses) <= RECORDINGS / 20
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(("rms", "rate"), [(0.7, 0.7), (1.0, 0.9)])
 def test_spells_are_seen_whichever_way_they_pull(rms: float, rate: float, sign: float) -> None:
