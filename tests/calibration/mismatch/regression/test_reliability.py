@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch import Prior, Simulation, compare
 from regolithd.calibration.mismatch.data.recording import Recording, from_columns
 from regolithd.calibration.mismatch.problem.build import build_problem
+from regolithd.calibration.mismatch.problem.input_doubt import InputDoubt
 from regolithd.calibration.mismatch.regression.equations import smooth_equations
-from regolithd.calibration.mismatch.regression.reliability import noise_size_of, reliability_of
+from regolithd.calibration.mismatch.regression.reliability import LEAST_RELIABILITY, noise_size_of, reliability_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -84,3 +86,16 @@ def test_noise_that_grows_is_no_physics(seed: int) -> None:
     assert [effect.name for effect in found.effects] == ["viscous-friction"]
     size = found.effects[0].parameters["relative_size"]
     assert size.low > 0
+
+
+def test_one_reading_in_great_doubt_is_no_evidence() -> None:
+    """Beside a step of the prediction an input's error is all of it; what all such readings lose is passed over."""
+    problem = build_problem(operated(1, share=0.0), Thruster())
+    residual, doubt = problem.residual.copy(), np.zeros(problem.mask.shape)
+    residual[700], doubt[700] = 25 * LEAST_N, (20 * LEAST_N) ** 2
+    none = np.zeros(doubt.shape)
+    doubtful = replace(problem, doubt=InputDoubt(doubt, doubt, none, np.zeros((0, *doubt.shape))))
+    factors = reliability_of(smooth_equations(doubtful).design, residual)
+    assert factors is not None
+    least, *others = np.sort(factors.ravel())
+    assert least < LEAST_RELIABILITY < others[0]
