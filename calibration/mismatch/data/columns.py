@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from regolithd.calibration.mismatch.errors import RecordingError, listed
+from regolithd.calibration.mismatch.errors import RecordingError, counted, listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -265,8 +265,8 @@ def _what_is_wrong(text: bytes, told: str) -> str:
         if expected == "1" and (separated := _separated_otherwise(text.split(b"\n", 1)[0].decode(errors="replace"))):
             return f": {separated}"
         return (
-            f", line {row}: {got} cells, but {expected} columns in the first line. Complete the line or remove it; "
-            "a decimal comma has to be a point."
+            f", line {row}: {counted(int(got), 'cell')}, but {expected} columns in the first line. Complete the line "
+            "or remove it; commas separate cells, and a decimal comma has to be a point."
         )
     try:
         text.decode("utf-8")
