@@ -47,7 +47,7 @@ def test_what_wears_is_named_still() -> None:
 
 def test_a_beat_too_quick_for_a_curve_over_time_is_located_there() -> None:
     """Something that switches every quarter of a minute, whatever the wheels do, is of time and has no name."""
-    table = columns(12, length_s=600.0)
+    table = columns(12, length_s=400.0)
     beat = 0.2 * np.sign(np.sin(2 * np.pi * table["t_s"] / 16.0))
     answer = answer_to(table, beat * np.sign(table["motor_speed_rad_s"]))
     assert answer.verdict == "unexplained"
