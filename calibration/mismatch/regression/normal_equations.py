@@ -140,16 +140,19 @@ class NormalEquations:
         solved = inverse @ moment
         return Fit(terms, columns, solved, inverse, float(moment @ solved) - self._explained_by_parameters)
 
-    def beside(self, terms: Sequence[Term], derive: Callable[[], Derived]) -> Derived:
-        """Return what is derived beside these terms, one thing for each set; the latest is kept for what follows."""
-        key = tuple(map(id, terms))
+    def lately(self, derive: Callable[[NormalEquations, Sequence[Term]], Derived], terms: Sequence[Term]) -> Derived:
+        """Return what is derived from terms beside these equations; the latest is kept: much is tried beside the same.
+
+        Terms are compared by identity.
+        """
+        key = derive, *map(id, terms)
         if key not in self._latest:
             self._latest.clear()
-            self._latest[key] = tuple(terms), derive()  # the terms are kept so that no other one gets its identity
+            self._latest[key] = tuple(terms), derive(self, terms)  # no other term gets the identity of one that is kept
         return self._latest[key][1]
 
     @cached_property
-    def _latest(self) -> dict[tuple[int, ...], tuple[tuple[Term, ...], Any]]:
+    def _latest(self) -> dict[tuple[Any, ...], tuple[tuple[Term, ...], Any]]:
         return {}
 
     def shifts_of_parameters(self, fit: Fit) -> Array:

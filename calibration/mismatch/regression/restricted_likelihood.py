@@ -19,7 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.regression.schur import pseudo_inverse, schur_complement
-from regolithd.calibration.mismatch.signal.noise_spectrum import Bands, cosine_transform, likeliest_powers
+from regolithd.calibration.mismatch.signal.noise_spectrum import (
+    Bands,
+    cosine_transform,
+    likeliest_powers,
+    minus_two_log_likelihood,
+    spectra_of,
+)
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
@@ -109,8 +115,8 @@ class GivenColumns:
         """Return the likelihood of so many columns in noise that is as slow as usually, and in slower noise."""
         held, mean = np.zeros((2, count))
         held[: len(self._priors.mean)], mean[: len(self._priors.mean)] = self._priors.precision, self._priors.mean
-        sums = [each.products(series) for each, series in zip(self._bands[0], transformed, strict=True)]
-        return tuple(_Likelihood(_Courses.of(bands, sums, count), np.diag(held), mean) for bands in self._bands)
+        products = _Products.of(self._bands[0], transformed, count)
+        return tuple(_Likelihood(_Courses.of(bands, products), np.diag(held), mean) for bands in self._bands)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +168,7 @@ class _InNoise:
 
     def smooth(self, roughness: Array) -> tuple[float, int]:
         """Return what they gain if they are smooth, and how many numbers are free."""
-        if not len(self.likelihood.courses.products):
+        if not len(self.likelihood.courses.shapes):
             return 0.0, 0
         given, count = self.given, len(roughness)
         matrix, moment, _ = self.likelihood.sums(given + count, self.before.spectra)
@@ -206,65 +212,88 @@ class _Spectra:
 
 
 @dataclass(frozen=True, eq=False)
-class _Courses:
-    """Courses, each of readings that followed each other, as products of the transforms of columns and readings.
-
-    A course with fewer bands or processes than another has bands without a coefficient, and processes that are 0.
+class _Products:
+    """Products of the transforms of columns and readings in each course; a course may lack the last bands of another.
 
     Attributes
     ----------
-    shapes: spectrum of each process of variance 1, shape (course, process, band)
     counts: coefficients in each band, shape (course, band)
-    products: of the columns, and of the readings as the last series, shape (course, band, series, series)
+    sums: of the columns, and of the readings as the last series, shape (course, band, series, series)
+    """
+
+    counts: Array
+    sums: Array
+
+    @classmethod
+    def of(cls, bands: Sequence[Bands], transformed: Sequence[Array], columns: int) -> _Products:
+        """Return the products of so many columns and of the readings in the bands of each course."""
+        most = max((len(each.count) for each in bands), default=1)
+        counts, sums = np.zeros((len(bands), most)), np.zeros((len(bands), most, columns + 1, columns + 1))
+        for place, (each, series) in enumerate(zip(bands, transformed, strict=True)):
+            own = len(each.count)
+            counts[place, :own], sums[place, :own] = each.count, each.products(series)
+        return cls(counts, sums)
+
+    @property
+    def of_readings(self) -> Array:
+        """Return the readings' sums of squares, shape (course, band)."""
+        return np.asarray(self.sums[..., -1, -1])
+
+    def of_first(self, count: int) -> tuple[Array, Array]:
+        """Return those of the first columns with each other, shape (course, band, …), and with the readings."""
+        if count not in self._first:
+            solved = self.sums[..., :count, :count].reshape(*self.counts.shape, count * count)
+            self._first[count] = solved, np.ascontiguousarray(self.sums[..., :count, -1])
+        return self._first[count]
+
+    @cached_property
+    def _first(self) -> dict[int, tuple[Array, Array]]:
+        return {}
+
+
+@dataclass(frozen=True, eq=False)
+class _Courses:
+    """Courses, each of readings that followed each other, in noise up to some correlation time.
+
+    Attributes
+    ----------
+    shapes: spectrum of each process of variance 1, shape (course, process, band); 0 for one that a course lacks
+    products: of the columns and of the readings
     """
 
     shapes: Array
-    counts: Array
-    products: Array
+    products: _Products
 
     @classmethod
-    def of(cls, bands: Sequence[Bands], products: Sequence[Array], columns: int) -> _Courses:
-        """Return courses with these bands, and in each the products of so many columns and of the readings."""
-        most = max((len(each.count) for each in bands), default=1)
-        shapes = np.zeros((len(bands), max((len(each.times) for each in bands), default=1), most))
-        counts, sums = np.zeros((len(bands), most)), np.zeros((len(bands), most, columns + 1, columns + 1))
-        for place, (of_course, each) in enumerate(zip(bands, products, strict=True)):
-            own = len(of_course.count)
-            shapes[place, : len(of_course.times), :own], shapes[place, :, own:] = of_course.shapes, 1.0
-            counts[place, :own], sums[place, :own] = of_course.count, each
-        return cls(shapes, counts, sums)
+    def of(cls, bands: Sequence[Bands], products: _Products) -> _Courses:
+        """Return the courses with the processes of these bands."""
+        processes = max((len(each.times) for each in bands), default=1)
+        shapes = np.zeros((len(bands), processes, products.counts.shape[1]))
+        for of_course, each in zip(shapes, bands, strict=True):
+            of_course[: len(each.times), : len(each.count)] = each.shapes
+            of_course[:, len(each.count) :] = 1.0  # in bands without a coefficient the level does not matter
+        return cls(shapes, products)
 
     def spectra(self, coefficients: Array, covariance: Array, start: _Spectra | None = None) -> _Spectra:
         """Return the spectra of what a fit of the first columns leaves, found from `start` on.
 
         The fit takes degrees of freedom of each band: its uncertainty there over the spectrum that it was made with.
         """
-        solved, moment = self._of_first(len(coefficients))
-        left = self.products[..., -1, -1] - 2 * moment @ coefficients
+        solved, moment = self.products.of_first(len(coefficients))
+        left = self.products.of_readings - 2 * moment @ coefficients
         left += solved @ np.outer(coefficients, coefficients).ravel()
         taken = 0.0 if start is None else solved @ covariance.ravel() / start.level
-        free, begin = np.maximum(self.counts - taken, 0.0), None if start is None else start.powers
+        free, begin = np.maximum(self.products.counts - taken, 0.0), None if start is None else start.powers
         powers = likeliest_powers(self.shapes, np.maximum(left, 0.0), free, begin)
-        return _Spectra(powers, (powers[:, None] @ self.shapes)[:, 0])
+        return _Spectra(powers, spectra_of(self.shapes, powers))
 
     def weighted(self, spectra: _Spectra, count: int) -> tuple[Array, Array, float]:
         """Return matrix and moment of the first columns' normal equations, and −2 ln of the likelihood without them."""
-        solved, moment = self._of_first(count)
+        solved, moment = self.products.of_first(count)
         weights = 1 / spectra.level
-        rest = float(np.sum(weights * self.products[..., -1, -1]) + np.sum(self.counts * np.log(spectra.level)))
+        rest = minus_two_log_likelihood(spectra.level, self.products.of_readings, self.products.counts)
         matrix = np.asarray(np.tensordot(weights, solved, axes=2)).reshape(count, count)
-        return matrix, np.asarray(np.tensordot(weights, moment, axes=2)), rest
-
-    def _of_first(self, count: int) -> tuple[Array, Array]:
-        """Return the products of the first columns with each other, (course, band, …), and with the readings."""
-        if count not in self._first:
-            solved = self.products[..., :count, :count].reshape(*self.counts.shape, count * count)
-            self._first[count] = solved, np.ascontiguousarray(self.products[..., :count, -1])
-        return self._first[count]
-
-    @cached_property
-    def _first(self) -> dict[int, tuple[Array, Array]]:
-        return {}
+        return matrix, np.asarray(np.tensordot(weights, moment, axes=2)), float(rest.sum())
 
 
 @dataclass(frozen=True, eq=False)

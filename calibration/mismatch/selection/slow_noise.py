@@ -37,7 +37,7 @@ def score_beside_slow_noise(equations: NormalEquations, rest: Sequence[Term], te
     read = [places for places, _ in equations.design.readings]
     if max((len(places) for places in read), default=0) < FEWEST_READINGS:
         return equations.score(equations.fit((*rest, *terms))) - equations.score(equations.fit(rest))
-    given = equations.beside(rest, lambda: _given(equations, rest))
+    given = equations.lately(_given, rest)
     own = columns_on_wheels(equations, equations.columns_of(terms)[len(equations.nuisance.columns) :])
     further = given.with_further([own[:, wheel, places] for wheel, places in enumerate(read)])
     gain, penalty = further.gain(), sum(equations.penalty(term) for term in terms)

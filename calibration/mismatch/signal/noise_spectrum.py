@@ -85,36 +85,6 @@ class Bands:
         bands = [transformed[:, start:end] for start, end in zip(self.edges[:-1], self.edges[1:], strict=True)]
         return np.array([of_band @ of_band.T for of_band in bands])
 
-    def fitted(self, power: Array, free: Array | None = None, start: NoiseSpectrum | None = None) -> NoiseSpectrum:
-        """Return the spectrum that is likeliest for sums of squared coefficients, shape (band,).
-
-        Parameters
-        ----------
-        free: degrees of freedom of each sum, shape (band,); as many as there are coefficients unless stated
-        start: where the search begins
-        """
-        free = self.count if free is None else free
-        begin = None if start is None else start.powers[None]
-        return NoiseSpectrum(self, likeliest_powers(self.shapes[None], power[None], free[None], begin)[0])
-
-
-@dataclass(frozen=True, eq=False)
-class NoiseSpectrum:
-    """Powers of first-order processes: the variance of each, in the square of the readings' unit, shape (process,)."""
-
-    bands: Bands
-    powers: Array
-
-    @cached_property
-    def level(self) -> Array:
-        """The spectrum in each band, shape (band,); that of white noise is its variance."""
-        return np.asarray(self.powers @ self.bands.shapes)
-
-    @property
-    def log_determinant(self) -> float:
-        """The logarithm of the determinant of the readings' covariance."""
-        return float(self.bands.count @ np.log(self.level))
-
 
 def likeliest_powers(shapes: Array, power: Array, free: Array, start: Array | None = None) -> Array:
     """Return the powers of processes, shape (course, process), that are likeliest for courses, each by itself.
@@ -130,7 +100,7 @@ def likeliest_powers(shapes: Array, power: Array, free: Array, start: Array | No
     variance = power.sum(axis=1) / np.maximum(free.sum(axis=1), RIDGE)
     equal = np.repeat(variance[:, None] / shapes.shape[1], shapes.shape[1], axis=1)
     powers = equal if start is None else np.maximum(start, RIDGE * equal)
-    value, moving = _minus_two_log(shapes, powers, power, free), variance > 0
+    value, moving = minus_two_log_likelihood(spectra_of(shapes, powers), power, free), variance > 0
     for _ in range(MOST_STEPS):
         if not moving.any():
             break
@@ -138,7 +108,7 @@ def likeliest_powers(shapes: Array, power: Array, free: Array, start: Array | No
         left = moving
         for share in SHARES_OF_A_STEP:
             tried = np.where(left[:, None], powers + share * step, powers)
-            reached = _minus_two_log(shapes, tried, power, free)
+            reached = minus_two_log_likelihood(spectra_of(shapes, tried), power, free)
             better = left & (reached <= before)
             powers, value = np.where(better[:, None], tried, powers), np.where(better, reached, value)
             left = left & ~better
@@ -148,21 +118,20 @@ def likeliest_powers(shapes: Array, power: Array, free: Array, start: Array | No
     return np.where(variance[:, None] > 0, powers, 0.0)
 
 
-def _minus_two_log(shapes: Array, powers: Array, power: Array, free: Array) -> Array:
-    """Return −2 ln of Whittle's likelihood of powers, but for a constant, shape (course,)."""
-    level = _level(shapes, powers)
+def spectra_of(shapes: Array, powers: Array) -> Array:
+    """Return the spectrum of processes with these powers in each band, shape (course, band)."""
+    return np.asarray((powers[:, None] @ shapes)[:, 0])
+
+
+def minus_two_log_likelihood(level: Array, power: Array, free: Array) -> Array:
+    """Return −2 ln of Whittle's likelihood of spectra (course, band), but for a constant, shape (course,)."""
     known = np.maximum(level, np.finfo(float).tiny)
     return np.where(level.min(axis=1) > 0, np.sum(free * np.log(known) + power / known, axis=1), np.inf)
 
 
-def _level(shapes: Array, powers: Array) -> Array:
-    """Return spectra, shape (course, band)."""
-    return np.asarray((powers[:, None] @ shapes)[:, 0])
-
-
 def _step(shapes: Array, powers: Array, power: Array, free: Array) -> Array:
     """Return the step to the least of the quadratic that has the likelihood's slope and Fisher information here."""
-    level = np.maximum(_level(shapes, powers), np.finfo(float).tiny)
+    level = np.maximum(spectra_of(shapes, powers), np.finfo(float).tiny)
     relative = shapes / level[:, None]
     slope = (relative @ (free - power / level)[..., None])[..., 0]
     information = (relative * free[:, None]) @ relative.swapaxes(1, 2)

@@ -17,7 +17,13 @@ from numpy.typing import NDArray
 
 from regolithd.calibration.mismatch.signal.markov_chain import MarkovChains
 from regolithd.calibration.mismatch.signal.means import block_means
-from regolithd.calibration.mismatch.signal.noise_spectrum import Bands, cosine_transform, likeliest_powers
+from regolithd.calibration.mismatch.signal.noise_spectrum import (
+    Bands,
+    cosine_transform,
+    likeliest_powers,
+    minus_two_log_likelihood,
+    spectra_of,
+)
 from regolithd.calibration.mismatch.thresholds import THRESHOLDS, Thresholds
 
 if TYPE_CHECKING:
@@ -227,10 +233,9 @@ def _wandering_likelihood(values: Array) -> float:
     power = bands.products(cosine_transform(values[None]))[:, 0, 0]
     white, *processes = bands.shapes
     shapes = np.array([(white, process) for process in processes])
-    powers, free = np.tile(power, (len(shapes), 1)), np.tile(bands.count, (len(shapes), 1))
-    level = np.einsum("cp,cpb->cb", likeliest_powers(shapes, powers, free), shapes)
-    minus_two_log = np.log(level) @ bands.count + (1 / level) @ power
-    return -0.5 * float(minus_two_log.min()) - WANDERING_NUMBERS
+    power, free = (np.tile(each, (len(shapes), 1)) for each in (power, bands.count))
+    level = spectra_of(shapes, likeliest_powers(shapes, power, free))
+    return -0.5 * float(minus_two_log_likelihood(level, power, free).min()) - WANDERING_NUMBERS
 
 
 def _autoregression_likelihood(values: Array) -> float:

@@ -77,7 +77,7 @@ def test_a_controller_that_acts_on_the_noise_is_no_physics(seed: int, memory: fl
 
 def test_the_note_says_what_cannot_be_told_apart() -> None:
     """It names the covariate and the reading, and what to record instead."""
-    notes = [compare(heated(seed, acts_on_noise=1.0), Chamber()).answer.notes for seed in range(2)]
+    notes = [compare(heated(seed, acts_on_noise=1.0), Chamber()).answer.notes for seed in range(4)]
     (told, *_) = [note for each in notes for note in each if "controller" in note]
     assert told.startswith("Duty follows the noise of the reading of temperature_degC")
     assert "record another sensor" in told
@@ -86,7 +86,7 @@ def test_the_note_says_what_cannot_be_told_apart() -> None:
 @pytest.mark.parametrize("acts_on_noise", [0.0, 0.3])
 def test_what_follows_the_duty_itself_stays_unexplained(acts_on_noise: float) -> None:
     """An offset by the duty's square is followed by its past as well as by what is new."""
-    for seed in range(2):
+    for seed in range(3):
         found = compare(heated(seed, acts_on_noise, offset_K=2.0), Chamber()).answer
         assert found.verdict == "unexplained"
         assert "duty" in {place.covariate for place in found.unexplained}

@@ -25,9 +25,9 @@ def _load(seed: int) -> CalibratedParameter:
 
 
 def test_its_interval_holds_the_truth_beside_a_law_with_a_free_exponent() -> None:
-    """With the exponent held where it was fitted, few do."""
-    found = [_load(seed) for seed in range(5)]
-    assert sum(each.low < stirrer.LOAD < each.high for each in found) >= 4
+    """With the exponent held where it was fitted, two of these eight did."""
+    found = [_load(seed) for seed in range(8)]
+    assert sum(each.low < stirrer.LOAD < each.high for each in found) >= 7
     scatter = np.std([each.value for each in found])
     widths = np.array([each.high - each.low for each in found]) / 3.29
     assert scatter < np.median(widths) < 3 * scatter, "as wide as the values scatter, and as a law that is not exact"

