@@ -173,6 +173,7 @@ def _ends(problem: Problem, name: str, values: Array) -> tuple[float, float] | N
         return None
     if name in MAGNITUDES:
         known = np.abs(known)
+        known = known[known > 0] if np.any(known > 0) else known  # a standstill is no size
     middle = float(np.median(known))
     low, high = (float(each) for each in np.quantile(known, USUAL_QUANTILES))
     if name in MAGNITUDES:

@@ -199,7 +199,7 @@ def _labels_of(simulation: Simulation, compared: Sequence[Chosen]) -> Labels:
     """Return what a fleet's report calls axes, covariates and effects."""
     corrected = frozenset(effect.name for effect in (*simulation.corrected_effects, *simulation.stated_effects()))
     covariates = {name: label for chosen in compared for name, label in chosen.labels.items()}
-    return Labels(noun_of(simulation.wheel_column), covariates, in_minutes=False, corrected=corrected)
+    return Labels(noun_of(simulation.wheel_column), covariates, time_unit="s", corrected=corrected)
 
 
 @dataclass

@@ -22,13 +22,15 @@ if TYPE_CHECKING:
 
 
 NOUNS = """
-actuator antenna arm axis axle bay bearing belt bench blade block blower boat body boom box brake branch
-burner bus cabin capstan car carriage cell chain channel column compressor conveyor crane cylinder device disc
-door drive drone drum engine fan finger flap gate gearbox gimbal gripper head heater hoist hopper jaw jet
-joint key lane leg lift line link loop machine mast module motor node nozzle oven pack panel pile pipe pitch
-press propeller pulley pump rack rail ring robot roll roller rotor rover row screw section segment sensor
-servo shaft side slide spindle spring stage stand station table tank thruster tool tower track train trolley
-truck tube turbine unit valve vehicle wagon wheel winch wing zone
+actuator antenna arm auger axis axle bank barrel battery bay bearing belt bench blade block blower boat bobbin
+body bogie boom box brake branch brush bucket burner bus cabin capstan car carriage caster cell chain channel
+chute column compressor conveyor crane cylinder device disc dome door drive drone drum dryer engine eye fan
+finger flap flipper gate gearbox gimbal gripper hand head heater hoist hopper jaw jet joint key kiln lane
+leg lift line link loop machine mast mill mixer module motor nest node nozzle oven pack paddle panel pile pillar
+pipe pitch plate platform press propeller pulley pump rack rail rake ram ring robot rod roll roller rotor rover
+row saw screw section segment sensor servo shaft shoe shovel side slide spindle spool spring stack stage stand
+station stirrer string strut table tank thruster tool tower track train trolley truck tube turbine turret unit
+valve vehicle wagon wheel winch wing zone
 """
 """What machines have several of, in English; a plural of any other word (`achse`) would be a guess."""
 

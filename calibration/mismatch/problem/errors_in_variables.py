@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
 from regolithd.calibration.mismatch.problem.true_values import (
     NormalTruth,
+    filtered_where_better,
     refined_by_density,
     smooth_where_better,
     still_at_rest,
@@ -97,7 +98,9 @@ def expected_inputs(
             continue
         moving, deviation = np.where(rest[:, k], np.nan, stabilised[:, k]), scales[k].deviation
         before = truths.column(k)
-        truth = smooth_where_better(stabilised[:, k], deviation, recording.time_s, recording.run, before, rest[:, k])
+        of_column = stabilised[:, k], deviation, recording.time_s, recording.run
+        truth = smooth_where_better(*of_column, before, rest[:, k])
+        truth = filtered_where_better(*of_column, truth, rest[:, k])
         if name not in normal:
             smooth[:, k] = refined_by_density(moving, deviation, starts, truth)
         elif truth is not before:

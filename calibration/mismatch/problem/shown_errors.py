@@ -21,6 +21,8 @@ from regolithd.calibration.mismatch.problem.prior import SensorError
 from regolithd.calibration.mismatch.problem.reading_scale import ReadingScale
 from regolithd.calibration.mismatch.signal.first_order import FirstOrder
 from regolithd.calibration.mismatch.signal.robust import robust_std
+from regolithd.calibration.mismatch.signal.smoothing_spline import fitted_rows
+from regolithd.calibration.mismatch.signal.wiener_filter import even_pieces, noise_floor
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping
@@ -52,7 +54,8 @@ def shown_errors(
     otherwise = {}
     for name in simulation.inputs:
         if name in as_read.channels and name != simulation.channel:
-            error = _by_scatter(as_read.channels[name], as_read.run, simulation.sensors.get(name, SensorError()))
+            stated_error = simulation.sensors.get(name, SensorError())
+            error = _by_scatter(as_read.channels[name], as_read.time_s, as_read.run, stated_error)
             if error is not None:
                 otherwise[name] = error
     if not otherwise:
@@ -71,10 +74,10 @@ def shown_errors(
     return found
 
 
-def _by_scatter(readings: Array, run: NDArray[np.int64], stated: SensorError) -> SensorError | None:
+def _by_scatter(readings: Array, time: Array, run: NDArray[np.int64], stated: SensorError) -> SensorError | None:
     """Return the error that readings (time, wheel) scatter by; None where that is near the stated one, or nothing."""
     scale = ReadingScale.of(readings, stated)
-    deviation = scatter(scale.stabilised(readings), run)
+    deviation = scatter(scale.stabilised(readings), time, run)
     if deviation <= LEAST_SCATTER * float(np.nanstd(readings)) or deviation / NEAR < scale.deviation < deviation * NEAR:
         return None
     if not scale.deviation:
@@ -83,19 +86,27 @@ def _by_scatter(readings: Array, run: NDArray[np.int64], stated: SensorError) ->
     return SensorError(relative=factor * stated.relative, absolute=factor * stated.absolute)
 
 
-def scatter(values: Array, run: NDArray[np.int64]) -> float:
+def scatter(values: Array, time: Array, run: NDArray[np.int64]) -> float:
     """Return the standard deviation of white noise in readings (time, wheel), by differences within a run.
 
     Their median does not see steps. What the column itself does adds to them, the less the higher their order is, and
     noise adds the same to each: the least counts. 0 where more than half of them are 0: a column that is set, or
-    rounded.
+    rounded. A course that goes to and fro within a few readings adds to all orders; noise is then what is left of
+    whole windows (`noise_floor`).
     """
     found = []
     for order in ORDERS[: max(len(run) - 1, 0)]:
         same = (run[order:] == run[: len(run) - order])[:, None]
         each = np.where(same, np.diff(values, order, axis=0), np.nan)
         found.append(robust_std(each[np.isfinite(each)]) / np.sqrt(comb(2 * order, order)))
-    return float(min(found, default=0.0))
+    least = float(min(found, default=0.0))
+    if not least:
+        return 0.0
+    floors = []
+    for column in values.T:
+        rows, runs = fitted_rows(column, run)
+        floors.append(noise_floor(column[rows], even_pieces(column[rows], time[rows], runs)))
+    return min(least, float(np.sqrt(np.mean(floors))))
 
 
 def notes_on_errors(

@@ -1,4 +1,4 @@
-"""One noisy input's true values: by a smoothing spline, and by the density of its values, beside an autoregression."""
+"""One noisy input's true values: by a smoothing spline, a process of any spectrum, and the density of its values."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from regolithd.calibration.mismatch.signal.stein import (
     consistent,
     consistent_throughout,
 )
+from regolithd.calibration.mismatch.signal.wiener_filter import best_filter, even_pieces
 
 Array = NDArray[np.float64]
 
@@ -30,8 +31,11 @@ LEAST_ERROR = 0.001
 """Error in standard deviations of the truth below which no density is asked for (a choice). An error of a twentieth
 biases a coefficient by a quarter of a percent, but where a column rests at a level for most of the time, its readings
 there are nothing but error, and all that is left of a residual follows them."""
+LEAST_FILTER_GAIN = 0.05
+"""Share of the mean square error that a filter has to gain (a choice: beside a small noise of the predicted channel, a
+twentieth of what is left of an input's error stands out over what the prediction was a few readings before)."""
 LEAST_LEFT = 0.01
-"""Share of the error's variance that a spline leaves, at least (a choice: a mean of a hundred readings has no less)."""
+"""Share of the error's variance that smoothing leaves at least (a choice: a mean of a hundred readings has no less)."""
 REST_DEVIATIONS = 3.0
 """Posterior standard deviations within which a smoothed value may be 0, and of a mean about it (1 in 370 is beyond)."""
 SLOWEST_CREEP = 0.25
@@ -80,12 +84,9 @@ def smooth_where_better(
     if not _matters(deviation, known, normal):
         return normal
     centred = readings - normal.prior_mean
-    parts = fitted_rows(readings)
-    rows = np.concatenate([np.arange(len(readings))[part] for part in parts])
+    rows, runs = fitted_rows(readings, run)
     if not _matters(deviation, known[rows], normal):  # it was read elsewhere
         return normal
-    part_of = np.concatenate([np.full(part.stop - part.start, number) for number, part in enumerate(parts)])
-    runs = run[rows] * len(parts) + part_of
     spline = best_spline(centred[rows], deviation, time[rows], runs, rest[rows])
     there = spline.estimate(centred[rows], deviation, differences(time[rows], runs, spline.order))
     new = _at(there, known[rows])
@@ -101,6 +102,48 @@ def smooth_where_better(
     return replace(
         normal, mean=np.where(np.isfinite(normal.mean), smooth, np.nan), variance=np.full(smooth.shape, variance)
     )
+
+
+def filtered_where_better(
+    readings: Array,
+    deviation: float,
+    time: Array,
+    run: NDArray[np.int64],
+    before: NormalTruth,
+    rest: NDArray[np.bool_],
+) -> NormalTruth:
+    """Return what a stationary process of any spectrum says of the truth where that is clearly nearer to it.
+
+    Else what was said of it `before`. What is left of the error is then correlated with no reading of a window, so that
+    nothing seems to follow the prediction or what it was shortly before; a small gain is enough.
+    """
+    known = np.isfinite(readings) & ~rest
+    if not _matters(deviation, known, before):
+        return before
+    centred, variance = readings - before.prior_mean, deviation**2
+    rows, runs = fitted_rows(readings, run)
+    pieces = even_pieces(centred[rows], time[rows], runs)
+    found = best_filter(centred[rows], variance, pieces, rest[rows])
+    if found is None:
+        return before
+    there = found.applied(centred[rows], pieces, variance)
+    told = known[rows] & np.isfinite(there.mean)
+    if told.sum() < BATCH * FEWEST_BATCHES:
+        return before
+    new = _at(there, told)
+    old = _at(Estimate((before.mean - before.prior_mean)[rows], before.variance[rows]), told)
+    read = centred[rows][told]
+    if not (
+        clearly_better(read, variance, new, old, found.fitted, LEAST_FILTER_GAIN) and consistent(read, variance, new)
+    ):
+        return before
+    everywhere = found.applied(centred, even_pieces(centred, time, run), variance)
+    told = np.isfinite(everywhere.mean) & np.isfinite(before.mean)
+    mean = np.where(told, everywhere.mean + before.prior_mean, before.mean)
+    if not consistent_throughout(readings[known], variance, mean[known]):
+        return before
+    left = np.maximum(everywhere.variance, LEAST_LEFT * variance)
+    return replace(before, mean=mean, variance=np.where(told, left, before.variance))
 
 
 def still_at_rest(readings: Array, deviation: float, smooth: NormalTruth) -> NormalTruth:

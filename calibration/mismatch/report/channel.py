@@ -41,9 +41,10 @@ class ChannelPart:
 
 
 def channel_parts(answer: Answer, evidence: Evidence) -> tuple[ChannelPart, ...]:
-    """Return the parts of all channels, in the simulation's order."""
+    """Return the parts of all channels in the simulation's order, those in which something was found first."""
     shown = (evidence, *evidence.others)
-    return tuple(_part(_about(answer, each.channel, shown), each, alone=len(shown) == 1) for each in shown)
+    parts = [_part(_about(answer, each.channel, shown), each, alone=len(shown) == 1) for each in shown]
+    return tuple(sorted(parts, key=lambda part: not (part.corrected or part.unexplained)))
 
 
 def _about(answer: Answer, channel: str, shown: Sequence[Evidence]) -> Answer:

@@ -64,7 +64,9 @@ def _onsets(answer: Answer, panels: Sequence[Panel], labels: Labels) -> list[str
             onset = effect.onset_s * labels.time_factor
             at, below = panels[0].at_x(onset), panels[0].top + panels[0].height + 15
             parts += [line([(at, p.top - 4), (at, p.top + p.height + 4)], "onset") for p in panels]
-            parts.append(text(at + 5, below, f"onset {onset:.1f} {labels.time_unit}"))
+            parts.append(
+                text(at + 5, below, f"onset {onset:.{2 if labels.time_unit == 'h' else 1}f} {labels.time_unit}")
+            )
     return parts
 
 

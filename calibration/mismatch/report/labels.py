@@ -39,8 +39,10 @@ UNITS = {"degC": "°C", "1": ""}
 """Units whose spelling in the answer is not the usual one."""
 WITH_MILLI = frozenset({"A"})
 """Units of a channel that are shown in thousandths where the mean reading is below 1."""
-LONGEST_IN_SECONDS = 180.0
-"""Recordings and periods up to this long are told in seconds, longer ones in minutes [s] (a choice)."""
+SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+"""Seconds of each unit of time."""
+LONGEST_IN_UNIT = {"s": 180.0, "min": 300.0}
+"""Recordings and periods up to so many of a unit are told in it, longer ones in the next (a choice)."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class Labels:
     wheel: what a column of the recording is called: wheel, axis, side
     covariates: axis labels with units, as the simulation gives them
     candidates: by name
-    in_minutes: whether times are in minutes, or in seconds
+    time_unit: unit of times: s, min or h
     in_milli: whether values of the channel are in thousandths of its unit
     corrected: names of the effects that the simulation was corrected by
     """
@@ -60,14 +62,14 @@ class Labels:
     wheel: str = "wheel"
     covariates: Mapping[str, str] = field(default_factory=dict)
     candidates: Mapping[str, Candidate] = field(default_factory=lambda: {c.name: c for c in library()})
-    in_minutes: bool = True
+    time_unit: str = "min"
     in_milli: bool = False
     corrected: frozenset[str] = frozenset()
 
     @classmethod
     def of(cls, evidence: Evidence, *, alone: bool = False) -> Labels:
         """Return the labels of the evidence's simulation, of its channel `alone` or of all channels."""
-        in_minutes = float(evidence.time_s[-1] - evidence.time_s[0]) > LONGEST_IN_SECONDS
+        time_unit = unit_of_time(float(evidence.time_s[-1] - evidence.time_s[0]))
         candidates = {candidate.name: candidate for candidate in evidence.candidates or library()}
         in_milli = evidence.unit in WITH_MILLI and float(np.nanmean(np.abs(evidence.measured))) < 1
         channels = (evidence, *evidence.others)
@@ -80,21 +82,16 @@ class Labels:
         problems = [each.problem for each in channels]
         corrected = frozenset(effect.name for problem in problems if problem for effect in problem.stated)
         kind = noun_of(evidence.wheel_column)
-        return cls(kind, covariates, candidates, in_minutes, in_milli, corrected)
-
-    @property
-    def time_unit(self) -> str:
-        """Unit of times: min or s."""
-        return "min" if self.in_minutes else "s"
+        return cls(kind, covariates, candidates, time_unit, in_milli, corrected)
 
     @property
     def time_factor(self) -> float:
         """Factor from seconds to `time_unit`."""
-        return 1 / 60 if self.in_minutes else 1.0
+        return 1 / SECONDS[self.time_unit]
 
     def from_to(self, from_s: float, to_s: float) -> str:
         """Return a time range: "0.0 to 6.2 min", "12 to 98 s"."""
-        places = 1 if self.in_minutes else 0
+        places = {"s": 0, "min": 1, "h": 2}[self.time_unit]
         first, last = (f"{each * self.time_factor:.{places}f}" for each in (from_s, to_s))
         return f"{first} to {last} {self.time_unit}"
 
@@ -138,8 +135,8 @@ class Labels:
             return ""
         period, unit = place.period, unit_in_label(place.covariate, self.covariates)
         if place.covariate == "time":
-            in_minutes = period > LONGEST_IN_SECONDS
-            period, unit = (period / 60, "min") if in_minutes else (period, "s")
+            unit = unit_of_time(period)
+            period /= SECONDS[unit]
         return f", with a period of {period:.3g}{after_number(unit)}"
 
     def parameter(self, effect: str, name: str) -> str:
@@ -153,6 +150,11 @@ class Labels:
         if len(wheels) == len(everything):
             return wheels_in_words(wheels, len(everything), self.wheel)
         return noun_before(wheels, self.wheel) + ", ".join(map(str, wheels))
+
+
+def unit_of_time(longest_s: float) -> str:
+    """Return the unit in which times up to so long [s] are told."""
+    return next((unit for unit, most in LONGEST_IN_UNIT.items() if longest_s <= most * SECONDS[unit]), "h")
 
 
 def verdict_sentence(answer: Answer, labels: Labels | None = None) -> str:

@@ -222,17 +222,21 @@ def differences(time: Array, run: NDArray[np.int64], order: int) -> Array:
     return np.asarray(np.where(whole[:, None], factorial(order) * usual**order / np.prod(apart, axis=2), 0.0))
 
 
-def fitted_rows(readings: Array) -> list[slice]:
-    """Return the parts of a recording in which a spline is found: of each stretch, the one whose readings change most.
+def fitted_rows(readings: Array, run: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return rows of a recording in which a spline is found, and a number for each of their unbroken stretches.
 
-    A spline that was found in dwells alone would smooth away the steps between others.
+    They are parts of `CORE` rows: of each stretch of the recording, the one whose readings change most. A spline that
+    was found in dwells alone would smooth away the steps between others.
     """
     count = max(len(readings) // CORE, 1)
     parts = [slice(first, min(first + CORE, len(readings))) for first in range(0, count * CORE, CORE)]
     changes = [np.diff(readings[part]) for part in parts]
     moved = np.array([np.sum(each[np.isfinite(each)] ** 2) for each in changes])
     stretches = np.array_split(np.arange(count), min(count, MOST_FITTED))
-    return [parts[each[np.argmax(moved[each])]] for each in stretches]
+    chosen = [parts[each[np.argmax(moved[each])]] for each in stretches]
+    rows = np.concatenate([np.arange(len(readings))[part] for part in chosen])
+    part_of = np.concatenate([np.full(part.stop - part.start, number) for number, part in enumerate(chosen)])
+    return rows, run[rows] * len(chosen) + part_of
 
 
 @cache

@@ -107,7 +107,14 @@ def best_combination(readings: Array, estimates: Sequence[Estimate]) -> Combinat
     return Combination(float(readings.mean()), best, centres)
 
 
-def clearly_better(readings: Array, error_variance: float, new: Estimate, old: Estimate, fitted: float) -> bool:
+def clearly_better(
+    readings: Array,
+    error_variance: float,
+    new: Estimate,
+    old: Estimate,
+    fitted: float,
+    least_gain: float = LEAST_GAIN,
+) -> bool:
     """Return whether an estimate's error is below another's by more than chance, and by a share of it.
 
     `fitted` is how many numbers of its model were fitted to the same readings: each makes its error look smaller by
@@ -120,4 +127,4 @@ def clearly_better(readings: Array, error_variance: float, new: Estimate, old: E
         return False
     chance = float(batches.std(ddof=1)) / np.sqrt(len(batches))
     by_chance = DEVIATIONS * chance + 2 * fitted * error_variance / len(gain)
-    return bool(gain.mean() > max(by_chance, LEAST_GAIN * float(before.mean())))
+    return bool(gain.mean() > max(by_chance, least_gain * float(before.mean())))

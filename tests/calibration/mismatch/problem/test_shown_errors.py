@@ -53,13 +53,15 @@ def recorded(seed: int, *, felt: bool) -> Recording:
 
 def test_scatter_is_white_noise_and_neither_steps_nor_slow_courses() -> None:
     """Of a column that is set, or rounded, it is 0."""
-    random, run = np.random.default_rng(3), np.zeros(COUNT, np.int64)
+    random, time, run = np.random.default_rng(3), np.arange(COUNT) * 0.1, np.zeros(COUNT, np.int64)
     noise = random.normal(size=(COUNT, 2))
     steps = np.repeat(random.uniform(0, 100, COUNT // 20), 20)[:, None]
-    assert scatter(noise + steps + np.linspace(0, 50, COUNT)[:, None], run) == pytest.approx(1.0, rel=0.15)
-    assert scatter(steps, run) == 0
+    assert scatter(noise + steps + np.linspace(0, 50, COUNT)[:, None], time, run) == pytest.approx(1.0, rel=0.15)
+    assert scatter(steps, time, run) == 0
     swing = 100 * np.sin(np.arange(COUNT) / 12)[:, None]  # its second differences are as large as those of the noise
-    assert scatter(noise + swing, run) == pytest.approx(1.0, rel=0.15)
+    assert scatter(noise + swing, time, run) == pytest.approx(1.0, rel=0.15)
+    strokes = 30 * np.sin(np.arange(COUNT) / 0.7)[:, None]  # four readings each: so are its differences of any order
+    assert scatter(noise + swing + strokes, time, run) == pytest.approx(1.0, rel=0.15)
 
 
 @pytest.mark.parametrize("said", [0.0, 1.5])

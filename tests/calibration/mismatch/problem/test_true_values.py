@@ -18,6 +18,7 @@ from regolithd.calibration.mismatch.problem.errors_in_variables import (
 from regolithd.calibration.mismatch.problem.prior import SensorError
 from regolithd.calibration.mismatch.problem.true_values import (
     NormalTruth,
+    filtered_where_better,
     refined_by_density,
     smooth_where_better,
     still_at_rest,
@@ -156,14 +157,17 @@ def test_unknown_readings_stay_unknown_and_exact_zeros_stay_zero() -> None:
 
 
 def test_inputs_that_are_to_stay_normal_have_no_density() -> None:
-    """Those that the speed is computed from: of a signal with two levels, the autoregression or a spline."""
+    """Those that the speed is computed from: what is linear in the readings, or a spline."""
     truth = autoregressive(20.0) + np.repeat(np.random.default_rng(13).choice([-3.0, 3.0], COUNT // 10), 10)
     readings = truth + np.random.default_rng(12).normal(0, 0.3, COUNT)
     recording = from_columns({"t_s": np.arange(COUNT) / 50, "speed": readings})
     errors = {"speed": SensorError(absolute=0.3)}
     found = expected_inputs(recording, errors, normal={"speed"}).channels["speed"]
     before = normal_truths(readings[:, None], np.array([0.09]), START).column(0)
-    expected = smooth_where_better(readings, 0.3, recording.time_s, recording.run, before, NO_REST)
+    given = readings, 0.3, recording.time_s, recording.run
+    spline = smooth_where_better(*given, before, NO_REST)
+    expected = filtered_where_better(*given, spline, NO_REST)
+    assert np.std(expected.mean - truth) < np.std(spline.mean - truth)
     np.testing.assert_allclose(found[:, 0], still_at_rest(readings, 0.3, expected).mean, rtol=1e-6)
 
 

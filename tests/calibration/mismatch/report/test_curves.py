@@ -131,11 +131,18 @@ def test_there_is_no_curve_of_what_is_not_there() -> None:
     assert curve_of(seen(wheel_angle=SPEED), "wheel_angle", (1, 2)) is None
 
 
-@pytest.mark.parametrize(("length_s", "in_minutes"), [(180.0, False), (180.5, True)])
-def test_a_recording_of_more_than_three_minutes_has_minutes_on_its_axes(length_s: float, in_minutes: bool) -> None:
+@pytest.mark.parametrize(("length_s", "unit"), [(180.0, "s"), (180.5, "min"), (18_000.0, "min"), (18_001.0, "h")])
+def test_a_recording_has_minutes_on_its_axes_from_three_minutes_on_and_hours_from_five(
+    length_s: float, unit: str
+) -> None:
     """From its first instant to its last, wherever the clock began."""
     evidence = replace(seen(), time_s=1000 + np.linspace(0, length_s, ROWS), candidates=())
-    assert Labels.of(evidence).in_minutes == in_minutes
+    assert Labels.of(evidence).time_unit == unit
+
+
+def test_a_span_of_hours_is_told_to_a_hundredth() -> None:
+    """It is 36 s."""
+    assert Labels(time_unit="h").from_to(0.0, 35_000.0) == "0.00 to 9.72 h"
 
 
 @pytest.mark.parametrize(("unit", "size", "in_milli"), [("A", 0.99, True), ("A", 1.01, False), ("N", 0.5, False)])

@@ -138,11 +138,19 @@ def test_the_change_with_the_readings_tells_the_error_of_heavy_tails(truth: Arra
 
 def test_a_long_recording_is_fitted_in_few_parts() -> None:
     """From its start to its end, none longer than another; a short one as a whole."""
-    parts = fitted_rows(np.zeros(100 * CORE + 7))
+    count = 100 * CORE + 7
+    rows, runs = fitted_rows(np.zeros(count), np.zeros(count, np.int64))
+    parts = [rows[runs == number] for number in np.unique(runs)]
     assert len(parts) == MOST_FITTED
-    assert all(part.stop - part.start == CORE for part in parts)
-    assert (parts[0].stop <= 25 * CORE, parts[-1].start >= 75 * CORE) == (True, True)
-    assert fitted_rows(np.zeros(CORE - 1)) == [slice(0, CORE - 1)]
+    assert all(np.array_equal(part, np.arange(part[0], part[0] + CORE)) for part in parts)
+    assert (parts[0][-1] < 25 * CORE, parts[-1][0] >= 75 * CORE) == (True, True)
+    assert fitted_rows(np.zeros(CORE - 1), np.zeros(CORE - 1, np.int64))[0].tolist() == list(range(CORE - 1))
+
+
+def test_what_is_fitted_of_two_runs_is_not_one_stretch() -> None:
+    """A part may have the end of one run and the beginning of the next."""
+    _, runs = fitted_rows(np.zeros(CORE), np.repeat([0, 1], CORE // 2))
+    assert np.flatnonzero(np.diff(runs)).tolist() == [CORE // 2 - 1]
 
 
 def test_it_is_fitted_where_the_readings_change_most() -> None:
@@ -150,4 +158,5 @@ def test_it_is_fitted_where_the_readings_change_most() -> None:
     readings = np.random.default_rng(0).normal(0, 0.1, 100 * CORE)
     readings[60 * CORE + 100 :] += 5.0
     readings[10 * CORE : 11 * CORE] = np.nan
-    assert fitted_rows(readings)[2] == slice(60 * CORE, 61 * CORE)
+    rows, _ = fitted_rows(readings, np.zeros(len(readings), np.int64))
+    assert rows[2 * CORE : 3 * CORE].tolist() == list(range(60 * CORE, 61 * CORE))
