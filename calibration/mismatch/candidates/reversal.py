@@ -9,6 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from regolithd.calibration.mismatch.candidates.friction_laws import (
+    Decay,
+    about_reversals,
+    decaying_drag,
+    friction_laws,
+)
 from regolithd.calibration.mismatch.candidates.motion import PRESLIDING, TRANSITION, along_motion, displacement_of
 from regolithd.calibration.mismatch.candidates.sensor_delay import as_shown
 from regolithd.calibration.mismatch.candidates.wheel_angle_ripple import WheelAngleRipple
@@ -46,6 +52,9 @@ REFINED_TO = 0.05
 FIRST_STEP = 0.35
 """First step of the search for the shape, in natural logarithms (a choice: half of the way to the next that is tried).
 """
+PROMISING = 0.5
+"""Share of the Δχ² that is needed, from which a shape is refined (a choice: the shapes that are tried are a factor of
+two apart, so that the nearest has most of what the best has)."""
 MOST_EVALUATIONS = 40
 """Of that search, at most (a choice: one number takes 10, two take 25)."""
 MOST_KEPT = 3
@@ -96,20 +105,36 @@ def _best_reversal(problem: Problem) -> Shape:
 
 
 def _gradual(beside: _Beside, tried: Sequence[Shape]) -> Shape:
-    """Return the best shape where it explains friction better than a step does, empty where none does."""
-    step, gradual = _Turn({}, beside.squares_left({})), _best_of(beside, tried)
-    # Drag near standstill that decays with speed resembles a gradual reversal, with as many numbers, or hides how
-    # gradual it is.
-    decaying_step = _with_decay(beside, {})
-    others = (gradual.shape, _best_of(replace(beside, decay=decaying_step.decay), tried).shape)
-    decaying = min((_with_decay(beside, shape) for shape in others), key=lambda turn: turn.left)
+    """Return the best shape where it explains friction better than a step does, empty where none does.
+
+    It is refined where those that are tried come near that.
+    """
     level = beside.problem.thresholds.single_test_level
-    needed = quantile(1, level)  # for the number that a gradual reversal has, and a step has not
+    # For friction of any law, and for the number that a gradual reversal has, and a step has not.
+    needed = np.array([quantile(beside.laws, level), quantile(1, level)])
+    for refined, share in ((_as_tried, PROMISING), (_refined, 1.0)):
+        shape, *found = _compared(beside, tried, needed[1], refined)
+        if not np.all(np.array(found) > share * needed):
+            return {}
+    return shape
+
+
+def _compared(
+    beside: _Beside, tried: Sequence[Shape], needed: float, refined: Callable[[_Beside, Shape], _Turn]
+) -> tuple[Shape, float, float]:
+    """Return the best shape, the Δχ² of friction with it, and by how much that is ahead of friction with a step.
+
+    Drag near standstill that decays with speed resembles a gradual reversal, with as many numbers, or hides how gradual
+    it is: both are held against each other beside it, too, where it has the Δχ² that is needed.
+    """
+    step, gradual = _Turn({}, beside.squares_left({})), _best_of(beside, tried, refined)
+    decaying_step = _with_decay(beside, {}, refined)
+    others = (gradual.shape, _best_of(replace(beside, decay=decaying_step.decay), tried, refined).shape)
+    decaying = min((_with_decay(beside, shape, refined) for shape in others), key=lambda turn: turn.left)
     if beside.gain(min(decaying_step.left, decaying.left), gradual.left) > needed:
         step, gradual = decaying_step, decaying
     of_friction = beside.independent * (beside.squares_without_friction / gradual.left - 1)
-    is_there = of_friction > quantile(beside.laws, level)
-    return gradual.shape if is_there and beside.gain(gradual.left, step.left) > needed else {}
+    return gradual.shape, of_friction, beside.gain(gradual.left, step.left)
 
 
 def _ripple(beside: _Beside, shape: Shape) -> list[Array]:
@@ -129,17 +154,17 @@ def _ripple(beside: _Beside, shape: Shape) -> list[Array]:
     return list(columns) if beside.gain(least, beside.squares_left(shape)) > needed else []
 
 
-def _best_of(beside: _Beside, tried: Sequence[Shape]) -> _Turn:
+def _best_of(beside: _Beside, tried: Sequence[Shape], refined: Callable[[_Beside, Shape], _Turn]) -> _Turn:
     """Return the best of these shapes, the best of each kind refined."""
     of_kind = {next(iter(shape)): shape for shape in sorted(tried, key=beside.squares_left, reverse=True)}
-    return min((_refined(beside, shape) for shape in of_kind.values()), key=lambda turn: turn.left)
+    return min((refined(beside, shape) for shape in of_kind.values()), key=lambda turn: turn.left)
 
 
-def _with_decay(beside: _Beside, shape: Shape) -> _Turn:
+def _with_decay(beside: _Beside, shape: Shape, refined: Callable[[_Beside, Shape], _Turn]) -> _Turn:
     """Return the best of the drags that decay from standstill, beside friction that reverses with a shape like this."""
     usual = _usual_speed(beside.problem)
-    tried = [replace(beside, decay=_Decay(share * usual, power)) for share in DECAYS for power in DECAY_POWERS]
-    return _refined(min(tried, key=lambda each: each.squares_left(shape)), shape)
+    tried = [replace(beside, decay=Decay(share * usual, power)) for share in DECAYS for power in DECAY_POWERS]
+    return refined(min(tried, key=lambda each: each.squares_left(shape)), shape)
 
 
 def _shapes(problem: Problem) -> Iterator[Shape]:
@@ -173,20 +198,12 @@ def _share_within(problem: Problem, shape: Shape, moving: NDArray[np.bool_]) -> 
 
 
 @dataclass(frozen=True)
-class _Decay:
-    """Drag that decays from standstill, as exp(−(|ω|/speed)^power)."""
-
-    speed: float
-    power: int
-
-
-@dataclass(frozen=True)
 class _Turn:
     """How friction may reverse: its shape, the sum of squares that is left, and what decays beside it, if anything."""
 
     shape: Shape
     left: float
-    decay: _Decay | None = None
+    decay: Decay | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +233,7 @@ class _Beside:
     free: Array
     residual: Array
     laws: int
-    decay: _Decay | None = None
+    decay: Decay | None = None
     made: dict[tuple[tuple[str, object], ...], tuple[Array, Array]] = field(default_factory=dict)
 
     def gain(self, left: float, step: float) -> float:
@@ -236,7 +253,7 @@ class _Beside:
         laws, products = self._laws_of(shape)
         if self.decay is None:
             return squares_left(products)[0]
-        drag = _decaying(self.problem, shape, self.decay)
+        drag = decaying_drag(self.problem, shape, self.decay)
         decaying = _in_order(self.problem, [drag], self.whitening, self.deviation)
         beside = np.concatenate([each @ decaying[0] for each in (self.free, laws, decaying, self.residual)])
         at = len(self.free) + len(laws)
@@ -248,7 +265,9 @@ class _Beside:
     def left_as_read(self, shape: Shape) -> Array:
         """Return what they and friction with this shape leave of the readings, shape (time, wheel)."""
         left = np.zeros(self.problem.mask.shape)
-        parts = _by_wheel(self.problem, _left_as_read(self.problem, [*self.as_read, *_laws(self.problem, shape)]))
+        parts = _by_wheel(
+            self.problem, _left_as_read(self.problem, [*self.as_read, *friction_laws(self.problem, shape)])
+        )
         for wheel, ((rows, _), part) in enumerate(zip(self.problem.courses, parts, strict=True)):
             left[rows, wheel] = part
         return left
@@ -271,7 +290,7 @@ class _Beside:
         if key not in self.made:
             while len(self.made) >= MOST_KEPT:
                 del self.made[next(iter(self.made))]
-            laws = _in_order(self.problem, _laws(self.problem, shape), self.whitening, self.deviation)
+            laws = _in_order(self.problem, friction_laws(self.problem, shape), self.whitening, self.deviation)
             self.made[key] = laws, self._products(self.free, laws, self.residual)
         return self.made[key]
 
@@ -279,8 +298,8 @@ class _Beside:
 def _beside_a_step(problem: Problem, further: Sequence[Array] = ()) -> _Beside:
     """Return the recording beside friction that reverses at once, the free parameters, and `further` columns."""
     parameters = [problem.tangent(name) for name in problem.free]
-    free = [*as_shown(problem, [*parameters, *_about_reversals(problem)]), *further]
-    residual, laws = problem.residual, _laws(problem, {})
+    free = [*as_shown(problem, [*parameters, *about_reversals(problem)]), *further]
+    residual, laws = problem.residual, friction_laws(problem, {})
     parts = _by_wheel(problem, _left_as_read(problem, [*free, *laws]))
     deviation = np.array([np.sqrt(np.mean(part**2)) if part.size else 0.0 for part in parts])
     deviation = np.where(deviation > 0, deviation, 1.0)
@@ -305,40 +324,6 @@ def _beside_a_step(problem: Problem, further: Sequence[Array] = ()) -> _Beside:
     )
 
 
-def _about_reversals(problem: Problem) -> list[Array]:
-    """Return what acts about reversals too: the inertia's acceleration, and the change of a prediction that is late.
-
-    Each resembles friction that follows the displacement, where there is no friction.
-    """
-    acceleration = [problem.known("wheel_acceleration")] if problem.has("wheel_acceleration") else []
-    return [*acceleration, np.nan_to_num(problem.recording.rate_of_change(problem.filled))]
-
-
-def _laws(problem: Problem, shape: Shape) -> list[Array]:
-    """Return friction that is constant, or grows with the speed, its root, its square, the load, or its square.
-
-    On each axis it may grow with the speed, too. The first three change with temperature and time: they would seem to
-    reverse with a long displacement. A late channel shows friction late: on time, it would seem to reverse so, too.
-    """
-    direction, speed = along_motion(problem, shape), np.abs(problem.known("wheel_speed"))
-    slow = [np.ones(speed.shape), problem.time_s / problem.length_s]
-    if problem.has("temperature"):
-        slow.append(problem.known("temperature"))
-    factors = [of_speed * each for of_speed in (1.0, np.sqrt(speed), speed) for each in slow]
-    factors.append(speed**2)
-    axes = np.eye(speed.shape[1])[:, None] if speed.shape[1] > 1 else ()  # one axis alone may have friction
-    of_axis = [each for axis in axes for each in (axis, axis * speed)]
-    load = np.abs(problem.filled)
-    return list(as_shown(problem, [direction * factor for factor in (*factors, load, load**2, *of_axis)]))
-
-
-def _decaying(problem: Problem, shape: Shape, decay: _Decay) -> Array:
-    """Return drag that decays with speed."""
-    left = np.exp(-((np.abs(problem.known("wheel_speed")) / decay.speed) ** decay.power))
-    (column,) = as_shown(problem, [along_motion(problem, shape) * left])
-    return column
-
-
 def _in_order(problem: Problem, columns: Sequence[Array], whitening: Whitening, deviation: Array) -> Array:
     """Return columns (time, wheel) over the noise's deviation, whitened, shape (column, reading): wheel by wheel."""
     parts = []
@@ -359,6 +344,11 @@ def _left_as_read(problem: Problem, columns: Sequence[Array]) -> Array:
     residual, *in_order = _in_order(problem, [problem.residual, *columns], NOT_WHITENED, ones)
     by = np.reshape(in_order, (len(columns), -1))
     return np.asarray(residual - fitted(by @ by.T, by @ residual) @ by)
+
+
+def _as_tried(beside: _Beside, shape: Shape) -> _Turn:
+    """Return this shape, and decay."""
+    return _Turn(shape, beside.squares_left(shape), beside.decay)
 
 
 def _refined(beside: _Beside, shape: Shape) -> _Turn:
